@@ -85,18 +85,22 @@ class Clock:
     should_stop
         Asked every `ASKED` seconds, in a thread of its own: once it says so, the time is up for
         this clock and all within it. `close` ends that.
+    begun
+        Time (`time.monotonic`) from which the limit counts, and the CPU seconds of the process at
+        that time; default now.
     """
 
     policy = TimingPolicy()
 
     def __init__(
         self, limit: float | None = None, *, within: Clock | None = None,
-        should_stop: Callable[[], bool] | None = None,
+        should_stop: Callable[[], bool] | None = None, begun: tuple[float, float] | None = None,
     ) -> None:  # fmt: skip
-        self.start = time.monotonic()
+        begun = begun or (time.monotonic(), time.process_time())
+        self.start = begun[0]
         self.deadline = math.inf if limit is None else self.start + limit
         self._stop = _Stop(should_stop) if should_stop is not None else None
-        self._family: _Family = _Family() if within is None else within._family
+        self._family: _Family = _Family(begun) if within is None else within._family
         if within is not None:
             self.deadline = min(self.deadline, within.deadline)
             self._stop = self._stop or within._stop
@@ -414,10 +418,10 @@ class _Family:
             self.compiling_s += now - self._looked_at
         self._looked_at = now
 
-    def __init__(self) -> None:
+    def __init__(self, begun: tuple[float, float]) -> None:
         self._looked_at = time.process_time()
         self.ended = False
-        self.begin, self.begin_cpu = time.monotonic(), time.process_time()
+        self.begin, self.begin_cpu = begun
         self.up_at: float | None = None
         self.doing: str | None = None
 

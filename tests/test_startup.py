@@ -2,7 +2,12 @@
 
 import subprocess
 import sys
+import time
 from pathlib import Path
+
+import pytest
+
+from netsp.command import command_clock, main
 
 ROOT = Path(__file__).parent.parent
 
@@ -33,3 +38,21 @@ def test_a_small_problem_is_solved_and_verified_without_what_only_others_need(tm
     assert not loaded & unused
     loaded = _loaded(run.format(["verify", "problems/pool.json", tour, "--quiet"]))
     assert not loaded & (unused | {"numba", "scipy"})
+
+
+LIMITED = {
+    "solve": "solve problems/pool.json",
+    "solve, a mission": "solve missions/basin.json",
+    "tether": "tether problems/pool.json",
+    "base": "base problems/pool.json --grid 2,2",
+    "gtsp": "gtsp examples/7ring28.gtsp",
+}
+
+
+@pytest.mark.parametrize("command", LIMITED)
+def test_a_limit_counts_from_the_start_of_the_command(command, monkeypatch):
+    """A command that was begun a thousand seconds ago has no time left."""
+    ago = (time.monotonic() - 1000.0, time.process_time() - 1000.0)
+    monkeypatch.setattr(main, "begin_command", lambda: command_clock._start.set(ago))
+    monkeypatch.chdir(ROOT)
+    assert main.main([*LIMITED[command].split(), "--time-limit", "100", "--quiet"]) == 4

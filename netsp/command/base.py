@@ -6,6 +6,7 @@ import argparse
 import sys
 
 from netsp.command import messages
+from netsp.command.command_clock import command_clock
 from netsp.command.types import check_writable, natural, positive, seconds
 from netsp.errors import EXIT_INFEASIBLE, EXIT_NOT_ALL
 
@@ -61,7 +62,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.plot:
         style.check_format(args.plot)
-    problem = Problem.load(args.problem)
+    clock = command_clock(args.time_limit)
+    problem = clock.bounded("reading the problem", lambda: Problem.load(args.problem))
     names: list[str | None] | None = None
     if args.candidates:
         places, names = from_table(args.candidates, Projection.of(problem), messages.note)
@@ -75,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"{candidate.name}: {found}; {left} may be better", file=sys.stderr)
 
     search = best_base(
-        problem, places, names=names, every=args.every, time_limit=args.time_limit,
+        problem, places, names=names, every=args.every, time_limit=clock,
         seed=args.seed, on_candidate=None if args.quiet else tell,
     )  # fmt: skip
     print(f"{'rank':>4}  {'place':<12} {'x':>10} {'y':>10} {'tether':>10} {'tour':>12}  status")

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from netsp.command import told
+from netsp.command.command_clock import command_clock
 from netsp.command.types import check_writable, length, natural, seconds, vector
 from netsp.errors import InputError
 
@@ -86,7 +87,6 @@ def run(args: argparse.Namespace) -> int:
     camera = _camera(args.camera, args.patch)
     anchor = vector(args.anchor, "--anchor")
     start = None if args.start is None else vector(args.start, "--start")
-    from netsp.clock import Clock
     from netsp.command.compiling import compile_messages
     from netsp.command.plot_scene import note_scene
     from netsp.command.stages import Stages
@@ -94,11 +94,11 @@ def run(args: argparse.Namespace) -> int:
     from netsp.files import write_text
     from netsp.online.scene.scene import Scene
 
-    clock = Clock(args.time_limit)  # reading the scene counts
-    scene = Scene.load(args.scene)
+    clock = command_clock(args.time_limit)
+    scene = clock.bounded("reading the scene", lambda: Scene.load(args.scene))
     if not args.quiet:
         note_scene(scene.name, scene.reading_notes())
-    stages = None if args.quiet else Stages(sys.stderr, args.time_limit)
+    stages = None if args.quiet else Stages(sys.stderr, clock.left)
     compiling = contextlib.nullcontext() if args.quiet else compile_messages(sys.stderr)
     with stages or contextlib.nullcontext(), compiling:
         found = cover(

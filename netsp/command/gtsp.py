@@ -9,6 +9,7 @@ import time
 from typing import TYPE_CHECKING
 
 from netsp.command import told
+from netsp.command.command_clock import command_clock
 from netsp.command.types import check_writable, natural, option, positive, seconds
 from netsp.errors import EXIT_INFEASIBLE, EXIT_NOT_ALL, InputError
 
@@ -65,7 +66,8 @@ def run(args: argparse.Namespace) -> int:
         style.check_format(args.plot)
     if len(dict(args.option)) < len(args.option):
         raise InputError("--option: the same option is given twice")
-    instance = load(args.instance)
+    clock = command_clock(args.time_limit)
+    instance = clock.bounded("reading the instance", lambda: load(args.instance))
     if args.plot and instance.places is None:
         raise InputError(
             f"--plot: {args.instance} is given by its distances, so there is nothing to draw"
@@ -80,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
         if table:
             table.begin(instance, "looking for a first tour …")
         result = solve_graph(
-            graph, args.solver, time_limit=args.time_limit, iteration_limit=args.iteration_limit,
+            graph, args.solver, time_limit=clock, iteration_limit=args.iteration_limit,
             seed=args.seed, params=dict(args.option), on_progress=table,
         )  # fmt: skip
     if result.tour is not None:

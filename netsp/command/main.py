@@ -18,6 +18,7 @@ from collections.abc import Container, Sequence
 from typing import Any, NoReturn
 
 from netsp.command import messages
+from netsp.command.command_clock import begin_command
 from netsp.command.interrupts import interrupts_are_heard
 from netsp.errors import (
     EXIT_BAD_INPUT,
@@ -57,6 +58,7 @@ def _end_abandoned_work(code: int) -> None:
 
 def _main(argv: Sequence[str] | None) -> int:
     """Run the command line; return the exit code, whatever work goes on."""
+    begin_command()
     # both are None when they were closed before we began
     sys.stdout, sys.stderr = sys.stdout or _Closed(), sys.stderr or io.StringIO()
     try:

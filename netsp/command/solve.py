@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from netsp.command import messages, told
 from netsp.command.clearance_flags import clearance_flags, warn_of_clearance
+from netsp.command.command_clock import command_clock
 from netsp.command.types import (
     check_writable,
     choices,
@@ -163,12 +164,12 @@ def run(args: argparse.Namespace) -> int:
     from netsp.solution import Solution
 
     told.check_stdout(args)
-    from netsp.clock import Clock, whole_or_interrupted
+    from netsp.clock import whole_or_interrupted
     from netsp.judge import checked
     from netsp.solvers import warm as warm_starts
     from netsp.solvers.solve import solve
 
-    clock = Clock(args.time_limit)  # reading and checking the files counts
+    clock = command_clock(args.time_limit)
     problem = clock.bounded("reading the problem", lambda: Problem.load(args.problem))
     warm = None
     if args.warm_start:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from netsp.command import told
 from netsp.command.clearance_flags import warn_of_clearance
+from netsp.command.command_clock import command_clock
 from netsp.command.types import check_writable
 from netsp.errors import EXIT_NOT_ALL, InputError, counted
 
@@ -71,15 +72,14 @@ def solve(
         from netsp.pictures import style
 
         style.check_format(plot)
-    from netsp.clock import Clock
     from netsp.command.compiling import compile_messages
     from netsp.command.stages import Stages
     from netsp.space.solve import MissionPolicy, solve_mission
 
-    clock = Clock(time_limit or TIME_LIMIT)  # reading the mission and its scene counts
+    clock = command_clock(time_limit or TIME_LIMIT)
     begin = time.monotonic()
     mission = clock.bounded("reading the mission", lambda: Mission.load(file))
-    stages = None if quiet else Stages(sys.stderr, time_limit or TIME_LIMIT)
+    stages = None if quiet else Stages(sys.stderr, clock.left)
     compiling = contextlib.nullcontext() if quiet else compile_messages(sys.stderr)
     with stages or contextlib.nullcontext(), compiling:
         from netsp.command.plot_scene import note_scene, tell, warn_of_scene

@@ -6,6 +6,7 @@ import argparse
 import sys
 
 from netsp.command import messages
+from netsp.command.command_clock import command_clock
 from netsp.command.types import check_writable, length, natural, seconds
 from netsp.errors import EXIT_NOT_ALL
 
@@ -38,7 +39,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.plot:
         style.check_format(args.plot)
-    problem = Problem.load(args.problem)
+    clock = command_clock(args.time_limit)
+    problem = clock.bounded("reading the problem", lambda: Problem.load(args.problem))
 
     def tell(step: Step) -> None:
         print(
@@ -47,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
         )
 
     curve = tether_curve(
-        problem, args.longest, time_limit=args.time_limit, seed=args.seed,
+        problem, args.longest, time_limit=clock, seed=args.seed,
         on_step=None if args.quiet else tell,
     )  # fmt: skip
     print(f"{'tether from':>12} {'up to':>12} {'tour':>12} {'saves':>8}  status")

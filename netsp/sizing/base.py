@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats
-from netsp.clock import Clock, until_interrupt
+from netsp.clock import Clock, TimeLimit, until_interrupt
 from netsp.drawn import Drawn
 from netsp.errors import InfeasibleError, InputError, LimitReachedError
 from netsp.files import cell, write_text
@@ -204,7 +204,7 @@ def best_base(
     *,
     names: Sequence[str | None] | None = None,
     every: bool = False,
-    time_limit: float | None = None,
+    time_limit: TimeLimit = None,
     seed: int = 0,
     on_candidate: Callable[[Candidate, int], None] | None = None,
 ) -> BaseSearch:
@@ -220,7 +220,7 @@ def best_base(
         Of the candidates.
     every : bool
         Solve from every candidate, also where its bound proves it worse.
-    time_limit : float, optional
+    time_limit : float or Clock, optional
         Seconds for all; the best known by then, or at Ctrl-C, is returned.
     seed : int
         Of all that is random.

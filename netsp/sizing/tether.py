@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.clock import Clock, until_interrupt
+from netsp.clock import Clock, TimeLimit, until_interrupt
 from netsp.drawn import Drawn
 from netsp.errors import InputError, LimitReachedError
 from netsp.fields import checked_argument
@@ -219,7 +219,7 @@ def tether_curve(
     longest: float | None = None,
     *,
     solver: str = "auto",
-    time_limit: float | None = None,
+    time_limit: TimeLimit = None,
     seed: int = 0,
     on_step: Callable[[Step], None] | None = None,
 ) -> TetherCurve:
@@ -233,7 +233,7 @@ def tether_curve(
         Longest tether, in the problem's units.
     solver : str
         Solves every step.
-    time_limit : float, optional
+    time_limit : float or Clock, optional
         Seconds for all; the steps found so far are returned when it is up, or at Ctrl-C.
     seed : int
         Of all that is random.

@@ -1,0 +1,32 @@
+"""The clock of a command: a limit counts from the command's start."""
+
+from __future__ import annotations
+
+import time
+from contextvars import ContextVar
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from netsp.clock import Clock
+
+_start: ContextVar[tuple[float, float] | None] = ContextVar("start", default=None)
+"""Time, and CPU seconds of the process, at the start of the command."""
+
+
+def begin_command() -> None:
+    """Note that a command starts now."""
+    _start.set((time.monotonic(), time.process_time()))
+
+
+def command_clock(limit: float | None) -> Clock:
+    """Return a clock that counts from the start of the command, so that loading netsp's modules and
+    reading files count.
+
+    Parameters
+    ----------
+    limit : float or None
+        Seconds; None for no limit.
+    """
+    from netsp.clock import Clock
+
+    return Clock(limit, begun=_start.get())
