@@ -1,6 +1,7 @@
 """What is kept of compiled functions must never outlive its sources."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import netsp
-from netsp.compiled.kernel import Kept
+from netsp.compiled.disk_cache import KernelFile
 
 CALLEE = """
 from typing import NamedTuple
@@ -32,6 +33,20 @@ def twice(pair: {name}) -> float:
     return 2.0 * times(pair)
 """
 
+SCRIPT = """
+from netsp.caller import *
+from netsp.compiled.compile_policy import everything_compiled
+with everything_compiled():
+    print(twice({name}(1.0)))
+"""
+
+
+def _imported_by(folder, source):
+    """Return the modules of netsp's ground that a package's modules import."""
+    text = "".join(file.read_text() for file in folder.glob("*.py"))
+    names = re.findall(r"^from netsp\.(\w+) import", text, re.M)
+    return {source / f"{name}.py" for name in names if (source / f"{name}.py").is_file()}
+
 
 @pytest.fixture
 def package(tmp_path):
@@ -40,6 +55,8 @@ def package(tmp_path):
     (tmp_path / "netsp").mkdir()
     (tmp_path / "netsp" / "__init__.py").touch()
     shutil.copytree(source / "compiled", tmp_path / "netsp" / "compiled")
+    for needed in _imported_by(source / "compiled", source):
+        shutil.copy(needed, tmp_path / "netsp" / needed.name)
 
     def run(name: str, factor: float) -> float:
         for module, text in (("callee", CALLEE), ("caller", CALLER)):
@@ -47,7 +64,7 @@ def package(tmp_path):
             if not file.exists() or file.read_text() != text.format(name=name, factor=factor):
                 file.write_text(text.format(name=name, factor=factor))
         done = subprocess.run(
-            [sys.executable, "-c", f"from netsp.caller import *; print(twice({name}(1.0)))"],
+            [sys.executable, "-c", SCRIPT.format(name=name)],
             env={**os.environ, "PYTHONPATH": str(tmp_path)}, cwd=tmp_path, text=True,
             capture_output=True,
         )  # fmt: skip
@@ -68,7 +85,7 @@ def test_a_class_in_a_signature_may_be_renamed(package):
 
 
 def test_what_two_processes_compile_at_once_is_found_under_its_own_types_or_not_at_all(tmp_path):
-    one, other = Kept(str(tmp_path), "f", "stamp"), Kept(str(tmp_path), "f", "stamp")
+    one, other = KernelFile(str(tmp_path), "f", "stamp"), KernelFile(str(tmp_path), "f", "stamp")
     write = one._save_data
 
     def while_the_other_keeps_its_own(name, data):
@@ -78,19 +95,19 @@ def test_what_two_processes_compile_at_once_is_found_under_its_own_types_or_not_
 
     one._save_data = while_the_other_keeps_its_own
     one.save("of floats", "for floats")
-    kept = Kept(str(tmp_path), "f", "stamp")
+    kept = KernelFile(str(tmp_path), "f", "stamp")
     assert kept.load("of ints") in ("for ints", None)
     assert kept.load("of floats") in ("for floats", None)
 
 
 def test_nothing_older_is_found_under_a_name_while_it_is_compiled_anew(tmp_path):
-    Kept(str(tmp_path), "f", "old").save("of floats", "as it was")
-    new, seen = Kept(str(tmp_path), "f", "new"), []
+    KernelFile(str(tmp_path), "f", "old").save("of floats", "as it was")
+    new, seen = KernelFile(str(tmp_path), "f", "new"), []
     write = new._save_index
 
     def look_first(overloads):
         write(overloads)
-        seen.append(Kept(str(tmp_path), "f", "new").load("of floats"))
+        seen.append(KernelFile(str(tmp_path), "f", "new").load("of floats"))
 
     new._save_index = look_first
     new.save("of floats", "as it is")
@@ -99,6 +116,6 @@ def test_nothing_older_is_found_under_a_name_while_it_is_compiled_anew(tmp_path)
 
 def test_files_of_sources_that_are_no_more_are_removed(tmp_path):
     for stamp in ("one", "another", "a third"):
-        Kept(str(tmp_path), "f", stamp).save(f"of {stamp}", "compiled")
-    Kept(str(tmp_path), "g", "stamp").save("of floats", "compiled")
+        KernelFile(str(tmp_path), "f", stamp).save(f"of {stamp}", "compiled")
+    KernelFile(str(tmp_path), "g", "stamp").save("of floats", "compiled")
     assert len(list(tmp_path.glob("f.*.nbc"))) == len(list(tmp_path.glob("g.*.nbc"))) == 1

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from netsp import Circle, Problem, solve
-from netsp.compiled.tiers import compiles
+from netsp.compiled.compile_policy import compiles
 from netsp.execute import execute, ready
 from netsp.fly import rehearsal
 from netsp.fly.rehearsal import rehearse

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError, Problem
-from netsp.compiled import tiers
+from netsp.compiled.compile_policy import everything_compiled
 from netsp.geometry.box_tree import build_box_tree
 from netsp.geometry.kernels import (
     depth_in_obstacle,
@@ -60,7 +60,7 @@ def _world(seed, clearance, corners=24):
 def test_tangents_by_horizons_are_those_of_all_pairs(seed, clearance, sectors):
     outline = build_outline(_world(seed, clearance))
     policy = SightPolicy(sectors=sectors, min_pairs=0, block=50)
-    with tiers.everything_compiled():
+    with everything_compiled():
         seen = tangent_rows(outline, outline.arcs, outline.full, 60.0, policy=policy)
         every = SightPolicy(min_pairs=10**9)
         assert np.array_equal(
@@ -108,7 +108,6 @@ def test_few_pairs_without_a_tangent_are_left_to_test(monkeypatch):
         asked.append(len(pairs))
         return pairs
 
-    monkeypatch.setattr(tangents, "choose", lambda kernel, steps: kernel)
     monkeypatch.setattr(tangents, "pairs_in_sight", count)
     rows = tangent_rows(outline, outline.arcs, outline.full, 60.0)
     n = len(outline.arcs)

@@ -1,5 +1,10 @@
 """Interpreted and compiled kernels: the same to the last bit, so it never matters which ran."""
 
+import contextlib
+import importlib.util
+import math
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple
 from pathlib import Path
 
@@ -7,14 +12,36 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numba import njit
 
-from netsp.compiled import tiers
+from netsp.compiled import disk_cache, tiered
+from netsp.compiled.compile_policy import (
+    CompilePolicy,
+    compiled_by,
+    compiles,
+    everything_compiled,
+)
+from netsp.compiled.interpretation import interpreted
+from netsp.compiled.overtime import Overtime, within
+from netsp.errors import InputError
 from netsp.problem import Problem
 from netsp.roadmap import outline, tangents
+from netsp.solvers.solve import solve
 from netsp.worlds import FAMILIES, random_world
 
 PROBLEMS = sorted((Path(__file__).parent.parent / "problems").glob("*.json"))
+
+pytestmark = pytest.mark.skipif(not compiles(), reason="NUMBA_DISABLE_JIT is set")
+
+
+@contextlib.contextmanager
+def everything_interpreted():
+    """Replace all kernels by the interpreted ones, also those that are loaded."""
+    with pytest.MonkeyPatch.context() as patch, np.errstate(all="ignore"):
+        patch.setattr(
+            tiered.TieredDispatcher, "__call__", lambda self, *args: interpreted(self)(*args),
+            raising=False,
+        )  # fmt: skip
+        yield
 
 
 def _arrays(value):
@@ -32,11 +59,9 @@ def _built(problem):
 
 
 def _both(problem):
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (outline, tangents):
-            patch.setattr(module, "choose", lambda kernel, steps: tiers.interpreted(kernel))
+    with everything_interpreted():
         by_interpreter = _built(problem)
-    with tiers.everything_compiled():
+    with everything_compiled():
         return by_interpreter, _built(problem)
 
 
@@ -44,7 +69,7 @@ def _both(problem):
 def test_shipped_problems_have_the_same_tangents_interpreted_and_compiled(path):
     problem = Problem.load(path)
     if len(problem.obstacles) > 12:
-        pytest.skip("never interpreted")
+        pytest.skip("takes the interpreter long")
     by_interpreter, by_compiler = _both(problem)
     assert by_interpreter == by_compiler
 
@@ -57,33 +82,143 @@ def test_random_worlds_have_the_same_tangents_interpreted_and_compiled(seed, fam
     assert by_interpreter == by_compiler
 
 
-def test_a_kernel_is_interpreted_until_its_allowance_is_spent_then_compiled():
-    @njit
-    def twice(x):
-        return 2 * x
-
-    small = tiers.ALLOWANCE // 2
-    first, second, third = (tiers.choose(twice, small) for _ in range(3))
-    assert first is second is tiers.interpreted(twice)
-    assert third is twice
-    assert first(3) == third(3) == 6
-
-
-def test_work_beyond_the_allowance_and_loaded_kernels_are_compiled_at_once():
-    @njit
-    def twice(x):
-        return 2 * x
-
-    assert tiers.choose(twice, tiers.ALLOWANCE + 1) is twice
-    twice(1)
-    assert tiers.choose(twice, 1) is twice
+@pytest.mark.parametrize("solver", ["auto", "mip", "dp", "lns"])
+def test_solvers_find_the_same_tour_interpreted_and_compiled(solver):
+    problem = random_world(7, goals=9, tether_length=250.0)
+    iterations = 20 if solver == "lns" else None
+    with everything_interpreted():
+        by_interpreter = solve(problem, solver, iteration_limit=iterations)
+    with everything_compiled():
+        by_compiler = solve(problem, solver, iteration_limit=iterations)
+    assert by_interpreter.path == by_compiler.path
+    assert by_interpreter.lower_bound == by_compiler.lower_bound
 
 
-def test_while_compiling_ahead_nothing_is_interpreted():
-    @njit
-    def twice(x):
-        return 2 * x
+MODULE = """
+from netsp.compiled.kernel import kernel
 
-    with tiers.everything_compiled():
-        assert tiers.choose(twice, 0) is twice
-    assert tiers.choose(twice, 0) is tiers.interpreted(twice)
+@kernel
+def total(x, stop):
+    for i in range(len(x)):
+        if stop[0]:
+            break
+        x[i] = x[i] + (x[i - 1] if i else 0.0)
+    return x[-1]
+
+@kernel
+def ratio(a, b):
+    return a // b
+"""
+
+
+@pytest.fixture
+def kernels(tmp_path):
+    """A module of kernels that were never compiled before."""
+    (tmp_path / "fresh.py").write_text(MODULE)
+    spec = importlib.util.spec_from_file_location("fresh", tmp_path / "fresh.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+NEVER = np.zeros(1, dtype=np.int64)
+
+
+def test_a_kernel_is_interpreted_until_its_price_is_spent_then_compiled(kernels):
+    with compiled_by(CompilePolicy(compile_s=0.02, compile_s_per_byte=0.0)):
+        calls = 0
+        while not kernels.total.signatures:
+            assert kernels.total.interpreted_s < 0.1
+            assert kernels.total(np.ones(1000), NEVER) == 1000.0
+            calls += 1
+    assert calls > 1
+    assert kernels.total(np.ones(1000), NEVER) == 1000.0
+
+
+def test_a_call_that_takes_too_long_begins_again_compiled_with_the_arguments_as_they_were(kernels):
+    x, pair = np.ones(1_000_000), np.ones(3)
+    with compiled_by(CompilePolicy(compile_s=0.05, compile_s_per_byte=0.0)):
+        assert kernels.total(pair, NEVER) == 3.0
+        assert not kernels.total.signatures
+        assert kernels.total(x, NEVER) == 1e6
+    assert kernels.total.signatures
+    assert np.array_equal(x, np.arange(1.0, 1e6 + 1.0))
+
+
+def test_an_end_asked_for_during_an_interpreted_call_is_not_forgotten(kernels):
+    stop, x = np.zeros(1, dtype=np.int64), np.ones(30_000_000)
+    with compiled_by(CompilePolicy(compile_s=0.3, compile_s_per_byte=0.0, max_copied_bytes=10**9)):
+        threading.Timer(0.1, lambda: stop.__setitem__(0, 1)).start()
+        kernels.total(x, stop)
+    assert stop[0] == 1
+    assert x[-1] == 1.0
+
+
+def test_work_that_threads_share_is_never_begun_again(kernels):
+    x = np.ones(200_000)
+    with (
+        compiled_by(CompilePolicy(compile_s=0.01, compile_s_per_byte=0.0)),
+        ThreadPoolExecutor(1) as pool,
+    ):
+        assert pool.submit(kernels.total, x, NEVER).result() == 200_000.0
+        assert not kernels.total.signatures
+        assert pool.submit(kernels.total, np.ones(3), NEVER).result() == 3.0
+    assert kernels.total.signatures
+
+
+def test_large_arguments_are_never_copied(kernels):
+    with compiled_by(CompilePolicy(max_copied_bytes=100)):
+        kernels.total(np.ones(10), NEVER)
+        assert not kernels.total.signatures
+        kernels.total(np.ones(100), NEVER)
+    assert kernels.total.signatures
+
+
+def test_while_compiling_ahead_nothing_is_interpreted(kernels):
+    with everything_compiled():
+        kernels.ratio(7, 2)
+    assert kernels.ratio.signatures
+    assert not kernels.ratio.interpreted_s
+
+
+def test_what_an_interpreted_kernel_raises_reaches_its_caller(kernels):
+    with pytest.raises(ZeroDivisionError):
+        kernels.ratio(1, 0)
+    assert not kernels.ratio.signatures
+
+
+def test_a_call_is_broken_off_in_time_or_not_at_all():
+    def count(n):
+        k = 0
+        while k < n:
+            k += 1
+        return k
+
+    assert within(10.0, count, (10,)) == 10
+    with pytest.raises(Overtime):
+        within(0.02, count, (math.inf,))
+    for _ in range(20):  # the end of the call and of its budget at about the same time
+        with contextlib.suppress(Overtime):
+            assert within(0.003, count, (60_000,)) == 60_000
+    assert count(1000) == 1000
+
+
+def test_without_what_numba_keeps_private_kernels_are_compiled_at_once(monkeypatch, tmp_path):
+    monkeypatch.setattr(disk_cache, "is_supported", lambda: False)
+    (tmp_path / "plain.py").write_text(MODULE)
+    spec = importlib.util.spec_from_file_location("plain", tmp_path / "plain.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.ratio(7, 2) == 3
+    assert module.ratio.signatures
+
+
+def test_this_release_of_numba_is_supported():
+    assert disk_cache.is_supported()
+    assert tiered.is_supported()
+
+
+@pytest.mark.parametrize("field", ["load_s", "compile_s", "compile_s_per_byte", "max_copied_bytes"])
+def test_a_policy_has_no_negative_numbers(field):
+    with pytest.raises(InputError, match=f"{field}: expected a number that is not negative"):
+        CompilePolicy(**{field: -1})

@@ -21,7 +21,7 @@ def run(args: argparse.Namespace) -> int:
     """Compile, and return the exit code."""
     from netsp.command.compiling import compile_messages
     from netsp.command.patience import span
-    from netsp.compiled.tiers import everything_compiled
+    from netsp.compiled.compile_policy import everything_compiled
 
     messages = contextlib.nullcontext() if args.quiet else compile_messages(sys.stderr)
     with messages, everything_compiled():

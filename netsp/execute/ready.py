@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from netsp.clock import interrupts_remembered
-from netsp.compiled.tiers import compiles, everything_compiled
+from netsp.compiled.compile_policy import compiles, everything_compiled
 from netsp.execute.repair import repair
 from netsp.problem import Circle, Goal, Problem, State
 from netsp.roadmap.from_state import graph_from_state

@@ -10,7 +10,7 @@ from __future__ import annotations
 from functools import cache
 
 from netsp.clock import interrupts_remembered
-from netsp.compiled.tiers import compiles, everything_compiled
+from netsp.compiled.compile_policy import compiles, everything_compiled
 from netsp.execute.events import Surprises
 from netsp.execute.log import ExecutionOptions
 from netsp.execute.run import execute

@@ -11,7 +11,7 @@ from functools import cache
 
 import numpy as np
 
-from netsp.compiled.tiers import compiles, everything_compiled
+from netsp.compiled.compile_policy import compiles, everything_compiled
 from netsp.errors import InputError
 from netsp.guard.fix import Fix
 from netsp.guard.guard import Guard

@@ -24,7 +24,6 @@ from netsp.arrays import Floats, Ints
 from netsp.clock import Clock
 from netsp.compiled.growing import longer, more_rows, sort_in_place
 from netsp.compiled.kernel import kernel
-from netsp.compiled.tiers import choose
 from netsp.geometry.kernels import (
     TWO_PI,
     Blockers,
@@ -62,8 +61,7 @@ def depths(x: float, y: float, blockers: Blockers) -> Floats:
 def is_free(points: Floats, blockers: Blockers) -> bool:
     """Whether a polyline (k, 2 or 3) enters no grown obstacle."""
     xy = np.asarray(points, dtype=float)[:, :2]
-    blocked = choose(segment_blocked, len(xy) * (len(blockers.box) + len(blockers.edges)))
-    return not any(blocked(p[0], p[1], q[0], q[1], blockers) for p, q in pairwise(xy))
+    return not any(segment_blocked(p[0], p[1], q[0], q[1], blockers) for p, q in pairwise(xy))
 
 
 @dataclass(frozen=True)
@@ -123,9 +121,8 @@ def build_outline(problem: Problem, clock: Clock | None = None) -> Outline:
     bounds = bounds - np.tile(origin, 2)
     parts = len(blockers.box) + len(blockers.edges)
     steps = 4 * len(disks) * parts
-    find_arcs = choose(_visible_arcs, steps)
     rows = (clock or Clock()).finish(
-        OUTLINING, steps, lambda stop: find_arcs(disks, blockers, bounds, stop)
+        OUTLINING, steps, lambda stop: _visible_arcs(disks, blockers, bounds, stop)
     )
     places = problem.points[:, :2] - origin
     points = np.array([pushed_out(p, blockers, STAND_OFF * scale) for p in places])
@@ -182,8 +179,7 @@ def pushed_out(point: Floats, blockers: Blockers, distance: float) -> Floats:
     """Move a point that lies on a grown boundary, or nearly, to a distance from it."""
     p = np.array(point, dtype=float)
     for _ in range(32):
-        parts = len(blockers.box) + len(blockers.edges)
-        depth = choose(depths, parts)(p[0], p[1], blockers)
+        depth = depths(p[0], p[1], blockers)
         if len(depth) == 0 or depth.max() <= -0.5 * distance:
             break
         o = int(np.argmax(depth))
@@ -208,7 +204,7 @@ def _push_out_of_polygon(p: Floats, o: int, blockers: Blockers, stand_off: float
     if distance <= 1e-6 * stand_off:
         unit = np.array([d[k, 1], -d[k, 0]]) / np.hypot(*d[k])
     else:
-        inside = choose(point_in_polygon, len(e))(
+        inside = point_in_polygon(
             p[0], p[1], blockers.edges, blockers.edge_start[o], blockers.edge_start[o + 1]
         )
         unit = away[k] / distance * (-1.0 if inside else 1.0)

@@ -21,7 +21,6 @@ from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import Clock, Flag
 from netsp.compiled.growing import more_rows
 from netsp.compiled.kernel import kernel
-from netsp.compiled.tiers import choose
 from netsp.geometry.kernels import TWO_PI, Blockers, segment_blocked
 from netsp.roadmap.letters import arc_letters, segment_letters
 from netsp.roadmap.outline import Outline
@@ -165,9 +164,8 @@ def tangent_rows(
 
     def rows_of(pairs: Ints, stop: Flag) -> Floats:
         # most segments are blocked by one of few parts, and the tree finds it
-        find = choose(_tangents, 4 * len(pairs) * (1 + len(blockers.tree.skip)))
         base = outline.points[0]
-        return np.asarray(find(place, len(arcs), full, base, reach, blockers, pairs, stop))
+        return np.asarray(_tangents(place, len(arcs), full, base, reach, blockers, pairs, stop))
 
     if since or total * (total - 1) // 2 < policy.min_pairs:
         j = np.arange(first, total)
@@ -179,16 +177,15 @@ def tangent_rows(
     horizons = empty_horizons(place, len(arcs), full, policy.sectors)
     pencils = len(horizons.low)
     steps = pencils * policy.sectors * 8
-    lower, pairs_of = choose(find_horizons, steps), choose(pairs_in_sight, steps)
 
     def in_sight(stop: Flag) -> Floats:
         def horizons_from(begin: int) -> None:
             end = min(begin + policy.block, pencils)
-            lower(place, len(arcs), blockers, horizons, begin, end, stop)
+            find_horizons(place, len(arcs), blockers, horizons, begin, end, stop)
 
         def rows_from(begin: int) -> Floats:
             end = min(begin + policy.block, total)
-            pairs = pairs_of(place, len(arcs), targets, horizons, begin, end, stop)
+            pairs = pairs_in_sight(place, len(arcs), targets, horizons, begin, end, stop)
             return rows_of(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], stop)
 
         with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -228,10 +225,9 @@ def assembled(
         ends[at_point, column : column + 2] = outline.places[node[at_point] - 2 * len(arcs)]
     _merge_contacts(source, target, length, ends, angle, len(arcs))
     steps = 3 * len(target) * (4 + len(outline.rays))
-    write_letters = choose(_write_letters, steps)
 
     def written(stop: Flag) -> Any:
-        return write_letters(
+        return _write_letters(
             arcs, full, start, target, key, arrival_key, ends, angle, outline.rays, order_of_rays,
             stop,
         )  # fmt: skip
@@ -240,7 +236,6 @@ def assembled(
         WRITING, steps, written
     )
     blockers = outline.blockers
-    boxes = choose(pending_boxes, len(outline.rays) * (len(blockers.box) + len(blockers.edges)))
     radius = np.zeros(node_count)
     radius[: 2 * len(arcs)] = np.repeat(arcs[:, 2], 2)
     return TangentGraph(
@@ -261,7 +256,7 @@ def assembled(
         gap_row,
         radius,
         outline.rays,
-        boxes(outline.rays, blockers),
+        pending_boxes(outline.rays, blockers),
     )
 
 

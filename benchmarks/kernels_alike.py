@@ -1,0 +1,101 @@
+"""Compare interpreted and compiled kernels, call by call, while the steps of `netsp warm-up` run.
+
+    python benchmarks/kernels_alike.py [WORDS …]
+
+Only steps whose names contain one of the words are run. Prints each kernel whose results, or the
+arrays that it writes to, differ in any bit, and how many kernels and calls were compared. Calls
+that take the interpreter long are not compared, nor are those that it never makes.
+"""
+
+from __future__ import annotations
+
+import struct
+import sys
+from collections import Counter
+from typing import Any
+
+import numpy as np
+from numba.core.registry import CPUDispatcher
+
+from netsp.command.warm_up import steps
+from netsp.compiled.compile_policy import everything_compiled
+from netsp.compiled.interpretation import interpreted
+from netsp.compiled.overtime import Overtime, within
+from netsp.compiled.tiered import NARROW, TieredDispatcher, arrays_in
+
+MAX_CALL_S, MAX_KERNEL_S = 0.3, 3.0
+"""Seconds of the interpreter for one call, and for one kernel in all."""
+
+
+class Comparison:
+    """Calls of kernels, made twice."""
+
+    def __init__(self) -> None:
+        self.spent: Counter[str] = Counter()
+        self.compared: Counter[str] = Counter()
+        self.unlike: dict[str, str] = {}
+
+    def call(self, kernel: Any, *args: Any) -> Any:
+        """Call a kernel compiled, and on copies of its arguments interpreted."""
+        name = f"{kernel.py_func.__module__}.{kernel.py_func.__name__}"
+        if self.spent[name] > MAX_KERNEL_S or name in self.unlike:
+            return CPUDispatcher.__call__(kernel, *args)
+        if any(a.size and a.dtype.char in NARROW for a in arrays_in(args)):
+            return CPUDispatcher.__call__(kernel, *args)
+        copies = _copied(args)
+        try:
+            with np.errstate(all="ignore"):
+                other = within(MAX_CALL_S, interpreted(kernel), copies)
+        except Overtime:
+            self.spent[name] += MAX_CALL_S
+            return CPUDispatcher.__call__(kernel, *args)
+        except Exception as error:
+            other = error
+        out = CPUDispatcher.__call__(kernel, *args)
+        self.spent[name] += 0.001
+        self.compared[name] += 1
+        for what, a, b in (("result", out, other), ("arguments", args, copies)):
+            if _bits(a) != _bits(b):
+                self.unlike[name] = f"{what}: compiled {str(a)[:200]}, interpreted {str(b)[:200]}"
+        return out
+
+
+def _copied(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.copy(order="K")
+    if isinstance(value, tuple):
+        parts = [_copied(part) for part in value]
+        return value._make(parts) if hasattr(value, "_make") else tuple(parts)
+    return value
+
+
+def _bits(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, np.ascontiguousarray(value).tobytes()
+    if isinstance(value, tuple):
+        return tuple(_bits(part) for part in value)
+    if isinstance(value, np.generic):
+        value = value.item()
+    return struct.pack("d", value) if isinstance(value, int | float) else repr(value)
+
+
+def main(words: list[str]) -> int:
+    """Run the steps and print what differs."""
+    comparison = Comparison()
+    TieredDispatcher.__call__ = lambda self, *args: comparison.call(self, *args)
+    with everything_compiled():
+        for name, step in steps():
+            if not words or any(word in name for word in words):
+                print(name, file=sys.stderr, flush=True)
+                step()
+    for name, how in sorted(comparison.unlike.items()):
+        print(f"{name}: {how}")
+    print(
+        f"{len(comparison.compared)} kernels, {sum(comparison.compared.values())} calls, "
+        f"{len(comparison.unlike)} kernels differ"
+    )
+    return 1 if comparison.unlike else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,98 @@
+"""Policy of when kernels are compiled."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+
+from numba import config
+
+from netsp.errors import InputError
+
+
+@dataclass(frozen=True)
+class CompilePolicy:
+    """Policy of when a compiled kernel takes over from the interpreted one.
+
+    The rule is that of the ski rental problem (Karlin et al. 1988, "Competitive snoopy caching"):
+    a kernel runs interpreted until this has taken as long as compiling it would, and then is
+    compiled. Whatever work comes, this takes at most twice the time of the better choice.
+
+    Parameters
+    ----------
+    load_s : float
+        Seconds to load one compiled kernel from the disk, about. A smaller number loads kernels
+        that a small problem hardly needs; with a larger one, large problems begin more slowly.
+    compile_s : float
+        Seconds to compile an empty kernel, about.
+    compile_s_per_byte : float
+        Seconds that each byte of a kernel's bytecode, and of the kernels that it calls, adds. The
+        three are estimates; wrong ones cost time, and never change a result.
+    max_copied_bytes : int
+        Size of arguments above which a kernel is never interpreted: an interpreted call that takes
+        too long is begun again from copies of its arguments.
+    is_eager : bool
+        Whether all kernels are compiled at their first call.
+    """
+
+    load_s: float = 0.02
+    compile_s: float = 0.2
+    compile_s_per_byte: float = 0.001
+    max_copied_bytes: int = 64 * 2**20
+    is_eager: bool = False
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if not getattr(self, field.name) >= 0:
+                raise InputError(
+                    f"{field.name}: expected a number that is not negative, "
+                    f"got {getattr(self, field.name)}"
+                )
+
+    def price_s(self, bytecode: int) -> float:
+        """Return about how many seconds it takes to compile a kernel.
+
+        Parameters
+        ----------
+        bytecode : int
+            Size of its bytecode, and of the kernels that it calls, in bytes.
+        """
+        return self.compile_s + self.compile_s_per_byte * bytecode
+
+
+_policy = CompilePolicy()
+
+
+def current_policy() -> CompilePolicy:
+    """Return the policy of this process."""
+    return _policy
+
+
+@contextlib.contextmanager
+def compiled_by(policy: CompilePolicy) -> Iterator[None]:
+    """Use another policy in all threads while the body runs.
+
+    Parameters
+    ----------
+    policy : CompilePolicy
+        The policy.
+    """
+    global _policy
+    before, _policy = _policy, policy
+    try:
+        yield
+    finally:
+        _policy = before
+
+
+@contextlib.contextmanager
+def everything_compiled() -> Iterator[None]:
+    """Compile every kernel at its first call while the body runs."""
+    with compiled_by(replace(_policy, is_eager=True)):
+        yield
+
+
+def compiles() -> bool:
+    """Return whether anything is compiled at all; with NUMBA_DISABLE_JIT nothing is."""
+    return not config.DISABLE_JIT

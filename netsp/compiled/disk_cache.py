@@ -1,0 +1,155 @@
+"""Compiled kernels on disk.
+
+Numba keeps a compiled function until its own file changes. That is too long in two cases: a kernel
+in another file that it calls (and that is compiled into it) has changed, and a class in its
+signature has another name (the kept index then cannot be read: AttributeError). And of two
+processes that compile one function for different types at the same time, both may call their file
+by the same number: then the one's is found under the other's types, in every run from then on. All
+three are mended here, so that no one ever has to delete a cache by hand.
+
+All of Numba that is not public and that this needs is in this file and in `netsp.compiled.tiered`;
+`is_supported` checks it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import glob
+import hashlib
+import re
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from numba import njit
+from numba.core.caching import IndexDataCacheFile
+
+_PACKAGE = Path(__file__).resolve().parent.parent
+_IMPORTS = re.compile(r"^from (netsp[\w.]*) import (\([^)]*\)|[^\n]*)", re.M)
+_HAS_KERNELS = re.compile(r"^from netsp\.compiled\.kernel import", re.M)
+
+
+class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
+    """The files of one kernel: an index by signature, and one file a signature.
+
+    An index that names a class which is no more counts as empty. Files are named by their
+    signature.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep a compiled kernel: first its file, then the index, so that no other process finds an
+        older one under its name."""
+        name = self._data_name(int(hashlib.sha256(self._dump(key)).hexdigest()[:15], 16))
+        self._save_data(name, data)
+        overloads = self._load_index()
+        fresh = not overloads
+        overloads[key] = name
+        self._save_index(overloads)
+        if fresh:
+            self._tidy(set(overloads.values()))
+
+    def holds(self, key: Any) -> bool:
+        """Return whether a compiled kernel is on disk, without loading it."""
+        name = self._load_index().get(key)
+        return name is not None and Path(self._data_path(name)).is_file()
+
+    def _tidy(self, named: set[str]) -> None:
+        """Remove files of sources that are no more; whoever looks for one compiles anew."""
+        of_all = glob.escape(self._index_name.removesuffix(".nbi")) + ".*.nbc"
+        for old in Path(self._cache_path).glob(of_all):
+            if old.name not in named:
+                old.unlink(missing_ok=True)
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except (AttributeError, ImportError):
+            return {}
+
+
+def keep_on_disk(dispatcher: Any, function: Callable[..., Any]) -> None:
+    """Have a cached dispatcher keep its compiled code in a `KernelFile`.
+
+    Parameters
+    ----------
+    dispatcher : numba dispatcher
+        Dispatcher of the function, with `cache=True`.
+    function : callable
+        The function.
+    """
+    kept = dispatcher._cache._cache_file
+    dispatcher._cache._cache_file = KernelFile(
+        kept._cache_path,
+        kept._index_name.removesuffix(".nbi"),
+        (kept._source_stamp, stamps(Path(function.__code__.co_filename))),
+    )
+
+
+def is_on_disk(dispatcher: Any, types: tuple[Any, ...]) -> bool:
+    """Return whether a kernel was compiled for argument types before.
+
+    Parameters
+    ----------
+    dispatcher : numba dispatcher
+        Dispatcher that `keep_on_disk` was called for.
+    types : tuple
+        Numba's types of the arguments.
+    """
+    own = dispatcher._cache
+    with contextlib.suppress(OSError):
+        return bool(own._cache_file.holds(own._index_key(types, dispatcher.targetctx.codegen())))
+    return False
+
+
+@cache
+def is_supported() -> bool:
+    """Return whether this release of Numba has all that `keep_on_disk` relies on.
+
+    Without it kernels are kept as Numba keeps them: then a change in a kernel may go unnoticed by
+    kernels in other files that call it, which concerns who changes netsp's own code.
+    """
+
+    def probe() -> None:
+        pass
+
+    needed = {
+        "_load_index", "_save_index", "_load_data", "_save_data", "_data_name", "_data_path",
+        "_dump",
+    }  # fmt: skip
+    own = getattr(njit(cache=True)(probe), "_cache", None)
+    kept = getattr(own, "_cache_file", None)
+    return (
+        isinstance(kept, IndexDataCacheFile)
+        and needed <= set(dir(kept))
+        and callable(getattr(own, "_index_key", None))
+        and all(hasattr(kept, name) for name in ("_cache_path", "_index_name", "_source_stamp"))
+    )
+
+
+@cache
+def stamps(file: Path) -> tuple[tuple[str, int, int], ...]:
+    """Return name, time of change (ns) and size of each file with kernels that a file imports,
+    directly or by way of others; without the file itself."""
+    found: set[Path] = set()
+    new = {file}
+    while new:
+        new = {other for one in new for other in _imported(one)} - found - {file}
+        found |= new
+    return tuple(
+        (str(one.relative_to(_PACKAGE)), one.stat().st_mtime_ns, one.stat().st_size)
+        for one in sorted(found)
+    )
+
+
+@cache
+def _imported(file: Path) -> frozenset[Path]:
+    """Return the files with kernels that a file imports."""
+    found = set()
+    for module, names in _IMPORTS.findall(file.read_text(encoding="utf-8")):
+        at = _PACKAGE.parent.joinpath(*module.split("."))
+        for one in (at, *(at / name for name in re.findall(r"\w+", names))):
+            source = one.with_suffix(".py")
+            if source.is_file() and _HAS_KERNELS.search(source.read_text(encoding="utf-8")):
+                found.add(source)
+    return frozenset(found)

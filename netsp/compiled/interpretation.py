@@ -1,0 +1,102 @@
+"""Kernels as plain Python functions.
+
+An interpreted kernel and a compiled one return the same to the last bit (tests/test_tiers.py,
+benchmarks/kernels_alike.py), so that it never matters which of them ran. Python and compiled code
+round two things differently: powers with a constant whole exponent are products where they are
+compiled, and hypotenuses are those of the C library.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import linecache
+import math
+import textwrap
+from collections.abc import Callable, Iterator
+from functools import cache
+from types import CodeType, FunctionType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+_POWER = "_netsp_power"
+
+
+@cache
+def interpreted(kernel: Any) -> Callable[..., Any]:
+    """Return a kernel as plain Python, and all kernels that it calls as well.
+
+    Parameters
+    ----------
+    kernel : dispatcher
+        Function that `netsp.compiled.kernel.kernel` decorates.
+    """
+    own = kernel.py_func
+    code = _code_with_products(own)
+    names = {name: own.__globals__[name] for name in names_used(code) if name in own.__globals__}
+    used = {n: interpreted(v) if hasattr(v, "py_func") else v for n, v in names.items()}
+    if used.get("math") is math:
+        used["math"] = _c_math()
+    scope = {**own.__globals__, **used, _POWER: _power}
+    return FunctionType(code, scope, own.__name__, own.__defaults__)
+
+
+def names_used(code: CodeType) -> Iterator[str]:
+    """Yield the global names in a function's code, those of its comprehensions included."""
+    yield from code.co_names
+    for inner in code.co_consts:
+        if isinstance(inner, CodeType):
+            yield from names_used(inner)
+
+
+class _Products(ast.NodeTransformer):
+    """Replaces powers with a constant whole exponent by calls of `_power`."""
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        exponent = node.right.value if isinstance(node.right, ast.Constant) else None
+        if not isinstance(node.op, ast.Pow) or not isinstance(exponent, int) or exponent < 1:
+            return node
+        return ast.Call(ast.Name(_POWER, ast.Load()), [node.left, node.right], [])
+
+
+def _code_with_products(function: Callable[..., Any]) -> CodeType:
+    """Return the code of a function in which powers are products."""
+    own = function.__code__
+    last = max(line for _, _, line in own.co_lines() if line is not None)
+    if not any(
+        "**" in line for line in linecache.getlines(own.co_filename)[own.co_firstlineno - 1 : last]
+    ):
+        return own
+    tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
+    (definition,) = tree.body
+    assert isinstance(definition, ast.FunctionDef)
+    definition.decorator_list, definition.returns = [], None
+    for argument in ast.walk(definition.args):
+        if isinstance(argument, ast.arg):
+            argument.annotation = None
+    tree = ast.fix_missing_locations(_Products().visit(tree))
+    ast.increment_lineno(tree, own.co_firstlineno - 1)
+    whole = compile(tree, own.co_filename, "exec")
+    (code,) = (c for c in whole.co_consts if isinstance(c, CodeType))
+    return code
+
+
+def _power(x: Any, exponent: int) -> Any:
+    """Return a power as Numba computes it: by squaring, lowest bit of the exponent first."""
+    out = None
+    while exponent:
+        if exponent & 1:
+            out = x if out is None else out * x
+        exponent >>= 1
+        if exponent:
+            x = x * x
+    return out
+
+
+@cache
+def _c_math() -> SimpleNamespace:
+    """Return `math` as compiled code sees it: Python rounds hypotenuses better than the C
+    library."""
+    return SimpleNamespace(**{**vars(math), "hypot": np.hypot})

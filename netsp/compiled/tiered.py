@@ -1,0 +1,157 @@
+"""Kernels that run interpreted until compiling them pays.
+
+Compiling a kernel takes up to seconds, and loading it up to a tenth of a second; small problems are
+solved sooner without. Whether a kernel runs interpreted or compiled changes no result.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from functools import cache
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numba.core.registry import CPUDispatcher
+
+from netsp.compiled import disk_cache
+from netsp.compiled.compile_policy import compiles, current_policy
+from netsp.compiled.interpretation import interpreted, names_used
+from netsp.compiled.overtime import Overtime, within
+
+FLAGS = frozenset({"stop"})
+"""Names of parameters that other threads write to, to end a kernel; these are never restored."""
+
+NARROW = frozenset("bBhHIefF")
+"""Characters of dtypes in which the interpreter computes with fewer than 64 bits, and compiled code
+does not. Kernels whose arguments have such numbers are never interpreted. Whole numbers of 32 bits
+are none of them: kernels keep these far below their limits."""
+
+
+class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
+    """A dispatcher that interprets its function until compiling it pays (`CompilePolicy`).
+
+    Numba calls `_compile_for_args` when there is no compiled code for the types of a call, and then
+    calls what it returns with the arguments of that call.
+
+    Attributes
+    ----------
+    interpreted_s : float
+        Seconds that the function has run interpreted.
+    """
+
+    interpreted_s = 0.0
+
+    def _compile_for_args(self, *args: Any, **kwargs: Any) -> Callable[..., Any]:
+        policy = current_policy()
+        if policy.is_eager or kwargs:
+            return self._compiled(args, kwargs)
+        types = tuple(self.typeof_pyval(a) for a in args)
+        on_disk = disk_cache.is_on_disk(self, types)
+        budget_s = policy.load_s if on_disk else policy.price_s(self.bytecode())
+        budget_s -= self.interpreted_s
+        is_shared = threading.current_thread().name.startswith("ThreadPoolExecutor")
+        arrays = arrays_in(args)
+        is_large = sum(a.nbytes for a in arrays) > policy.max_copied_bytes
+        is_narrow = any(a.size and a.dtype.char in NARROW for a in arrays)
+        if budget_s <= 0.0 or is_large or is_narrow or (is_shared and on_disk):
+            return self._compiled(args, kwargs)
+        return self._run_pooled if is_shared else self._within(budget_s)
+
+    def _compiled(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Callable[..., Any]:
+        return super()._compile_for_args(*args, **kwargs)  # type: ignore[no-any-return]
+
+    def _within(self, budget_s: float) -> Callable[..., Any]:
+        """Return the interpreted function; where a call takes too long, it is begun again
+        compiled."""
+
+        def run(*args: Any) -> Any:
+            begin = perf_counter()
+            names = self.py_func.__code__.co_varnames
+            own = [a for name, a in zip(names, args, strict=False) if name not in FLAGS]
+            before = [(a, a.copy()) for a in arrays_in(own) if a.flags.writeable]
+            try:
+                with np.errstate(all="ignore"):  # compiled code does not warn either
+                    return _plain(within(budget_s, interpreted(self), args))
+            except Overtime:
+                pass
+            finally:
+                self.interpreted_s += perf_counter() - begin
+            for array, copy in before:
+                array[...] = copy
+            return self._compiled(args, {})(*args)
+
+        return run
+
+    def _run_pooled(self, *args: Any) -> Any:
+        """Run interpreted to the end: arrays that other threads write to cannot be restored."""
+        begin = perf_counter()
+        try:
+            with np.errstate(all="ignore"):
+                return _plain(interpreted(self)(*args))
+        finally:
+            self.interpreted_s += perf_counter() - begin
+
+    def bytecode(self) -> int:
+        """Return the bytes of the function's bytecode, with the kernels that it calls and that are
+        not compiled."""
+        return sum(len(k.py_func.__code__.co_code) for k in _called(self) if not k.overloads)
+
+
+def arrays_in(value: Any) -> list[np.ndarray[Any, Any]]:
+    """Return all arrays in an argument, those in tuples included."""
+    if isinstance(value, np.ndarray):
+        return [value]
+    if isinstance(value, tuple | list):
+        return [a for part in value for a in arrays_in(part)]
+    return []
+
+
+def _plain(value: Any) -> Any:
+    """Return a result with Python's numbers instead of NumPy's, as compiled code returns it."""
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, tuple):
+        parts = [_plain(part) for part in value]
+        return value._make(parts) if hasattr(value, "_make") else tuple(parts)
+    return value
+
+
+@cache
+def _called(kernel: Any) -> frozenset[Any]:
+    """Return a kernel and all kernels that it calls."""
+    found = {kernel}
+    for name in names_used(kernel.py_func.__code__):
+        other = kernel.py_func.__globals__.get(name)
+        if isinstance(other, TieredDispatcher) and other not in found:
+            found |= _called(other)
+    return frozenset(found)
+
+
+@cache
+def is_supported() -> bool:
+    """Return whether this release of Numba dispatches as `TieredDispatcher` expects.
+
+    Without it kernels are compiled at their first call.
+    """
+    if not compiles() or not disk_cache.is_supported():
+        return False
+
+    def probe(x: int) -> int:
+        return x + 1
+
+    probed = njit(probe)
+    seen: list[Any] = []
+
+    class Probe(CPUDispatcher):  # type: ignore[misc]
+        def _compile_for_args(self, *args: Any) -> Callable[[int], int]:
+            seen.append(self.typeof_pyval(*args))
+            return lambda x: -x
+
+    try:
+        probed.__class__ = Probe
+        return probed(1) == -1 and len(seen) == 1 and not probed.overloads
+    except (AttributeError, TypeError):
+        return False
