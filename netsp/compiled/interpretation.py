@@ -16,11 +16,33 @@ import textwrap
 from collections.abc import Callable, Iterator
 from functools import cache
 from types import CodeType, FunctionType, SimpleNamespace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
+F = TypeVar("F", bound=Callable[..., Any])
+
 _POWER = "_netsp_power"
+
+_in_numpy: dict[Any, Callable[..., Any]] = {}
+
+
+def interprets(kernel: Any) -> Callable[[F], F]:
+    """Register a function in NumPy that runs where a kernel is interpreted.
+
+    It returns the same to the last bit, and changes the same arrays in the same way.
+
+    Parameters
+    ----------
+    kernel : dispatcher
+        The kernel whose loops it vectorises.
+    """
+
+    def register(function: F) -> F:
+        _in_numpy[kernel] = function
+        return function
+
+    return register
 
 
 @cache
@@ -32,6 +54,8 @@ def interpreted(kernel: Any) -> Callable[..., Any]:
     kernel : dispatcher
         Function that `netsp.compiled.kernel.kernel` decorates.
     """
+    if kernel in _in_numpy:
+        return _in_numpy[kernel]
     own = kernel.py_func
     code = _code_with_products(own)
     names = {name: own.__globals__[name] for name in names_used(code) if name in own.__globals__}

@@ -24,10 +24,10 @@ from netsp.compiled.overtime import Overtime, within
 FLAGS = frozenset({"stop"})
 """Names of parameters that other threads write to, to end a kernel; these are never restored."""
 
-NARROW = frozenset("bBhHIefF")
-"""Characters of dtypes in which the interpreter computes with fewer than 64 bits, and compiled code
-does not. Kernels whose arguments have such numbers are never interpreted. Whole numbers of 32 bits
-are none of them: kernels keep these far below their limits."""
+NARROW = frozenset("ef")
+"""Characters of dtypes in which the interpreter computes with fewer bits than compiled code does:
+NumPy's singles by Python's doubles are singles, Numba's are doubles. Kernels whose arguments have
+such numbers are never interpreted."""
 
 
 class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Bools, Floats, Ints
+from netsp.compiled.interpretation import interprets
 from netsp.compiled.kernel import kernel
 from netsp.dp.memory import CHUNK
 
@@ -113,6 +114,40 @@ def completions(
             before[k + 1, u] = last
 
 
+@interprets(completions)
+def _completions_in_numpy(
+    graph: Graph, prices: Floats, alive: Bools, least: Floats, onward: Floats, stop: Ints
+) -> None:
+    """Do as `completions`, all vertices of a goal at once."""
+    costs, goal, start = graph
+    n = len(start) - 2
+    second = np.full(least.shape, np.inf)
+    before = np.full(least.shape, -1, dtype=np.int64)
+    least[:] = np.inf
+    onward[:] = np.inf
+    first = np.where(alive[1], costs[0] - prices[goal], np.inf)
+    least[1, 1:] = first[1:]
+    for k in range(1, n + 1):
+        for h in range(1, n + 1):
+            if stop[0] != 0:
+                return
+            own = slice(start[h], start[h + 1])
+            is_back = before[k, own, None] == goal
+            cost = np.where(is_back, second[k, own, None], least[k, own, None])
+            onward[k, h] = np.fmin.reduce(cost + costs[own], axis=0, initial=np.inf)
+            onward[k, h, own] = np.inf
+        if k == n:
+            break
+        by_goal = onward[k, 1:]
+        last, ascending = by_goal.argmin(axis=0) + 1, np.sort(by_goal, axis=0)
+        best, other = ascending[0], ascending[1] if n > 1 else np.full(len(goal), np.inf)
+        here = alive[k + 1].copy()
+        here[0] = False
+        least[k + 1, here] = (best - prices[goal])[here]
+        second[k + 1, here] = (other - prices[goal])[here]
+        before[k + 1, here] = np.where(best < np.inf, last, -1)[here]
+
+
 @kernel
 def translate(tables: npt.NDArray[np.int32], g: int, h: int, memory: int) -> int:
     """The memory at goal h of a walk that comes from goal g; negative if it must not."""
@@ -202,7 +237,7 @@ def extend(
             if found == 0:
                 continue
             own = used_up
-            for i in np.argsort(found_cost[:found]):
+            for i in np.argsort(found_cost[:found], kind="mergesort"):
                 m = found_memory[i]
                 dominated = False
                 for label in range(own, used_up):
@@ -221,6 +256,64 @@ def extend(
             slot[seen[s]] = -1
     out_pointer[-1] = used_up
     return out_pointer, out_cost[:used_up], out_memory[:used_up]
+
+
+@interprets(extend)
+def _extend_in_numpy(
+    graph: Graph,
+    first: int,
+    last: int,
+    bits: Ints,
+    tables: npt.NDArray[np.int32],
+    labels: Labels,
+    bounds: Bounds,
+    prices: Floats,
+    stop: Ints,
+) -> tuple[Ints, Floats, npt.NDArray[np.int32]]:
+    """Do as `extend`, all labels at the vertices of a goal at once."""
+    costs, start = graph.costs, graph.start
+    pointer, cost, memory = labels
+    vertex = np.repeat(np.arange(len(pointer) - 1), np.diff(pointer))
+    out_pointer, out_cost, out_memory = [0], [0.0], [0]
+    for h in range(first, last):
+        own = slice(start[h], start[h + 1])
+        come, masks = [], []
+        for g in range(1, len(start) - 1):
+            if g == h or stop[0] != 0:
+                continue
+            there = np.arange(pointer[start[g]], pointer[start[g + 1]])
+            there = there[~(cost[there] > bounds.cut - bounds.onward[h, vertex[there]])]
+            m = memory[there]
+            m = (
+                tables[g, h, 0, m & LOW]
+                | tables[g, h, 1, (m >> CHUNK) & LOW]
+                | tables[g, h, 2, m >> (2 * CHUNK)]
+            )
+            come.append(there[m >= 0])
+            masks.append(m[m >= 0])
+        at = np.concatenate([*come, np.zeros(0, dtype=np.int64)])
+        if not len(at):
+            out_pointer += [len(out_cost) - 1] * (own.stop - own.start)
+            continue
+        # memories in the order in which they were met, as ties are broken by it
+        kinds, met, kind = np.unique(np.concatenate(masks), return_index=True, return_inverse=True)
+        by_kind = np.argsort(kind, kind="stable")
+        begin = np.searchsorted(kind[by_kind], np.arange(len(kinds)))
+        legs = cost[at, None] + costs[vertex[at], own]
+        order = np.argsort(met)
+        table = np.minimum.reduceat(legs[by_kind], begin, axis=0)[order]
+        seen = kinds[order]
+        for j, limit in enumerate(bounds.limit[own]):
+            fits = np.flatnonzero((table[:, j] <= limit) & (table[:, j] < np.inf))
+            fits = fits[np.argsort(table[fits, j], kind="stable")]
+            kept: list[int] = []
+            for s, m in zip(fits.tolist(), seen[fits].tolist(), strict=True):
+                if not any(k & m == k for k in kept):
+                    kept.append(m)
+                    out_cost.append(float(table[s, j]) - float(prices[h]))
+            out_memory += kept
+            out_pointer.append(len(out_cost) - 1)
+    return np.array(out_pointer), np.array(out_cost[1:]), np.array(out_memory[1:], dtype=np.int32)
 
 
 @kernel

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from netsp.arrangement import UNORDERED
 from netsp.arrays import Bools, Floats, Ints
+from netsp.compiled.interpretation import interprets
 from netsp.compiled.kernel import kernel
 from netsp.lns.links import EVEN
 from netsp.travel.graph import TravelGraph
@@ -190,4 +192,23 @@ def best_classes(clusters: Ints, start: Ints, costs: Floats) -> tuple[float, Int
     for k in range(n - 1, -1, -1):
         tour[k + 1] = start[clusters[k]] + at
         at = back[k, at]
+    return best, tour
+
+
+@interprets(best_classes)
+def _best_classes_in_numpy(clusters: Ints, start: Ints, costs: Floats) -> tuple[float, Ints]:
+    """Do as `best_classes`, all vertices of a cluster at once."""
+    n = len(clusters)
+    own = [slice(start[c], start[c + 1]) for c in clusters]
+    reach, back = costs[0, own[0]], []
+    for before, now in pairwise(own):
+        lengths = reach[:, None] + costs[before, now]
+        back.append(lengths.argmin(axis=0))
+        reach = lengths.min(axis=0)
+    home = reach + costs[own[-1], 0]
+    at = int(home.argmin())
+    best, tour = float(home[at]), np.zeros(n + 1, dtype=np.int64)
+    for k in range(n - 1, -1, -1):
+        tour[k + 1] = own[k].start + at
+        at = int(back[k - 1][at]) if k else 0
     return best, tour

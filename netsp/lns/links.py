@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.compiled.chance import uniform
+from netsp.compiled.interpretation import interprets
 from netsp.compiled.kernel import kernel
 
 EVEN = 1e-13
@@ -108,6 +109,31 @@ def carry_on(
             ahead[c, j] = row[j] - least
         sure -= 1
         c = after[c]
+
+
+@interprets(carry_on)
+def _carry_on_in_numpy(
+    c: int, sure: int, after: Ints, prior: Ints, start: Ints, costs: Floats, ahead: Floats,
+    grown: Floats, row: Floats,
+) -> float:  # fmt: skip
+    """Do as `carry_on`, all vertices of a cluster at once."""
+    longer = 0.0
+    while True:
+        p, begin, end = prior[c], start[c], start[c + 1]
+        legs = costs[start[p] : start[p + 1], begin:end]
+        best = np.fmin.reduce(ahead[p, : len(legs), None] + legs, axis=0, initial=np.inf)
+        row[: len(best)] = best
+        least = 0.0 if c == p else float(best.min(initial=np.inf))
+        longer += least - float(grown[c])
+        grown[c] = least
+        if c == 0:
+            return longer
+        rest = best - least
+        if sure <= 0 and not (np.abs(rest - ahead[c, : len(best)]) > EVEN * best).any():
+            return longer
+        ahead[c, : len(best)] = rest
+        sure -= 1
+        c = int(after[c])
 
 
 @kernel
@@ -197,6 +223,25 @@ def between(
             if d < best:
                 best = d
     return best - now if best < limit else most
+
+
+@interprets(between)
+def _between_in_numpy(
+    c: int, p: int, most: float, after: Ints, start: Ints, costs: Floats, nearest: Floats,
+    ahead: Floats, behind: Floats, rest: Floats,
+) -> float:  # fmt: skip
+    """Do as `between`, all vertices of the clusters at once."""
+    q = after[p]
+    own, left, right = (slice(start[k], start[k + 1]) for k in (c, p, q))
+    far = ahead[p, : left.stop - left.start]
+    now = np.fmin.reduce(far + behind[p, : len(far)], initial=np.inf) + rest[p]
+    if nearest[p, c] + nearest[c, q] - now >= most:
+        return most
+    limit = float(most + now)
+    there = np.fmin.reduce(far + costs[own, left], axis=1, initial=np.inf)
+    onward = there[:, None] + costs[own, right] + behind[q, : right.stop - right.start]
+    best = float(np.fmin.reduce(onward, axis=None, initial=limit))
+    return best - float(now) if best < limit else most
 
 
 @kernel

@@ -8,6 +8,8 @@ near a random goal is taken out, its clusters are put back one by one where they
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -114,7 +116,7 @@ def ruin_and_recreate(
                 behind, rest, place, BLINK, chance,
             )  # fmt: skip
             d += put(gone[r], p, after, prior, start, costs, ahead, behind, grown, rest, row)
-        if d < length - theta * np.log(max(uniform(chance), 1e-300)):
+        if d < length - theta * math.log(max(uniform(chance), 1e-300)):
             links.after[:], links.prior[:] = after, prior
             links.ahead[:], links.behind[:] = ahead, behind
             links.grown[:], links.rest[:] = grown, rest

@@ -299,8 +299,8 @@ def through(
     if counts == 0:
         return -1, 0, table
     unknown = (
-        (labels[low] == UNKNOWN) + (labels[right] == UNKNOWN) + (labels[top] == UNKNOWN)
-        + (labels[left] == UNKNOWN)
+        int(labels[low] == UNKNOWN) + int(labels[right] == UNKNOWN) + int(labels[top] == UNKNOWN)
+        + int(labels[left] == UNKNOWN)
     )  # fmt: skip
     if unknown != 1:
         return -1, 0, table
