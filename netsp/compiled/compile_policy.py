@@ -22,12 +22,12 @@ class CompilePolicy:
     Parameters
     ----------
     load_s : float
-        Seconds to load one compiled kernel from the disk, about. A smaller number loads kernels
+        CPU seconds to load one compiled kernel from the disk, about. A smaller number loads kernels
         that a small problem hardly needs; with a larger one, large problems begin more slowly.
     compile_s : float
-        Seconds to compile an empty kernel, about.
+        CPU seconds to compile an empty kernel, about.
     compile_s_per_byte : float
-        Seconds that each byte of a kernel's bytecode, and of the kernels that it calls, adds. The
+        CPU seconds that each byte of a kernel, and of the kernels that it calls, adds. The
         three are estimates; wrong ones cost time, and never change a result.
     max_copied_bytes : int
         Size of arguments above which a kernel is never interpreted: an interpreted call that takes

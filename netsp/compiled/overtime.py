@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 LOOK_S = 0.005
-"""Seconds between two looks at the calls under way; budgets are kept about so exactly."""
+"""Seconds between two looks at the calls under way."""
 
 IDLE_LOOKS = 20
 """Looks without a call under way after which the watching thread sleeps until the next one."""
@@ -31,7 +31,7 @@ class _Call:
 
     def __init__(self, budget_s: float) -> None:
         self.thread = threading.get_ident()
-        self.deadline = time.perf_counter() + budget_s
+        self.deadline = time.process_time() + budget_s
         self.was_ended = False
 
 
@@ -74,7 +74,7 @@ class _Watch:
                     self._is_asleep = True
                     self._wake.wait()
                     self._is_asleep, idle = False, 0
-                now = time.perf_counter()
+                now = time.process_time()
                 for call in [c for c in self._under_way if now > c.deadline]:
                     self._under_way.discard(call)
                     call.was_ended = True
@@ -93,7 +93,7 @@ def within(budget_s: float, function: Callable[..., T], args: tuple[Any, ...]) -
     Parameters
     ----------
     budget_s : float
-        Seconds that it may take.
+        CPU seconds that it may take; those of other threads count as well.
     function : callable
         Function in Python; what it calls in other languages is not broken off.
     args : tuple

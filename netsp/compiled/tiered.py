@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from functools import cache
-from time import perf_counter
+from time import thread_time
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
     Attributes
     ----------
     interpreted_s : float
-        Seconds that the function has run interpreted.
+        CPU seconds that the function has run interpreted.
     """
 
     interpreted_s = 0.0
@@ -68,7 +68,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         compiled."""
 
         def run(*args: Any) -> Any:
-            begin = perf_counter()
+            begin = thread_time()
             names = self.py_func.__code__.co_varnames
             own = [a for name, a in zip(names, args, strict=False) if name not in FLAGS]
             before = [(a, a.copy()) for a in arrays_in(own) if a.flags.writeable]
@@ -78,7 +78,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
             except Overtime:
                 pass
             finally:
-                self.interpreted_s += perf_counter() - begin
+                self.interpreted_s += thread_time() - begin
             for array, copy in before:
                 array[...] = copy
             return self._compiled(args, {})(*args)
@@ -87,12 +87,12 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
 
     def _run_pooled(self, *args: Any) -> Any:
         """Run interpreted to the end: arrays that other threads write to cannot be restored."""
-        begin = perf_counter()
+        begin = thread_time()
         try:
             with np.errstate(all="ignore"):
                 return _plain(interpreted(self)(*args))
         finally:
-            self.interpreted_s += perf_counter() - begin
+            self.interpreted_s += thread_time() - begin
 
     def bytecode(self) -> int:
         """Return the bytes of the function's bytecode, with the kernels that it calls and that are

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from netsp.arrays import Floats, Ints
+from netsp.compiled.interpretation import interpreted, interprets
 from netsp.compiled.kernel import kernel
 from netsp.roadmap.arcs import Arcs
 from netsp.roadmap.pulled import NODE, SAME_ANGLE, SLID, path_for, pull
@@ -175,6 +176,36 @@ def fill(
     return i, j
 
 
+@interprets(fill)
+def _fill_in_numpy(
+    branches: Branches, lengths: Lengths, point: Ints, ends: Ends, slits: Slits, arcs: Arcs,
+    stop: Ints, i: int, j: int,
+) -> tuple[int, int]:  # fmt: skip
+    """Do as `fill`, and look for open legs in a whole row at once."""
+    order, out, row = branches.order, lengths.out, lengths.row
+    whole, place = len(out) == len(order), point[order]
+    longest = interpreted(longest_word)(ends.row)
+    room, path = interpreted(room_for)(longest, slits), interpreted(path_for)(longest)
+    pull_one, note_alike = interpreted(pull), interpreted(spread)
+    while i < len(order) and stop[0] == 0:
+        u = order[i]
+        if row[i] >= 0 and point[u] != 0:
+            own = out[row[i]]
+            is_asked = (own[order[j:]] == OPEN) & (place[j:] != point[u]) & (place[j:] != 0)
+            for k in (np.flatnonzero(is_asked) + j).tolist():
+                v = order[k]
+                if own[v] != OPEN:
+                    continue  # noted with a leg before it
+                a, b = (u, v) if i < k else (v, u)
+                length, _, count = pull_one(a, b, ends, point, slits, arcs, room, path)
+                if length < 0.0:
+                    return i, k
+                note_alike(a, b, length, count, path.whole, path.real, branches, lengths)
+        i += 1
+        j = i + 1 if whole else 0
+    return i, j
+
+
 @kernel
 def spread(
     u: int, v: int, length: float, count: int, on: Ints, at: Floats, branches: Branches,
@@ -208,6 +239,18 @@ def _note(
         if rise != 0.0:
             length = np.sqrt(length * length + rise * rise)
         out[b] = share * length
+
+
+@interprets(_note)
+def _note_in_numpy(
+    out: Floats, a: int, begin: int, end: int, saved: float, order: Ints, lengths: Lengths
+) -> None:  # fmt: skip
+    """Do as `_note`, all legs at once."""
+    b = order[begin:end]
+    rise = lengths.height[b] - lengths.height[a]
+    length = lengths.planar[a] + lengths.planar[b] - saved
+    whole = np.sqrt(length * length + rise * rise)
+    out[b] = lengths.share * np.where(rise != 0.0, whole, length)
 
 
 @kernel
