@@ -19,10 +19,11 @@ import numpy as np
 from numba.core.registry import CPUDispatcher
 
 from netsp.command.warm_up import steps
+from netsp.compiled.arguments import NARROW, arrays_in
 from netsp.compiled.compile_policy import everything_compiled
 from netsp.compiled.interpretation import interpreted
 from netsp.compiled.overtime import Overtime, within
-from netsp.compiled.tiered import NARROW, TieredDispatcher, arrays_in
+from netsp.compiled.tiered import TieredDispatcher
 
 MAX_CALL_S, MAX_KERNEL_S = 0.3, 3.0
 """Seconds of the interpreter for one call, and for one kernel in all."""

@@ -1,5 +1,6 @@
 """Tests of what a command loads before it works: time that every user waits for."""
 
+import os
 import subprocess
 import sys
 import time
@@ -7,9 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from netsp.clock import Clock, TimingPolicy
 from netsp.command import command_clock, main
 
 ROOT = Path(__file__).parent.parent
+SMALL = "problems/pool.json"
 
 
 def _loaded(code: str) -> set[str]:
@@ -32,12 +35,63 @@ def test_a_problem_is_read_without_solvers_and_pictures():
 
 def test_a_small_problem_is_solved_and_verified_without_what_only_others_need(tmp_path):
     tour = str(tmp_path / "tour.json")
-    run = "from netsp.command.main import main\nmain({!r})"
-    unused = {"matplotlib", "highspy", "pulp"}
-    loaded = _loaded(run.format(["solve", "problems/pool.json", "-o", tour, "--quiet"]))
-    assert not loaded & unused
-    loaded = _loaded(run.format(["verify", "problems/pool.json", tour, "--quiet"]))
-    assert not loaded & (unused | {"numba", "scipy"})
+    # as much as a slow machine may need
+    patient = (
+        "from netsp.compiled.compile_policy import CompilePolicy, compiled_by\n"
+        "with compiled_by(CompilePolicy(numba_s=60.0)): "
+    )
+    run = "from netsp.command.main import main\n" + patient + "main({!r})"
+    for words in (["solve", SMALL, "-o", tour], ["verify", SMALL, tour]):
+        loaded = _loaded(run.format([*words, "--quiet"]))
+        assert not loaded & {"numba", "scipy", "matplotlib", "highspy", "pulp"}
+
+
+KERNELS = """
+import numpy as np
+from netsp.compiled.kernel import kernel
+
+@kernel
+def twice(x: float) -> float:
+    return 2.0 * x
+
+@kernel
+def fill(a, stop) -> float:
+    total = 0.0
+    for i in range(len(a)):
+        a[i] += 1.0
+        total += twice(a[i])
+        if stop[0]:
+            break
+    return total
+"""
+
+DEFERRED = """
+import pickle, sys
+import numpy as np
+import kernels
+from netsp.compiled.compile_policy import CompilePolicy, compiled_by
+
+stop = np.zeros(1, dtype=np.int64)
+assert kernels.fill(np.zeros(3), stop) == 6.0
+assert "numba" not in sys.modules
+assert pickle.loads(pickle.dumps(kernels.fill)) is kernels.fill
+a = np.zeros(10**6)
+with compiled_by(CompilePolicy(numba_s=0.05, load_s=0.0, compile_s=0.0, compile_s_per_byte=0.0)):
+    assert kernels.fill(a, stop) == 2e6
+assert (a == 1.0).all()
+assert kernels.fill.signatures and kernels.twice.signatures
+"""
+
+
+def test_a_kernel_that_runs_long_loads_numba_and_begins_again_compiled(tmp_path):
+    """What the interpreted call has changed is restored; kernels call one another compiled."""
+    (tmp_path / "kernels.py").write_text(KERNELS)
+    (tmp_path / "deferred.py").write_text(DEFERRED)
+    done = subprocess.run(
+        [sys.executable, "deferred.py"], cwd=tmp_path, capture_output=True, text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
 
 
 LIMITED = {
@@ -54,5 +108,6 @@ def test_a_limit_counts_from_the_start_of_the_command(command, monkeypatch):
     """A command that was begun a thousand seconds ago has no time left."""
     ago = (time.monotonic() - 1000.0, time.process_time() - 1000.0)
     monkeypatch.setattr(main, "begin_command", lambda: command_clock._start.set(ago))
+    monkeypatch.setattr(Clock, "policy", TimingPolicy(untimed_steps=0, grace_s=0.0))
     monkeypatch.chdir(ROOT)
     assert main.main([*LIMITED[command].split(), "--time-limit", "100", "--quiet"]) == 4

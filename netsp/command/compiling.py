@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
 
+from netsp.compiled.kernel import when_numba_is_loaded
+
 SUBJECTS = {
     "online": "the simulation", "space": "planning in space", "cover": "the choice of viewpoints",
 }  # fmt: skip
@@ -32,9 +34,26 @@ def compile_messages(stream: TextIO) -> Iterator[None]:
     stream : file
         Stream of messages, as stderr.
     """
-    from numba.core import event
-
     preparation = Preparation(stream)
+    listener: list[Any] = []
+
+    def listen() -> None:
+        listener.append(_listener(preparation))
+
+    when_numba_is_loaded(listen)
+    try:
+        yield
+    finally:
+        if listener:
+            from numba.core import event
+
+            event.unregister("numba:compile", listener[0])
+        preparation.close()
+
+
+def _listener(preparation: Preparation) -> Any:
+    """Return a listener that is told of all that is compiled."""
+    from numba.core import event
 
     class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, record: Any) -> None:
@@ -45,11 +64,7 @@ def compile_messages(stream: TextIO) -> Iterator[None]:
 
     listener = Listener()
     event.register("numba:compile", listener)
-    try:
-        yield
-    finally:
-        event.unregister("numba:compile", listener)
-        preparation.close()
+    return listener
 
 
 class Preparation:

@@ -6,8 +6,6 @@ import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 
-from numba import config
-
 from netsp.errors import InputError
 
 
@@ -19,8 +17,14 @@ class CompilePolicy:
     a kernel runs interpreted until this has taken as long as compiling it would, and then is
     compiled. Whatever work comes, this takes at most twice the time of the better choice.
 
+    All seconds are CPU seconds.
+
     Parameters
     ----------
+    numba_s : float
+        Seconds that kernels run interpreted before Numba is loaded, about as many as that takes. A
+        smaller number loads it for small problems, which need it little; with a larger one, large
+        problems begin more slowly.
     load_s : float
         CPU seconds to load one compiled kernel from the disk, about. A smaller number loads kernels
         that a small problem hardly needs; with a larger one, large problems begin more slowly.
@@ -36,6 +40,7 @@ class CompilePolicy:
         Whether all kernels are compiled at their first call.
     """
 
+    numba_s: float = 0.5
     load_s: float = 0.02
     compile_s: float = 0.2
     compile_s_per_byte: float = 0.001
@@ -95,4 +100,6 @@ def everything_compiled() -> Iterator[None]:
 
 def compiles() -> bool:
     """Return whether anything is compiled at all; with NUMBA_DISABLE_JIT nothing is."""
+    from numba import config
+
     return not config.DISABLE_JIT

@@ -39,13 +39,13 @@ def interprets(kernel: Any) -> Callable[[F], F]:
     """
 
     def register(function: F) -> F:
-        _in_numpy[kernel] = function
+        # by the function, because a kernel and its dispatcher are two objects
+        _in_numpy[getattr(kernel, "py_func", kernel)] = function
         return function
 
     return register
 
 
-@cache
 def interpreted(kernel: Any) -> Callable[..., Any]:
     """Return a kernel as plain Python, and all kernels that it calls as well.
 
@@ -54,9 +54,13 @@ def interpreted(kernel: Any) -> Callable[..., Any]:
     kernel : dispatcher
         Function that `netsp.compiled.kernel.kernel` decorates.
     """
-    if kernel in _in_numpy:
-        return _in_numpy[kernel]
-    own = kernel.py_func
+    return _interpreted(getattr(kernel, "py_func", kernel))
+
+
+@cache
+def _interpreted(own: Any) -> Callable[..., Any]:
+    if own in _in_numpy:
+        return _in_numpy[own]
     code = _code_with_products(own)
     names = {name: own.__globals__[name] for name in names_used(code) if name in own.__globals__}
     used = {n: interpreted(v) if hasattr(v, "py_func") else v for n, v in names.items()}

@@ -1,14 +1,24 @@
-"""The decorator of compiled functions."""
+"""The decorator of compiled functions.
+
+Numba takes a third of a second to load, and a small problem is solved without it. So it is loaded
+once kernels have run interpreted for about as long (`CompilePolicy.numba_s`).
+"""
 
 from __future__ import annotations
 
+import functools
+import operator
+import os
+import sys
+import threading
 from collections.abc import Callable
+from time import thread_time
 from typing import Any, TypeVar
 
-from numba import njit
-
-from netsp.compiled import disk_cache, tiered
-from netsp.compiled.compile_policy import compiles
+from netsp.compiled.arguments import call_within, can_be_interpreted
+from netsp.compiled.compile_policy import current_policy
+from netsp.compiled.interpretation import interpreted
+from netsp.compiled.overtime import Overtime
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -25,9 +35,126 @@ def kernel(function: F) -> F:
     function : callable
         The function; its arguments are arrays, numbers and tuples of these.
     """
+    if "numba" not in sys.modules and os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
+        return Kernel(function)  # type: ignore[return-value]
+    return _dispatcher_of(function)  # type: ignore[no-any-return]
+
+
+class Kernel:
+    """A kernel for which Numba may not be loaded yet.
+
+    Parameters
+    ----------
+    function : callable
+        The function.
+    """
+
+    _total_s = 0.0
+    """CPU seconds that all kernels have run interpreted before Numba was loaded."""
+
+    _lock = threading.RLock()
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func = function
+        self._early_s = 0.0
+        self._dispatcher: Any = None
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Call the function, interpreted or compiled."""
+        if not kwargs and "numba" not in sys.modules:
+            policy = current_policy()
+            budget_s = policy.numba_s - Kernel._total_s
+            if (
+                budget_s > 0.0
+                and not policy.is_eager
+                and not threading.current_thread().name.startswith("ThreadPoolExecutor")
+                and can_be_interpreted(args, policy.max_copied_bytes)
+            ):
+                begin = thread_time()
+                names = self.py_func.__code__.co_varnames
+                try:
+                    return call_within(budget_s, interpreted(self), names, args)
+                except Overtime:
+                    pass
+                finally:
+                    spent = thread_time() - begin
+                    self._early_s += spent
+                    Kernel._total_s += spent
+        return self.dispatcher(*args, **kwargs)
+
+    @property
+    def dispatcher(self) -> Any:
+        """Numba's dispatcher of the function; reading it loads Numba."""
+        if self._dispatcher is None:
+            with self._lock:
+                if self._dispatcher is None:
+                    made = _dispatcher_of(self.py_func)
+                    if hasattr(made, "interpreted_s"):
+                        made.interpreted_s = self._early_s
+                    self._dispatcher = made
+                    self.__class__ = _LoadedKernel
+        return self._dispatcher
+
+    def __getattr__(self, name: str) -> Any:
+        """Return an attribute of the dispatcher."""
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self.dispatcher, name)
+
+    def __reduce__(self) -> str:
+        """Pickle as the name of the function."""
+        return self.py_func.__qualname__
+
+
+class _LoadedKernel(Kernel):
+    """A kernel for which Numba is loaded: calls go to the dispatcher, without Python in between."""
+
+    __call__ = property(operator.attrgetter("_dispatcher"))  # type: ignore[assignment]
+
+
+def _dispatcher_of(function: Callable[..., Any]) -> Any:
+    """Return Numba's dispatcher of a function; where nothing is compiled, the function."""
+    _register()
+    from numba import njit
+
+    from netsp.compiled import disk_cache, tiered
+    from netsp.compiled.compile_policy import compiles
+
     compiled = njit(cache=True, nogil=True)(function)
     if compiles() and disk_cache.is_supported():
         disk_cache.keep_on_disk(compiled, function)
         if tiered.is_supported():
             compiled.__class__ = tiered.TieredDispatcher
-    return compiled  # type: ignore[no-any-return]
+    return compiled
+
+
+@functools.cache
+def _register() -> None:
+    """Have Numba take a `Kernel` in a kernel's globals for its dispatcher."""
+    from numba.core.types import Dispatcher
+    from numba.extending import typeof_impl
+
+    @typeof_impl.register(Kernel)  # type: ignore[untyped-decorator]
+    def _type_of(value: Kernel, context: Any) -> Any:
+        return Dispatcher(value.dispatcher)
+
+    for on_load in _on_load:
+        on_load()
+
+
+_on_load: list[Callable[[], None]] = []
+
+
+def when_numba_is_loaded(call: Callable[[], None]) -> None:
+    """Call a function once Numba is loaded for a kernel: now, if it is.
+
+    Parameters
+    ----------
+    call : callable
+        Function without arguments.
+    """
+    if "numba" in sys.modules:
+        call()
+    else:
+        _on_load.append(call)

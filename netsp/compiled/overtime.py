@@ -31,8 +31,16 @@ class _Call:
 
     def __init__(self, budget_s: float) -> None:
         self.thread = threading.get_ident()
-        self.deadline = time.process_time() + budget_s
+        # CPU time of the thread: other processes do not use up the budget
+        self._clock: int | None = None
+        if hasattr(time, "pthread_getcpuclockid"):
+            self._clock = time.pthread_getcpuclockid(self.thread)
+        self.deadline = self.now() + budget_s
         self.was_ended = False
+
+    def now(self) -> float:
+        """Return the CPU seconds of the thread; where these are not to be had, the time."""
+        return time.perf_counter() if self._clock is None else time.clock_gettime(self._clock)
 
 
 class _Watch:
@@ -74,8 +82,7 @@ class _Watch:
                     self._is_asleep = True
                     self._wake.wait()
                     self._is_asleep, idle = False, 0
-                now = time.process_time()
-                for call in [c for c in self._under_way if now > c.deadline]:
+                for call in [c for c in self._under_way if c.now() > c.deadline]:
                     self._under_way.discard(call)
                     call.was_ended = True
                     ctypes.pythonapi.PyThreadState_SetAsyncExc(
@@ -93,7 +100,7 @@ def within(budget_s: float, function: Callable[..., T], args: tuple[Any, ...]) -
     Parameters
     ----------
     budget_s : float
-        CPU seconds that it may take; those of other threads count as well.
+        CPU seconds that it may take.
     function : callable
         Function in Python; what it calls in other languages is not broken off.
     args : tuple

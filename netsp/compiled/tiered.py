@@ -12,22 +12,14 @@ from functools import cache
 from time import thread_time
 from typing import Any
 
-import numpy as np
 from numba import njit
 from numba.core.registry import CPUDispatcher
 
 from netsp.compiled import disk_cache
+from netsp.compiled.arguments import call_interpreted, call_within, can_be_interpreted
 from netsp.compiled.compile_policy import compiles, current_policy
 from netsp.compiled.interpretation import interpreted, names_used
-from netsp.compiled.overtime import Overtime, within
-
-FLAGS = frozenset({"stop"})
-"""Names of parameters that other threads write to, to end a kernel; these are never restored."""
-
-NARROW = frozenset("ef")
-"""Characters of dtypes in which the interpreter computes with fewer bits than compiled code does:
-NumPy's singles by Python's doubles are singles, Numba's are doubles. Kernels whose arguments have
-such numbers are never interpreted."""
+from netsp.compiled.overtime import Overtime
 
 
 class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
@@ -53,10 +45,8 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         budget_s = policy.load_s if on_disk else policy.price_s(self.bytecode())
         budget_s -= self.interpreted_s
         is_shared = threading.current_thread().name.startswith("ThreadPoolExecutor")
-        arrays = arrays_in(args)
-        is_large = sum(a.nbytes for a in arrays) > policy.max_copied_bytes
-        is_narrow = any(a.size and a.dtype.char in NARROW for a in arrays)
-        if budget_s <= 0.0 or is_large or is_narrow or (is_shared and on_disk):
+        can_be = can_be_interpreted(args, policy.max_copied_bytes)
+        if budget_s <= 0.0 or not can_be or (is_shared and on_disk):
             return self._compiled(args, kwargs)
         return self._run_pooled if is_shared else self._within(budget_s)
 
@@ -69,18 +59,13 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
 
         def run(*args: Any) -> Any:
             begin = thread_time()
-            names = self.py_func.__code__.co_varnames
-            own = [a for name, a in zip(names, args, strict=False) if name not in FLAGS]
-            before = [(a, a.copy()) for a in arrays_in(own) if a.flags.writeable]
             try:
-                with np.errstate(all="ignore"):  # compiled code does not warn either
-                    return _plain(within(budget_s, interpreted(self), args))
+                names = self.py_func.__code__.co_varnames
+                return call_within(budget_s, interpreted(self), names, args)
             except Overtime:
                 pass
             finally:
                 self.interpreted_s += thread_time() - begin
-            for array, copy in before:
-                array[...] = copy
             return self._compiled(args, {})(*args)
 
         return run
@@ -89,8 +74,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         """Run interpreted to the end: arrays that other threads write to cannot be restored."""
         begin = thread_time()
         try:
-            with np.errstate(all="ignore"):
-                return _plain(interpreted(self)(*args))
+            return call_interpreted(interpreted(self), args)
         finally:
             self.interpreted_s += thread_time() - begin
 
@@ -100,31 +84,13 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         return sum(len(k.py_func.__code__.co_code) for k in _called(self) if not k.overloads)
 
 
-def arrays_in(value: Any) -> list[np.ndarray[Any, Any]]:
-    """Return all arrays in an argument, those in tuples included."""
-    if isinstance(value, np.ndarray):
-        return [value]
-    if isinstance(value, tuple | list):
-        return [a for part in value for a in arrays_in(part)]
-    return []
-
-
-def _plain(value: Any) -> Any:
-    """Return a result with Python's numbers instead of NumPy's, as compiled code returns it."""
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, tuple):
-        parts = [_plain(part) for part in value]
-        return value._make(parts) if hasattr(value, "_make") else tuple(parts)
-    return value
-
-
 @cache
 def _called(kernel: Any) -> frozenset[Any]:
     """Return a kernel and all kernels that it calls."""
     found = {kernel}
     for name in names_used(kernel.py_func.__code__):
         other = kernel.py_func.__globals__.get(name)
+        other = getattr(other, "dispatcher", other)  # of a `Kernel`
         if isinstance(other, TieredDispatcher) and other not in found:
             found |= _called(other)
     return frozenset(found)

@@ -1,0 +1,89 @@
+"""Arguments and results of kernels, where these run interpreted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from netsp.compiled.overtime import Overtime, within
+
+FLAGS = frozenset({"stop"})
+"""Names of parameters that other threads write to, to end a kernel; these are never restored."""
+
+NARROW = frozenset("ef")
+"""Characters of dtypes in which the interpreter computes with fewer bits than compiled code does:
+NumPy's singles by Python's doubles are singles, Numba's are doubles. Kernels whose arguments have
+such numbers are never interpreted."""
+
+
+def arrays_in(value: Any) -> list[np.ndarray[Any, Any]]:
+    """Return all arrays in an argument, those in tuples included."""
+    if isinstance(value, np.ndarray):
+        return [value]
+    if isinstance(value, tuple | list):
+        return [a for part in value for a in arrays_in(part)]
+    return []
+
+
+def can_be_interpreted(args: tuple[Any, ...], max_copied_bytes: int) -> bool:
+    """Return whether a call with these arguments may run interpreted.
+
+    Parameters
+    ----------
+    args : tuple
+        Arguments of the call.
+    max_copied_bytes : int
+        Size of all arrays above which none is copied (`CompilePolicy`).
+    """
+    arrays = arrays_in(args)
+    is_narrow = any(a.size and a.dtype.char in NARROW for a in arrays)
+    return not is_narrow and sum(a.nbytes for a in arrays) <= max_copied_bytes
+
+
+def call_interpreted(function: Callable[..., Any], args: tuple[Any, ...]) -> Any:
+    """Return what a kernel's interpreted function returns, as compiled code returns it."""
+    with np.errstate(all="ignore"):  # compiled code does not warn either
+        return _plain(function(*args))
+
+
+def call_within(
+    budget_s: float, function: Callable[..., Any], names: tuple[str, ...], args: tuple[Any, ...]
+) -> Any:
+    """Return what a kernel's interpreted function returns, or break it off.
+
+    Parameters
+    ----------
+    budget_s : float
+        CPU seconds that it may take.
+    function : callable
+        The interpreted function.
+    names : tuple of str
+        Names of its parameters.
+    args : tuple
+        Its arguments.
+
+    Raises
+    ------
+    Overtime
+        The budget is used up; the arguments are as they were.
+    """
+    own = [a for name, a in zip(names, args, strict=False) if name not in FLAGS]
+    before = [(a, a.copy()) for a in arrays_in(own) if a.flags.writeable]
+    try:
+        return within(budget_s, call_interpreted, (function, args))
+    except Overtime:
+        for array, copy in before:
+            array[...] = copy
+        raise
+
+
+def _plain(value: Any) -> Any:
+    """Return a result with Python's numbers instead of NumPy's, as compiled code returns it."""
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, tuple):
+        parts = [_plain(part) for part in value]
+        return value._make(parts) if hasattr(value, "_make") else tuple(parts)
+    return value
