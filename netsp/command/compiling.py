@@ -11,8 +11,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
 
-from netsp.compiled.kernel import when_numba_is_loaded
-
 SUBJECTS = {
     "online": "the simulation", "space": "planning in space", "cover": "the choice of viewpoints",
 }  # fmt: skip
@@ -34,6 +32,8 @@ def compile_messages(stream: TextIO) -> Iterator[None]:
     stream : file
         Stream of messages, as stderr.
     """
+    from netsp.compiled.kernel import when_numba_is_loaded
+
     preparation = Preparation(stream)
     listener: list[Any] = []
 
