@@ -1,10 +1,16 @@
 """Tests of what users read while kernels are compiled."""
 
 import io
+import os
 import re
+import subprocess
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 from netsp.command.compiling import Preparation
+
+ROOT = Path(__file__).parent.parent
 
 
 def _kernel(module):
@@ -55,3 +61,32 @@ def test_kernels_of_other_packages_are_not_told():
     told.end(_kernel("elsewhere.fast"))
     told.close()
     assert stream.getvalue() == ""
+
+
+COMPILED = """
+import sys
+from netsp.command.compiling import compile_messages
+from netsp.compiled.compile_policy import everything_compiled
+from netsp.compiled.kernel import kernel
+
+with compile_messages(sys.stderr):
+    pass  # over before Numba is loaded: it tells nothing later
+
+def minimum_violated_cut(x):
+    return x + 1
+
+minimum_violated_cut.__module__ = "netsp.mip.flows"
+with compile_messages(sys.stderr), everything_compiled():
+    kernel(minimum_violated_cut)(1)
+"""
+
+
+def test_no_internal_name_is_told_while_a_kernel_is_compiled(tmp_path):
+    (tmp_path / "compiled.py").write_text(COMPILED)
+    done = subprocess.run(
+        [sys.executable, "compiled.py"], cwd=tmp_path, capture_output=True, text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+    )  # fmt: skip
+    lines = done.stderr.splitlines()  # on a slow machine more than one
+    told = re.compile(r"preparing the solver, about [1-9]\d* s, once per installation")
+    assert lines and all(map(told.fullmatch, lines))

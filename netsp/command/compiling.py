@@ -35,19 +35,22 @@ def compile_messages(stream: TextIO) -> Iterator[None]:
     from netsp.compiled.kernel import when_numba_is_loaded
 
     preparation = Preparation(stream)
-    listener: list[Any] = []
+    listeners: list[Any] = []
+    is_over = False
 
     def listen() -> None:
-        listener.append(_listener(preparation))
+        if not is_over:
+            listeners.append(_listener(preparation))
 
     when_numba_is_loaded(listen)
     try:
         yield
     finally:
-        if listener:
+        is_over = True
+        for listener in listeners:
             from numba.core import event
 
-            event.unregister("numba:compile", listener[0])
+            event.unregister("numba:compile", listener)
         preparation.close()
 
 
@@ -120,11 +123,11 @@ class Preparation:
             return
         running = time.monotonic() - self._since if self._depth else 0.0
         if not self._said_s or self._spent_s + running > self._said_s:
-            self._said_s = max(self._total_s, 2.0 * self._said_s)
+            self._said_s = max(self._total_s, 2.0 * self._said_s, 1.0)
             print(self._line(self._said_s), file=self._stream, flush=True)
 
     def _line(self, seconds: float) -> str:
-        return f"preparing {self._subject}, about {seconds:.0f} s, once per installation"
+        return f"preparing {self._subject}, about {max(seconds, 1.0):.0f} s, once per installation"
 
 
 def price_s(kernel: Any, with_called: bool = False) -> float:
