@@ -139,23 +139,25 @@ def _steps_told(figure: Any) -> Iterator[None]:
 def literal(figure: Any) -> Any:
     """The figure (Matplotlib's), its texts not read as mathematics but for the labels of ticks,
     which Matplotlib writes itself, and cut where they are endless."""
-    from matplotlib.text import Text
-
-    ticks = set()
-    for axes in figure.findobj(match=lambda artist: hasattr(artist, "_axis_map")):
-        for axis in axes._axis_map.values():
-            for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
-                ticks |= {id(tick.label1), id(tick.label2)}
-            ticks.add(id(axis.get_offset_text()))
-    for text in figure.findobj(match=Text):
-        if id(text) in ticks:
-            continue
+    for text in _texts(figure):
         text.set_parse_math(False)
         content = text.get_text()
         if not content.isascii():
             text.set_fontfamily(["DejaVu Sans", *_fonts_of_other_scripts()])
         text.set_text(re.sub(rf"(\S{{{LONGEST_WORD}}})\S+", r"\1…", content))
     return figure
+
+
+def _texts(artist: Any) -> Iterator[Any]:
+    """Yield all texts in a Matplotlib artist but the labels of ticks, which are made where they are
+    asked for, and most of which no one sees."""
+    from matplotlib.axis import Axis
+    from matplotlib.text import Text
+
+    if isinstance(artist, Text):
+        yield artist
+    for part in [artist.label] if isinstance(artist, Axis) else artist.get_children():
+        yield from _texts(part)
 
 
 @cache
