@@ -1,6 +1,7 @@
 """Tests of what a command loads before it works: time that every user waits for."""
 
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -44,6 +45,17 @@ def test_a_small_problem_is_solved_and_verified_without_what_only_others_need(tm
     for words in (["solve", SMALL, "-o", tour], ["verify", SMALL, tour]):
         loaded = _loaded(run.format([*words, "--quiet"]))
         assert not loaded & {"numba", "scipy", "matplotlib", "highspy", "pulp"}
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+def test_the_demo_installs_no_extras_and_compiles_nothing_ahead(tmp_path):
+    steps = subprocess.run(
+        ["make", "-n", "demo", f"VENV={tmp_path / 'new'}"],
+        cwd=ROOT, capture_output=True, text=True, check=True,
+    ).stdout  # fmt: skip
+    assert "solve problems/wharf.json" in steps
+    assert "[" not in steps
+    assert "warm-up" not in steps
 
 
 KERNELS = """

@@ -74,6 +74,16 @@ def cold_start() -> tuple[str, bool]:
     return f"{spent:.1f} s CPU", done.returncode == 0 and spent <= ALLOWANCE * 4.0
 
 
+def next_start() -> tuple[str, bool]:
+    """CPU seconds of a further solve: of starting, mostly."""
+    command = [sys.executable, "-m", "netsp", "solve", str(ROOT / "problems" / "wharf.json")]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(command, capture_output=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return f"{spent:.2f} s CPU", done.returncode == 0 and spent <= ALLOWANCE * 0.8
+
+
 def help_start() -> tuple[str, bool]:
     """Seconds of CPU until the help is printed, over those of Python's own start."""
 
@@ -115,6 +125,7 @@ def starting() -> Iterator[Claim]:
         timed=True,
         beside=True,
     )
+    yield Claim("further solves of the wharf", "0.8 s CPU (x 3)", next_start, timed=True)
     yield Claim("`netsp --help` over the start of Python", "8 times", help_start, timed=True)
 
 
