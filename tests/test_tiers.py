@@ -3,6 +3,9 @@
 import contextlib
 import importlib.util
 import math
+import os
+import subprocess
+import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple
@@ -13,7 +16,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp.compiled import disk_cache, tiered
+from netsp.compiled import chance, disk_cache, tiered
+from netsp.compiled.compile_lock import is_locked, locked
 from netsp.compiled.compile_policy import (
     CompilePolicy,
     compiled_by,
@@ -111,14 +115,31 @@ def ratio(a, b):
 """
 
 
-@pytest.fixture
-def kernels(tmp_path):
-    """A module of kernels that were never compiled before."""
-    (tmp_path / "fresh.py").write_text(MODULE)
-    spec = importlib.util.spec_from_file_location("fresh", tmp_path / "fresh.py")
+CALLERS = """
+from netsp.compiled.kernel import kernel
+
+@kernel
+def scaled(x, by, negative):
+    return -by * x if negative else by * x
+
+@kernel
+def caller(x):
+    return scaled(x, 1, False) + scaled(x, 0, True) + scaled(x, x - x, x > 0)
+"""
+
+
+def _module(folder, text):
+    """Return a module of kernels that were never compiled before."""
+    (folder / "fresh.py").write_text(text)
+    spec = importlib.util.spec_from_file_location("fresh", folder / "fresh.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture
+def kernels(tmp_path):
+    return _module(tmp_path, MODULE)
 
 
 NEVER = np.zeros(1, dtype=np.int64)
@@ -205,10 +226,7 @@ def test_a_call_is_broken_off_in_time_or_not_at_all():
 
 def test_without_what_numba_keeps_private_kernels_are_compiled_at_once(monkeypatch, tmp_path):
     monkeypatch.setattr(disk_cache, "is_supported", lambda: False)
-    (tmp_path / "plain.py").write_text(MODULE)
-    spec = importlib.util.spec_from_file_location("plain", tmp_path / "plain.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = _module(tmp_path, MODULE)
     assert module.ratio(7, 2) == 3
     assert module.ratio.signatures
 
@@ -216,6 +234,89 @@ def test_without_what_numba_keeps_private_kernels_are_compiled_at_once(monkeypat
 def test_this_release_of_numba_is_supported():
     assert disk_cache.is_supported()
     assert tiered.is_supported()
+
+
+SIGNATURES = """
+from netsp.compiled.compile_policy import everything_compiled
+from netsp.compiled.kernel import all_kernels
+from netsp.problem import Problem
+from netsp.solvers.solve import solve
+from netsp.worlds import random_world
+
+with everything_compiled():
+    solve(Problem.load("problems/wharf.json"))
+    world = random_world(1, goals=9, tether_length=300.0)
+    for solver in ("auto", "mip", "dp", "lns"):
+        solve(world, solver, iteration_limit=20)
+print(sum(len(k.signatures) > 0 for k in all_kernels()))
+for kernel in all_kernels():
+    if len(kernel.signatures) > 1:
+        print(kernel.py_func.__module__, kernel.py_func.__name__, *kernel.signatures)
+"""
+
+
+def test_each_kernel_is_compiled_for_one_signature():
+    done = subprocess.run(
+        [sys.executable, "-c", SIGNATURES], cwd=PROBLEMS[0].parent.parent, text=True,
+        capture_output=True, env={**os.environ, "PYTHONPATH": str(PROBLEMS[0].parent.parent)},
+    )  # fmt: skip
+    assert not done.returncode, done.stderr
+    count, *several = done.stdout.splitlines()
+    assert int(count) > 20
+    assert several == []
+
+
+def test_numbers_are_compiled_for_their_widest_type(kernels):
+    with everything_compiled():
+        assert kernels.ratio(np.int32(7), np.int8(2)) == kernels.ratio(7, 2) == 3
+    assert len(kernels.ratio.signatures) == 1
+
+
+def test_kernels_that_others_call_with_constants_are_compiled_once(tmp_path):
+    module = _module(tmp_path, CALLERS)
+    with everything_compiled():
+        assert module.caller(5) == 5
+    assert len(module.scaled.signatures) == 1
+
+
+def test_random_numbers_are_the_same_interpreted_and_compiled():
+    state, other = chance.seeded(np.random.default_rng(1)), chance.seeded(np.random.default_rng(1))
+    with everything_compiled():
+        drawn = [chance.uniform(state) for _ in range(1000)]
+    assert drawn == [interpreted(chance.uniform)(other) for _ in range(1000)]
+    assert state == other
+
+
+def test_a_kernel_that_another_process_compiles_is_waited_for_or_interpreted(kernels):
+    file = disk_cache.lock_file(kernels.ratio)
+    kernels.ratio.interpreted_s = 60.0  # more than its price
+    with locked(file) as is_held:
+        assert is_held
+        assert is_locked(file)
+        assert kernels.ratio(7, 2) == 3
+        assert not kernels.ratio.signatures
+    assert not is_locked(file)
+    assert not file.exists()
+    with everything_compiled():
+        assert kernels.ratio(7, 2) == 3
+    assert kernels.ratio.signatures
+
+
+def test_one_of_two_holds_a_lock_file(tmp_path):
+    file = tmp_path / "a.lock"
+    inside, most = [], []
+
+    def hold(_):
+        for _ in range(20):
+            with locked(file):
+                inside.append(1)
+                most.append(len(inside))
+                inside.pop()
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(hold, range(4)))
+    assert max(most) == 1
+    assert len(most) == 80
 
 
 @pytest.mark.parametrize("field", ["load_s", "compile_s", "compile_s_per_byte", "max_copied_bytes"])

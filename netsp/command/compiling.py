@@ -70,6 +70,58 @@ def _listener(preparation: Preparation) -> Any:
     return listener
 
 
+class CompileTimes:
+    """CPU seconds that each kernel took to compile, the kernels that it calls not counted.
+
+    Attributes
+    ----------
+    seconds : dict
+        By module and name; the types of a kernel add up.
+    """
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._within: list[tuple[float, float]] = []
+
+    @contextmanager
+    def measured(self) -> Iterator[None]:
+        """Measure while the body runs."""
+        from numba.core import event
+
+        times = self
+
+        class Listener(event.Listener):  # type: ignore[misc]
+            def on_start(self, record: Any) -> None:
+                times._within.append((time.thread_time(), 0.0))
+
+            def on_end(self, record: Any) -> None:
+                begin, called_s = times._within.pop()
+                whole_s = time.thread_time() - begin
+                name = kernel_name(record.data["dispatcher"])
+                times.seconds[name] = times.seconds.get(name, 0.0) + whole_s - called_s
+                if times._within:
+                    outer, so_far_s = times._within[-1]
+                    times._within[-1] = outer, so_far_s + whole_s
+
+        listener = Listener()
+        event.register("numba:compile", listener)
+        try:
+            yield
+        finally:
+            event.unregister("numba:compile", listener)
+
+
+def kernel_name(kernel: Any) -> str:
+    """Return module and name of a kernel.
+
+    Parameters
+    ----------
+    kernel : dispatcher
+        The kernel.
+    """
+    return f"{kernel.py_func.__module__.removeprefix('netsp.')}.{kernel.py_func.__name__}"
+
+
 class Preparation:
     """Progress of compiling, as it is shown.
 

@@ -17,7 +17,7 @@ import sys
 from collections.abc import Container, Sequence
 from typing import Any, NoReturn
 
-from netsp.command import messages
+from netsp.command import background_warm_up, messages
 from netsp.command.command_clock import begin_command
 from netsp.command.interrupts import interrupts_are_heard
 from netsp.errors import (
@@ -72,6 +72,8 @@ def _main(argv: Sequence[str] | None) -> int:
         with interrupts_are_heard(), messages.warnings_in_one_line():
             code = int(args.run(args))
         sys.stdout.flush()
+        if argv is None and wanted is not None and wanted != "warm-up":
+            background_warm_up.begin(wanted)
         return code
     except SeveralErrors as error:
         for complaint in error.complaints[:MOST_COMPLAINTS]:

@@ -11,23 +11,54 @@ from functools import partial
 
 EXAMPLE = "netsp warm-up"
 
+Step = tuple[str, Callable[[], object]]
+"""Name of a step, and the step."""
+
+NEEDED = {
+    "simulate": "mission", "cover": "space", "execute": "carried out", "fly": "carried out",
+    "guard": "guard",
+}  # fmt: skip
+"""Word in the names of the steps that compile what a command needs."""
+
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument("--quiet", action="store_true", help="no progress")
+    p.add_argument(
+        "--list", action="store_true",
+        help="print all functions with the CPU seconds that compiling each took, without those of "
+        "the functions that it calls; - for what was compiled before",
+    )  # fmt: skip
+    p.add_argument("--after", default=None, metavar="COMMAND", help=argparse.SUPPRESS)
 
 
 def run(args: argparse.Namespace) -> int:
     """Compile, and return the exit code."""
-    from netsp.command.compiling import compile_messages
-    from netsp.command.patience import span
+    from netsp.command.background_warm_up import alone
+    from netsp.command.compiling import CompileTimes
     from netsp.compiled.compile_policy import everything_compiled
 
-    messages = contextlib.nullcontext() if args.quiet else compile_messages(sys.stderr)
-    with messages, everything_compiled():
-        every, begin = list(steps()), time.monotonic()
+    times = CompileTimes()
+    with everything_compiled(), times.measured():
+        if args.after is None:
+            _compile(list(steps()), args.quiet)
+        else:
+            with alone() as is_alone:
+                _compile(_likely_first(list(steps()), args.after) if is_alone else [], True)
+    if args.list:
+        _print(times.seconds)
+    return 0
+
+
+def _compile(every: list[Step], quiet: bool) -> None:
+    """Run all steps, and tell how far they are."""
+    from netsp.command.compiling import compile_messages
+    from netsp.command.patience import span
+
+    begin = time.monotonic()
+    with contextlib.nullcontext() if quiet else compile_messages(sys.stderr):
         for done, (name, step) in enumerate(every):
-            if not args.quiet:
+            if not quiet:
                 left = (time.monotonic() - begin) / max(done, 1) * (len(every) - done)
                 more = f", about {span(left)} left" if done else ""
                 print(
@@ -35,10 +66,27 @@ def run(args: argparse.Namespace) -> int:
                     file=sys.stderr, flush=True,
                 )  # fmt: skip
             step()
-    return 0
 
 
-def steps() -> Iterator[tuple[str, Callable[[], object]]]:
+def _likely_first(every: list[Step], command: str) -> list[Step]:
+    """Return the steps with those first that a user of a command needs next."""
+    words = NEEDED.get(command, "solver")
+    return sorted(every, key=lambda step: words not in step[0])
+
+
+def _print(seconds: dict[str, float]) -> None:
+    """Print all kernels, the dearest first."""
+    from netsp.command.compiling import kernel_name
+    from netsp.compiled.kernel import all_kernels
+
+    names = {kernel_name(kernel) for kernel in all_kernels()} | set(seconds)
+    for name in sorted(names, key=lambda name: (-seconds.get(name, 0.0), name)):
+        spent = f"{seconds[name]:7.2f}" if name in seconds else f"{'-':>7}"
+        print(f"{spent}  {name}")
+    print(f"{sum(seconds.values()):7.2f}  in all, {len(names)} functions")
+
+
+def steps() -> Iterator[Step]:
     """What to run so that all kernels are compiled, with names."""
     import numpy as np
 

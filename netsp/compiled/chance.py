@@ -12,7 +12,10 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from netsp.compiled.interpretation import interprets
 from netsp.compiled.kernel import kernel
+
+WORD = 2**64 - 1  # mask of 64 bits
 
 
 def seeded(rng: np.random.Generator) -> npt.NDArray[np.uint64]:
@@ -29,6 +32,17 @@ def uniform(state: npt.NDArray[np.uint64]) -> float:
     x ^= x >> np.uint64(27)
     state[0] = x
     return np.float64((x * np.uint64(2685821657736338717)) >> np.uint64(11)) / 9007199254740992.0
+
+
+@interprets(uniform)
+def _uniform_by_integers(state: npt.NDArray[np.uint64]) -> float:
+    """Do as `uniform`, with Python's integers: NumPy warns where a product overflows."""
+    x = int(state[0])
+    x ^= x >> 12
+    x = (x ^ (x << 25)) & WORD
+    x ^= x >> 27
+    state[0] = x
+    return ((x * 2685821657736338717 & WORD) >> 11) / 9007199254740992.0
 
 
 @kernel

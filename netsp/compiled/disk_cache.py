@@ -54,6 +54,11 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
         name = self._load_index().get(key)
         return name is not None and Path(self._data_path(name)).is_file()
 
+    @property
+    def lock(self) -> Path:
+        """The file that is locked while the kernel is compiled."""
+        return Path(self._index_path).with_suffix(".lock")
+
     def _tidy(self, named: set[str]) -> None:
         """Remove files of sources that are no more; whoever looks for one compiles anew."""
         of_all = glob.escape(self._index_name.removesuffix(".nbi")) + ".*.nbc"
@@ -102,6 +107,17 @@ def is_on_disk(dispatcher: Any, types: tuple[Any, ...]) -> bool:
     return False
 
 
+def lock_file(dispatcher: Any) -> Path:
+    """Return the file that is locked while a kernel is compiled.
+
+    Parameters
+    ----------
+    dispatcher : numba dispatcher
+        Dispatcher that `keep_on_disk` was called for.
+    """
+    return Path(dispatcher._cache._cache_file.lock)
+
+
 @cache
 def is_supported() -> bool:
     """Return whether this release of Numba has all that `keep_on_disk` relies on.
@@ -123,7 +139,10 @@ def is_supported() -> bool:
         isinstance(kept, IndexDataCacheFile)
         and needed <= set(dir(kept))
         and callable(getattr(own, "_index_key", None))
-        and all(hasattr(kept, name) for name in ("_cache_path", "_index_name", "_source_stamp"))
+        and all(
+            hasattr(kept, name)
+            for name in ("_cache_path", "_index_name", "_index_path", "_source_stamp")
+        )
     )
 
 

@@ -40,6 +40,16 @@ def kernel(function: F) -> F:
     return _dispatcher_of(function)  # type: ignore[no-any-return]
 
 
+def all_kernels() -> list[Any]:
+    """Return the dispatchers of all kernels in the modules that are imported; loads Numba."""
+    from netsp.compiled.tiered import TieredDispatcher
+
+    modules = [m for name, m in list(sys.modules.items()) if name.startswith("netsp.")]
+    values = [v for m in modules for v in list(vars(m).values())]
+    made = {v.dispatcher for v in values if isinstance(v, Kernel)}
+    return list(made | {v for v in values if isinstance(v, TieredDispatcher)})
+
+
 class Kernel:
     """A kernel for which Numba may not be loaded yet.
 

@@ -7,19 +7,25 @@ solved sooner without. Whether a kernel runs interpreted or compiled changes no 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from time import thread_time
 from typing import Any
 
-from numba import njit
+from numba import int64, njit
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
+from numba.core.types import Boolean, Integer, unliteral  # type: ignore[attr-defined]
 
 from netsp.compiled import disk_cache
 from netsp.compiled.arguments import call_interpreted, call_within, can_be_interpreted
+from netsp.compiled.compile_lock import is_locked, locked
 from netsp.compiled.compile_policy import compiles, current_policy
 from netsp.compiled.interpretation import interpreted, names_used
 from netsp.compiled.overtime import Overtime
+
+OVERRIDDEN = ("compile", "get_call_template")
+"""Methods of Numba's dispatcher that `TieredDispatcher` refines."""
 
 
 class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
@@ -32,23 +38,47 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
     ----------
     interpreted_s : float
         CPU seconds that the function has run interpreted.
+    has_compiled : bool
+        Whether any kernel was compiled in this process; an attribute of the class.
     """
 
     interpreted_s = 0.0
+    has_compiled = False
 
     def _compile_for_args(self, *args: Any, **kwargs: Any) -> Callable[..., Any]:
         policy = current_policy()
         if policy.is_eager or kwargs:
             return self._compiled(args, kwargs)
-        types = tuple(self.typeof_pyval(a) for a in args)
+        types = _general(self.typeof_pyval(a) for a in args)
         on_disk = disk_cache.is_on_disk(self, types)
         budget_s = policy.load_s if on_disk else policy.price_s(self.bytecode())
         budget_s -= self.interpreted_s
         is_shared = threading.current_thread().name.startswith("ThreadPoolExecutor")
         can_be = can_be_interpreted(args, policy.max_copied_bytes)
+        if budget_s <= 0.0 and not on_disk and is_locked(disk_cache.lock_file(self)):
+            budget_s = policy.price_s(self.bytecode())  # another process compiles it just now
         if budget_s <= 0.0 or not can_be or (is_shared and on_disk):
             return self._compiled(args, kwargs)
         return self._run_pooled if is_shared else self._within(budget_s)
+
+    def compile(self, sig: Any) -> Any:
+        """Compile for argument types, or load what another process has compiled for them.
+
+        Numbers are compiled for their widest type: a kernel that is called with 0, 1 and a number
+        of 32 bits is compiled once.
+        """
+        types = _general(sig) if isinstance(sig, tuple) else sig
+        if types in self.overloads or disk_cache.is_on_disk(self, types):
+            return super().compile(types)
+        with global_compiler_lock, locked(disk_cache.lock_file(self)):
+            TieredDispatcher.has_compiled = True
+            return super().compile(types)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Return what Numba needs to compile a call of this kernel by another one."""
+        return super().get_call_template(
+            _general(args), dict(zip(kws, _general(kws.values()), strict=True))
+        )
 
     def _compiled(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Callable[..., Any]:
         return super()._compile_for_args(*args, **kwargs)  # type: ignore[no-any-return]
@@ -82,6 +112,17 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         """Return the bytes of the function's bytecode, with the kernels that it calls and that are
         not compiled."""
         return sum(len(k.py_func.__code__.co_code) for k in _called(self) if not k.overloads)
+
+
+def _general(types: Iterable[Any]) -> tuple[Any, ...]:
+    """Return argument types with the widest type of each number, none for one value only."""
+    return tuple(map(_widest, types))
+
+
+def _widest(kind: Any) -> Any:
+    kind = unliteral(kind)
+    is_narrow = isinstance(kind, Integer) and kind.bitwidth < 64  # type: ignore[attr-defined]
+    return int64 if is_narrow and not isinstance(kind, Boolean) else kind
 
 
 @cache
@@ -118,6 +159,7 @@ def is_supported() -> bool:
 
     try:
         probed.__class__ = Probe
-        return probed(1) == -1 and len(seen) == 1 and not probed.overloads
+        is_called = probed(1) == -1 and len(seen) == 1 and not probed.overloads
+        return is_called and all(callable(getattr(Probe, k, None)) for k in OVERRIDDEN)
     except (AttributeError, TypeError):
         return False

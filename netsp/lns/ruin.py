@@ -52,7 +52,8 @@ def ruin_and_recreate(
     )  # fmt: skip
     grown, rest = links.grown.copy(), links.rest.copy()
     out = np.zeros(n, dtype=np.bool_)
-    gone, place, work = np.empty((3, n), dtype=np.int64)
+    gone, place = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    work = np.empty(n, dtype=np.int64)
     key, row = np.empty(n), np.empty(ahead.shape[1])
     for _ in range(count):
         # strings around clusters near a seed, as in the paper, section 3.1

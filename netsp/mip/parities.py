@@ -31,6 +31,7 @@ from itertools import combinations
 import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
+from netsp.compiled.interpretation import interprets
 from netsp.compiled.kernel import kernel
 from netsp.hsignature import Word
 from netsp.mip.cuts import Cut
@@ -201,3 +202,18 @@ def _cost(ends: Ints, flow: Floats, sides: Bools) -> tuple[float, int]:
     if odd:
         return total, -1
     return total + least, at
+
+
+@interprets(_cost)
+def _cost_in_numpy(ends: Ints, flow: Floats, sides: Bools) -> tuple[float, int]:
+    """Do as `_cost`, all pairs at once."""
+    if not len(ends):
+        return np.inf, -1
+    q = np.where(sides[ends[:, 0]] == sides[ends[:, 1]], flow[:, 1], flow[:, 0])
+    is_tooth = q > 0.5
+    total = float(np.cumsum(np.where(is_tooth, 1.0 - q, q))[-1])  # in the order of the pairs
+    if np.count_nonzero(is_tooth) % 2:
+        return total, -1
+    off = np.abs(1.0 - 2.0 * q)
+    at = int(off.argmin())
+    return total + float(off[at]), at

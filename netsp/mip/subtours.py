@@ -97,7 +97,7 @@ def goal_cuts(legs: Ints, y: Floats, cluster: Ints) -> list[Cut]:
     for some that no set is crossed more for having together. They say nothing of classes, so that
     no other class of a goal gets round them."""
     between = shrunk(legs, y, cluster)
-    tail, head = np.nonzero(np.triu(between))
+    tail, head = map(np.ascontiguousarray, np.nonzero(np.triu(between)))
     goals = np.arange(1, len(between))
     sets, which, _ = min_cuts(
         len(between), tail, head, between[tail, head], np.arange(len(between)), 0, goals,

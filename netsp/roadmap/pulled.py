@@ -295,7 +295,7 @@ def _named(
         bends -= 1  # that is its end
     on[0, NODE] = from_
     x, y = place[u, 0], place[u, 1]
-    _note(0, x, y, cell[u], at)
+    _note(0, x, y, float(cell[u]), at)
     count = 1
     before = -1
     for c in range(bends):
@@ -336,7 +336,7 @@ def _named(
         if count + 2 >= MOST_NODES:
             return 0
     on[count, NODE] = to
-    _note(count, place[v, 0], place[v, 1], cell[v], at)
+    _note(count, place[v, 0], place[v, 1], float(cell[v]), at)
     return count + 1
 
 

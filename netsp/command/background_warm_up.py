@@ -1,0 +1,54 @@
+"""Compiles what is likely needed next, in a process of its own, after a command has ended."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+VARIABLE = "NETSP_BACKGROUND"
+"""Environment variable that turns this off where it is 0."""
+
+LOWEST_PRIORITY = 19
+"""Niceness of the process; anything else that wants the processor gets it first."""
+
+
+def begin(command: str) -> None:
+    """Start the process if a command had to compile something; the command need not wait for it.
+
+    Small problems compile nothing, so that they start no process.
+
+    Parameters
+    ----------
+    command : str
+        Name of the command, which tells what is likely needed next.
+    """
+    tiered = sys.modules.get("netsp.compiled.tiered")
+    is_wanted = os.environ.get(VARIABLE, "1") != "0" and os.name == "posix"
+    if tiered is None or not tiered.TieredDispatcher.has_compiled or not is_wanted:
+        return
+    import subprocess
+
+    with contextlib.suppress(OSError):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "netsp", "warm-up", "--quiet", "--after", command],
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            cwd=Path(__file__).resolve().parents[2], start_new_session=True,
+            env={**os.environ, VARIABLE: "0"},
+        )  # fmt: skip
+        process.returncode = 0  # nobody waits for it
+
+
+@contextlib.contextmanager
+def alone() -> Iterator[bool]:
+    """Run the body at the lowest priority; yield whether no other such process is under way."""
+    from netsp.compiled import growing
+    from netsp.compiled.compile_lock import locked
+    from netsp.compiled.disk_cache import lock_file
+
+    os.nice(LOWEST_PRIORITY)
+    file = lock_file(growing.longer).with_name("background.lock")
+    with locked(file, wait=False) as is_alone:
+        yield is_alone

@@ -1,0 +1,73 @@
+"""Locks that keep two processes from compiling the same kernel."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+try:
+    import fcntl
+except ImportError:  # on Windows two processes may compile the same kernel; both keep the same
+    fcntl = None  # type: ignore[assignment]
+
+
+@contextlib.contextmanager
+def locked(file: Path, wait: bool = True) -> Iterator[bool]:
+    """Hold a lock file while the body runs; yield whether this process has it.
+
+    The lock ends with the process, however that ends. Where a folder takes no files there is no
+    lock, and the body runs as if it had it.
+
+    Parameters
+    ----------
+    file : Path
+        The lock file, which is removed in the end.
+    wait : bool
+        Whether to wait for a process that holds it.
+    """
+    descriptor, is_held = _taken(file, wait)
+    try:
+        yield is_held
+    finally:
+        if descriptor is not None:
+            if is_held:
+                file.unlink(missing_ok=True)  # whoever waits for it looks whether it is still there
+            os.close(descriptor)
+
+
+def _taken(file: Path, wait: bool) -> tuple[int | None, bool]:
+    """Return the descriptor of the lock file, if there is one, and whether it is locked by us."""
+    if fcntl is None:
+        return None, True
+    while True:
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError:
+            return None, True
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except BlockingIOError:
+            return descriptor, False
+        except OSError:  # a file system without locks
+            return descriptor, True
+        with contextlib.suppress(OSError):
+            if os.fstat(descriptor).st_ino == file.stat().st_ino:
+                return descriptor, True
+        os.close(descriptor)  # removed by its last owner meanwhile
+
+
+def is_locked(file: Path) -> bool:
+    """Return whether another process, or another thread, holds a lock file.
+
+    Parameters
+    ----------
+    file : Path
+        The lock file.
+    """
+    if fcntl is None or not file.exists():
+        return False
+    with locked(file, wait=False) as is_held:
+        return not is_held
