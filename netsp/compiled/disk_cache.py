@@ -107,6 +107,19 @@ def is_on_disk(dispatcher: Any, types: tuple[Any, ...]) -> bool:
     return False
 
 
+def is_any_on_disk(dispatcher: Any) -> bool:
+    """Return whether a kernel was compiled for any argument types before.
+
+    Parameters
+    ----------
+    dispatcher : numba dispatcher
+        Dispatcher that `keep_on_disk` was called for.
+    """
+    with contextlib.suppress(OSError):
+        return bool(dispatcher._cache._cache_file._load_index())
+    return False
+
+
 def lock_file(dispatcher: Any) -> Path:
     """Return the file that is locked while a kernel is compiled.
 

@@ -40,6 +40,19 @@ def kernel(function: F) -> F:
     return _dispatcher_of(function)  # type: ignore[no-any-return]
 
 
+def is_kept(kernel: Any) -> bool:
+    """Return whether a kernel was compiled on this machine before, for any types; loads Numba.
+
+    Parameters
+    ----------
+    kernel : callable
+        Function that `kernel` decorates.
+    """
+    from netsp.compiled import disk_cache
+
+    return disk_cache.is_supported() and disk_cache.is_any_on_disk(kernel)
+
+
 def all_kernels() -> list[Any]:
     """Return the dispatchers of all kernels in the modules that are imported; loads Numba."""
     from netsp.compiled.tiered import TieredDispatcher

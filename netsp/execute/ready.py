@@ -8,7 +8,9 @@ from functools import cache
 import numpy as np
 
 from netsp.clock import interrupts_remembered
-from netsp.compiled.compile_policy import compiles, everything_compiled
+from netsp.compiled.compile_policy import compiles, current_policy, everything_compiled
+from netsp.compiled.kernel import is_kept
+from netsp.dp.labels import extend
 from netsp.execute.repair import repair
 from netsp.problem import Circle, Goal, Problem, State
 from netsp.roadmap.from_state import graph_from_state
@@ -17,6 +19,16 @@ from netsp.worlds import random_world
 
 _SOLVERS = (("dp", None), ("mip", None), ("lns", 200), ("auto", 30))
 """Between them, with these iteration limits, they call all that a new order may take."""
+
+
+def should_make_ready() -> bool:
+    """Return whether all that a repair needs is to be loaded before there is one.
+
+    It is before a flight (`everything_compiled`), and where it was compiled before. On a machine
+    that compiled nothing yet, a simulated tour is carried out interpreted, as far as that goes:
+    compiling all that a repair may need would take a minute.
+    """
+    return compiles() and (current_policy().is_eager or is_kept(extend))
 
 
 @cache

@@ -14,7 +14,7 @@ from netsp.execute.aside import aside
 from netsp.execute.events import Event, Surprises, changed, index_of
 from netsp.execute.log import Arrival, Entry, Execution, ExecutionOptions, ExecutionRow
 from netsp.execute.plan import HOME, Leg, legs_of
-from netsp.execute.ready import make_ready
+from netsp.execute.ready import make_ready, should_make_ready
 from netsp.execute.repair import Repair, broken, reachable, repair
 from netsp.execute.run_record import Begun, LeftOut, RunRecord, RunState
 from netsp.fields import LARGEST, checked_argument, checked_instance
@@ -446,7 +446,8 @@ def execute(
             f"delta: expected at most {coarsest:.4g}, or the tether would slip through the "
             f"thinnest obstacle, got {options.delta!r}"
         )
-    if (surprises.events or incoming is not None or begun is not None) and options.repair:
+    is_live = incoming is not None or begun is not None
+    if options.repair and (is_live or (surprises.events and should_make_ready())):
         make_ready()
     begin = time.perf_counter()
     run = _Run(problem, solution, options, vehicle, begun)

@@ -232,16 +232,19 @@ def _between_in_numpy(
 ) -> float:  # fmt: skip
     """Do as `between`, all vertices of the clusters at once."""
     q = after[p]
-    own, left, right = (slice(start[k], start[k + 1]) for k in (c, p, q))
-    far = ahead[p, : left.stop - left.start]
-    now = np.fmin.reduce(far + behind[p, : len(far)], initial=np.inf) + rest[p]
+    left, right = start[p], start[q]
+    left_end, right_end = start[p + 1], start[q + 1]
+    far = ahead[p, : left_end - left]
+    now = float(np.fmin.reduce(far + behind[p, : left_end - left]) + rest[p])
     if nearest[p, c] + nearest[c, q] - now >= most:
         return most
     limit = float(most + now)
-    there = np.fmin.reduce(far + costs[own, left], axis=1, initial=np.inf)
-    onward = there[:, None] + costs[own, right] + behind[q, : right.stop - right.start]
-    best = float(np.fmin.reduce(onward, axis=None, initial=limit))
-    return best - float(now) if best < limit else most
+    legs = costs[start[c] : start[c + 1]]
+    there = np.fmin.reduce(legs[:, left:left_end] + far, 1)
+    onward = there[:, None] + legs[:, right:right_end]
+    onward += behind[q, : right_end - right]
+    best = float(np.fmin.reduce(onward, None))
+    return best - now if best < limit else most
 
 
 @kernel
