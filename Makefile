@@ -23,6 +23,8 @@ $(VENV)/.installed: $(VENV)/.core
 	$(BIN)/netsp warm-up --quiet
 	touch $@
 
+# bytecode of what the demo imports is kept for the commands after it, whatever the shell says
+demo: export PYTHONDONTWRITEBYTECODE =
 demo: $(VENV)/.core
 	mkdir -p $(DEMO)
 	$(BIN)/netsp solve problems/wharf.json -o $(DEMO)/wharf-solution.json --plot $(DEMO)/wharf.png
