@@ -77,7 +77,7 @@ def executed(folder: Path, cache: Path) -> float:
 
 def simulated(folder: Path, cache: Path) -> float:
     """Simulate the mission of the basin."""
-    return cpu_s(folder, cache, "simulate", ROOT / "missions" / "basin.json", "-o", "run")
+    return cpu_s(folder, cache, "simulate", ROOT / "missions" / "basin.json")
 
 
 def warmed_up(folder: Path, cache: Path) -> float:

@@ -36,11 +36,12 @@ def fly(
     `check` has the mission's tour judged before; `inputs` are files that must not be overwritten;
     `how` is as of `simulate`. Ctrl-C ends the flight, and what was flown is written."""
     from netsp.clock import until_interrupt
+    from netsp.compiled.compile_policy import long_work
 
     if output is not None:
         there = [str(Path(output) / name) for name in WRITTEN if (Path(output) / name).exists()]
         check_writable(*there, inputs=inputs)
-    with until_interrupt(None) as clock:
+    with until_interrupt(None) as clock, long_work():
         try:
             runs = _flown(
                 mission, planners, clock, output=output, quiet=quiet, surprises=surprises,

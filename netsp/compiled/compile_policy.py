@@ -33,6 +33,9 @@ class CompilePolicy:
     compile_s_per_byte : float
         CPU seconds that each byte of a kernel, and of the kernels that it calls, adds. The
         three are estimates; wrong ones cost time, and never change a result.
+    price_share : float
+        Share of its price that a kernel runs interpreted before it is compiled. The default wastes
+        least where nothing is known of the work; less is better where it is known to be long.
     max_copied_bytes : int
         Size of arguments above which a kernel is never interpreted: an interpreted call that takes
         too long is begun again from copies of its arguments.
@@ -44,6 +47,7 @@ class CompilePolicy:
     load_s: float = 0.02
     compile_s: float = 0.2
     compile_s_per_byte: float = 0.001
+    price_share: float = 1.0
     max_copied_bytes: int = 64 * 2**20
     is_eager: bool = False
 
@@ -95,6 +99,19 @@ def compiled_by(policy: CompilePolicy) -> Iterator[None]:
 def everything_compiled() -> Iterator[None]:
     """Compile every kernel at its first call while the body runs."""
     with compiled_by(replace(_policy, is_eager=True)):
+        yield
+
+
+@contextlib.contextmanager
+def long_work(price_share: float = 0.05) -> Iterator[None]:
+    """Compile kernels soon while the body runs, because its work is known to be long.
+
+    Parameters
+    ----------
+    price_share : float
+        Share of its price that a kernel runs interpreted (`CompilePolicy`).
+    """
+    with compiled_by(replace(_policy, price_share=price_share)):
         yield
 
 

@@ -51,7 +51,9 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
             return self._compiled(args, kwargs)
         types = _general(self.typeof_pyval(a) for a in args)
         on_disk = disk_cache.is_on_disk(self, types)
-        budget_s = policy.load_s if on_disk else policy.price_s(self.bytecode())
+        budget_s = policy.load_s
+        if not on_disk:
+            budget_s = policy.price_share * policy.price_s(self.bytecode())
         budget_s -= self.interpreted_s
         is_shared = threading.current_thread().name.startswith("ThreadPoolExecutor")
         can_be = can_be_interpreted(args, policy.max_copied_bytes)
