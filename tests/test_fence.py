@@ -192,6 +192,8 @@ def test_the_command_writes_missions_of_cockpit_and_says_what_the_fence_lacks(
     assert main([*line, str(tmp_path / "m.plan"), "--fence-bytes", "2000"]) == 0
     assert "left out of the fence" not in capsys.readouterr().err
     assert main([*line, str(tmp_path / "m.cmp")]) == 0
-    assert "not written in this format" in (err := capsys.readouterr().err) and "obstacles" in err
+    assert "not written in this format: the tether's length, the clearance, obstacles" in (
+        capsys.readouterr().err
+    )
     load_cockpit(json.loads((tmp_path / "m.cmp").read_text()))
     assert isinstance(Solution.load(tmp_path / "s.json"), Solution)
