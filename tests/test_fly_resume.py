@@ -10,7 +10,7 @@ import pytest
 from netsp import Circle, Problem, solve
 from netsp.command.main import main
 from netsp.errors import InputError
-from netsp.execute.events import Event
+from netsp.execute.events import Event, Surprises
 from netsp.execute.log import ExecutionOptions
 from netsp.execute.run_record import RunRecord, RunState
 from netsp.fly import flight
@@ -93,6 +93,30 @@ def test_events_outlive_a_flight_that_was_killed(tour, tmp_path):
     assert (state.left, state.cancelled) == ((0,), (1,))
 
 
+def test_a_flight_is_resumed_when_an_obstacle_stands_on_a_goal(tour, tmp_path):
+    last = tour.tour[-1].goal
+    boat = Circle(center=SITE.goals[last].position[:2], radius=0.4, name="boat")
+    events = [[], [], [Event(time=0, appear=boat)]]
+    session = killed(tour, tmp_path, 9.0, incoming=lambda: events.pop(0) if events else [])
+    problem, plan, state = read_run(tmp_path)
+    assert [g.goal for g in state.left_out] == [last]
+    done = fly(problem, plan, after_kill(session), OPTIONS, begins=from_record(problem, state))
+    assert (done.summary["home"], done.summary["tether_free"]) == (True, True)
+    assert "boat stands on it" in done.left_out[last]
+
+
+def test_a_resumed_flight_keeps_the_reserve_of_its_plan(tour, tmp_path):
+    session = killed(
+        tour, tmp_path, 8.0, surprises=Surprises(events=(Event(time=2.0, tether_length=9.0),))
+    )
+    problem, plan, state = read_run(tmp_path)
+    assert problem.tether_length == 9.0
+    longest = max(v.tether_length for v in tour.tour)
+    assert state.reserve == pytest.approx(min(1.2, 12.0 - longest))
+    done = fly(problem, plan, after_kill(session), OPTIONS, begins=from_record(problem, state))
+    assert done.reserve == state.reserve
+
+
 @pytest.mark.parametrize("word", ["1", ""])
 def test_a_flight_begins_where_the_vehicle_is_with_the_class_of_the_operator(tour, word):
     """Between the base and a vehicle beyond the pile the tether lies on one side or the other."""
@@ -119,8 +143,12 @@ def test_a_class_that_is_not_known_is_asked_for(tour, tmp_path):
             parse_class(text)
     with pytest.raises(InputError, match="up to 1"):
         from_word(SITE, (2,), state)
-    for bad in ({"left": (2,)}, {"tether": ((1, 0, 0), (3, 0, -1))}):
-        with pytest.raises(InputError, match=r"left|tether"):
+    for bad, field in (
+        ({"left": (2,)}, "left"), ({"tether": ((1, 0, 0), (3, 0, -1))}, "tether"),
+        ({"cancelled": (2,)}, "cancelled"), ({"left": (0, 0)}, "left"),
+        ({"left": (0,), "cancelled": (0,)}, "left"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=f"state.json: {field}: expected"):
             state.model_copy(update=bad).check(SITE, "state.json")
     with pytest.raises(InputError, match=r"state\.json"):
         read_run(tmp_path)

@@ -99,6 +99,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--planning-limit", type=seconds, metavar="S",
         help="seconds that a repair may take, while the vehicle holds its place; default 2",
     )  # fmt: skip
+    p.add_argument(
+        "--reserve", type=length, metavar="R",
+        help="tether that repairs keep in reserve, m; default: as the plan does, at most a tenth "
+        "of the limit",
+    )  # fmt: skip
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="of solvers; default 0")
     p.add_argument("-o", "--output", metavar="RUN", help="folder for logs, summary and run.png")
     clearance_flags(p)
@@ -241,6 +246,7 @@ def _flown(
     from netsp.execute.log import ExecutionOptions
     from netsp.execute.repair import REPLAN_S
     from netsp.execute.run_record import RunRecord
+    from netsp.execute.tether_reserve import ReservePolicy
     from netsp.files import output_folder
     from netsp.fly.flight import check_options, fly
     from netsp.fly.rehearsal import rehearse
@@ -254,6 +260,7 @@ def _flown(
     options = ExecutionOptions(
         speed=args.speed, reach=args.reach, seed=args.seed,
         planning_limit=REPLAN_S if args.planning_limit is None else args.planning_limit,
+        reserve_policy=ReservePolicy(args.reserve),
     )  # fmt: skip
     assert surprises is None or isinstance(surprises, Surprises)
     address = Address.parse(args.link)
