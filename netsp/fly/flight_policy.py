@@ -22,16 +22,30 @@ class FlightPolicy:
         be bad until the flight is stopped, s. The estimate drifts meanwhile.
     max_gps_age_s
         Longest time without a message of a GPS, s; three of its usual intervals if they are longer.
+    max_frozen_s
+        Time for which the position may stay the same to the last bit while the vehicle moves or is
+        told to, s. Positions of a moving vehicle change within half a second.
+    min_frozen_speed
+        Speed that a vehicle tells from which on its position must change, m/s; the same in depth.
     max_unaided_hold_s
         Time for which a vehicle without a source holds its place by its estimate, s, before it is
         put into ALT_HOLD: long enough to stop, and short of where the estimate leads it away.
     max_path_error
-        Largest distance in the plan from the line to the target, metres. ArduSub keeps within 0.2,
-        and within 0.5 where it brakes into a bend; a larger distance means that the vehicle was
-        carried off, or that its estimate was set anew.
+        Largest distance in the plan from the way to the target, metres: from the straight leg, and
+        after a bend from the triangle of the leg and the point where the vehicle came to a stop.
+        ArduSub keeps within 0.2; a larger distance means that the vehicle was carried off, or that
+        its estimate was set anew.
     max_depth_error
         Largest distance above or below the depths between which the leg runs, metres. A vehicle
         that lags in depth on a sloping leg is between them, and is let go on.
+    stopping_s
+        Longest way in which a vehicle comes to a stop when its target changes, over its speed, s.
+        ArduSub takes 1 s of its speed in still water (1 / PSC_POSXY_P), and nearly 2 in a current
+        of 0.8 m/s.
+    min_return
+        Way back towards the leg after which a vehicle has come to its stop beyond a bend, metres.
+    max_speed
+        Highest speed that a vehicle is believed to have when its target changes, m/s.
     resend_s
         Time after which a target is sent again if the vehicle echoes another one, or neither echoes
         any nor moves towards it, s. A target that is sent again is planned for anew: the vehicle
@@ -62,9 +76,14 @@ class FlightPolicy:
     max_position_age_s: float = 2.0
     min_source_loss_s: float = 0.6
     max_gps_age_s: float = 1.2
+    max_frozen_s: float = 1.5
+    min_frozen_speed: float = 0.1
     max_unaided_hold_s: float = 2.0
     max_path_error: float = 1.0
     max_depth_error: float = 1.0
+    stopping_s: float = 2.0
+    min_return: float = 0.2
+    max_speed: float = 3.0
     resend_s: float = 2.0
     max_resends: int = 3
     max_echo_error: float = 0.15

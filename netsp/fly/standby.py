@@ -44,6 +44,9 @@ CONSEQUENCES = {
 LOOK_S = 0.1
 """Seconds between two looks at what came."""
 
+ASK_AGAIN_S = 0.5
+"""Seconds after which a mode that the vehicle does not have yet is asked for again."""
+
 
 def stand_by(
     session: Session,
@@ -83,6 +86,27 @@ def stand_by(
         return "Ctrl-C"
 
 
+def do_without_estimate(session: Session, policy: FlightPolicy) -> None:
+    """Put a vehicle that would follow a wrong estimate into ALT_HOLD; ask again until it is.
+
+    Parameters
+    ----------
+    session : Session
+        The vehicle.
+    policy : FlightPolicy
+        Limits.
+    """
+    waited, ask_at = 0.0, 0.0
+    while session.now.mode in (mode_name(GUIDED), mode_name(POSHOLD)):
+        if waited >= policy.max_answer_s or session.silent_s > policy.max_silence_s:
+            return
+        if waited >= ask_at:
+            ask_at = waited + ASK_AGAIN_S
+            session.command(dialect().MAV_CMD_DO_SET_MODE, 1, ALT_HOLD)
+        session.sleep(LOOK_S)
+        waited += LOOK_S
+
+
 class _Standby:
     """A vehicle that is looked after.
 
@@ -92,6 +116,8 @@ class _Standby:
         Whether it was told where to stay since the link was there last.
     is_unaided
         Whether it was put into ALT_HOLD because it has no estimate.
+    has_told
+        Whether it was said that the estimate is of no use.
     unaided_since
         Time by the vehicle's clock since which it has no source of its estimate.
     ask_again
@@ -107,7 +133,7 @@ class _Standby:
         self.session, self.ending, self.say = session, ending, say
         self.vehicle = LinkedVehicle(session, 1.0, policy)
         self.policy = self.vehicle.policy
-        self.is_held = self.is_unaided = False
+        self.is_held = self.is_unaided = self.has_told = False
         self.ask_again = -np.inf
         self.unaided_since: float | None = None
         self.strangers: set[int] = set()
@@ -190,11 +216,15 @@ class _Standby:
             return
         if self.unaided_since is None:
             self.unaided_since = now.time
-        wait = 0.0 if now.estimate is False else self.policy.max_unaided_hold_s
-        if now.time - self.unaided_since >= wait and not self.is_unaided:
-            self.is_unaided = True
-            self.say(f"the position estimate is of no use ({lost or 'lost'}): ALT_HOLD")
-            self.session.command(dialect().MAV_CMD_DO_SET_MODE, 1, ALT_HOLD)
+        is_useless = now.estimate is False or self.session.is_distrusted
+        wait = 0.0 if is_useless else self.policy.max_unaided_hold_s
+        is_heard = self.session.silent_s <= self.policy.max_silence_s
+        if is_heard and now.time - self.unaided_since >= wait and not self.is_unaided:
+            if not self.has_told:
+                self.has_told = True
+                self.say(f"the position estimate is of no use ({lost or 'lost'}): ALT_HOLD")
+            do_without_estimate(self.session, self.policy)
+            self.is_unaided = self.session.now.mode == mode_name(ALT_HOLD)
 
     def _outlook(self) -> str:
         """Tell what the vehicle does now, and what it will do."""

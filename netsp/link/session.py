@@ -75,6 +75,7 @@ class Session:
         self._station: tuple[int, float] | None = None
         self._echoes = TargetEcho(frame)
         self._sources = PositionSources()
+        self._distrust: str | None = None
         self._echo: tuple[Point3, float] | None = None
         self._said = itertools.count()
         self._stop = threading.Event()
@@ -226,7 +227,26 @@ class Session:
         """
         with self._lock:
             time = self._listener.time
-            return None if time is None else self._sources.lost(time, confirm_s, max_age_s)
+            if self._distrust is not None or time is None:
+                return self._distrust
+            return self._sources.lost(time, confirm_s, max_age_s)
+
+    @property
+    def is_distrusted(self) -> bool:
+        """Return whether the positions are of no use, not even to stop by."""
+        with self._lock:
+            return self._distrust is not None
+
+    def distrust(self, why: str) -> None:
+        """Take the positions of the vehicle for lost from now on, whatever it says of them.
+
+        Parameters
+        ----------
+        why : str
+            Reason, for messages.
+        """
+        with self._lock:
+            self._distrust = why
 
     @property
     def echo(self) -> tuple[Point3, float] | None:
