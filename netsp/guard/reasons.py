@@ -54,6 +54,9 @@ OF_PLACES, OF_VELOCITIES = Course(1.3, LIKELY, 0.6), Course(0.6, 0.75, 0.0)
 """From where the robot has been alone, and where it tells its velocity, too
 (benchmarks/guard.py)."""
 
+FROZEN = "the position stands still to the last digit while the vehicle moves"
+"""Why a frozen position is not believed."""
+
 DOUBT = 0.05
 """Share that a second class must have to be worth a word."""
 
