@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import queue
 import sys
 from collections.abc import Callable
@@ -137,8 +138,17 @@ def run(args: argparse.Namespace) -> int:
         return 0
     with ExitStack() as stack:
         done, session, clock = _flown(args, problem, solution, frame, surprises, begins, stack)
-        _tell(args, done)
-        _stand_by(args, session, clock)
+        if isinstance(done, BaseException):
+            failure: BaseException | None = done
+            has_pressed_again = isinstance(done, KeyboardInterrupt)
+        else:
+            failure, has_pressed_again = _told_failure(args, done)
+        if isinstance(failure, Exception):
+            complain(f"{type(failure).__name__}: {failure}; the flight ends here")
+        _stand_by(args, session, clock, has_pressed_again)
+    if failure is not None:
+        raise failure
+    assert not isinstance(done, BaseException)
     s = done.summary
     if s["defects"]:
         return EXIT_DEFECT
@@ -199,6 +209,29 @@ def _next_folder(run: str) -> str:
     return str(next(f for name in names if not (f := Path(run) / name).exists()))
 
 
+def complain(text: str) -> None:
+    """Print a line to standard error, wherever that leads: nobody's vehicle depends on it."""
+    with contextlib.suppress(OSError, ValueError):
+        print(f"\nnetsp: {text}", file=sys.stderr, flush=True)
+
+
+def _told_failure(args: argparse.Namespace, done: Execution) -> tuple[Exception | None, bool]:
+    """Write the files of the run, and tell what came of it; return what went wrong with that, and
+    whether Ctrl-C was pressed meanwhile. The vehicle is looked after in either case."""
+    from netsp.clock import whole_or_interrupted
+
+    failure = None
+    try:
+        with whole_or_interrupted():
+            try:
+                _tell(args, done)
+            except Exception as error:
+                failure = error
+    except KeyboardInterrupt:
+        return failure, True
+    return failure, False
+
+
 def _tell(args: argparse.Namespace, done: Execution) -> None:
     """Write the files of the run, and tell what came of it."""
     if args.output is not None:
@@ -218,27 +251,37 @@ def _tell(args: argparse.Namespace, done: Execution) -> None:
             print(way_home(done), file=sys.stderr)
 
 
-def _stand_by(args: argparse.Namespace, session: Session, clock: Clock) -> None:
+def _stand_by(
+    args: argparse.Namespace, session: Session, clock: Clock, has_pressed_again: bool
+) -> None:
     """Look after the vehicle until somebody else has it, or Ctrl-C: the second one, where the first
-    has ended the flight."""
+    has ended the flight. A second one that came before anybody looked after the vehicle ends it as
+    soon as it is said what the vehicle will do."""
     from netsp.fly.standby import stand_by
 
     has_stopped = clock.stopped
+    said: list[str] = []
 
     def say(text: str) -> None:
-        for line in session.texts():
-            print(f"the vehicle says: {line}", file=sys.stderr)
-        print(f"netsp: {text}", file=sys.stderr, flush=True)
+        said.append(text)
+        with contextlib.suppress(OSError, ValueError):  # the terminal may have gone
+            for line in session.texts():
+                print(f"the vehicle says: {line}", file=sys.stderr)
+            print(f"netsp: {text}", file=sys.stderr, flush=True)
 
-    # where the first Ctrl-C has ended the flight, the next one interrupts
-    stand_by(session, args.at_end, say=say, should_stop=lambda: clock.stopped and not has_stopped)
+    def should_stop() -> bool:
+        # where the first Ctrl-C has ended the flight, the next one interrupts
+        return bool(said) if has_pressed_again else clock.stopped and not has_stopped
+
+    stand_by(session, args.at_end, say=say, should_stop=should_stop)
 
 
 def _flown(
     args: argparse.Namespace, problem: Problem, solution: Solution, frame: Frame,
     surprises: object, begins: BeginsAt | None, stack: ExitStack,
-) -> tuple[Execution, Session, Clock]:  # fmt: skip
-    """Fly the tour; the link stays open until the stack is left."""
+) -> tuple[Execution | BaseException, Session, Clock]:  # fmt: skip
+    """Fly the tour, or return what ended the flight under way; the link stays open until the stack
+    is left."""
     from netsp.clock import until_interrupt
     from netsp.command.compiling import compile_messages
     from netsp.command.execute import show_execution
@@ -253,9 +296,6 @@ def _flown(
     from netsp.link.address import Address
     from netsp.link.session import Session
     from netsp.link.udp import UdpLink
-
-    def complain(text: str) -> None:
-        print(f"\nnetsp: {text}", file=sys.stderr)
 
     options = ExecutionOptions(
         speed=args.speed, reach=args.reach, seed=args.seed,
@@ -289,7 +329,10 @@ def _flown(
         print(f"waiting for system {args.system} on {args.link}", file=sys.stderr)
     clock = stack.enter_context(until_interrupt(None))
 
+    rows: list[ExecutionRow] = []
+
     def on_step(row: ExecutionRow) -> None:
+        rows[:] = [row]
         if clock.stopped:
             raise KeyboardInterrupt
         for text in session.texts():
@@ -299,12 +342,18 @@ def _flown(
             if call is not None:
                 call(row)
 
-    done = fly(
-        problem, solution, session, options, surprises=surprises, on_step=on_step,
-        should_stop=lambda: clock.stopped, any_vehicle=args.any_vehicle, begins=begins,
-        record=None if args.output is None else RunRecord(args.output, solution),
-        incoming=(lambda: [e for s in sources for e in s()]) if sources else None,
-    )  # fmt: skip
+    try:
+        done = fly(
+            problem, solution, session, options, surprises=surprises, on_step=on_step,
+            should_stop=lambda: clock.stopped, any_vehicle=args.any_vehicle, begins=begins,
+            record=None if args.output is None else RunRecord(args.output, solution),
+            incoming=(lambda: [e for s in sources for e in s()]) if sources else None,
+        )  # fmt: skip
+    except (Exception, KeyboardInterrupt) as error:
+        if not rows:
+            raise
+        session.say(f"flight ended by {type(error).__name__}: {error}", urgent=True)
+        return error, session, clock
     if done.stopped:
         session.say(f"flight stopped: {done.stopped}", urgent=True)
     return done, session, clock

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -570,6 +571,11 @@ def execute(
     except StopsFlightError as stop:
         run.out.stopped = stop.reason
         note()
+    except Exception:
+        if record is not None and run.out.rows:
+            with contextlib.suppress(Exception):  # what ended the run is told, not what follows
+                record.keep(run.problem, run.state)
+        raise
     run.out.tethers.append((round(run.now, 6), run.tether.nodes.copy()))
     # a corner may have held it back for the few rounds of an update
     run.out.free = tether_is_free(run.model.refine(run.tether), run.delta)

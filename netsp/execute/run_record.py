@@ -175,9 +175,21 @@ class RunRecord:
         with (self.folder / LOG).open("a") as log_file:
             log_file.write(",".join(map(str, cells)) + "\n")
         changed = problem is not self._problem
-        if changed:
-            write_text(self.folder / PROBLEM, problem.to_json())
-            self._problem = problem
         if changed or row.time >= self._due:
             self._due = row.time + PERIOD_S
-            write_text(self.folder / STATE, state().to_json())
+            self.keep(problem, state())
+
+    def keep(self, problem: Problem, state: RunState) -> None:
+        """Write the state, whenever the last one was written.
+
+        Parameters
+        ----------
+        problem : Problem
+            The problem as it is now.
+        state : RunState
+            The state now.
+        """
+        if problem is not self._problem:
+            write_text(self.folder / PROBLEM, problem.to_json())
+            self._problem = problem
+        write_text(self.folder / STATE, state.to_json())

@@ -88,6 +88,9 @@ def fly(
         As of `execute`.
     RefusedError
         As of `netsp.fly.checks.ready`.
+    Exception
+        Anything that a callable or netsp itself raises under way, once the vehicle was told to hold
+        its place and the state was written.
     """
     options = options or ExecutionOptions(reach=0.3)
     judged = verify(problem, solution) if begins is None else None
@@ -102,10 +105,15 @@ def fly(
     begun = begins and begins(np.array(session.now.position))
     session.places()  # of before the flight
     vehicle = LinkedVehicle(session, options.reach, policy)
-    done = execute(
-        problem, solution, replace(options, vehicle="linked"), surprises=surprises,
-        on_step=on_step, vehicle=vehicle, incoming=incoming, record=record, begun=begun,
-    )  # fmt: skip
+    try:
+        done = execute(
+            problem, solution, replace(options, vehicle="linked"), surprises=surprises,
+            on_step=on_step, vehicle=vehicle, incoming=incoming, record=record, begun=begun,
+        )  # fmt: skip
+    except (Exception, KeyboardInterrupt):
+        if vehicle.sent:
+            _leave(session, vehicle)
+        raise
     if done.stopped or done.interrupted:
         _leave(session, vehicle)
     return done
@@ -151,4 +159,4 @@ def _leave(session: Session, vehicle: LinkedVehicle) -> None:
                 return
         do_without_estimate(session, vehicle.policy)
         return
-    vehicle.hold()
+    vehicle.halt()
