@@ -6,7 +6,7 @@ import argparse
 import sys
 
 from netsp.command import messages, told
-from netsp.command.clearance_flags import clearance_flags, warn_of_clearance
+from netsp.command.clearance_flags import clearance_flags, warn_of_clearance, warn_of_problem
 from netsp.command.types import (
     check_writable,
     depth,
@@ -146,10 +146,7 @@ def run(args: argparse.Namespace) -> int:
     for line in warnings(problem, solution, points, slack, clearance):
         messages.warning(line)
     if kind in FOR_VEHICLES:
-        warn_of_clearance(
-            args.position_error, args.current, problem.clearance, problem.units,
-            bool(problem.obstacles),
-        )  # fmt: skip
+        warn_of_problem(args, problem, solution.margin)
     said = export_notes(problem, points, kind, settings)
     for line in said.warnings:
         messages.warning(line)
@@ -213,7 +210,7 @@ def _mission(args: argparse.Namespace) -> int:
             f"margin of {clearance:g}: plan with a larger clearance, or set another margin"
         )
     if kind in FOR_VEHICLES:
-        warn_of_clearance(args.position_error, args.current, mission.clearance, "m", True)
+        warn_of_clearance(args.position_error, args.current, mission.clearance, "m")
         shallow = sum(p.position[2] > -SHALLOWEST for p in done.points)
         if shallow:
             messages.note(

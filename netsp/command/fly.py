@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from netsp.command import told
-from netsp.command.clearance_flags import clearance_flags, warn_of_clearance
+from netsp.command.clearance_flags import clearance_flags, warn_of_problem
 from netsp.command.guard import PORT
 from netsp.command.types import length, natural, seconds
 from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
@@ -129,10 +129,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"units: a vehicle goes by metres; expected m, got {problem.units!r}")
     frame = Frame(problem, args.frame)
     if not args.quiet:
-        warn_of_clearance(
-            args.position_error, args.current, problem.clearance, problem.units,
-            bool(problem.obstacles),
-        )  # fmt: skip
+        warn_of_problem(args, problem, solution.margin)
     if args.dry_run:
         print_targets(problem, solution, frame)
         return 0
