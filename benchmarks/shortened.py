@@ -1,6 +1,6 @@
 """Tethers shortened under way: is the new limit kept, and how soon.
 
-    python benchmarks/shortened.py [--moments 4] [--problems pool wharf] [--flown pool wharf] [--keep]
+    python benchmarks/shortened.py [--moments 4] [--problems pool …] [--flown pool …] [--keep]
 
 Every problem's tour is carried out, and at random moments the limit is lowered to a random share of
 the longest tether; in the simulation of `netsp execute`, and flown by the fake autopilot of the
