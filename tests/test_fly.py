@@ -19,6 +19,7 @@ from netsp.execute.log import ExecutionOptions
 from netsp.fly.checks import ready
 from netsp.fly.flight import fly
 from netsp.fly.flight_policy import FlightPolicy
+from netsp.fly.flight_time import predicted_flight
 from netsp.fly.inputs import event_of
 from netsp.fly.rehearsal import rehearse
 from netsp.fly.stopped import RefusedError
@@ -333,9 +334,11 @@ def test_a_dry_run_shows_every_target_and_needs_no_link(tmp_path, capsys, tour):
     problem.write_text(SITE.to_json())
     solution.write_text(tour.to_json())
     assert main(["fly", str(problem), str(solution), "--dry-run"]) == 0
-    out = capsys.readouterr().out
+    out, err = capsys.readouterr()
     assert out.count("goal") == 2
     assert "the base" in out
+    seconds = predicted_flight(SITE, tour, 0.5, 0.3).total_s
+    assert f"about {seconds:.0f} s at 0.5 m/s" in err
     broken = json.loads(tour.to_json())
     broken["path"][1][0] += 3.0
     solution.write_text(json.dumps(broken))

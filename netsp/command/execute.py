@@ -185,16 +185,28 @@ def _problem(args: argparse.Namespace) -> int:
     return EXIT_NOT_ALL if s["left_out"] or s["status"] != "done" else 0
 
 
-def show_execution(problem: Problem) -> Callable[[ExecutionRow], None]:
-    """Shows how a run goes, in one line."""
+def show_execution(
+    problem: Problem, total_s: Callable[[ExecutionRow], float | None] = lambda row: None
+) -> Callable[[ExecutionRow], None]:
+    """Return a callback that shows how a run goes, in one line.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem that was solved.
+    total_s : callable
+        Returns the seconds that the whole run will take; None if that is not known.
+    """
     count = [0]
 
     def on_step(row: ExecutionRow) -> None:
         count[0] += 1
+        total = total_s(row)
         if count[0] % 20 == 1:
             name = "base" if row.goal < 0 else problem.goal_label(row.goal)
+            of = "" if total is None else f" of about {total:.0f}"
             print(
-                f"\r{row.time:8.1f} s  to {name:<9} tether {row.tether:8.2f} of {row.limit:g} "
+                f"\r{row.time:8.1f}{of} s  to {name:<9} tether {row.tether:8.2f} of {row.limit:g} "
                 f"{problem.units}   ",
                 end="", file=sys.stderr, flush=True,
             )  # fmt: skip

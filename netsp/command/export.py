@@ -187,16 +187,17 @@ def _mission(args: argparse.Namespace) -> int:
         ),
     )  # fmt: skip
     stops = sum(p.goal is not None and p.goal >= 0 for p in done.points)
+    seconds = predicted_s(done.points, settings)
     print(
         f"{args.output}: {len(done.points)} waypoints, {stops} of them stops, all in the classes "
-        f"of the plan; about {predicted_s(done.points, settings):.0f} s at {settings.speed:g} m/s, "
+        f"of the plan; about {seconds:.0f} s at {settings.speed:g} m/s, "
         f"stops included; longest tether {done.longest:.2f} of {mission.tether_length:g} m",
         file=sys.stderr,
     )
     if args.json:
         told.tell({
             "file": args.output, "format": kind, "waypoints": len(done.points), "stops": stops,
-            "seconds": predicted_s(done.points, settings), "speed": settings.speed,
+            "seconds": seconds, "speed": settings.speed,
             "longest_tether": done.longest, "tether_length": mission.tether_length,
         })  # fmt: skip
     if mission.tether_length - done.longest < slack:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from netsp.clock import Clock
     from netsp.execute.events import Event
     from netsp.execute.log import Execution, ExecutionRow
+    from netsp.fly.flight_time import FlightTime
     from netsp.fly.resume import BeginsAt
     from netsp.guard.page import Page
     from netsp.link.frame import Frame
@@ -72,7 +73,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "--speed", type=length, default=0.5, metavar="V",
-        help="what the vehicle is set to go at, m/s: for what a repair would save; default 0.5",
+        help="speed that the vehicle is set to, m/s: for predicted times, and for what a repair "
+        "would save; default 0.5",
     )  # fmt: skip
     p.add_argument(
         "--reach", type=length, default=0.3, metavar="R",
@@ -130,11 +132,23 @@ def run(args: argparse.Namespace) -> int:
     frame = Frame(problem, args.frame)
     if not args.quiet:
         warn_of_problem(args, problem, solution.margin)
+    predicted = None
+    if begins is None and args.speed > 0.0:
+        from netsp.fly.flight_time import predicted_flight
+
+        predicted = predicted_flight(problem, solution, args.speed, args.reach)
     if args.dry_run:
         print_targets(problem, solution, frame)
+    if predicted is not None and not args.quiet:
+        print(
+            f"about {predicted.total_s:.0f} s at {args.speed:g} m/s in still water", file=sys.stderr
+        )
+    if args.dry_run:
         return 0
     with ExitStack() as stack:
-        done, session, clock = _flown(args, problem, solution, frame, surprises, begins, stack)
+        done, session, clock = _flown(
+            args, problem, solution, frame, surprises, begins, stack, predicted
+        )
         if isinstance(done, BaseException):
             failure: BaseException | None = done
             has_pressed_again = isinstance(done, KeyboardInterrupt)
@@ -275,7 +289,7 @@ def _stand_by(
 
 def _flown(
     args: argparse.Namespace, problem: Problem, solution: Solution, frame: Frame,
-    surprises: object, begins: BeginsAt | None, stack: ExitStack,
+    surprises: object, begins: BeginsAt | None, stack: ExitStack, predicted: FlightTime | None,
 ) -> tuple[Execution | BaseException, Session, Clock]:  # fmt: skip
     """Fly the tour, or return what ended the flight under way; the link stays open until the stack
     is left."""
@@ -289,6 +303,7 @@ def _flown(
     from netsp.execute.tether_reserve import ReservePolicy
     from netsp.files import output_folder
     from netsp.fly.flight import check_options, fly
+    from netsp.fly.flight_time import FlightClock
     from netsp.fly.rehearsal import rehearse
     from netsp.link.address import Address
     from netsp.link.session import Session
@@ -317,7 +332,11 @@ def _flown(
         print(f"the page is {page.address}", file=sys.stderr)
         sources.append(_from(page, complain))
     shows = not args.quiet and sys.stderr.isatty()
-    told = show_execution(problem) if shows else None
+    told = None
+    if shows and predicted is not None:
+        told = show_execution(problem, FlightClock(predicted).total_s)
+    elif shows:
+        told = show_execution(problem)
     watched = None if page is None else _watched(problem, page, args.speed)
     # the link last: while it is open, the vehicle counts on our heartbeats
     session = Session(UdpLink(address), frame, args.system, args.pace)
