@@ -16,6 +16,7 @@ from netsp.export import Projection, export
 from netsp.export.export_notes import fence_warnings
 from netsp.export.fence import FencePolicy, fence_of
 from netsp.export.write import Settings
+from netsp.site.qgc_plan import read_plan
 from tests.plan_loaders import RefusedError, load_cockpit, load_fence, load_plan, stored_bytes
 
 pytest.importorskip("pyproj")
@@ -157,6 +158,11 @@ def test_plans_are_what_ground_stations_load(plan, tmp_path):
     assert stored_bytes(data["geoFence"]) <= 672
     assert len(data["geoFence"]["circles"]) + len(data["geoFence"]["polygons"]) == 3
     assert data["netsp"]["fence"] == {"simplified": ["#2"], "left_out": []}
+    (note,) = read_plan(tmp_path / "n.plan").notes  # else the plan would pass for the problem
+    assert note.startswith("the fence has 1 obstacle ('#2') simplified")
+    export(many, plan, tmp_path / "n.plan", "plan", PROJECTION, settings=Settings(
+        fence=FencePolicy(max_bytes=18)))  # fmt: skip
+    assert any("lacks 2 obstacles" in line for line in read_plan(tmp_path / "n.plan").notes)
 
 
 @pytest.mark.parametrize(

@@ -112,9 +112,9 @@ def fence_warnings(problem: Problem, fence: Fence) -> list[str]:
     if fence.simplified:
         most = max(z.growth for z in fence.simplified)
         lines.append(
-            f"{counted(len(fence.simplified), 'obstacle')} simplified in the fence, which reaches "
-            f"up to {most:.2g} {problem.units} beyond them, to fit into the vehicle's storage; if "
-            "your vehicle stores more, raise --fence-bytes"
+            f"{counted(len(fence.simplified), 'obstacle')} simplified in the fence, by up to "
+            f"{most:.2g} {problem.units}, to fit into the vehicle's storage; if your vehicle "
+            "stores more, raise --fence-bytes"
         )
     if fence.left_out:
         lines.append(
