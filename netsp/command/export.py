@@ -14,6 +14,7 @@ from netsp.command.types import (
     margins,
     natural,
     positive,
+    whole_bytes,
 )
 from netsp.errors import InputError, counted
 
@@ -62,7 +63,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="maximum number of waypoints; default 650",
     )
     p.add_argument(
-        "--fence-bytes", type=positive, default=672, metavar="N",
+        "--fence-bytes", type=whole_bytes, default=672, metavar="N",
         help="storage of the vehicle for its fence, bytes; default 672, as of Pixhawk flight "
         "controllers without a card",
     )  # fmt: skip

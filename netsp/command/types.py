@@ -97,6 +97,16 @@ def natural(text: str) -> int:
     return value
 
 
+def whole_bytes(text: str) -> int:
+    """Parse a number of bytes; the caller checks its range."""
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"expected a whole number of bytes, got {text!r}"
+        ) from None
+
+
 def count_or_range(text: str) -> int | tuple[int, int]:
     """Parse a whole number from 0 on, or two of them as in ``1-20``."""
     least, dash, most = text.partition("-")
