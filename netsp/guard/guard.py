@@ -56,7 +56,7 @@ class GuardOptions:
     speed : float
         Fastest speed, m/s.
     dead_reckoning : DeadReckoning
-        How the drift grows while no fixes correct the position.
+        Growth of the drift while no fixes correct the position.
     """
 
     noise: float = 0.3
@@ -242,7 +242,7 @@ class Guard:
         return self._told(self._last)
 
     def _note_aiding(self) -> None:
-        """Note since when no fixes correct the position, or since when they do again."""
+        """Note the time at which fixes were lost, or taken again."""
         now = self._seen
         if self._last.aiding_fault:
             self._corrected_at = None
@@ -256,7 +256,7 @@ class Guard:
 
     @property
     def drift(self) -> float:
-        """Standard deviation of how far the position is off by now, metres."""
+        """Standard deviation of the position's error now, metres."""
         o, since, error = self.options, self._uncorrected_since, 0.0
         if since is not None:
             until = self._seen if self._corrected_at is None else self._corrected_at
@@ -267,7 +267,7 @@ class Guard:
         return o.drift + error
 
     def _fit_drift(self, place: Floats) -> None:
-        """Have the belief know how far the position may be off by now."""
+        """Update the belief if the drift has changed enough."""
         drift, known = self.drift, self.belief.drift
         is_growing = self._uncorrected_since is not None or self.track.frozen
         least = self.options.dead_reckoning.growth if is_growing else 1.0

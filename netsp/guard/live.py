@@ -164,8 +164,8 @@ def _rate_lines(rates: MessageRates, message: Any, fix: Fix | None, clock: float
 
 
 class _Hints:
-    """Hints at options that help while no position is understood, and a warning of vehicles whose
-    words may be misread; each is given once."""
+    """Hints at helpful options while no position is understood, and a warning about unknown kinds
+    of vehicles; each is given once."""
 
     def __init__(self) -> None:
         self._has_position = False
