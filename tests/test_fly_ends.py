@@ -102,6 +102,23 @@ def test_another_ground_station_that_the_vehicle_counts_on_takes_over(tour):
     assert session.heard("disarmed") == []
 
 
+def test_what_the_vehicle_will_do_is_asked_for_until_it_is_told(tour):
+    """A link that loses the first question for each parameter."""
+    session, asked = SimulatedSession(SITE, params={"FS_GCS_TIMEOUT": 42}).arm(), set()
+    fly(SITE, tour, session, OPTIONS, on_step=after(session, 4.0, stop))
+    receive, said = session.simulation.vehicle.receive, []
+
+    def deaf(message):
+        if message.get_type() == "PARAM_REQUEST_READ" and message.param_id not in asked:
+            asked.add(message.param_id)
+            return
+        receive(message)
+
+    session.simulation.vehicle.receive = deaf
+    stand_by(session, say=said.append, should_stop=lambda: bool(said))
+    assert "after 42 s" in said[0]
+
+
 def test_nobody_waits_for_a_vehicle_that_needs_nobody_or_is_gone(tour):
     for params, befall, why in (
         ({"FS_GCS_ENABLE": 0}, {}, "FS_GCS_ENABLE"),

@@ -45,7 +45,7 @@ LOOK_S = 0.1
 """Seconds between two looks at what came."""
 
 ASK_AGAIN_S = 0.5
-"""Seconds after which a mode that the vehicle does not have yet is asked for again."""
+"""Seconds after which a mode or a parameter that has not come yet is asked for again."""
 
 
 def stand_by(
@@ -141,11 +141,14 @@ class _Standby:
     def run(self, should_stop: Callable[[], bool]) -> str:
         """Look after it until one of the reasons to end; return the reason."""
         session = self.session
-        for name in (FAILSAFE, FAILSAFE_TIME):
-            session.ask_parameter(name)
         self._hold()
-        waited, told = 0.0, False
+        waited, ask_at, told = 0.0, 0.0, False
         while True:
+            if waited >= ask_at and waited < self.policy.max_answer_s:
+                ask_at = waited + ASK_AGAIN_S
+                for name in (FAILSAFE, FAILSAFE_TIME):
+                    if session.parameter(name) is None:
+                        session.ask_parameter(name)
             if should_stop():
                 return "Ctrl-C"
             if session.now.armed is False:
@@ -178,7 +181,8 @@ class _Standby:
         mode that it is to have."""
         asked = ASKED.get(self.ending)
         is_so = asked is None or self.session.now.mode == mode_name(asked)
-        return is_so and self.session.parameter(FAILSAFE) is not None
+        names = (FAILSAFE, FAILSAFE_TIME)
+        return is_so and all(self.session.parameter(name) is not None for name in names)
 
     @property
     def needs_nobody(self) -> bool:
