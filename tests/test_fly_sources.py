@@ -195,10 +195,11 @@ FAR = [(20.0, 0.0, -3.0)]
         (lambda t: (min(0.5 * t, 2.0), 0.0, -3.0), (0.5, 0.0, 0.0), FAR, "position"),
         (lambda t: (0.0, 0.0, max(-0.5 * t, -2.0)), None, [(0.0, 0.0, -9.0)], "position"),
         (lambda t: (0.5 * t, 0.0, max(-0.2 * t, -1.0)), (0.5, 0.0, -0.2), FAR, "depth"),
+        (lambda t: (19.9, 0.0, -3.25), None, FAR, "position"),  # within reach, and still under way
         # it says that it moves, and has only drifted past its target
         (lambda t: (19.9, 0.0, -3.0), (0.4, 0.0, 0.0), FAR, "position"),
         (lambda t: (19.9, 0.0, -3.0), (0.02, 0.02, 0.0), FAR, None),  # it waits there
-        (lambda t: (19.9, 0.1, -2.9), None, FAR, None),
+        (lambda t: (19.95, 0.05, -2.95), None, FAR, None),
         (lambda t: (0.0, 0.0, max(-0.5 * t, -9.0)), None, [(0.0, 0.0, -9.0)], None),
         (lambda t: (0.4, 0.0, -0.5 * t), None, [(0.0, 0.0, -20.0)], None),  # dives beside it
     ],

@@ -74,7 +74,7 @@ class FrozenPosition:
         sent : float
             Time when it was sent first, s.
         reach : float
-            Distance within which the vehicle may wait, metres.
+            Distance from its target within which the vehicle may wait, metres.
         is_echoed : bool
             Whether the vehicle says that it has this target.
         """

@@ -145,7 +145,7 @@ class LinkedVehicle:
             self._check_path()
         if places and self._target is not None:
             fault = self._frozen.fault(
-                self.time, np.array(self._target), self._first_sent, self.reach,
+                self.time, np.array(self._target), self._first_sent, 0.5 * self.reach,
                 self._is_echoed,
             )  # fmt: skip
             if fault is not None:
