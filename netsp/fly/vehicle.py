@@ -18,8 +18,8 @@ from netsp.execute.run import StopsFlightError
 from netsp.export.write import altitude
 from netsp.fields import Point3
 from netsp.fly.flight_policy import FlightPolicy
-from netsp.fly.frozen_position import FrozenPosition
 from netsp.fly.leg_corridor import LegCorridor
+from netsp.fly.stuck_position import StuckPosition
 from netsp.guard.fix import Fix
 from netsp.link.dialect import dialect
 from netsp.link.modes import GUIDED, mode_name
@@ -62,7 +62,7 @@ class LinkedVehicle:
         self._vertex: Floats | None = None
         self._corridor: LegCorridor | None = None
         self._stages: list[Floats] = []
-        self._frozen = FrozenPosition(self.policy)
+        self._frozen = StuckPosition(self.policy)
         session.watch(_wrong)
 
     def _told(self) -> Floats:

@@ -19,7 +19,7 @@ MIN_SHARE = 0.5
 change: on a steeper way a vehicle may keep beside its target while it dives."""
 
 
-class FrozenPosition:
+class StuckPosition:
     """Watches for a position that does not change while the vehicle moves, or is told to.
 
     A vehicle that waits at its target may hold still to the last bit, as simulators without noise
