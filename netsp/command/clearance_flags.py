@@ -22,7 +22,7 @@ def clearance_flags(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "--current", type=length, default=0.0, metavar="V",
-        help="speed of the current (m/s), which takes the vehicle off its path; default 0",
+        help="speed of the current (m/s), which pushes the vehicle off its path; default 0",
     )  # fmt: skip
 
 
@@ -32,7 +32,7 @@ def warn_of_problem(args: argparse.Namespace, problem: Problem, margin: float) -
     Parameters
     ----------
     args : Namespace
-        Flags, as of `clearance_flags`.
+        Parsed flags of `clearance_flags`.
     problem : Problem
         The problem.
     margin : float

@@ -64,8 +64,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument(
         "--fence-bytes", type=whole_bytes, default=672, metavar="N",
-        help="storage of the vehicle for its fence, bytes; default 672, as of Pixhawk flight "
-        "controllers without a card",
+        help="storage of the vehicle for its fence, bytes; default 672, that of Pixhawk flight "
+        "controllers without an SD card",
     )  # fmt: skip
     p.add_argument(
         "--margin", default="0.3,0.2", metavar="SLACK[,CLEARANCE]",

@@ -38,12 +38,12 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("solution", metavar="TOUR", nargs="?", help="its solution file (JSON)")
     p.add_argument(
         "--resume", metavar="RUN",
-        help="go on with the flight in this folder, from where the vehicle is, in place of PROBLEM "
-        "and TOUR; writes RUN/resumed unless -o says where",
+        help="resume the flight in this folder from where the vehicle is, in place of PROBLEM and "
+        "TOUR; writes RUN/resumed unless -o names another folder",
     )  # fmt: skip
     p.add_argument(
         "--class", dest="word", metavar="WORD",
-        help="begin where the vehicle is, with a tether of this class: numbers of obstacles from "
+        help="begin where the vehicle is, with its tether in this class: numbers of obstacles from "
         "1, negative from right to left, such as --class=-1,2; '' for a straight tether",
     )  # fmt: skip
     p.add_argument(
@@ -63,8 +63,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "--any-vehicle", action="store_true",
-        help="command any vehicle, not only a submarine with ArduPilot; for experts: others take "
-        "the same numbers for other modes",
+        help="command any vehicle, not only an ArduPilot submarine; for experts: others use the "
+        "same numbers for other modes",
     )  # fmt: skip
     p.add_argument(
         "--frame", metavar="NAME",
@@ -73,8 +73,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "--speed", type=length, default=0.5, metavar="V",
-        help="speed that the vehicle is set to, m/s: for predicted times, and for what a repair "
-        "would save; default 0.5",
+        help="cruise speed of the vehicle, m/s, used to predict times and to compare repairs; "
+        "default 0.5",
     )  # fmt: skip
     p.add_argument(
         "--reach", type=length, default=0.3, metavar="R",
@@ -183,11 +183,14 @@ def _given(args: argparse.Namespace) -> tuple[Problem, Solution, BeginsAt | None
     from netsp.solution import Solution
 
     if args.word is not None and args.class_from is not None:
-        raise InputError("--class-from: expected either this or --class")
+        raise InputError("--class, --class-from: expected one of them")
     word = None if args.word is None else parse_class(args.word)
     begins_elsewhere = any(x is not None for x in (args.resume, word, args.class_from))
     if args.dry_run and begins_elsewhere:
-        raise InputError("--dry-run: what is left is planned where the vehicle is; expected a tour")
+        raise InputError(
+            "--dry-run: --resume, --class and --class-from plan from where the vehicle is; "
+            "expected none of them"
+        )
     if args.resume is None:
         if args.problem is None or args.solution is None:
             raise InputError("PROBLEM, TOUR: missing; expected two files, or --resume RUN")
@@ -199,11 +202,11 @@ def _given(args: argparse.Namespace) -> tuple[Problem, Solution, BeginsAt | None
         state = None
     else:
         if args.problem is not None:
-            raise InputError("--resume: has problem and tour; expected no PROBLEM and TOUR")
+            raise InputError("--resume: RUN has problem and tour; expected no PROBLEM and TOUR")
         problem, solution, state = read_run(args.resume)
         args.output = args.output or _next_folder(args.resume)
         if Path(args.output).resolve() == Path(args.resume).resolve():
-            raise InputError("-o: is the folder of the flight before; expected another one")
+            raise InputError("-o: is the folder of the resumed flight; expected another one")
     if not begins_elsewhere:
         return problem, solution, None
     left = state or whole_tour(problem, solution)
@@ -215,20 +218,20 @@ def _given(args: argparse.Namespace) -> tuple[Problem, Solution, BeginsAt | None
 
 
 def _next_folder(run: str) -> str:
-    """Return a folder for a flight that is resumed, which is not there yet."""
+    """Return a folder for a resumed flight; it does not exist yet."""
     names = ("resumed", *(f"resumed-{k}" for k in range(2, 1000)))
     return str(next(f for name in names if not (f := Path(run) / name).exists()))
 
 
 def complain(text: str) -> None:
-    """Print a line to standard error, wherever that leads: nobody's vehicle depends on it."""
+    """Print a line to standard error; a failure is ignored, so that the flight goes on."""
     with contextlib.suppress(OSError, ValueError):
         print(f"\nnetsp: {text}", file=sys.stderr, flush=True)
 
 
 def _told_failure(args: argparse.Namespace, done: Execution) -> tuple[Exception | None, bool]:
-    """Write the files of the run, and tell what came of it; return what went wrong with that, and
-    whether Ctrl-C was pressed meanwhile. The vehicle is looked after in either case."""
+    """Write the files of the run and print its result; return an exception that this raised, and
+    whether Ctrl-C was pressed meanwhile. The caller stands by the vehicle in either case."""
     from netsp.clock import whole_or_interrupted
 
     failure = None
@@ -244,7 +247,7 @@ def _told_failure(args: argparse.Namespace, done: Execution) -> tuple[Exception 
 
 
 def _tell(args: argparse.Namespace, done: Execution) -> None:
-    """Write the files of the run, and tell what came of it."""
+    """Write the files of the run, and print its result."""
     if args.output is not None:
         from netsp.execute.write import write_execution
         from netsp.pictures.execution import save_execution
@@ -265,9 +268,9 @@ def _tell(args: argparse.Namespace, done: Execution) -> None:
 def _stand_by(
     args: argparse.Namespace, session: Session, clock: Clock, has_pressed_again: bool
 ) -> None:
-    """Look after the vehicle until somebody else has it, or Ctrl-C: the second one, where the first
-    has ended the flight. A second one that came before anybody looked after the vehicle ends it as
-    soon as it is said what the vehicle will do."""
+    """Stand by the vehicle until another ground station takes over, or Ctrl-C: the second one, if
+    the first ended the flight. If the second one came before standby began, standby ends as soon
+    as it has printed what the vehicle will do."""
     from netsp.fly.standby import stand_by
 
     has_stopped = clock.stopped

@@ -42,7 +42,7 @@ class LeftOut(Model):
 
 
 class RunState(FileModel):
-    """State of a run (`state.json` of `netsp fly -o RUN`): all that it takes to resume it.
+    """State of a run (`state.json` of `netsp fly -o RUN`), from which it can be resumed.
 
     Problem and plan are beside it, in `problem.json` and `solution.json`. Goals of the problem that
     are not named in it were visited.
@@ -83,7 +83,7 @@ class RunState(FileModel):
         Parameters
         ----------
         problem : Problem
-            Problem that the run was of.
+            Problem of the run.
         source : str
             Name of the state in messages.
 
@@ -180,7 +180,7 @@ class RunRecord:
             self.keep(problem, state())
 
     def keep(self, problem: Problem, state: RunState) -> None:
-        """Write the state, whenever the last one was written.
+        """Write the state now, regardless of when the last one was written.
 
         Parameters
         ----------

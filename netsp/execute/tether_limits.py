@@ -1,4 +1,4 @@
-"""Tether of a run beside its limits: how long it was under each, and when it was over."""
+"""Tether of a run compared with its limits: the longest under each, and the times over them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from netsp.arrays import Bools, Floats
 
 RESOLUTION = 1e-4
-"""Share of the tether length to which the tether model is right; less is not over the limit."""
+"""Relative accuracy of the tether model; a smaller excess does not count as over the limit."""
 
 
 @dataclass(frozen=True)

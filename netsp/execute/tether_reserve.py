@@ -1,5 +1,5 @@
-"""Reserve of tether that repairs keep: flown paths are not exactly the planned ones, and a plan
-that uses its limit up is over it wherever the vehicle is beside its path."""
+"""Reserve of tether that repairs keep, because flown paths are not exactly the planned ones: a plan
+without a reserve exceeds its limit wherever the vehicle leaves its path."""
 
 from __future__ import annotations
 
@@ -66,9 +66,9 @@ class ReservedLimit:
     length
         The limit less the reserve that can be kept, in the problem's units.
     reserve
-        What is kept in reserve.
+        Length that is kept in reserve.
     wanted
-        What was to be kept.
+        Length that should be kept.
     goal
         Number of the goal that needs the tether in which less than that is kept; None if all is.
     """

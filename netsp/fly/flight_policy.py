@@ -24,9 +24,9 @@ class FlightPolicy:
         Longest time without a message of a GPS, s; three of its usual intervals if they are longer.
     max_frozen_s
         Time for which the position may stay the same to the last bit while the vehicle moves or is
-        told to, s. Positions of a moving vehicle change within half a second.
+        commanded to, s. Positions of a moving vehicle change within half a second.
     min_frozen_speed
-        Speed that a vehicle tells from which on its position must change, m/s; the same in depth.
+        Reported speed from which on the position must change, m/s; the same in depth.
     max_unaided_hold_s
         Time for which a vehicle without a source holds its place by its estimate, s, before it is
         put into ALT_HOLD: long enough to stop, and short of where the estimate leads it away.
@@ -34,24 +34,24 @@ class FlightPolicy:
         Largest distance in the plan from the way to the target, metres: from the straight leg, and
         after a bend from the triangle of the leg and the point where the vehicle came to a stop.
         ArduSub keeps within 0.2; a larger distance means that the vehicle was carried off, or that
-        its estimate was set anew.
+        its estimate was reset.
     max_depth_error
         Largest distance above or below the depths between which the leg runs, metres. A vehicle
-        that lags in depth on a sloping leg is between them, and is let go on.
+        that lags in depth on a sloping leg is between them, and is not stopped.
     stopping_s
         Longest way in which a vehicle comes to a stop when its target changes, over its speed, s.
         ArduSub takes 1 s of its speed in still water (1 / PSC_POSXY_P), and nearly 2 in a current
         of 0.8 m/s.
     min_return
-        Way back towards the leg after which a vehicle has come to its stop beyond a bend, metres.
+        Way back towards the leg after which the vehicle has stopped beyond a bend, metres.
     max_speed
-        Highest speed that a vehicle is believed to have when its target changes, m/s.
+        Largest reported speed that counts when the target changes, m/s; higher ones are capped.
     resend_s
         Time after which a target is sent again if the vehicle echoes another one, or neither echoes
         any nor moves towards it, s. A target that is sent again is planned for anew: the vehicle
         falls behind in depth.
     max_resends
-        How often a target is sent again to a vehicle that echoes another one.
+        Maximum number of times a target is resent to a vehicle that echoes another one.
     max_echo_error
         Largest distance between a target and its echo, metres.
     min_approach
@@ -64,12 +64,12 @@ class FlightPolicy:
         Longest straight way from where a vehicle was last to where it is when its flight is
         resumed, metres: on a longer one it may have gone round an obstacle.
     min_class_odds
-        How many times as likely as any other the class of a guard's state file must be.
+        Minimum ratio of the likelihoods of the likeliest and the next class in the state file of a
+        guard.
     max_answer_s
         Longest wait for the answer to a question, such as the value of a parameter, s.
     max_standby_silence_s
-        Time without a heartbeat after which nobody waits for the vehicle any more once the flight
-        has ended, s.
+        Time without a heartbeat after which standby ends, once the flight has ended, s.
     """
 
     max_silence_s: float = 3.0

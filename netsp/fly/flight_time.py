@@ -78,7 +78,7 @@ def predicted_flight(
 
 
 class FlightClock:
-    """Predicted total of a flight that is under way: what it has taken and what is left.
+    """Predicted total of a flight under way: the time elapsed and the time of the legs left.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class FlightClock:
         Parameters
         ----------
         row : ExecutionRow
-            Row of the flight's log, each in its turn.
+            Row of the flight's log; rows must be passed in their order.
         """
         if self._total_s is None:
             return None

@@ -1,7 +1,7 @@
 """Beginning of a flight elsewhere than at the start of its tour.
 
-The class of the tether is known from the record of a flight that was broken off, from the state
-file of a guard, or by the operator's word.
+The class of the tether comes from the record of an interrupted flight, from the state file of a
+guard, or from the operator.
 """
 
 from __future__ import annotations
@@ -31,19 +31,19 @@ from netsp.roadmap.paths import TautPaths, UnknownPathError
 from netsp.solution import Solution
 
 BeginsAt = Callable[[Floats], Begun]
-"""Function that says how a flight begins, given the position of the vehicle, shape (3,)."""
+"""Function that returns how a flight begins, given the position of the vehicle, shape (3,)."""
 
 SAY_CLASS = "say with --class on which sides of the obstacles the tether lies"
 
 
 def parse_class(text: str) -> Word:
-    """Return the word that an operator gives.
+    """Parse a class given by an operator.
 
     Parameters
     ----------
     text : str
         Numbers of obstacles from 1, negative where the ray is crossed from right to left, with
-        commas or spaces between them; empty for a tether that is straight.
+        commas or spaces between them; empty for a straight tether.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def read_run(folder: str | Path) -> tuple[Problem, Solution, RunState]:
     place = Path(folder)
     if not (place / STATE).is_file():
         raise InputError(f"--resume: {folder}: has no {STATE}; expected the folder of a flight")
-    # an obstacle may have come to stand on a goal since
+    # an obstacle may have appeared on a goal since
     problem = Problem.from_run(read_text(place / PROBLEM), str(place / PROBLEM))
     solution = Solution.load(place / SOLUTION)
     state = RunState.load(place / STATE)
@@ -87,7 +87,7 @@ def read_run(folder: str | Path) -> tuple[Problem, Solution, RunState]:
 
 
 def from_record(problem: Problem, state: RunState, policy: FlightPolicy | None = None) -> BeginsAt:
-    """Return how a flight goes on that was broken off.
+    """Return how an interrupted flight goes on.
 
     Parameters
     ----------

@@ -163,7 +163,7 @@ class LinkedVehicle:
         self.halt()
 
     def halt(self) -> None:
-        """Stay where it is, whatever its estimate is worth."""
+        """Stop the vehicle where it is, even if its estimate is unreliable."""
         self._position = self._told()
         self._vertex, self._corridor = None, self._corridor_to(self._position)
         self._send(self._position)
@@ -209,7 +209,7 @@ class LinkedVehicle:
 
     @property
     def source_lost(self) -> str | None:
-        """What is wrong with the sources of the position estimate; None if nothing is."""
+        """Fault of the sources of the position estimate; None if there is none."""
         policy = self.policy
         return self.session.source_lost(policy.min_source_loss_s, policy.max_gps_age_s)
 
@@ -294,7 +294,7 @@ class LinkedVehicle:
         if off > self.policy.max_echo_error:
             if self._resends >= self.policy.max_resends:
                 raise StopsFlightError(
-                    f"the vehicle does not take its target: it goes {off:.1f} m beside it"
+                    f"the vehicle does not accept its target: it goes to one {off:.1f} m away"
                 )
             self._resends += 1
             return True

@@ -233,12 +233,12 @@ class Session:
 
     @property
     def is_distrusted(self) -> bool:
-        """Return whether the positions are of no use, not even to stop by."""
+        """Return whether the positions are unusable, even to stop by."""
         with self._lock:
             return self._distrust is not None
 
     def distrust(self, why: str) -> None:
-        """Take the positions of the vehicle for lost from now on, whatever it says of them.
+        """Treat the positions of the vehicle as lost from now on, whatever it reports.
 
         Parameters
         ----------
@@ -257,7 +257,7 @@ class Session:
         return None if echo is None else (echo[0], (self._seconds() - echo[1]) * self.pace)
 
     def ask_for_positions(self) -> None:
-        """Ask for ten positions a second, and for all else that a flight watches."""
+        """Ask for ten positions a second, and for the other messages that a flight watches."""
         m = dialect()
         wanted = (
             m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT if self.frame.is_global
