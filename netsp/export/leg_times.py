@@ -33,7 +33,7 @@ COINCIDENT = 1e-6
 
 @dataclass(frozen=True)
 class VehicleMotion:
-    """Motion control of ArduSub and the answer of the vehicle. All numbers are positive.
+    """Motion control of ArduSub and the response of the vehicle. All numbers are positive.
 
     The controller's numbers are the defaults of ArduSub 4.7; the parameter's name is given. Thrust
     and drag are those of its simulator's vectored frame: thrust is 4 x 51.5 N on 10.5 kg, drag was
@@ -193,7 +193,7 @@ class SmoothMove:
 
 
 class _Follower:
-    """A vehicle that follows the reference, with the state that outlasts a leg."""
+    """Vehicle that follows the reference; its state is kept from leg to leg."""
 
     def __init__(self, place: Point3, speed: float, motion: VehicleMotion) -> None:
         self.speed, self.motion = speed, motion
@@ -225,13 +225,13 @@ class _Follower:
         self.integral, self.rate = self.command, 1.0
 
     def is_at(self, goal: Point3, radius: float) -> bool:
-        """Tell whether the vehicle is within a radius, or has had time enough to get there."""
+        """Return whether the vehicle is within a radius, or has had time enough to get there."""
         waited_s = self.track_s - self.move.duration_s
         return math.dist(self.place, goal) <= radius or waited_s > self.motion.max_followed_s
 
     @property
     def is_there(self) -> bool:
-        """Whether the reference is at its end and the vehicle in the acceptance radius."""
+        """True once the reference is at its end and the vehicle in the acceptance radius."""
         return self.track_s >= self.move.duration_s and self.is_at(
             self.goal, self.motion.acceptance_radius
         )

@@ -35,7 +35,7 @@ def ready(
     should_stop : callable, optional
         Asked while it waits; a KeyboardInterrupt is raised then.
     any_vehicle : bool
-        Command any vehicle; by default only a submarine with ArduPilot, because others take the
+        Command any vehicle; by default only an ArduPilot submarine, because others use the
         same numbers for other modes and targets.
 
     Raises

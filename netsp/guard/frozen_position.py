@@ -1,8 +1,8 @@
-"""Frozen positions: estimates that go on coming but do not change while the robot moves.
+"""Frozen positions: estimates that keep coming but do not change while the robot moves.
 
 Estimates of a filter that works change in their last digits even at rest. Rounded ones repeat at
-rest, and so do exact ones of a simulation. So repetition alone is no evidence; it takes velocities
-that say that the robot moves, or a robot that stops faster than one can.
+rest, and so do exact ones of a simulation. So repetition alone is no evidence: velocities must
+show that the robot moves, or it must have stopped faster than a robot can.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ class FreezePolicy:
     min_repeat_s
         Shortest time for which a position must repeat, s. Positive.
     min_said_m
-        Distance that the velocities told meanwhile must add up to, m; at rest they add up to less,
-        also with noise. Positive.
+        Distance that the reported velocities must add up to meanwhile, m; at rest they add up to
+        less, even with noise. Positive.
     dead_stop_s
         Time for which a position must repeat after the robot moved if no velocity tells whether it
         still does, s. Positive.
@@ -130,7 +130,7 @@ class FrozenPosition:
         place : ndarray, shape (3,)
             Position, metres.
         velocity : (vx, vy, vz) or None
-            Velocity that the vehicle tells, m/s.
+            Velocity that the vehicle reports, m/s.
         speed : float
             Smoothed speed before this estimate, m/s.
 

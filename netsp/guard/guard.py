@@ -275,7 +275,7 @@ class Guard:
             self.belief = self.belief.with_drift(drift, place)
 
     def _widen(self) -> None:
-        """Have more classes count while the position is frozen and something is still claimed."""
+        """Widen the set of classes while the position is frozen and the guard still claims one."""
         if self._motion is None or self.track.silence(self._seen) > GAP:
             return
         place = self._motion.after

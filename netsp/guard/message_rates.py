@@ -1,4 +1,4 @@
-"""Rates of a vehicle's messages: how often it tells its position, and requests for more."""
+"""Rates of a vehicle's messages: how often it sends its position, and requests for more."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class RatePolicy:
 
 
 class MessageRates:
-    """Measures how often a vehicle tells its position, and asks for more if allowed.
+    """Monitor of how often a vehicle sends its position; it requests more if allowed.
 
     Parameters
     ----------

@@ -126,7 +126,7 @@ def messages_of(data: bytes) -> Iterator[Any]:
 
 
 def _next_marker(data: bytes, begin: int) -> int:
-    """Return where the next byte is that begins messages; -1 where there is none."""
+    """Return the index of the next first byte of a message; -1 if there is none."""
     found = _MARKER.search(data, begin)
     return -1 if found is None else found.start()
 
@@ -142,8 +142,8 @@ def _length(data: bytes, begin: int) -> int:
 
 
 def _is_message(data: bytes, begin: int, end: int) -> bool:
-    """Return whether some bytes are a message, by their checksum; those of other dialects, which
-    cannot be checked, by the times beside them.
+    """Return whether some bytes are a message, by their checksum; messages of other dialects, which
+    have no known checksum, are recognized by the times before and after them.
 
     pymavlink does the same in Python, which takes seconds for each megabyte of a file that is no
     log. `binascii.crc_hqx` has the polynomial of MAVLink's checksum, with the bits of each byte

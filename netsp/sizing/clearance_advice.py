@@ -1,4 +1,4 @@
-"""How much clearance a real vehicle needs, from flights of ArduSub 4.7 in its own simulator.
+"""Clearance that a real vehicle needs, from flights of ArduSub 4.7 in its own simulator.
 
 Flown paths cost up to 0.10 m of clearance in still water and 0.15 m in a current of 0.8 m/s, with
 the position as the vehicle believed it; the error of that position comes on top.
@@ -30,8 +30,8 @@ class ClearancePolicy:
         Clearance that a flown path costs in still water, m; the largest of the measured flights.
         0 or more.
     error_by_current
-        Clearance that it costs besides, for each m/s of the current, s; of the measured flights in
-        0 and 0.8 m/s. 0 or more.
+        Further clearance that it costs per m/s of the current, s; from flights in 0 and 0.8 m/s.
+        0 or more.
     """
 
     position_error: float = 0.0
@@ -46,7 +46,7 @@ class ClearancePolicy:
 
     @property
     def min_clearance(self) -> float:
-        """Return the least clearance that leaves room for a vehicle, m.
+        """Return the minimum clearance with which a plan can be flown, m.
 
         Examples
         --------
@@ -106,7 +106,7 @@ def clearance_advice(
     clearance : float
         Clearance of the plan, in its units.
     units : str
-        Units of the plan; those that are no length cannot be compared with flights.
+        Units of the plan; clearances in units that are not lengths are not checked.
     policy : ClearancePolicy, optional
         How much a vehicle needs.
     margin : float
