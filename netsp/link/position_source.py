@@ -15,7 +15,7 @@ OTHER_SOURCES = {0x40: "the optical flow sensor", 0x80: "the DVL or visual odome
 """Bits of SYS_STATUS for sensors that may give a filter its horizontal motion."""
 
 REJECTED = 1.0
-"""Innovation over the bound of acceptance (EKF_STATUS_REPORT) from which on a filter rejects a
+"""Innovation over the bound of acceptance (EKF_STATUS_REPORT) above which a filter rejects a
 measurement, by definition."""
 
 N_INTERVALS = 9
