@@ -168,6 +168,27 @@ def test_an_armed_vehicle_is_not_refused_before_it_has_said_whether_it_is():
     ready(Heard(), np.zeros(3), 2.0)
 
 
+def test_positions_without_heartbeats_are_told_from_silence():
+    class Heard:
+        silent_s, unplaced_s, system, others = np.inf, 0.1, 7, ()
+
+        def sleep(self, seconds):
+            pass
+
+        def ask_for_positions(self):
+            pass
+
+    with pytest.raises(RefusedError, match="positions come from system 7, but no heartbeat"):
+        ready(Heard(), np.zeros(3), 2.0)
+
+
+@pytest.mark.parametrize("number", ["0", "256", "-1", "one"])
+@pytest.mark.parametrize("command", ["fly", "guard"])
+def test_system_ids_that_mavlink_does_not_have_are_refused(command, number, capsys):
+    assert main([command, "p.json", "--link", "udpin:14550", f"--system={number}"]) == 2
+    assert f"expected a system id from 1 to 255, got '{number}'" in capsys.readouterr().err
+
+
 def test_a_link_with_nobody_at_the_other_end_is_told(tour):
     session = Session(UdpLink(Address(True, "127.0.0.1", 0)), Frame(SITE), 1, 20.0)
     try:

@@ -11,7 +11,7 @@ from netsp import Circle, Problem, solve
 from netsp.command.main import main
 from netsp.errors import InputError
 from netsp.execute.events import Event, Surprises
-from netsp.execute.log import ExecutionOptions
+from netsp.execute.log import ExecutionOptions, describe_execution
 from netsp.execute.run_record import RunRecord, RunState
 from netsp.fly import flight
 from netsp.fly.flight import fly
@@ -77,6 +77,7 @@ def test_a_flight_that_was_killed_is_resumed_in_its_class(tour, tmp_path, when):
     assert (s["status"], s["visited"], s["home"]) == ("done", len(state.left), True), done.stopped
     assert s["tether_free"]
     assert s["exceedance_s"] == 0.0
+    assert "than planned" not in describe_execution(done).split("tether ")[0]  # the whole tour
     true = np.vstack([[0.0, 0.0], session.truth[:, 1:3]])
     assert signature(np.vstack([true, [[0.0, 0.0]]]), SITE.representative_points) == ()
     assert {v.goal for v in tour.tour} == {a.goal for a in done.arrivals if a.goal >= 0} | (

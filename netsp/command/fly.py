@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from netsp.command import told
 from netsp.command.clearance_flags import clearance_flags, warn_of_problem
 from netsp.command.guard import PORT
-from netsp.command.types import length, natural, seconds
+from netsp.command.types import length, natural, seconds, system_id
 from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--dry-run", action="store_true", help="show what would be sent, and send nothing"
     )
     p.add_argument(
-        "--system", type=natural, default=1, metavar="N",
+        "--system", type=system_id, default=1, metavar="N",
         help="system id of the vehicle; others are not listened to; default 1",
     )  # fmt: skip
     p.add_argument(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from netsp.command import messages
 from netsp.command.solve_mission import is_mission
-from netsp.command.types import check_writable, length, natural
+from netsp.command.types import check_writable, length, natural, system_id
 from netsp.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     source.add_argument(
         "--system",
-        type=natural,
+        type=system_id,
         metavar="N",
         help="the vehicle's system id; default: the first one heard; in a recording, the only one "
         "with positions",

@@ -323,13 +323,14 @@ def describe_execution(done: Execution) -> str:
     """
     s, units = done.summary, done.problem.units
     planned = s["planned_path"] or 0.0
-    every_goal = not (s["cancelled"] or s["left_out"])
+    has_resumed = any(e.event == "resumed" for e in done.entries)
+    is_comparable = not (s["cancelled"] or s["left_out"] or has_resumed)
     lines = [
         f"run      {s['problem']}: {s['status']} after {s['time_s']:.1f} s"
         + (f": {done.stopped}" if done.stopped else ""),
         f"visited  {counted(s['visited'], 'goal')}{_class_of(done.arrivals)}",
         f"path     {s['path']:.6g} {units}"
-        + (f", {_beside(s['path'] / planned)}" if planned and every_goal else ""),
+        + (f", {_beside(s['path'] / planned)}" if planned and is_comparable else ""),
         f"tether   {describe_limits(done.limit_periods, done.overruns, units)}; "
         + (
             "recovered free at the base" if s["tether_free"] and s["home"] else "not recovered free"

@@ -54,6 +54,11 @@ def ready(
                 f"heard from system {', '.join(map(str, session.others))}, but nothing from system "
                 f"{session.system} for {WAIT_S:g} s: is that its id?"
             )
+        if session.unplaced_s < np.inf:
+            raise RefusedError(
+                f"positions come from system {session.system}, but no heartbeat for {WAIT_S:g} s: "
+                "is the autopilot's stream forwarded whole?"
+            )
         raise RefusedError(f"no vehicle has been heard for {WAIT_S:g} s: is the link right?")
     kind = session.kind
     if not (any_vehicle or (kind is not None and kind.is_ardusub)):
