@@ -180,7 +180,7 @@ def test_a_target_is_sent_again_only_to_a_vehicle_that_does_not_have_it(motion, 
 def test_a_vehicle_that_goes_elsewhere_gets_its_target_three_times_more_and_is_then_stopped():
     session = Scripted(moving, lambda target: (target[0], target[1] + 4.0, target[2]))
     vehicle = LinkedVehicle(session, 0.3)
-    with pytest.raises(StopsFlightError, match=r"does not take its target.* 4\.0 m"):
+    with pytest.raises(StopsFlightError, match=r"does not accept its target.* 4\.0 m"):
         vehicle.go(np.array(FAR), 30.0, 0.0, np.zeros(3), True)
     assert len(session.sent) == 4
 
