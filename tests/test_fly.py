@@ -16,6 +16,7 @@ from netsp.command.main import main
 from netsp.errors import InputError
 from netsp.execute.events import Surprises
 from netsp.execute.log import ExecutionOptions
+from netsp.execute.run import StopsFlightError
 from netsp.fly.checks import ready
 from netsp.fly.flight import fly
 from netsp.fly.flight_policy import FlightPolicy
@@ -166,6 +167,36 @@ def test_an_armed_vehicle_is_not_refused_before_it_has_said_whether_it_is():
             pass
 
     ready(Heard(), np.zeros(3), 2.0)
+
+
+def test_a_clock_that_stands_still_ends_the_flight(monkeypatch):
+    session = Session(UdpLink(Address(True, "127.0.0.1", 0)), Frame(SITE, "local"), 1, 1.0)
+    m, pack, ours = dialect(), parser(1, 1), [0.0]
+    monkeypatch.setattr(session, "_seconds", lambda: ours[0])
+
+    def say(time_ms):
+        for message in (
+            m.MAVLink_heartbeat_message(12, 3, 128, 4, 4, 3),
+            m.MAVLink_local_position_ned_message(time_ms, 0.0, 0.0, 0.0, 0, 0, 0),
+        ):
+            for heard in messages_in(bytes(message.pack(pack))):
+                session._take(heard, ("127.0.0.1", 1))
+
+    try:
+        for second in range(4):
+            ours[0] = float(second)
+            say(1000 * second)
+            assert session.stalled_s == 0.0
+        vehicle = LinkedVehicle(session, 0.3)
+        for second in range(4, 7):
+            ours[0] = float(second)
+            say(3000)
+            vehicle.check()
+        ours[0] = 6.5
+        with pytest.raises(StopsFlightError, match=r"the vehicle's clock stands still.* 4 s"):
+            vehicle.check()
+    finally:
+        session.close()
 
 
 def test_positions_without_heartbeats_are_told_from_silence():

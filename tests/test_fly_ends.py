@@ -212,7 +212,7 @@ def test_whatever_breaks_in_netsp_the_vehicle_is_held_and_the_error_told_in_the_
 def test_ctrl_c_while_the_files_are_written_does_not_break_them_off(
     tour, tmp_path, monkeypatch, capfd
 ):
-    """The vehicle's future is told before the command ends."""
+    """The command prints what the vehicle will do, and then ends."""
     session, pressed = SimulatedSession(SITE).arm(), []
     words = commanded(monkeypatch, tmp_path, tour, session)
     sleep, write = session.sleep, log.Execution.summary.fget

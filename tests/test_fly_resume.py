@@ -94,6 +94,15 @@ def test_events_outlive_a_flight_that_was_killed(tour, tmp_path):
     assert (state.left, state.cancelled) == ((0,), (1,))
 
 
+def test_a_run_beside_the_problem_of_another_is_not_resumed(tour, tmp_path):
+    killed(tour, tmp_path, 4.0)
+    read_run(tmp_path)
+    other = SITE.model_copy(update={"tether_length": SITE.tether_length + 1.0})
+    other.save(tmp_path / "problem.json")
+    with pytest.raises(InputError, match=r"state\.json: problem_sha256: .*expected the problem"):
+        read_run(tmp_path)
+
+
 def test_a_flight_is_resumed_when_an_obstacle_stands_on_a_goal(tour, tmp_path):
     last = tour.tour[-1].goal
     boat = Circle(center=SITE.goals[last].position[:2], radius=0.4, name="boat")

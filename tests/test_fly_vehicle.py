@@ -24,7 +24,8 @@ SITE = Problem(base=(0, 0), goals=[(6, 2, -1)], tether_length=40)
 class Scripted:
     """A session whose vehicle goes where a function of time says, ten positions a second."""
 
-    system, others, broken, silent_s, unplaced_s, pace = 1, (), None, 0.0, 0.0, 1.0
+    system, others, broken, pace = 1, (), None, 1.0
+    silent_s = unplaced_s = stalled_s = 0.0
     kind = VehicleKind(12, 3)
 
     def __init__(self, motion, echo=None, velocity=None):

@@ -35,7 +35,7 @@ def told(reports, kind):
 
 
 def fixes_of(simulation, seconds, until=lambda: None):
-    """What a vehicle tells of itself over some seconds."""
+    """Return the fixes that come from a vehicle in some seconds."""
     listener, out, end = Listener(Frame(SITE, "local"), 1), [], simulation.now + seconds
     while simulation.now < end:
         until()
@@ -59,7 +59,7 @@ def test_an_estimate_that_freezes_on_the_way_is_told_within_two_seconds_and_wide
     simulation = flown()
     fixes = fixes_of(simulation, 10.0)
     frozen_at = simulation.now
-    simulation.do(do="freeze")  # the velocity is told as 0 from here on
+    simulation.do(do="freeze")  # its messages have a velocity of 0 from here on
     fixes += fixes_of(simulation, 8.0)
     reports = watched(fixes)
     (first,) = told(reports, "position")

@@ -1,4 +1,4 @@
-"""Where a vehicle may be on its way to a vertex, at any speed and after any bend."""
+"""Corridors of legs hold vehicles that brake into bends, and no vehicle that is carried off."""
 
 import numpy as np
 import pytest

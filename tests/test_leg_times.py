@@ -111,7 +111,7 @@ def test_a_hold_is_added_to_the_leg_before_it():
 
 @pytest.mark.parametrize("speed", [1e-3, 0.05, 20.0])
 def test_legs_of_any_speed_and_length_are_predicted_soon(speed):
-    """A vehicle that is slow, or is told to be faster than its thrust allows, has a finite time."""
+    """Times are finite for slow vehicles and for speeds above those that the thrust allows."""
     times = leg_times([(0, 0, -1), (1, 0, -1), (1e5, 0, -1)], [0.0] * 3, speed)
     fastest = math.sqrt(PLAIN.full_thrust / PLAIN.drag)
     assert times[1] == pytest.approx(1e5 / min(speed, fastest), rel=0.01)

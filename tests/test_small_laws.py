@@ -601,7 +601,8 @@ def test_velocity_and_turn_are_those_of_the_motion():
 class Vehicle:
     """The part of a session that is used before a flight; it answers everything at once."""
 
-    system, others, silent_s, unplaced_s, broken = 1, (), 0.0, 0.0, None
+    system, others, broken = 1, (), None
+    silent_s = unplaced_s = stalled_s = 0.0
     kind, echo = VehicleKind(12, 3), None
 
     def __init__(self, **told):

@@ -42,8 +42,8 @@ def shortened(when, limit):
 
 
 def check_limits(run):
-    """What must hold of every run whose limit was lowered: once within it, the tether stays so, or
-    the summary says when it was not."""
+    """Check a run whose limit was lowered: once within it, the tether stays so, or the summary says
+    when it was not."""
     s, met = run.summary, True
     for row in run.rows:
         if row.tether <= row.limit * (1.0 + RESOLUTION):

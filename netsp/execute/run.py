@@ -573,7 +573,7 @@ def execute(
         note()
     except Exception:
         if record is not None and run.out.rows:
-            with contextlib.suppress(Exception):  # what ended the run is told, not what follows
+            with contextlib.suppress(Exception):  # the first exception is raised, not a second one
                 record.keep(run.problem, run.state)
         raise
     run.out.tethers.append((round(run.now, 6), run.tether.nodes.copy()))

@@ -77,6 +77,12 @@ class RunState(FileModel):
         Field(description="length of tether that repairs keep in reserve, in the problem's units"),
     ] = 0.0
 
+    problem_sha256: Annotated[
+        str | None,
+        Field(description="hash of the problem beside it, which must not be edited; not in states "
+              "of earlier versions"),
+    ] = None  # fmt: skip
+
     def check(self, problem: Problem, source: str) -> None:
         """Refuse the state of another problem.
 
@@ -92,6 +98,11 @@ class RunState(FileModel):
         InputError
             A goal that the problem does not have, or a tether that begins elsewhere.
         """
+        if self.problem_sha256 not in (None, problem.sha256):
+            raise InputError(
+                f"{source}: problem_sha256: is of another problem; expected the {PROBLEM} that the "
+                "run wrote, unchanged"
+            )
         out = tuple(g.goal for g in self.left_out)
         named = {"left": self.left, "left_out": out, "cancelled": self.cancelled}
         for field_name, goals in named.items():
@@ -154,6 +165,7 @@ class RunRecord:
     def __init__(self, folder: str | Path, solution: Solution) -> None:
         self.folder, self.solution = Path(folder), solution
         self._problem: Problem | None = None
+        self._sha256: str | None = None
         self._due = -np.inf
 
     def take(self, row: ExecutionRow, problem: Problem, state: Callable[[], RunState]) -> None:
@@ -191,5 +203,6 @@ class RunRecord:
         """
         if problem is not self._problem:
             write_text(self.folder / PROBLEM, problem.to_json())
-            self._problem = problem
+            self._problem, self._sha256 = problem, problem.sha256
+        state = state.model_copy(update={"problem_sha256": self._sha256})
         write_text(self.folder / STATE, state.to_json())

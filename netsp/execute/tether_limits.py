@@ -137,19 +137,15 @@ def describe_limits(periods: Sequence[LimitPeriod], over: Sequence[Overrun], uni
     return ", ".join(parts)
 
 
-MAX_TIMES = 5
-"""Longest list of times that is written out in words; a log has all."""
-
-
-def _times(over: Sequence[Overrun], units: str) -> str:
-    """Return words for when the tether was over its limit."""
+def _times(over: Sequence[Overrun], units: str, max_times: int = 5) -> str:
+    """Return words for the first times at which the tether was over its limit; a log has all."""
     if not over:
         return ""
     told = [
         f"{o.begin_s:.1f} to {o.end_s:.1f} s: up to {o.longest:.4g} of {o.limit:g} {units}"
-        for o in over[:MAX_TIMES]
+        for o in over[:max_times]
     ]
-    rest = f"; {len(over) - MAX_TIMES} more" if len(over) > MAX_TIMES else ""
+    rest = f"; {len(over) - max_times} more" if len(over) > max_times else ""
     return f" ({'; '.join(told)}{rest})"
 
 

@@ -27,6 +27,11 @@ class FlightPolicy:
         commanded to, s. Positions of a moving vehicle change within half a second.
     min_frozen_speed
         Reported speed from which on the position must change, m/s; the same in depth.
+    min_plan_share
+        Share of the distance to the target that is horizontal, above which the place in the plan
+        must change: on a steeper leg a vehicle may stay beside its target while it dives.
+    max_clock_stall_s
+        Longest time for which the vehicle's clock may stand still while messages come, s of ours.
     max_unaided_hold_s
         Time for which a vehicle without a source holds its place by its estimate, s, before it is
         put into ALT_HOLD: long enough to stop, and short of where the estimate leads it away.
@@ -66,6 +71,12 @@ class FlightPolicy:
     min_class_odds
         Minimum ratio of the likelihoods of the likeliest and the next class in the state file of a
         guard.
+    retry_s
+        Time after which a question without an answer, or a mode that the vehicle does not have
+        yet, is asked for again, s.
+    notice_s
+        Mean time from a position within reach of a vertex to the next target, s: positions come
+        ten times a second and are read 20 times a second. Counts in predicted times only.
     max_answer_s
         Longest wait for the answer to a question, such as the value of a parameter, s.
     max_standby_silence_s
@@ -78,6 +89,8 @@ class FlightPolicy:
     max_gps_age_s: float = 1.2
     max_frozen_s: float = 1.5
     min_frozen_speed: float = 0.1
+    min_plan_share: float = 0.5
+    max_clock_stall_s: float = 3.0
     max_unaided_hold_s: float = 2.0
     max_path_error: float = 1.0
     max_depth_error: float = 1.0
@@ -91,6 +104,8 @@ class FlightPolicy:
     max_depth_step: float = 2.0
     max_unwatched_way: float = 10.0
     min_class_odds: float = 100.0
+    retry_s: float = 0.5
+    notice_s: float = 0.1
     max_answer_s: float = 2.0
     max_standby_silence_s: float = 60.0
 

@@ -16,8 +16,6 @@ from netsp.fly.flight_policy import FlightPolicy
 from netsp.problem import Problem
 from netsp.solution import Solution
 
-NOTICE_S = 0.1  # mean time from reach to the next target: positions at 10 Hz, looked at at 20 Hz
-
 
 @dataclass(frozen=True)
 class FlightTime:
@@ -70,7 +68,7 @@ def predicted_flight(
         for a, b in pairwise(leg.path):
             places += _stages(_target(a), _target(b), reach, policy.max_depth_step)
         counts.append(len(places) - before)
-    times = iter(target_times(places, reach, speed, motion, notice_s=NOTICE_S))
+    times = iter(target_times(places, reach, speed, motion, notice_s=policy.notice_s))
     return FlightTime(
         tuple(leg.goal for leg in legs),
         tuple(sum(next(times) for _ in range(count)) for count in counts),

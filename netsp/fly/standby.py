@@ -44,9 +44,6 @@ CONSEQUENCES = {
 LOOK_S = 0.1
 """Period of standby, s: messages are read and conditions checked this often."""
 
-ASK_AGAIN_S = 0.5
-"""Time after which a missing mode or parameter is requested again, s."""
-
 
 def stand_by(
     session: Session,
@@ -101,7 +98,7 @@ def do_without_estimate(session: Session, policy: FlightPolicy) -> None:
         if waited >= policy.max_answer_s or session.silent_s > policy.max_silence_s:
             return
         if waited >= ask_at:
-            ask_at = waited + ASK_AGAIN_S
+            ask_at = waited + policy.retry_s
             session.command(dialect().MAV_CMD_DO_SET_MODE, 1, ALT_HOLD)
         session.sleep(LOOK_S)
         waited += LOOK_S
@@ -145,7 +142,7 @@ class _Standby:
         waited, ask_at, told = 0.0, 0.0, False
         while True:
             if waited >= ask_at and waited < self.policy.max_answer_s:
-                ask_at = waited + ASK_AGAIN_S
+                ask_at = waited + self.policy.retry_s
                 for name in (FAILSAFE, FAILSAFE_TIME):
                     if session.parameter(name) is None:
                         session.ask_parameter(name)

@@ -14,13 +14,9 @@ from netsp.fly.flight_policy import FlightPolicy
 PLAN, DEPTH, ALL = slice(0, 2), slice(2, 3), slice(0, 3)
 """Coordinates that may be stuck by themselves: latitude and longitude, depth, or all three."""
 
-MIN_SHARE = 0.5
-"""Share of the way to the target that is horizontal, from which on the place in the plan must
-change: on a steeper way a vehicle may keep beside its target while it dives."""
-
 
 class StuckPosition:
-    """Watches for a position that does not change while the vehicle moves, or is told to.
+    """Detector of positions that do not change while the vehicle moves or has a target to reach.
 
     A vehicle that waits at its target may hold still to the last bit, as simulators without noise
     do. Times are by the vehicle's clock.
@@ -90,7 +86,7 @@ class StuckPosition:
         left = target - self._place
         far, flat = float(np.linalg.norm(left)), float(np.linalg.norm(left[PLAN]))
         for name, is_away in (
-            ("plan", flat > reach and flat > MIN_SHARE * far), ("all", far > reach)
+            ("plan", flat > reach and flat > self.policy.min_plan_share * far), ("all", far > reach)
         ):  # fmt: skip
             since = self._since[name]
             # a target that got lost is sent again; a vehicle without it may wait

@@ -203,6 +203,11 @@ class LinkedVehicle:
                 f"the link is lost or carries no position: none for {session.unplaced_s:.0f} s"
             )
 
+        if session.stalled_s > self.policy.max_clock_stall_s:
+            raise StopsFlightError(
+                f"the vehicle's clock stands still: its messages have had the same time for "
+                f"{session.stalled_s:.0f} s"
+            )
         source = self.source_lost
         if source is not None:
             raise StopsFlightError(f"the position estimate drifts: {source}")

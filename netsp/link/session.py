@@ -66,6 +66,7 @@ class Session:
         self._now = Fix(0.0)
         self._heard: float | None = None
         self._placed: float | None = None
+        self._ticked: tuple[float, float] | None = None
         self._holds: Callable[[Fix], str | None] | None = None
         self._broken: str | None = None
         self._places: deque[tuple[float, Point3]] = deque(maxlen=2000)
@@ -127,6 +128,13 @@ class Session:
         with self._lock:
             heard = self._heard
         return float("inf") if heard is None else (self._seconds() - heard) * self.pace
+
+    @property
+    def stalled_s(self) -> float:
+        """Seconds since the vehicle's clock last changed; infinite before its first time."""
+        with self._lock:
+            ticked = self._ticked
+        return float("inf") if ticked is None else (self._seconds() - ticked[1]) * self.pace
 
     @property
     def unplaced_s(self) -> float:
@@ -314,6 +322,8 @@ class Session:
             elif kind == "PARAM_VALUE":
                 self._parameters[str(message.param_id)] = float(message.param_value)
             if self._listener.time is not None:
+                if self._ticked is None or self._ticked[0] != self._listener.time:
+                    self._ticked = self._listener.time, self._seconds()
                 self._sources.take(message, self._listener.time)
             echo = self._echoes.understand(message)
             if echo is not None:
