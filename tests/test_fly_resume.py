@@ -1,5 +1,6 @@
 """Flights that were broken off go on where the vehicle is, in the class that the tether has."""
 
+import contextlib
 import csv
 import json
 import time
@@ -10,6 +11,7 @@ import pytest
 from netsp import Circle, Problem, solve
 from netsp.command.main import main
 from netsp.errors import InputError
+from netsp.execute import run_record
 from netsp.execute.events import Event, Surprises
 from netsp.execute.log import ExecutionOptions, describe_execution
 from netsp.execute.run_record import RunRecord, RunState
@@ -101,6 +103,28 @@ def test_a_run_beside_the_problem_of_another_is_not_resumed(tour, tmp_path):
     other.save(tmp_path / "problem.json")
     with pytest.raises(InputError, match=r"state\.json: problem_sha256: .*expected the problem"):
         read_run(tmp_path)
+
+
+@pytest.mark.parametrize("n_files", [0, 1, 2, 3])
+def test_a_run_killed_as_its_problem_is_replaced_is_resumed(tour, tmp_path, monkeypatch, n_files):
+    killed(tour, tmp_path, 4.0)
+    state, written = read_run(tmp_path)[2], []
+    record = RunRecord(tmp_path, tour)
+    record.keep(SITE, state)
+
+    def write_text(file, text):
+        if len(written) == n_files:
+            raise KilledError
+        written.append(file.name)
+        file.write_text(text)
+
+    monkeypatch.setattr(run_record, "write_text", write_text)
+    longer = SITE.model_copy(update={"tether_length": SITE.tether_length + 1.0})
+    with contextlib.suppress(KilledError):
+        record.keep(longer, state)
+    assert written == ["state.json", "problem.json", "state.json"][:n_files]
+    problem, _, _ = read_run(tmp_path)
+    assert problem.tether_length == (SITE if n_files < 2 else longer).tether_length
 
 
 def test_a_flight_is_resumed_when_an_obstacle_stands_on_a_goal(tour, tmp_path):

@@ -76,12 +76,14 @@ class RunState(FileModel):
         NonNegative,
         Field(description="length of tether that repairs keep in reserve, in the problem's units"),
     ] = 0.0
-
     problem_sha256: Annotated[
-        str | None,
-        Field(description="hash of the problem beside it, which must not be edited; not in states "
-              "of earlier versions"),
-    ] = None  # fmt: skip
+        tuple[str, ...],
+        Field(
+            description="hashes of the problem beside it, which must not be edited: one, or two "
+            "while the problem is replaced; none in states of earlier versions",
+            max_length=2,
+        ),
+    ] = ()  # fmt: skip
 
     def check(self, problem: Problem, source: str) -> None:
         """Refuse the state of another problem.
@@ -98,7 +100,7 @@ class RunState(FileModel):
         InputError
             A goal that the problem does not have, or a tether that begins elsewhere.
         """
-        if self.problem_sha256 not in (None, problem.sha256):
+        if self.problem_sha256 and problem.sha256 not in self.problem_sha256:
             raise InputError(
                 f"{source}: problem_sha256: is of another problem; expected the {PROBLEM} that the "
                 "run wrote, unchanged"
@@ -165,7 +167,8 @@ class RunRecord:
     def __init__(self, folder: str | Path, solution: Solution) -> None:
         self.folder, self.solution = Path(folder), solution
         self._problem: Problem | None = None
-        self._sha256: str | None = None
+        self._sha256 = ""
+        self._state: RunState | None = None
         self._due = -np.inf
 
     def take(self, row: ExecutionRow, problem: Problem, state: Callable[[], RunState]) -> None:
@@ -202,7 +205,14 @@ class RunRecord:
             The state now.
         """
         if problem is not self._problem:
+            before, self._sha256 = self._sha256, problem.sha256
+            if self._state is not None:  # a run that is killed before the new state is written
+                self._write(self._state, before, self._sha256)
             write_text(self.folder / PROBLEM, problem.to_json())
-            self._problem, self._sha256 = problem, problem.sha256
-        state = state.model_copy(update={"problem_sha256": self._sha256})
+            self._problem = problem
+        self._state = state
+        self._write(state, self._sha256)
+
+    def _write(self, state: RunState, *hashes: str) -> None:
+        state = state.model_copy(update={"problem_sha256": hashes})
         write_text(self.folder / STATE, state.to_json())
