@@ -88,7 +88,7 @@ purpose it goes farther than the problem's tether of 20 m reaches; it is watched
 
 @dataclass
 class Outcome:
-    """What a guard said of a flight.
+    """Result of a guard on the recording of a flight.
 
     Attributes
     ----------

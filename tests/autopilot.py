@@ -665,9 +665,13 @@ class Body:
         """Advance the vehicle by a step towards a velocity."""
         p = self.params
         missing = minus(wanted, moving)
+        # an integral does not grow while the thrusters give all they have
+        is_full = p.push * math.hypot(self.command[0], self.command[1]) ** 2 >= p.thrust
+        would_grow = missing[0] * self.command[0] + missing[1] * self.command[1] > 0.0
+        gain = 0.0 if is_full and would_grow else p.trim
         self.trim = (
-            self.trim[0] + STEP * p.trim * missing[0],
-            self.trim[1] + STEP * p.trim * missing[1],
+            self.trim[0] + STEP * gain * missing[0],
+            self.trim[1] + STEP * gain * missing[1],
             self.trim[2] + STEP * p.trim_z * missing[2],
         )
         keep = min(STEP / p.lag_s, 1.0)

@@ -2,15 +2,18 @@
 
 import gzip
 import json
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, InputError, Problem, solve
+from netsp.axes import metres_per_unit
 from netsp.command.main import main
-from netsp.sizing.clearance_advice import ClearancePolicy, clearance_advice
+from netsp.sizing.clearance_advice import ClearancePolicy, clearance_advice, clearance_room
 
 FLIGHTS = Path(__file__).parent / "data" / "ardusub47"
 PROBLEMS = Path(__file__).parent.parent / "problems"
@@ -32,7 +35,9 @@ def test_a_warning_comes_below_the_sum_and_its_number_ends_it(clearance, error, 
     if clearance >= needed:
         assert text is None
     elif clearance < needed - 1e-6:
-        assert f"raise clearance to {needed:.3g}" in text
+        number = float(re.search(r"raise clearance to (\S+) or more", text)[1])
+        assert needed - 1e-9 <= number <= 1.01 * needed
+        assert clearance_advice(number, "m", policy) is None
     assert clearance_advice(needed, "m", policy) is None
     assert clearance_advice(0.0, "pixels", policy) is None
 
@@ -50,6 +55,63 @@ def test_the_numbers_are_those_of_flights():
     )  # fmt: skip
     lost = problem.clearance - room
     assert 0.05 < lost <= ClearancePolicy().path_error + 0.005
+
+
+@given(st.floats(0.0, 3.0), st.floats(0.0, 2.0), st.sampled_from(["km", "ft", "cm", "Metres"]))
+@settings(max_examples=40, deadline=None)
+def test_other_units_of_length_are_converted(error, current, units):
+    policy, metres = ClearancePolicy(position_error=error, current=current), metres_per_unit(units)
+    text = clearance_advice(0.01 / metres, units, policy)
+    number = float(re.search(r"raise clearance to (\S+)", text)[1])
+    assert policy.min_clearance - 1e-6 <= number * metres <= 1.01 * policy.min_clearance
+    assert clearance_advice(number, units, policy) is None
+
+
+@given(st.floats(0.0, 0.5), st.floats(0.0, 4.0))
+@settings(max_examples=30, deadline=None)
+def test_following_the_advice_ends_it_or_the_advice_says_which_goal_is_too_near(margin, error):
+    problem = site(0.2)
+    policy, room = ClearancePolicy(position_error=error), clearance_room(problem)
+    assert room.most == pytest.approx(np.hypot(4, 0.2) - 1.0)
+    text = clearance_advice(0.2, "m", policy, margin=margin, room=room)
+    if text is None:
+        assert 0.2 + margin >= error + 0.1 - 1e-6
+        return
+    data = json.loads(problem.to_json())
+    number = float(re.search(r"(?:raise clearance to|can be raised to) (\d+\.?\d*)", text)[1])
+    raised = Problem.model_validate({**data, "clearance": number})  # base and goal stay free
+    again = clearance_advice(number, "m", policy, margin=margin, room=clearance_room(raised))
+    if "raise clearance to" in text:
+        assert again is None
+    else:
+        assert f"is only {number:g} m from obstacle #0" in text
+        assert "cannot be raised" in again
+
+
+def test_a_margin_counts_as_clearance_and_px_are_no_length(tmp_path, capsys):
+    file, tour = str(tmp_path / "p.json"), str(tmp_path / "s.json")
+    site(0.1).save(file)
+    more = ["--position-error", "0.2"]
+    assert main(["solve", file, "-o", tour, "--margin", "0.2", *more]) == 0
+    assert main(["fly", file, tour, "--dry-run", *more]) == 0
+    plan = ["--origin", "55,12", "-o", str(tmp_path / "m.plan")]
+    assert main(["export", tour, "--problem", file, *plan, *more]) == 0
+    assert "clearance: " not in capsys.readouterr().err
+    assert main(["fly", file, tour, "--dry-run", "--position-error", "0.3"]) == 0
+    said = capsys.readouterr().err
+    assert "0.1 m and a margin of 0.2 m is less than the 0.4 m" in said
+    assert "raise clearance to 0.2 or more" in said
+    site(0.1, "px").save(file)
+    assert main(["solve", file, "-o", tour, *more]) == 0
+    assert "a clearance in px cannot be compared with metres" in capsys.readouterr().err
+
+
+def test_goals_that_an_obstacle_has_come_upon_do_not_limit_the_clearance():
+    problem = site(0.3)
+    boat = Circle(center=(8, 0), radius=1)
+    over = problem.model_copy(update={"obstacles": (*problem.obstacles, boat)})
+    assert clearance_room(over).place == "the base"
+    assert clearance_room(problem.model_copy(update={"obstacles": ()})) is None
 
 
 @pytest.mark.parametrize("name", ["position_error", "current", "path_error", "error_by_current"])

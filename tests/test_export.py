@@ -208,6 +208,8 @@ def test_tags_of_sea_charts_are_read(tmp_path):
         ([], "origin: format 'plan' needs latitude"),
         (["--origin", "55,12", "--format", "dxf"], "format: expected plan, wpl, cockpit, geojson,"),
         (["--origin", "55,12", "--fence-bytes", "17"], "--fence-bytes: expected 18 or more"),
+        (["--origin", "55,12", "--fence-bytes=-5"], "--fence-bytes: expected 18 or more, got -5"),
+        (["--origin", "55,12", "--fence-bytes", "1e3"], "expected a whole number of bytes"),
         (["--origin", "55,12", "--max-waypoints", "3"], "waypoints, and the vehicle takes 3"),
         (["--origin", "55,12", "--hold", "9999"], "hold: expected whole seconds"),
     ],

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from netsp import Circle, InputError, Polygon, Problem, Solution, solve
 from netsp.command.main import main
 from netsp.export import Projection, export
-from netsp.export.export_notes import _fence_warnings as fence_lines
+from netsp.export.export_notes import fence_warnings
 from netsp.export.fence import FencePolicy, fence_of
 from netsp.export.write import Settings
+from netsp.site.qgc_plan import read_plan
 from tests.plan_loaders import RefusedError, load_cockpit, load_fence, load_plan, stored_bytes
 
 pytest.importorskip("pyproj")
@@ -106,14 +107,32 @@ def test_a_large_fence_is_simplified_before_anything_is_left_out_and_both_are_sa
     obstacles = [ring(120, 9), ring(120, 20, dent=0.3), Circle(center=(30, 20), radius=1)]
     fence = fence_of(site(obstacles), PATH)
     assert not fence.left_out
-    (line,) = fence_lines(site(obstacles), fence)
+    (line,) = fence_warnings(site(obstacles), fence)
     assert line.startswith("2 obstacles simplified in the fence")
     # without a clearance nothing may grow: the farthest from the tour are left out
     tight = [ring(60, 9), ring(60, 20, y=60.0), Circle(center=(30, 9), radius=1, name="post")]
     fence = fence_of(site(tight, 0.0), PATH)
     assert fence.left_out == (1,)
-    (line,) = fence_lines(site(tight, 0.0), fence)
+    (line,) = fence_warnings(site(tight, 0.0), fence)
     assert line.startswith("1 obstacle left out of the fence (#1)")
+
+
+def test_an_obstacle_too_large_for_the_vehicle_does_not_keep_others_out_of_the_fence():
+    obstacles = [ring(90, 9, dent=2.0), *[Circle(center=(k, 20), radius=0.2) for k in range(9)]]
+    fence = fence_of(site(obstacles, 0.1), PATH)
+    assert fence.left_out == (0,)
+    (line,) = fence_warnings(site(obstacles, 0.1), fence)
+    assert line.startswith("1 obstacle left out of the fence (#0), which takes the nearest")
+
+
+def test_a_tour_that_touches_the_fence_is_told():
+    beside = [Circle(center=(9, 2), radius=2, name="pier"), Circle(center=(20, 2), radius=1.9)]
+    corner = Polygon(polygon=[(30, 0), (33, 3), (27, 3)], name="quay")
+    fence = fence_of(site([*beside, corner], 0.0), PATH)
+    assert fence.touched == (0, 2)
+    (line,) = fence_warnings(site([*beside, corner], 0.0), fence)
+    assert line.startswith("the tour touches the fence at 2 obstacles (pier, quay)")
+    assert fence_of(site(beside[1:]), PATH).touched == ()
 
 
 def test_a_policy_out_of_range_is_refused(tmp_path, capsys):
@@ -139,6 +158,11 @@ def test_plans_are_what_ground_stations_load(plan, tmp_path):
     assert stored_bytes(data["geoFence"]) <= 672
     assert len(data["geoFence"]["circles"]) + len(data["geoFence"]["polygons"]) == 3
     assert data["netsp"]["fence"] == {"simplified": ["#2"], "left_out": []}
+    (note,) = read_plan(tmp_path / "n.plan").notes  # else the plan would pass for the problem
+    assert note.startswith("the fence has 1 obstacle ('#2') simplified")
+    export(many, plan, tmp_path / "n.plan", "plan", PROJECTION, settings=Settings(
+        fence=FencePolicy(max_bytes=18)))  # fmt: skip
+    assert any("lacks 2 obstacles" in line for line in read_plan(tmp_path / "n.plan").notes)
 
 
 @pytest.mark.parametrize(
@@ -192,6 +216,8 @@ def test_the_command_writes_missions_of_cockpit_and_says_what_the_fence_lacks(
     assert main([*line, str(tmp_path / "m.plan"), "--fence-bytes", "2000"]) == 0
     assert "left out of the fence" not in capsys.readouterr().err
     assert main([*line, str(tmp_path / "m.cmp")]) == 0
-    assert "not written in this format" in (err := capsys.readouterr().err) and "obstacles" in err
+    assert "not written in this format: the tether's length, the clearance, obstacles" in (
+        capsys.readouterr().err
+    )
     load_cockpit(json.loads((tmp_path / "m.cmp").read_text()))
     assert isinstance(Solution.load(tmp_path / "s.json"), Solution)

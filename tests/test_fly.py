@@ -16,9 +16,11 @@ from netsp.command.main import main
 from netsp.errors import InputError
 from netsp.execute.events import Surprises
 from netsp.execute.log import ExecutionOptions
+from netsp.execute.run import StopsFlightError
 from netsp.fly.checks import ready
 from netsp.fly.flight import fly
 from netsp.fly.flight_policy import FlightPolicy
+from netsp.fly.flight_time import predicted_flight
 from netsp.fly.inputs import event_of
 from netsp.fly.rehearsal import rehearse
 from netsp.fly.stopped import RefusedError
@@ -165,6 +167,57 @@ def test_an_armed_vehicle_is_not_refused_before_it_has_said_whether_it_is():
             pass
 
     ready(Heard(), np.zeros(3), 2.0)
+
+
+def test_a_clock_that_stands_still_ends_the_flight(monkeypatch):
+    session = Session(UdpLink(Address(True, "127.0.0.1", 0)), Frame(SITE, "local"), 1, 1.0)
+    m, pack, ours = dialect(), parser(1, 1), [0.0]
+    monkeypatch.setattr(session, "_seconds", lambda: ours[0])
+
+    def say(time_ms):
+        for message in (
+            m.MAVLink_heartbeat_message(12, 3, 128, 4, 4, 3),
+            m.MAVLink_local_position_ned_message(time_ms, 0.0, 0.0, 0.0, 0, 0, 0),
+        ):
+            for heard in messages_in(bytes(message.pack(pack))):
+                session._take(heard, ("127.0.0.1", 1))
+
+    try:
+        for second in range(4):
+            ours[0] = float(second)
+            say(1000 * second)
+            assert session.stalled_s == 0.0
+        vehicle = LinkedVehicle(session, 0.3)
+        for second in range(4, 7):
+            ours[0] = float(second)
+            say(3000)
+            vehicle.check()
+        ours[0] = 6.5
+        with pytest.raises(StopsFlightError, match=r"the vehicle's clock stands still.* 4 s"):
+            vehicle.check()
+    finally:
+        session.close()
+
+
+def test_positions_without_heartbeats_are_told_from_silence():
+    class Heard:
+        silent_s, unplaced_s, system, others = np.inf, 0.1, 7, ()
+
+        def sleep(self, seconds):
+            pass
+
+        def ask_for_positions(self):
+            pass
+
+    with pytest.raises(RefusedError, match="positions come from system 7, but no heartbeat"):
+        ready(Heard(), np.zeros(3), 2.0)
+
+
+@pytest.mark.parametrize("number", ["0", "256", "-1", "one"])
+@pytest.mark.parametrize("command", ["fly", "guard"])
+def test_system_ids_that_mavlink_does_not_have_are_refused(command, number, capsys):
+    assert main([command, "p.json", "--link", "udpin:14550", f"--system={number}"]) == 2
+    assert f"expected a system id from 1 to 255, got '{number}'" in capsys.readouterr().err
 
 
 def test_a_link_with_nobody_at_the_other_end_is_told(tour):
@@ -333,9 +386,11 @@ def test_a_dry_run_shows_every_target_and_needs_no_link(tmp_path, capsys, tour):
     problem.write_text(SITE.to_json())
     solution.write_text(tour.to_json())
     assert main(["fly", str(problem), str(solution), "--dry-run"]) == 0
-    out = capsys.readouterr().out
+    out, err = capsys.readouterr()
     assert out.count("goal") == 2
     assert "the base" in out
+    seconds = predicted_flight(SITE, tour, 0.5, 0.3).total_s
+    assert f"about {seconds:.0f} s at 0.5 m/s" in err
     broken = json.loads(tour.to_json())
     broken["path"][1][0] += 3.0
     solution.write_text(json.dumps(broken))

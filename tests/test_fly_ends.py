@@ -7,9 +7,13 @@ import pytest
 
 from netsp import Circle, Problem, solve
 from netsp.command.main import main
+from netsp.execute import log
 from netsp.execute.log import ExecutionOptions
+from netsp.execute.run import _Run
+from netsp.execute.run_record import RunState
 from netsp.fly import flight
 from netsp.fly.flight import fly
+from netsp.fly.resume import read_run
 from netsp.fly.standby import stand_by
 from tests.simulated_session import SimulatedSession
 
@@ -98,6 +102,23 @@ def test_another_ground_station_that_the_vehicle_counts_on_takes_over(tour):
     assert session.heard("disarmed") == []
 
 
+def test_what_the_vehicle_will_do_is_asked_for_until_it_is_told(tour):
+    """A link that loses the first question for each parameter."""
+    session, asked = SimulatedSession(SITE, params={"FS_GCS_TIMEOUT": 42}).arm(), set()
+    fly(SITE, tour, session, OPTIONS, on_step=after(session, 4.0, stop))
+    receive, said = session.simulation.vehicle.receive, []
+
+    def deaf(message):
+        if message.get_type() == "PARAM_REQUEST_READ" and message.param_id not in asked:
+            asked.add(message.param_id)
+            return
+        receive(message)
+
+    session.simulation.vehicle.receive = deaf
+    stand_by(session, say=said.append, should_stop=lambda: bool(said))
+    assert "after 42 s" in said[0]
+
+
 def test_nobody_waits_for_a_vehicle_that_needs_nobody_or_is_gone(tour):
     for params, befall, why in (
         ({"FS_GCS_ENABLE": 0}, {}, "FS_GCS_ENABLE"),
@@ -124,18 +145,109 @@ def test_a_pilot_who_has_taken_over_is_left_alone_and_the_link_kept_alive(tour):
     assert "does not steer it" in said[0]
 
 
+def commanded(monkeypatch, tmp_path, tour, session, *more):
+    """Return the words of the command for a session; the run goes to ``tmp_path / "run"``."""
+    problem, solution, run = tmp_path / "p.json", tmp_path / "s.json", tmp_path / "run"
+    problem.write_text(SITE.to_json())
+    solution.write_text(tour.to_json())
+    monkeypatch.setattr("netsp.link.session.Session", lambda *_: session)
+    monkeypatch.setattr("netsp.link.udp.UdpLink", lambda *_: None)
+    monkeypatch.setattr("netsp.fly.rehearsal.rehearse", lambda: None)
+    return ["fly", str(problem), str(solution), "--link", "udpin:14550", "-o", str(run), *more]
+
+
+def broken(error, when):
+    """Return a method of a run that raises an error after some seconds of it."""
+    go = _Run.go
+
+    def step(run):
+        if run.now >= when:
+            raise error
+        go(run)
+
+    return step
+
+
+@pytest.mark.parametrize(
+    ("error", "where"),
+    [
+        (RuntimeError("no such thing"), "netsp.execute.run._Run.go"),
+        (OSError(28, "No space left on device"), "netsp.execute.run._Run.go"),
+        (RuntimeError("no such thing"), "netsp.pictures.execution.save_execution"),
+    ],
+)
+def test_whatever_breaks_in_netsp_the_vehicle_is_held_and_the_error_told_in_the_end(
+    tour, tmp_path, monkeypatch, capfd, error, where
+):
+    session, run = SimulatedSession(SITE).arm(), tmp_path / "run"
+    words = commanded(monkeypatch, tmp_path, tour, session)
+    is_flight = where.endswith("go")
+
+    def fail(*_):
+        raise error
+
+    monkeypatch.setattr(where, broken(error, 8.0) if is_flight else fail)
+    begin = session.simulation.now
+    session.stations = {(255, 190): begin + 80.0}
+    if isinstance(error, OSError):
+        assert main(words) == 2
+    else:
+        with pytest.raises(RuntimeError, match="no such thing"):
+            main(words)
+    assert session.simulation.now == pytest.approx(begin + 80.0, abs=1.0)
+    assert session.heard("disarmed") == []
+    track = session.truth
+    late = track[track[:, 0] > begin + (20.0 if is_flight else 45.0), 1:3]
+    assert np.linalg.norm(late - late[0], axis=1).max() < 0.3
+    told = capfd.readouterr().err
+    assert f"{type(error).__name__}: {error}; the flight ends here" in told
+    assert "the vehicle holds its place" in told
+    state = RunState.load(run / "state.json")
+    if is_flight:
+        assert state.time == pytest.approx(8.0, abs=0.5)
+        _, _, left = read_run(run)
+        assert left.left == (0,)
+
+
+def test_ctrl_c_while_the_files_are_written_does_not_break_them_off(
+    tour, tmp_path, monkeypatch, capfd
+):
+    """The command prints what the vehicle will do, and then ends."""
+    session, pressed = SimulatedSession(SITE).arm(), []
+    words = commanded(monkeypatch, tmp_path, tour, session)
+    sleep, write = session.sleep, log.Execution.summary.fget
+
+    def press(seconds):
+        sleep(seconds)
+        if session.simulation.now > 12.0 and not pressed:
+            pressed.append(1)
+            signal.raise_signal(signal.SIGINT)
+
+    def summary(done):
+        if len(pressed) == 1:
+            pressed.append(2)
+            signal.raise_signal(signal.SIGINT)
+        return write(done)
+
+    monkeypatch.setattr(session, "sleep", press)
+    monkeypatch.setattr(log.Execution, "summary", property(summary))
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        assert main(words) == 4
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert pressed == [1, 2]
+    assert {"summary.json", "run.png", "log.csv"} <= {p.name for p in (tmp_path / "run").iterdir()}
+    assert "disarms and drifts after 5 s" in capfd.readouterr().err
+
+
 @pytest.mark.parametrize("pressed", [(), (8.0,), (8.0, 30.0)])
 def test_the_command_ends_with_another_ground_station_or_the_second_ctrl_c(
     tour, tmp_path, monkeypatch, capfd, pressed
 ):
     """The first Ctrl-C ends the flight, and its files are written before anybody waits."""
-    problem, solution, run = tmp_path / "p.json", tmp_path / "s.json", tmp_path / "run"
-    problem.write_text(SITE.to_json())
-    solution.write_text(tour.to_json())
-    session = SimulatedSession(SITE).arm()
-    monkeypatch.setattr("netsp.link.session.Session", lambda *_: session)
-    monkeypatch.setattr("netsp.link.udp.UdpLink", lambda *_: None)
-    monkeypatch.setattr("netsp.fly.rehearsal.rehearse", lambda: None)
+    session, run = SimulatedSession(SITE).arm(), tmp_path / "run"
+    words = commanded(monkeypatch, tmp_path, tour, session)
     begin, left, sleep, written = session.simulation.now, list(pressed), session.sleep, []
 
     def press(seconds):
@@ -150,7 +262,7 @@ def test_the_command_ends_with_another_ground_station_or_the_second_ctrl_c(
     session.stations = {(255, 190): takes_over}
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        code = main(["fly", str(problem), str(solution), "--link", "udpin:14550", "-o", str(run)])
+        code = main(words)
     finally:
         signal.signal(signal.SIGINT, before)
     assert code == (4 if pressed else 0)

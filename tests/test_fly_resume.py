@@ -1,5 +1,6 @@
 """Flights that were broken off go on where the vehicle is, in the class that the tether has."""
 
+import contextlib
 import csv
 import json
 import time
@@ -10,8 +11,9 @@ import pytest
 from netsp import Circle, Problem, solve
 from netsp.command.main import main
 from netsp.errors import InputError
-from netsp.execute.events import Event
-from netsp.execute.log import ExecutionOptions
+from netsp.execute import run_record
+from netsp.execute.events import Event, Surprises
+from netsp.execute.log import ExecutionOptions, describe_execution
 from netsp.execute.run_record import RunRecord, RunState
 from netsp.fly import flight
 from netsp.fly.flight import fly
@@ -77,6 +79,7 @@ def test_a_flight_that_was_killed_is_resumed_in_its_class(tour, tmp_path, when):
     assert (s["status"], s["visited"], s["home"]) == ("done", len(state.left), True), done.stopped
     assert s["tether_free"]
     assert s["exceedance_s"] == 0.0
+    assert "than planned" not in describe_execution(done).split("tether ")[0]  # the whole tour
     true = np.vstack([[0.0, 0.0], session.truth[:, 1:3]])
     assert signature(np.vstack([true, [[0.0, 0.0]]]), SITE.representative_points) == ()
     assert {v.goal for v in tour.tour} == {a.goal for a in done.arrivals if a.goal >= 0} | (
@@ -91,6 +94,61 @@ def test_events_outlive_a_flight_that_was_killed(tour, tmp_path):
     problem, _, state = read_run(tmp_path)
     assert [o.name for o in problem.obstacles] == ["pile", "boat"]
     assert (state.left, state.cancelled) == ((0,), (1,))
+
+
+def test_a_run_beside_the_problem_of_another_is_not_resumed(tour, tmp_path):
+    killed(tour, tmp_path, 4.0)
+    read_run(tmp_path)
+    other = SITE.model_copy(update={"tether_length": SITE.tether_length + 1.0})
+    other.save(tmp_path / "problem.json")
+    with pytest.raises(InputError, match=r"state\.json: problem_sha256: .*expected the problem"):
+        read_run(tmp_path)
+
+
+@pytest.mark.parametrize("n_files", [0, 1, 2, 3])
+def test_a_run_killed_as_its_problem_is_replaced_is_resumed(tour, tmp_path, monkeypatch, n_files):
+    killed(tour, tmp_path, 4.0)
+    state, written = read_run(tmp_path)[2], []
+    record = RunRecord(tmp_path, tour)
+    record.keep(SITE, state)
+
+    def write_text(file, text):
+        if len(written) == n_files:
+            raise KilledError
+        written.append(file.name)
+        file.write_text(text)
+
+    monkeypatch.setattr(run_record, "write_text", write_text)
+    longer = SITE.model_copy(update={"tether_length": SITE.tether_length + 1.0})
+    with contextlib.suppress(KilledError):
+        record.keep(longer, state)
+    assert written == ["state.json", "problem.json", "state.json"][:n_files]
+    problem, _, _ = read_run(tmp_path)
+    assert problem.tether_length == (SITE if n_files < 2 else longer).tether_length
+
+
+def test_a_flight_is_resumed_when_an_obstacle_stands_on_a_goal(tour, tmp_path):
+    last = tour.tour[-1].goal
+    boat = Circle(center=SITE.goals[last].position[:2], radius=0.4, name="boat")
+    events = [[], [], [Event(time=0, appear=boat)]]
+    session = killed(tour, tmp_path, 9.0, incoming=lambda: events.pop(0) if events else [])
+    problem, plan, state = read_run(tmp_path)
+    assert [g.goal for g in state.left_out] == [last]
+    done = fly(problem, plan, after_kill(session), OPTIONS, begins=from_record(problem, state))
+    assert (done.summary["home"], done.summary["tether_free"]) == (True, True)
+    assert "boat stands on it" in done.left_out[last]
+
+
+def test_a_resumed_flight_keeps_the_reserve_of_its_plan(tour, tmp_path):
+    session = killed(
+        tour, tmp_path, 8.0, surprises=Surprises(events=(Event(time=2.0, tether_length=9.0),))
+    )
+    problem, plan, state = read_run(tmp_path)
+    assert problem.tether_length == 9.0
+    longest = max(v.tether_length for v in tour.tour)
+    assert state.reserve == pytest.approx(min(1.2, 12.0 - longest))
+    done = fly(problem, plan, after_kill(session), OPTIONS, begins=from_record(problem, state))
+    assert done.reserve == state.reserve
 
 
 @pytest.mark.parametrize("word", ["1", ""])
@@ -119,8 +177,12 @@ def test_a_class_that_is_not_known_is_asked_for(tour, tmp_path):
             parse_class(text)
     with pytest.raises(InputError, match="up to 1"):
         from_word(SITE, (2,), state)
-    for bad in ({"left": (2,)}, {"tether": ((1, 0, 0), (3, 0, -1))}):
-        with pytest.raises(InputError, match=r"left|tether"):
+    for bad, field in (
+        ({"left": (2,)}, "left"), ({"tether": ((1, 0, 0), (3, 0, -1))}, "tether"),
+        ({"cancelled": (2,)}, "cancelled"), ({"left": (0, 0)}, "left"),
+        ({"left": (0,), "cancelled": (0,)}, "left"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=f"state.json: {field}: expected"):
             state.model_copy(update=bad).check(SITE, "state.json")
     with pytest.raises(InputError, match=r"state\.json"):
         read_run(tmp_path)

@@ -7,11 +7,14 @@ import pytest
 
 from netsp import Problem, solve
 from netsp.execute.log import ExecutionOptions
+from netsp.execute.run import StopsFlightError
 from netsp.fly import flight
 from netsp.fly.flight import fly
 from netsp.fly.standby import stand_by
+from netsp.fly.vehicle import LinkedVehicle
 from netsp.link.position_source import PositionSources
 from tests.simulated_session import SimulatedSession
+from tests.test_fly_vehicle import Scripted, driven
 
 SITE = Problem(base=(0, 0), goals=[(9, 2, -1), (9, -2, -1)], tether_length=15)
 OPTIONS = ExecutionOptions(speed=0.5, reach=0.3)
@@ -134,3 +137,87 @@ def test_a_gps_is_silent_after_a_second_or_three_of_its_intervals(period, silenc
     last = 19 * period
     assert sources.lost(last + silence - 0.05, 0.5, 1.2) is None
     assert "silent" in sources.lost(last + silence + 0.05, 0.5, 1.2)
+
+
+@pytest.mark.parametrize("when", [0.0, 4.0, 7.3, 13.0])
+@pytest.mark.parametrize("current", [(0.0, 0.0), (0.3, -0.4)])
+def test_a_frozen_position_stops_the_flight_and_the_vehicle_follows_it_no_more(tour, when, current):
+    """Positions go on coming in time, and the filter vouches for them."""
+    session, begun = SimulatedSession(SITE, current=current, noise=0.02, smooth=1.0).arm(), []
+
+    def befall(row):
+        if row.time >= when and not begun:
+            begun.append(session.simulation.now)
+            session.simulation.do(do="freeze")
+
+    done = fly(SITE, tour, session, OPTIONS, on_step=befall)
+    assert "the position is frozen: its position is the same" in done.stopped
+    assert done.rows[-1].time - when < 2.0
+    assert session.simulation.vehicle.mode == 2  # ALT_HOLD
+    end, sent = session.simulation.now, len(session.heard("target"))
+    stand_by(session, should_stop=lambda: session._seconds() > end + 20.0)
+    assert session.simulation.vehicle.mode == 2
+    assert (session.heard("disarmed"), len(session.heard("target"))) == ([], sent)
+    away = session.truth[-1, 1:3] - session.truth[session.truth[:, 0] <= end][-1, 1:3]
+    drift = np.array(current) * (session.simulation.now - end)
+    assert np.linalg.norm(away - drift) < 1.6  # it coasts from 0.5 m/s
+
+
+def test_a_frozen_vehicle_is_asked_for_alt_hold_until_it_has_it(tour):
+    session, begun = SimulatedSession(SITE).arm(), []
+    receive, asked = session.simulation.vehicle.receive, []
+
+    def deaf(message):
+        if message.get_type() == "COMMAND_LONG" and message.command == 176:
+            asked.append(message)
+            if len(asked) < 3:
+                return
+        receive(message)
+
+    def befall(row):
+        if row.time >= 5.0 and not begun:
+            begun.append(True)
+            session.simulation.do(do="freeze")
+            session.simulation.vehicle.receive = deaf
+
+    fly(SITE, tour, session, OPTIONS, on_step=befall)
+    assert session.simulation.vehicle.mode == 2
+
+
+FAR = [(20.0, 0.0, -3.0)]
+
+
+@pytest.mark.parametrize(
+    ("motion", "velocity", "path", "what"),
+    [
+        (lambda t: (1.0, 0.0, -1.0 - 0.1 * t), None, FAR, "position"),  # stuck in the plan only
+        (lambda t: (min(0.5 * t, 2.0), 0.0, -3.0), None, FAR, "position"),
+        (lambda t: (min(0.5 * t, 2.0), 0.0, -3.0), (0.5, 0.0, 0.0), FAR, "position"),
+        (lambda t: (0.0, 0.0, max(-0.5 * t, -2.0)), None, [(0.0, 0.0, -9.0)], "position"),
+        (lambda t: (0.5 * t, 0.0, max(-0.2 * t, -1.0)), (0.5, 0.0, -0.2), FAR, "depth"),
+        (lambda t: (19.9, 0.0, -3.25), None, FAR, "position"),  # within reach, and still under way
+        # it says that it moves, and has only drifted past its target
+        (lambda t: (19.9, 0.0, -3.0), (0.4, 0.0, 0.0), FAR, "position"),
+        (lambda t: (19.9, 0.0, -3.0), (0.02, 0.02, 0.0), FAR, None),  # it waits there
+        (lambda t: (19.95, 0.05, -2.95), None, FAR, None),
+        (lambda t: (0.0, 0.0, max(-0.5 * t, -9.0)), None, [(0.0, 0.0, -9.0)], None),
+        (lambda t: (0.4, 0.0, -0.5 * t), None, [(0.0, 0.0, -20.0)], None),  # dives beside it
+    ],
+)
+def test_a_position_is_frozen_where_the_vehicle_moves_or_is_told_to(motion, velocity, path, what):
+    given = velocity and (lambda t: velocity)
+    if what is None:
+        driven(motion, path, 30.0, lambda target: target, given)
+        return
+    with pytest.raises(StopsFlightError, match=f"frozen: its {what} is the same"):
+        driven(motion, path, 8.0, lambda target: target, given)
+
+
+def test_a_vehicle_that_may_have_missed_its_target_gets_it_again_before_it_is_called_frozen():
+    session = Scripted(lambda t: (0.0, 0.0, -3.0))
+    vehicle = LinkedVehicle(session, 0.3)
+    with pytest.raises(StopsFlightError, match="frozen"):
+        vehicle.go(np.array(FAR), 30.0, 0.0, np.zeros(3), True)
+    assert [round(t) for t, _ in session.sent] == [0, 2]
+    assert 3.0 < session.now.time < 5.0
+    assert "20.0 m away" in session.distrusted

@@ -24,12 +24,16 @@ SITE = Problem(base=(0, 0), goals=[(6, 2, -1)], tether_length=40)
 class Scripted:
     """A session whose vehicle goes where a function of time says, ten positions a second."""
 
-    system, others, broken, silent_s, unplaced_s, pace = 1, (), None, 0.0, 0.0, 1.0
+    system, others, broken, pace = 1, (), None, 1.0
+    silent_s = unplaced_s = stalled_s = 0.0
     kind = VehicleKind(12, 3)
 
-    def __init__(self, motion, echo=None):
+    def __init__(self, motion, echo=None, velocity=None):
         self.motion, self.frame, self.link = motion, Frame(SITE), self
-        self.now = Fix(0.0, motion(0.0), armed=True, mode="GUIDED", estimate=True)
+        velocity = velocity or (lambda t: None)
+        self.velocity = velocity
+        self.now = Fix(0.0, motion(0.0), armed=True, mode="GUIDED", estimate=True,
+                       velocity=velocity(0.0))  # fmt: skip
         self.sent, self.asked, self.fresh = [], [], []
         self.answers = echo
 
@@ -51,6 +55,9 @@ class Scripted:
     def ask_for_positions(self):
         self.asked.append("positions")
 
+    def distrust(self, why):
+        self.distrusted = why
+
     def command(self, *numbers):
         self.asked.append(numbers)
         return True
@@ -61,7 +68,9 @@ class Scripted:
 
     def sleep(self, seconds):
         time = self.now.time + seconds
-        self.now = replace(self.now, time=time, position=self.motion(time))
+        self.now = replace(
+            self.now, time=time, position=self.motion(time), velocity=self.velocity(time)
+        )
         self.fresh.append(np.array(self.now.position))
 
     def places(self):
@@ -69,9 +78,9 @@ class Scripted:
         return found
 
 
-def driven(motion, path, seconds, echo=None):
+def driven(motion, path, seconds, echo=None, velocity=None):
     """Drive a vehicle along a path that it does not decide itself."""
-    vehicle = LinkedVehicle(Scripted(motion, echo), 0.3)
+    vehicle = LinkedVehicle(Scripted(motion, echo, velocity), 0.3)
     vehicle.go(np.array(path, dtype=float), seconds, 0.0, np.zeros(3), True)
     return vehicle
 
@@ -141,7 +150,7 @@ def test_the_kind_of_a_vehicle_is_that_of_its_heartbeat():
 
 
 def resting(t):
-    return 0.0, 0.0, -1.0
+    return 1e-4 * np.sin(t), 0.0, -1.0  # to the last bit no real vehicle holds still
 
 
 def moving(t):
@@ -172,7 +181,7 @@ def test_a_target_is_sent_again_only_to_a_vehicle_that_does_not_have_it(motion, 
 def test_a_vehicle_that_goes_elsewhere_gets_its_target_three_times_more_and_is_then_stopped():
     session = Scripted(moving, lambda target: (target[0], target[1] + 4.0, target[2]))
     vehicle = LinkedVehicle(session, 0.3)
-    with pytest.raises(StopsFlightError, match=r"does not take its target.* 4\.0 m"):
+    with pytest.raises(StopsFlightError, match=r"does not accept its target.* 4\.0 m"):
         vehicle.go(np.array(FAR), 30.0, 0.0, np.zeros(3), True)
     assert len(session.sent) == 4
 

@@ -25,6 +25,7 @@ from netsp.link.position_aiding import AidingPolicy
 pytest.importorskip("pymavlink")
 
 from netsp.link.dialect import dialect, parser
+from tests.autopilot import Simulation
 
 FLIGHTS = Path(__file__).parent / "data" / "ardusub47"
 SITE = Problem(
@@ -244,6 +245,92 @@ def test_a_guard_says_how_often_positions_come_and_asks_for_more_only_if_it_may(
     said, sent = beside(monkeypatch, 3, ask_rates=True, accepts=False)
     assert [line for line in said if "refuses other rates" in line]
     assert len(sent) == len(asked)
+
+
+class SimulatedWire(Wire):
+    """A link to a fake ArduSub that tells nothing but heartbeats until it is asked."""
+
+    def __init__(self, seconds, *, refuses=None, loses=0):
+        super().__init__([])
+        self.simulation = Simulation(params={})
+        self.end, self.loses, self.positions = seconds, loses, []
+        vehicle = self.simulation.vehicle
+        for message, stream in vehicle.streams.items():
+            stream.interval = 1.0 if message == M.MAVLINK_MSG_ID_HEARTBEAT else 0.0
+        if refuses is not None:
+            vehicle.commands[M.MAV_CMD_SET_MESSAGE_INTERVAL] = lambda _: refuses
+
+    @property
+    def is_over(self):
+        return self.simulation.now >= self.end
+
+    def hear(self, seconds):
+        del seconds
+        self.simulation.advance(0.1)
+        heard = self.simulation.wire.messages()
+        self.positions += [self.simulation.now for m in heard if "LOCAL_POSITION" in m.get_type()]
+        other = M.MAVLink_heartbeat_message(12, 3, 0, 4, 4, 3)
+        other.pack(parser(2, 1))
+        return [(parser().decode(bytearray(m.get_msgbuf())), ("here", 5)) for m in (*heard, other)]
+
+    def send(self, message):
+        message.pack(parser(live.SYSTEM, 191))
+        if len(self.sent) >= self.loses:
+            self.simulation.vehicle.receive(message)
+        return super().send(message)
+
+
+def listens(monkeypatch, wire, **options):
+    """Run a live guard on a link until it is over, by the link's clock; return its lines."""
+    monkeypatch.setattr(live, "UdpLink", lambda *_: wire)
+    monkeypatch.setattr(live, "rehearse", lambda **_: None)
+    monkeypatch.setattr(live.time, "monotonic", lambda: 1e5 + wire.simulation.now)
+    said = []
+    live.watch(
+        Guard(SITE), Frame(SITE), "udpin:14550", lambda _: None, say=said.append,
+        until=lambda: wire.is_over, **options,
+    )  # fmt: skip
+    return said
+
+
+def test_a_vehicle_that_sends_only_heartbeats_is_asked_and_then_tells_ten_positions_a_second(
+    monkeypatch,
+):
+    for loses in (0, 5):  # also where the first requests get lost
+        wire = SimulatedWire(20.0, loses=loses)
+        said = listens(monkeypatch, wire, ask_rates=True)
+        late = [t for t in wire.positions if t > 10.0]
+        assert 9.0 <= len(late) / 10.0 <= 11.0
+        assert {m.target_system for m in wire.sent} == {1}  # and never the other one on the link
+        assert 5 + loses <= len(wire.sent) <= 5 + 2 * loses
+        assert not [line for line in said if "times a second" in line or "refuses" in line]
+    wire = SimulatedWire(20.0)
+    said = listens(monkeypatch, wire)
+    assert not wire.sent
+    assert any(line.startswith("no positions come; --ask-rates asks") for line in said)
+
+
+@pytest.mark.parametrize(
+    ("result", "n_rounds"),
+    [(M.MAV_RESULT_UNSUPPORTED, 1), (M.MAV_RESULT_DENIED, 1),
+     (M.MAV_RESULT_TEMPORARILY_REJECTED, 4)],
+)  # fmt: skip
+def test_a_vehicle_that_refuses_rates_is_not_asked_again_and_it_is_said(
+    monkeypatch, result, n_rounds
+):
+    wire = SimulatedWire(19.0, refuses=result)
+    said = listens(monkeypatch, wire, ask_rates=True)
+    assert len(wire.sent) == 5 * n_rounds
+    refusals = [line for line in said if line.startswith("the vehicle refuses")]
+    assert len(refusals) == (n_rounds == 1)
+    assert any("no positions come, though the vehicle was asked" in line for line in said)
+
+
+def test_an_answer_to_another_ground_station_is_no_refusal():
+    rates = MessageRates(Frame(SITE), True, sender=live.SYSTEM)
+    rates.requests(1, 0.0)
+    assert not list(rates.take_ack(M.MAV_CMD_SET_MESSAGE_INTERVAL, M.MAV_RESULT_DENIED, 255))
+    assert list(rates.take_ack(M.MAV_CMD_SET_MESSAGE_INTERVAL, M.MAV_RESULT_DENIED, live.SYSTEM))
 
 
 def test_rates_are_counted_by_the_vehicle_s_clock_also_when_it_is_set():

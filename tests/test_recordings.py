@@ -557,3 +557,28 @@ def test_beside_the_vehicle_it_is_said_once_which_option_would_help(m):
     assert len(said) == 2
     assert "--frame local" in said[0]
     assert "--system 1" in said[1]
+
+
+@pytest.mark.parametrize("wire", [1, 2])
+def test_damaged_messages_of_a_log_are_told_by_the_checksum_as_pymavlink_tells_them(m, wire):
+    import random
+
+    from netsp.guard.telemetry_log import STAMP_BYTES, messages_of
+    from netsp.link.dialect import parser
+
+    chance, stamp = random.Random(wire), (10**15).to_bytes(STAMP_BYTES, "big")
+    packets = [bytes(packet.pack(parser(1, 1), force_mavlink1=wire == 1))
+               for _, _, packet in vehicle(m, 1)]  # fmt: skip
+    assert len(list(messages_of(b"".join(stamp + p for p in packets)))) == len(packets)
+    for _ in range(200):
+        good = bytearray(chance.choice(packets))
+        at = chance.randrange(1, len(good))
+        good[at] ^= 1 << chance.randrange(8)
+        try:
+            found = parser().decode(bytearray(good))
+            is_known = not found.get_type().startswith("UNKNOWN")
+        except Exception:
+            is_known = False
+        heard = [x for x in messages_of(stamp + bytes(good))
+                 if not x.get_type().startswith("UNKNOWN")]  # fmt: skip
+        assert len(heard) == is_known, (at, bytes(good).hex())

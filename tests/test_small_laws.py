@@ -25,6 +25,7 @@ from netsp.errors import LimitReachedError
 from netsp.execute.passing import lasting, passing
 from netsp.execute.plan import HOME, Leg
 from netsp.execute.repair import broken, outside, reachable
+from netsp.export.leg_times import SmoothMove, VehicleMotion, leg_times
 from netsp.export.margins import warnings
 from netsp.export.mission import pursued
 from netsp.export.waypoints import (
@@ -334,12 +335,14 @@ def test_a_vehicle_stays_at_goals_and_shortly_at_bends():
 
 
 def test_predicted_seconds_are_those_of_legs_stops_and_holds():
-    """At 0.5 m/s a stop costs 3.5 s; a leg of 1 m never gets to full speed."""
-    far = [Waypoint((0, 0, 0), None), Waypoint((10, 0, 0), 0)]
-    assert predicted_s(far, Settings(speed=0.5)) == pytest.approx(10 / 0.5 + 3.5 + 1 + 5)
-    near = [Waypoint((0, 0, 0), None), Waypoint((1, 0, 0), 0)]
-    assert predicted_s(near, Settings(speed=0.5)) == pytest.approx(2 * math.sqrt(7.0) + 6)
-    assert predicted_s(near, Settings(speed=None)) is None
+    """Holds are added to the legs, and no leg is faster than its speed or its acceleration lets."""
+    for length in (10.0, 1.0):
+        points = [Waypoint((0, 0, 0), None), Waypoint((length, 0, 0), 0)]
+        places = [(0.0, 0.0, altitude(0.0)), (length, 0.0, altitude(0.0))]
+        moving = leg_times(places, [0.0, 0.0], 0.5)[0]
+        assert moving > SmoothMove(length, 0.0, 0.5, VehicleMotion()).duration_s > length / 0.5
+        assert predicted_s(points, Settings(speed=0.5)) == pytest.approx(moving + 1 + 5, abs=0.1)
+    assert predicted_s(points, Settings(speed=None)) is None
 
 
 def test_rings_run_counter_clockwise():
@@ -598,7 +601,8 @@ def test_velocity_and_turn_are_those_of_the_motion():
 class Vehicle:
     """The part of a session that is used before a flight; it answers everything at once."""
 
-    system, others, silent_s, unplaced_s, broken = 1, (), 0.0, 0.0, None
+    system, others, broken = 1, (), None
+    silent_s = unplaced_s = stalled_s = 0.0
     kind, echo = VehicleKind(12, 3), None
 
     def __init__(self, **told):

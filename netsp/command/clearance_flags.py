@@ -4,9 +4,14 @@ for them."""
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
 from netsp.command import messages
 from netsp.command.types import length
+
+if TYPE_CHECKING:
+    from netsp.problem import Problem
+    from netsp.sizing.clearance_advice import ClearanceRoom
 
 
 def clearance_flags(p: argparse.ArgumentParser) -> None:
@@ -17,17 +22,45 @@ def clearance_flags(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "--current", type=length, default=0.0, metavar="V",
-        help="speed of the current (m/s), which takes the vehicle off its path; default 0",
+        help="speed of the current (m/s), which pushes the vehicle off its path; default 0",
     )  # fmt: skip
 
 
+def warn_of_problem(args: argparse.Namespace, problem: Problem, margin: float) -> None:
+    """Warn if the clearance of a tour is too small to be flown.
+
+    Parameters
+    ----------
+    args : Namespace
+        Parsed flags of `clearance_flags`.
+    problem : Problem
+        The problem.
+    margin : float
+        Margin that the tour was planned with, which counts as clearance.
+    """
+    from netsp.sizing.clearance_advice import clearance_room
+
+    room = clearance_room(problem)
+    if room is not None:
+        warn_of_clearance(
+            args.position_error, args.current, problem.clearance, problem.units, margin, room
+        )
+
+
 def warn_of_clearance(
-    position_error: float, current: float, clearance: float, units: str, has_obstacles: bool
-) -> None:
-    """Warn if the clearance of a plan is too small to be flown."""
+    position_error: float, current: float, clearance: float, units: str, margin: float = 0.0,
+    room: ClearanceRoom | None = None,
+) -> None:  # fmt: skip
+    """Warn if the clearance of a plan among obstacles is too small to be flown."""
+    from netsp.axes import metres_per_unit
     from netsp.sizing.clearance_advice import ClearancePolicy, clearance_advice
 
     policy = ClearancePolicy(position_error=position_error, current=current)
-    text = clearance_advice(clearance, units, policy) if has_obstacles else None
+    text = clearance_advice(clearance, units, policy, margin=margin, room=room)
     if text is not None:
         messages.warning(text)
+    elif (position_error or current) and metres_per_unit(units) is None:
+        messages.warning(
+            f"units: a clearance in {units} cannot be compared with metres, so --position-error "
+            "and --current have no effect; expected a unit of length such as m"
+        )

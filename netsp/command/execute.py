@@ -62,6 +62,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "space 10",
     )  # fmt: skip
     p.add_argument(
+        "--reserve", type=length, metavar="R",
+        help="tether that repairs keep in reserve, in the problem's units; default: as the plan "
+        "does, at most a tenth of the limit",
+    )  # fmt: skip
+    p.add_argument(
         "--delta",
         type=length,
         metavar="D",
@@ -96,7 +101,8 @@ def _mission(args: argparse.Namespace) -> int:
     from netsp.online.planner import PlannerOptions
     from netsp.online.surprises import SceneSurprises
 
-    for name, flag in (("solution", "SOLUTION"), ("speed", "--speed"), ("delta", "--delta")):
+    for name, flag in (("solution", "SOLUTION"), ("speed", "--speed"), ("delta", "--delta"),
+                       ("reserve", "--reserve")):  # fmt: skip
         if getattr(args, name) is not None:
             raise InputError(
                 f"{flag}: is for problems, and {args.problem} is a mission, which has its own; "
@@ -134,6 +140,7 @@ def _problem(args: argparse.Namespace) -> int:
     from netsp.execute.log import ExecutionOptions, describe_execution
     from netsp.execute.repair import REPLAN_S
     from netsp.execute.run import execute
+    from netsp.execute.tether_reserve import ReservePolicy
     from netsp.execute.write import write_execution
     from netsp.files import output_folder
     from netsp.pictures.execution import save_execution
@@ -154,6 +161,7 @@ def _problem(args: argparse.Namespace) -> int:
         current=vector(args.current, "--current") if args.current else (0.0, 0.0, 0.0),
         gusts=args.gusts or 0.0, seed=args.seed,
         planning_limit=REPLAN_S if args.planning_limit is None else args.planning_limit,
+        reserve_policy=ReservePolicy(args.reserve),
     )  # fmt: skip
     show = not args.quiet and sys.stderr.isatty()
     on_step = show_execution(problem) if show else None
@@ -177,16 +185,28 @@ def _problem(args: argparse.Namespace) -> int:
     return EXIT_NOT_ALL if s["left_out"] or s["status"] != "done" else 0
 
 
-def show_execution(problem: Problem) -> Callable[[ExecutionRow], None]:
-    """Shows how a run goes, in one line."""
+def show_execution(
+    problem: Problem, total_s: Callable[[ExecutionRow], float | None] = lambda row: None
+) -> Callable[[ExecutionRow], None]:
+    """Return a callback that shows how a run goes, in one line.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem that was solved.
+    total_s : callable
+        Returns the seconds that the whole run will take; None if that is not known.
+    """
     count = [0]
 
     def on_step(row: ExecutionRow) -> None:
         count[0] += 1
+        total = total_s(row)
         if count[0] % 20 == 1:
             name = "base" if row.goal < 0 else problem.goal_label(row.goal)
+            of = "" if total is None else f" of about {total:.0f}"
             print(
-                f"\r{row.time:8.1f} s  to {name:<9} tether {row.tether:8.2f} of {row.limit:g} "
+                f"\r{row.time:8.1f}{of} s  to {name:<9} tether {row.tether:8.2f} of {row.limit:g} "
                 f"{problem.units}   ",
                 end="", file=sys.stderr, flush=True,
             )  # fmt: skip

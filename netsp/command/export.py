@@ -6,7 +6,7 @@ import argparse
 import sys
 
 from netsp.command import messages, told
-from netsp.command.clearance_flags import clearance_flags, warn_of_clearance
+from netsp.command.clearance_flags import clearance_flags, warn_of_clearance, warn_of_problem
 from netsp.command.types import (
     check_writable,
     depth,
@@ -14,6 +14,7 @@ from netsp.command.types import (
     margins,
     natural,
     positive,
+    whole_bytes,
 )
 from netsp.errors import InputError, counted
 
@@ -62,9 +63,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="maximum number of waypoints; default 650",
     )
     p.add_argument(
-        "--fence-bytes", type=positive, default=672, metavar="N",
-        help="storage of the vehicle for its fence, bytes; default 672, as of Pixhawk flight "
-        "controllers without a card",
+        "--fence-bytes", type=whole_bytes, default=672, metavar="N",
+        help="storage of the vehicle for its fence, bytes; default 672, that of Pixhawk flight "
+        "controllers without an SD card",
     )  # fmt: skip
     p.add_argument(
         "--margin", default="0.3,0.2", metavar="SLACK[,CLEARANCE]",
@@ -146,10 +147,7 @@ def run(args: argparse.Namespace) -> int:
     for line in warnings(problem, solution, points, slack, clearance):
         messages.warning(line)
     if kind in FOR_VEHICLES:
-        warn_of_clearance(
-            args.position_error, args.current, problem.clearance, problem.units,
-            bool(problem.obstacles),
-        )  # fmt: skip
+        warn_of_problem(args, problem, solution.margin)
     said = export_notes(problem, points, kind, settings)
     for line in said.warnings:
         messages.warning(line)
@@ -190,16 +188,17 @@ def _mission(args: argparse.Namespace) -> int:
         ),
     )  # fmt: skip
     stops = sum(p.goal is not None and p.goal >= 0 for p in done.points)
+    seconds = predicted_s(done.points, settings)
     print(
         f"{args.output}: {len(done.points)} waypoints, {stops} of them stops, all in the classes "
-        f"of the plan; about {predicted_s(done.points, settings):.0f} s at {settings.speed:g} m/s, "
+        f"of the plan; about {seconds:.0f} s at {settings.speed:g} m/s, "
         f"stops included; longest tether {done.longest:.2f} of {mission.tether_length:g} m",
         file=sys.stderr,
     )
     if args.json:
         told.tell({
             "file": args.output, "format": kind, "waypoints": len(done.points), "stops": stops,
-            "seconds": predicted_s(done.points, settings), "speed": settings.speed,
+            "seconds": seconds, "speed": settings.speed,
             "longest_tether": done.longest, "tether_length": mission.tether_length,
         })  # fmt: skip
     if mission.tether_length - done.longest < slack:
@@ -213,7 +212,7 @@ def _mission(args: argparse.Namespace) -> int:
             f"margin of {clearance:g}: plan with a larger clearance, or set another margin"
         )
     if kind in FOR_VEHICLES:
-        warn_of_clearance(args.position_error, args.current, mission.clearance, "m", True)
+        warn_of_clearance(args.position_error, args.current, mission.clearance, "m")
         shallow = sum(p.position[2] > -SHALLOWEST for p in done.points)
         if shallow:
             messages.note(

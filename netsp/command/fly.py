@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import queue
 import sys
 from collections.abc import Callable
@@ -11,15 +12,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from netsp.command import told
-from netsp.command.clearance_flags import clearance_flags, warn_of_clearance
+from netsp.command.clearance_flags import clearance_flags, warn_of_problem
 from netsp.command.guard import PORT
-from netsp.command.types import length, natural, seconds
+from netsp.command.types import length, natural, seconds, system_id
 from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 
 if TYPE_CHECKING:
     from netsp.clock import Clock
     from netsp.execute.events import Event
     from netsp.execute.log import Execution, ExecutionRow
+    from netsp.fly.flight_time import FlightTime
     from netsp.fly.resume import BeginsAt
     from netsp.guard.page import Page
     from netsp.link.frame import Frame
@@ -36,12 +38,12 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("solution", metavar="TOUR", nargs="?", help="its solution file (JSON)")
     p.add_argument(
         "--resume", metavar="RUN",
-        help="go on with the flight in this folder, from where the vehicle is, in place of PROBLEM "
-        "and TOUR; writes RUN/resumed unless -o says where",
+        help="resume the flight in this folder from where the vehicle is, in place of PROBLEM and "
+        "TOUR; writes RUN/resumed unless -o names another folder",
     )  # fmt: skip
     p.add_argument(
         "--class", dest="word", metavar="WORD",
-        help="begin where the vehicle is, with a tether of this class: numbers of obstacles from "
+        help="begin where the vehicle is, with its tether in this class: numbers of obstacles from "
         "1, negative from right to left, such as --class=-1,2; '' for a straight tether",
     )  # fmt: skip
     p.add_argument(
@@ -56,13 +58,13 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--dry-run", action="store_true", help="show what would be sent, and send nothing"
     )
     p.add_argument(
-        "--system", type=natural, default=1, metavar="N",
+        "--system", type=system_id, default=1, metavar="N",
         help="system id of the vehicle; others are not listened to; default 1",
     )  # fmt: skip
     p.add_argument(
         "--any-vehicle", action="store_true",
-        help="command any vehicle, not only a submarine with ArduPilot; for experts: others take "
-        "the same numbers for other modes",
+        help="command any vehicle, not only an ArduPilot submarine; for experts: others use the "
+        "same numbers for other modes",
     )  # fmt: skip
     p.add_argument(
         "--frame", metavar="NAME",
@@ -71,7 +73,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "--speed", type=length, default=0.5, metavar="V",
-        help="what the vehicle is set to go at, m/s: for what a repair would save; default 0.5",
+        help="cruise speed of the vehicle, m/s, used to predict times and to compare repairs; "
+        "default 0.5",
     )  # fmt: skip
     p.add_argument(
         "--reach", type=length, default=0.3, metavar="R",
@@ -99,6 +102,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--planning-limit", type=seconds, metavar="S",
         help="seconds that a repair may take, while the vehicle holds its place; default 2",
     )  # fmt: skip
+    p.add_argument(
+        "--reserve", type=length, metavar="R",
+        help="tether that repairs keep in reserve, m; default: as the plan does, at most a tenth "
+        "of the limit",
+    )  # fmt: skip
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="of solvers; default 0")
     p.add_argument("-o", "--output", metavar="RUN", help="folder for logs, summary and run.png")
     clearance_flags(p)
@@ -123,17 +131,35 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"units: a vehicle goes by metres; expected m, got {problem.units!r}")
     frame = Frame(problem, args.frame)
     if not args.quiet:
-        warn_of_clearance(
-            args.position_error, args.current, problem.clearance, problem.units,
-            bool(problem.obstacles),
-        )  # fmt: skip
+        warn_of_problem(args, problem, solution.margin)
+    predicted = None
+    if begins is None and args.speed > 0.0:
+        from netsp.fly.flight_time import predicted_flight
+
+        predicted = predicted_flight(problem, solution, args.speed, args.reach)
     if args.dry_run:
         print_targets(problem, solution, frame)
+    if predicted is not None and not args.quiet:
+        print(
+            f"about {predicted.total_s:.0f} s at {args.speed:g} m/s in still water", file=sys.stderr
+        )
+    if args.dry_run:
         return 0
     with ExitStack() as stack:
-        done, session, clock = _flown(args, problem, solution, frame, surprises, begins, stack)
-        _tell(args, done)
-        _stand_by(args, session, clock)
+        done, session, clock = _flown(
+            args, problem, solution, frame, surprises, begins, stack, predicted
+        )
+        if isinstance(done, BaseException):
+            failure: BaseException | None = done
+            has_pressed_again = isinstance(done, KeyboardInterrupt)
+        else:
+            failure, has_pressed_again = _told_failure(args, done)
+        if isinstance(failure, Exception):
+            complain(f"{type(failure).__name__}: {failure}; the flight ends here")
+        _stand_by(args, session, clock, has_pressed_again)
+    if failure is not None:
+        raise failure
+    assert not isinstance(done, BaseException)
     s = done.summary
     if s["defects"]:
         return EXIT_DEFECT
@@ -157,11 +183,14 @@ def _given(args: argparse.Namespace) -> tuple[Problem, Solution, BeginsAt | None
     from netsp.solution import Solution
 
     if args.word is not None and args.class_from is not None:
-        raise InputError("--class-from: expected either this or --class")
+        raise InputError("--class, --class-from: expected one of them")
     word = None if args.word is None else parse_class(args.word)
     begins_elsewhere = any(x is not None for x in (args.resume, word, args.class_from))
     if args.dry_run and begins_elsewhere:
-        raise InputError("--dry-run: what is left is planned where the vehicle is; expected a tour")
+        raise InputError(
+            "--dry-run: --resume, --class and --class-from plan from where the vehicle is; "
+            "expected none of them"
+        )
     if args.resume is None:
         if args.problem is None or args.solution is None:
             raise InputError("PROBLEM, TOUR: missing; expected two files, or --resume RUN")
@@ -173,11 +202,11 @@ def _given(args: argparse.Namespace) -> tuple[Problem, Solution, BeginsAt | None
         state = None
     else:
         if args.problem is not None:
-            raise InputError("--resume: has problem and tour; expected no PROBLEM and TOUR")
+            raise InputError("--resume: RUN has problem and tour; expected no PROBLEM and TOUR")
         problem, solution, state = read_run(args.resume)
         args.output = args.output or _next_folder(args.resume)
         if Path(args.output).resolve() == Path(args.resume).resolve():
-            raise InputError("-o: is the folder of the flight before; expected another one")
+            raise InputError("-o: is the folder of the resumed flight; expected another one")
     if not begins_elsewhere:
         return problem, solution, None
     left = state or whole_tour(problem, solution)
@@ -189,13 +218,36 @@ def _given(args: argparse.Namespace) -> tuple[Problem, Solution, BeginsAt | None
 
 
 def _next_folder(run: str) -> str:
-    """Return a folder for a flight that is resumed, which is not there yet."""
+    """Return a folder for a resumed flight; it does not exist yet."""
     names = ("resumed", *(f"resumed-{k}" for k in range(2, 1000)))
     return str(next(f for name in names if not (f := Path(run) / name).exists()))
 
 
+def complain(text: str) -> None:
+    """Print a line to standard error; a failure is ignored, so that the flight goes on."""
+    with contextlib.suppress(OSError, ValueError):
+        print(f"\nnetsp: {text}", file=sys.stderr, flush=True)
+
+
+def _told_failure(args: argparse.Namespace, done: Execution) -> tuple[Exception | None, bool]:
+    """Write the files of the run and print its result; return an exception that this raised, and
+    whether Ctrl-C was pressed meanwhile. The caller stands by the vehicle in either case."""
+    from netsp.clock import whole_or_interrupted
+
+    failure = None
+    try:
+        with whole_or_interrupted():
+            try:
+                _tell(args, done)
+            except Exception as error:
+                failure = error
+    except KeyboardInterrupt:
+        return failure, True
+    return failure, False
+
+
 def _tell(args: argparse.Namespace, done: Execution) -> None:
-    """Write the files of the run, and tell what came of it."""
+    """Write the files of the run, and print its result."""
     if args.output is not None:
         from netsp.execute.write import write_execution
         from netsp.pictures.execution import save_execution
@@ -213,27 +265,37 @@ def _tell(args: argparse.Namespace, done: Execution) -> None:
             print(way_home(done), file=sys.stderr)
 
 
-def _stand_by(args: argparse.Namespace, session: Session, clock: Clock) -> None:
-    """Look after the vehicle until somebody else has it, or Ctrl-C: the second one, where the first
-    has ended the flight."""
+def _stand_by(
+    args: argparse.Namespace, session: Session, clock: Clock, has_pressed_again: bool
+) -> None:
+    """Stand by the vehicle until another ground station takes over, or Ctrl-C: the second one, if
+    the first ended the flight. If the second one came before standby began, standby ends as soon
+    as it has printed what the vehicle will do."""
     from netsp.fly.standby import stand_by
 
     has_stopped = clock.stopped
+    said: list[str] = []
 
     def say(text: str) -> None:
-        for line in session.texts():
-            print(f"the vehicle says: {line}", file=sys.stderr)
-        print(f"netsp: {text}", file=sys.stderr, flush=True)
+        said.append(text)
+        with contextlib.suppress(OSError, ValueError):  # the terminal may have gone
+            for line in session.texts():
+                print(f"the vehicle says: {line}", file=sys.stderr)
+            print(f"netsp: {text}", file=sys.stderr, flush=True)
 
-    # where the first Ctrl-C has ended the flight, the next one interrupts
-    stand_by(session, args.at_end, say=say, should_stop=lambda: clock.stopped and not has_stopped)
+    def should_stop() -> bool:
+        # where the first Ctrl-C has ended the flight, the next one interrupts
+        return bool(said) if has_pressed_again else clock.stopped and not has_stopped
+
+    stand_by(session, args.at_end, say=say, should_stop=should_stop)
 
 
 def _flown(
     args: argparse.Namespace, problem: Problem, solution: Solution, frame: Frame,
-    surprises: object, begins: BeginsAt | None, stack: ExitStack,
-) -> tuple[Execution, Session, Clock]:  # fmt: skip
-    """Fly the tour; the link stays open until the stack is left."""
+    surprises: object, begins: BeginsAt | None, stack: ExitStack, predicted: FlightTime | None,
+) -> tuple[Execution | BaseException, Session, Clock]:  # fmt: skip
+    """Fly the tour, or return what ended the flight under way; the link stays open until the stack
+    is left."""
     from netsp.clock import until_interrupt
     from netsp.command.compiling import compile_messages
     from netsp.command.execute import show_execution
@@ -241,19 +303,19 @@ def _flown(
     from netsp.execute.log import ExecutionOptions
     from netsp.execute.repair import REPLAN_S
     from netsp.execute.run_record import RunRecord
+    from netsp.execute.tether_reserve import ReservePolicy
     from netsp.files import output_folder
     from netsp.fly.flight import check_options, fly
+    from netsp.fly.flight_time import FlightClock
     from netsp.fly.rehearsal import rehearse
     from netsp.link.address import Address
     from netsp.link.session import Session
     from netsp.link.udp import UdpLink
 
-    def complain(text: str) -> None:
-        print(f"\nnetsp: {text}", file=sys.stderr)
-
     options = ExecutionOptions(
         speed=args.speed, reach=args.reach, seed=args.seed,
         planning_limit=REPLAN_S if args.planning_limit is None else args.planning_limit,
+        reserve_policy=ReservePolicy(args.reserve),
     )  # fmt: skip
     assert surprises is None or isinstance(surprises, Surprises)
     address = Address.parse(args.link)
@@ -273,7 +335,11 @@ def _flown(
         print(f"the page is {page.address}", file=sys.stderr)
         sources.append(_from(page, complain))
     shows = not args.quiet and sys.stderr.isatty()
-    told = show_execution(problem) if shows else None
+    told = None
+    if shows and predicted is not None:
+        told = show_execution(problem, FlightClock(predicted).total_s)
+    elif shows:
+        told = show_execution(problem)
     watched = None if page is None else _watched(problem, page, args.speed)
     # the link last: while it is open, the vehicle counts on our heartbeats
     session = Session(UdpLink(address), frame, args.system, args.pace)
@@ -282,7 +348,10 @@ def _flown(
         print(f"waiting for system {args.system} on {args.link}", file=sys.stderr)
     clock = stack.enter_context(until_interrupt(None))
 
+    rows: list[ExecutionRow] = []
+
     def on_step(row: ExecutionRow) -> None:
+        rows[:] = [row]
         if clock.stopped:
             raise KeyboardInterrupt
         for text in session.texts():
@@ -292,12 +361,18 @@ def _flown(
             if call is not None:
                 call(row)
 
-    done = fly(
-        problem, solution, session, options, surprises=surprises, on_step=on_step,
-        should_stop=lambda: clock.stopped, any_vehicle=args.any_vehicle, begins=begins,
-        record=None if args.output is None else RunRecord(args.output, solution),
-        incoming=(lambda: [e for s in sources for e in s()]) if sources else None,
-    )  # fmt: skip
+    try:
+        done = fly(
+            problem, solution, session, options, surprises=surprises, on_step=on_step,
+            should_stop=lambda: clock.stopped, any_vehicle=args.any_vehicle, begins=begins,
+            record=None if args.output is None else RunRecord(args.output, solution),
+            incoming=(lambda: [e for s in sources for e in s()]) if sources else None,
+        )  # fmt: skip
+    except (Exception, KeyboardInterrupt) as error:
+        if not rows:
+            raise
+        session.say(f"flight ended by {type(error).__name__}: {error}", urgent=True)
+        return error, session, clock
     if done.stopped:
         session.say(f"flight stopped: {done.stopped}", urgent=True)
     return done, session, clock

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from netsp.command import messages
 from netsp.command.solve_mission import is_mission
-from netsp.command.types import check_writable, length, natural
+from netsp.command.types import check_writable, length, natural, system_id
 from netsp.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="problem file or mission file (JSON); one of a planned mission also tells whether the "
         "tether is as planned",
     )
-    source = p.add_argument_group("where it listens; the vehicle is never told to go anywhere")
+    source = p.add_argument_group("where it listens; the vehicle is never commanded to move")
     source.add_argument(
         "--link", metavar="ADDRESS",
         help="MAVLink over UDP: udpin:PORT (this machine only), udpin:HOST:PORT, udpout:HOST:PORT",
@@ -45,7 +45,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     source.add_argument(
         "--system",
-        type=natural,
+        type=system_id,
         metavar="N",
         help="the vehicle's system id; default: the first one heard; in a recording, the only one "
         "with positions",
@@ -72,7 +72,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "--ask-rates", action="store_true",
-        help="ask the vehicle to tell its position ten times a second (SET_MESSAGE_INTERVAL)",
+        help="ask the vehicle to send its position ten times a second (SET_MESSAGE_INTERVAL)",
     )  # fmt: skip
     p.add_argument(
         "--page", nargs="?", type=natural, const=PORT, metavar="PORT",

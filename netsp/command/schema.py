@@ -13,6 +13,7 @@ FORMATS = {
     "scene": "netsp.online.scene.scene:Scene",
     "mission": "netsp.online.mission:Mission",
     "surprises": "netsp.execute.events:Surprises",
+    "run-state": "netsp.execute.run_record:RunState",
     "scene-surprises": "netsp.online.surprises:SceneSurprises",
     "study": "netsp.compare.study:Study",
 }

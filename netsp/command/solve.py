@@ -8,7 +8,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from netsp.command import messages, told
-from netsp.command.clearance_flags import clearance_flags, warn_of_clearance
+from netsp.command.clearance_flags import clearance_flags, warn_of_problem
 from netsp.command.command_clock import command_clock
 from netsp.command.types import (
     check_writable,
@@ -240,10 +240,7 @@ def run(args: argparse.Namespace) -> int:
         text = summary(problem, solution, args.output, args.plot, args.plot_trace)
         print(text, file=sys.stderr)
         if solution.tour:
-            warn_of_clearance(
-                args.position_error, args.current, problem.clearance + args.margin, problem.units,
-                bool(problem.obstacles),
-            )  # fmt: skip
+            warn_of_problem(args, problem, args.margin)
     if args.json:
         told.tell(told.of_solution(problem, solution))
     return _EXIT.get(solution.status.value, 0)

@@ -120,7 +120,7 @@ def solve(
             summary(mission, found, time.monotonic() - begin, output, plot, scene.units),
             file=sys.stderr,
         )
-        warn_of_clearance(position_error, current, mission.clearance, scene.units, True)
+        warn_of_clearance(position_error, current, mission.clearance, scene.units)
     if as_json:
         told.tell(told.of_mission(mission, found, scene.units))
     return EXIT_NOT_ALL if found.left_out else 0

@@ -80,6 +80,9 @@ def option(text: str) -> tuple[str, str]:
     return name, value
 
 
+MAX_SYSTEM = 255
+"""Highest system id of MAVLink."""
+
 LARGEST = 2**62
 """Largest whole number that is taken."""
 
@@ -95,6 +98,29 @@ def natural(text: str) -> int:
             f"expected a whole number from 0 to {LARGEST}, got {text!r}"
         )
     return value
+
+
+def system_id(text: str) -> int:
+    """Parse the MAVLink system id of a vehicle, from 1 to 255."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if not 1 <= value <= MAX_SYSTEM:
+        raise argparse.ArgumentTypeError(
+            f"expected a system id from 1 to {MAX_SYSTEM}, got {text!r}"
+        )
+    return value
+
+
+def whole_bytes(text: str) -> int:
+    """Parse a number of bytes; the caller checks its range."""
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"expected a whole number of bytes, got {text!r}"
+        ) from None
 
 
 def count_or_range(text: str) -> int | tuple[int, int]:

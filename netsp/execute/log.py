@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from netsp.arrays import Floats
+from netsp.arrays import Bools, Floats
 from netsp.drawn import Drawn
 from netsp.errors import counted
 from netsp.execute.plan import HOME
 from netsp.execute.repair import REPLAN_S
+from netsp.execute.tether_limits import (
+    LimitPeriod,
+    Overrun,
+    describe_limits,
+    limit_periods,
+    overruns,
+)
+from netsp.execute.tether_reserve import ReservePolicy
 from netsp.fields import Point3
 from netsp.frames import frame_of
 from netsp.hsignature import Word
@@ -20,9 +28,6 @@ from netsp.solution import Solution
 
 if TYPE_CHECKING:
     import pandas
-
-RESOLUTION = 1e-4
-"""The tether model is right to this share of the tether length; less is no exceedance."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +54,8 @@ class ExecutionOptions:
         Standard deviation of what comes and goes on top.
     seed : int
         Of the gusts and of the solver.
+    reserve_policy : ReservePolicy
+        How much tether repairs keep in reserve.
     """
 
     speed: float = 0.5
@@ -60,6 +67,7 @@ class ExecutionOptions:
     current: Point3 = (0.0, 0.0, 0.0)
     gusts: float = 0.0
     seed: int = 0
+    reserve_policy: ReservePolicy = field(default_factory=ReservePolicy)
 
 
 @dataclass(frozen=True)
@@ -86,6 +94,8 @@ class ExecutionRow:
         Length that it may have.
     shortening : bool
         Whether the limit was lowered below the tether, which is being shortened.
+    over : bool
+        Whether the tether is longer than the limit.
     """
 
     time: float
@@ -97,6 +107,7 @@ class ExecutionRow:
     tether: float
     limit: float
     shortening: bool = False
+    over: bool = False
 
 
 @dataclass(frozen=True)
@@ -193,6 +204,8 @@ class Execution(Drawn):
         Why a vehicle that is not simulated had to stop; empty if it had not.
     maps : list of (float, Problem)
         The problem as it was from some seconds on; the first from 0.
+    reserve : float
+        Length of tether that repairs keep where they can, in the problem's units.
     """
 
     picture: ClassVar[str] = "netsp.pictures.execution:draw_map"
@@ -212,6 +225,7 @@ class Execution(Drawn):
     wall_s: float = 0.0
     stopped: str = ""
     maps: list[tuple[float, Problem]] = field(default_factory=list)
+    reserve: float = 0.0
 
     def to_frame(self) -> pandas.DataFrame:
         """Return the steps as a pandas DataFrame, a column per field of `ExecutionRow`.
@@ -231,20 +245,41 @@ class Execution(Drawn):
     def __repr__(self) -> str:
         """In a line."""
         s = self.summary
+        tethers = ", then ".join(f"{p.longest:.4g} of {p.limit:g}" for p in self.limit_periods)
         return (
             f"<Execution of {self.problem.name!r}: {counted(s['visited'], 'goal')} in "
-            f"{s['time_s']:.1f} s, longest tether {s['longest_tether']:.4g} of "
-            f"{s['tether_length']:g}>"
+            f"{s['time_s']:.1f} s, longest tether {tethers or 'never out'}>"
         )
 
     @property
+    def limit_periods(self) -> list[LimitPeriod]:
+        """The tether beside each limit that it had in turn."""
+        t, tether, limit, _ = self._lengths
+        return limit_periods(t, tether, limit)
+
+    @property
+    def overruns(self) -> list[Overrun]:
+        """Times in which the tether was over its limit."""
+        return overruns(*self._lengths)
+
+    @property
+    def _lengths(self) -> tuple[Floats, Floats, Floats, Bools]:
+        """Time, tether, limit, and whether it is being shortened, by rows."""
+        return (
+            np.array([r.time for r in self.rows]), np.array([r.tether for r in self.rows]),
+            np.array([r.limit for r in self.rows]),
+            np.array([r.shortening for r in self.rows], dtype=bool),
+        )  # fmt: skip
+
+    @property
     def summary(self) -> dict[str, Any]:
-        """The numbers. exceedance_s : seconds with a tether longer than it is at that time;
-        shortening_s : the same after the limit itself was lowered below it, until it fits."""
-        long = np.array([r.tether > r.limit * (1.0 + RESOLUTION) for r in self.rows], dtype=bool)
-        lowered = np.array([r.shortening for r in self.rows], dtype=bool)
-        over, shortening = long & ~lowered, long & lowered
-        steps = np.diff([r.time for r in self.rows], append=self.rows[-1].time if self.rows else 0)
+        """The numbers.
+
+        `limits` has the tether beside each limit that it had in turn, `over_limit` every time in
+        which it was longer: `exceedance_s` is their sum, and `shortening_s` of those after the
+        limit was lowered below it, until it fits.
+        """
+        over = self.overruns
         goals = [a for a in self.arrivals if a.goal != HOME]
         return {
             "problem": self.problem.name,
@@ -259,8 +294,11 @@ class Execution(Drawn):
             "cancelled_s": [round(self.cancelled[g], 6) for g in sorted(self.cancelled)],
             "longest_tether": max((r.tether for r in self.rows), default=0.0),
             "tether_length": self.problem.tether_length,
-            "exceedance_s": float(np.array(steps)[over].sum()) if self.rows else 0.0,
-            "shortening_s": float(np.array(steps)[shortening].sum()) if self.rows else 0.0,
+            "reserve": self.reserve,
+            "limits": [asdict(p) for p in self.limit_periods],
+            "over_limit": [asdict(o) for o in over],
+            "exceedance_s": sum((o.seconds for o in over if not o.shortening), 0.0),
+            "shortening_s": sum((o.seconds for o in over if o.shortening), 0.0),
             "home": bool(self.arrivals and self.arrivals[-1].goal == HOME),
             "tether_free": self.free,
             "defects": sum(e.response == "defect" for e in self.entries),
@@ -285,15 +323,15 @@ def describe_execution(done: Execution) -> str:
     """
     s, units = done.summary, done.problem.units
     planned = s["planned_path"] or 0.0
-    every_goal = not (s["cancelled"] or s["left_out"])
+    has_resumed = any(e.event == "resumed" for e in done.entries)
+    is_comparable = not (s["cancelled"] or s["left_out"] or has_resumed)
     lines = [
         f"run      {s['problem']}: {s['status']} after {s['time_s']:.1f} s"
         + (f": {done.stopped}" if done.stopped else ""),
         f"visited  {counted(s['visited'], 'goal')}{_class_of(done.arrivals)}",
         f"path     {s['path']:.6g} {units}"
-        + (f", {_beside(s['path'] / planned)}" if planned and every_goal else ""),
-        f"tether   longest {s['longest_tether']:.6g} of {s['tether_length']:g} {units}, over the "
-        f"limit for {s['exceedance_s']:.1f} s, "
+        + (f", {_beside(s['path'] / planned)}" if planned and is_comparable else ""),
+        f"tether   {describe_limits(done.limit_periods, done.overruns, units)}; "
         + (
             "recovered free at the base" if s["tether_free"] and s["home"] else "not recovered free"
         ),

@@ -19,6 +19,7 @@ from netsp.arrays import Floats
 from netsp.clock import Clock
 from netsp.errors import LimitReachedError, NetspError
 from netsp.execute.plan import HOME, Leg, legs_of
+from netsp.execute.tether_reserve import ReservedLimit
 from netsp.geometry import polylines
 from netsp.hsignature import concatenate, crossings, signature
 from netsp.problem import Circle, Goal, Problem, State
@@ -53,6 +54,8 @@ class Repair:
         Metres to go.
     planning_s
         What it took.
+    limit
+        Length of tether that the plan may use at its goals; None where it visits none.
     """
 
     kind: str
@@ -61,9 +64,12 @@ class Repair:
     left_out: tuple[tuple[int, str], ...]
     length: float
     planning_s: float
+    limit: ReservedLimit | None = None
 
 
-def broken(problem: Problem, tether: Floats, legs: list[Leg]) -> tuple[str | None, list[Leg]]:
+def broken(
+    problem: Problem, tether: Floats, legs: list[Leg], limit: ReservedLimit | None = None
+) -> tuple[str | None, list[Leg]]:
     """What is wrong with what is left of a plan, None if nothing is; and the legs with the words
     and tethers that they have among the obstacles that there are now.
 
@@ -72,7 +78,10 @@ def broken(problem: Problem, tether: Floats, legs: list[Leg]) -> tuple[str | Non
     tether
         (k, 3) the taut tether now. The paths of the legs follow on each other, the first starts at
         the robot.
+    limit
+        Length of tether that the plan may use; by default all there is.
     """
+    longest = problem.tether_length if limit is None else limit.length
     rays = problem.representative_points
     word = signature(tether[:, :2], rays)
     left = [leg.goal for leg in legs if leg.goal != HOME]
@@ -93,9 +102,12 @@ def broken(problem: Problem, tether: Floats, legs: list[Leg]) -> tuple[str | Non
             needs = tethers.length(0, k + 1, word)
         except NetspError:
             return f"no tether of the planned class reaches {_label(problem, leg)}", legs
-        if needs > problem.tether_length + tethers.margin:
+        if needs > longest + tethers.margin:
+            what = "be over the limit"
+            if needs <= problem.tether_length + tethers.margin and limit is not None:
+                what = f"leave less than {limit.reserve:.4g} {problem.units} in reserve"
             return (
-                f"the tether would be over the limit at {_label(problem, leg)}: {needs:.6g} of "
+                f"the tether would {what} at {_label(problem, leg)}: {needs:.6g} of "
                 f"{problem.tether_length:g} {problem.units}"
             ), legs
         now.append(Leg(leg.goal, leg.path, word, needs))
@@ -125,15 +137,18 @@ def _in_the_way(problem: Problem, path: Floats) -> int | None:
 
 def repair(
     problem: Problem, robot: Floats, tether: Floats, left: list[int], speed: float, why: str,
-    seed: int = 0, limit: float = REPLAN_S,
+    seed: int = 0, limit: float = REPLAN_S, reserve: float = 0.0,
 ) -> Repair:  # fmt: skip
-    """A plan from the present state through the goals `left` (numbers in the problem, in their
-    order) and home. Goals that cannot be reached are left out, with the reason.
+    """Return a plan from the present state through the goals `left` (numbers in the problem, in
+    their order) and home. Goals that cannot be reached are left out, with the reason.
 
     Parameters
     ----------
     limit
         Seconds that all of it may take.
+    reserve
+        Length of tether to keep in reserve. No goal is left out for it: where one needs more, less
+        is kept.
     """
     clock = Clock(limit)
     word = signature(tether[:, :2], problem.representative_points)
@@ -142,7 +157,8 @@ def repair(
     if not order:
         home, reason = _home(problem, state, tether, why)
         return Repair("home", reason, [home], tuple(left_out), home.length, clock.elapsed)
-    rest = _rest(problem, order, state)
+    reserved = reserved_limit(problem, order, reserve)
+    rest = _rest(problem, order, state, reserved.length)
     graph = graph_from_state(
         rest, max_classes=MOST_CLASSES, time_limit=clock, limits_paths=False
     )  # fmt: skip
@@ -169,9 +185,54 @@ def repair(
         )
     else:
         reason += f", a new order could save at most {max(saving, 0.0):.1f} s"
+    if kept := reserved.describe(problem):
+        reason += f"; {kept}"
     solution = to_solution(rest, graph, chosen, "auto", seed)
     legs = legs_of(rest, solution, order)
-    return Repair(kind, reason, legs, tuple(left_out), float(chosen.length or 0.0), clock.elapsed)
+    return Repair(
+        kind, reason, legs, tuple(left_out), float(chosen.length or 0.0), clock.elapsed, reserved
+    )
+
+
+def reserved_limit(problem: Problem, goals: list[int], reserve: float) -> ReservedLimit:
+    """Return the length of tether that a plan may use which keeps a reserve, or as much of it as it
+    can without leaving out a goal.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    goals
+        Goals to be visited; those that no tether reaches do not count.
+    reserve
+        Length to be kept in reserve.
+    """
+    all_of_it = ReservedLimit(problem.tether_length, 0.0, reserve)
+    if reserve <= 0.0:
+        return all_of_it
+    goals = _in_free_water(problem, goals)[0]
+    if not goals:
+        return all_of_it
+    paths, needs = _shortest_tethers(problem, goals)
+    within = [k for k in range(len(goals)) if needs[k] <= problem.tether_length + paths.margin]
+    far = max(within, key=lambda k: float(needs[k]), default=None)
+    length = problem.tether_length - reserve
+    if length > paths.margin and (far is None or needs[far] <= length + paths.margin):
+        return ReservedLimit(length, reserve, reserve)
+    if far is None:
+        return all_of_it
+    length = min(float(needs[far]), problem.tether_length)
+    return ReservedLimit(length, problem.tether_length - length, reserve, goals[far])
+
+
+def _shortest_tethers(problem: Problem, goals: list[int]) -> tuple[TautPaths, Floats]:
+    """Return the paths of a problem with some of its goals, and the length of the shortest tether
+    to each, inf where there is none."""
+    chosen = tuple(problem.goals[g] for g in goals)
+    plain = problem.model_copy(update={"goals": chosen, "state": None})
+    paths = TautPaths(plain)
+    planar = paths.contacts.lengths([0])[0][1:]
+    return paths, np.hypot(planar, plain.points[1:, 2] - plain.points[0, 2])
 
 
 def reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple[int, str]]]:
@@ -180,11 +241,8 @@ def reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple[
     order, left_out = _in_free_water(problem, left)
     if not order:
         return order, left_out
-    goals = tuple(problem.goals[g] for g in order)
-    plain = problem.model_copy(update={"goals": goals, "state": None})
-    paths = TautPaths(plain)
-    planar = paths.contacts.lengths([0])[0][1:]
-    needs = np.hypot(planar, plain.points[1:, 2] - plain.points[0, 2])
+    paths, needs = _shortest_tethers(problem, order)
+    plain = paths.problem
     beyond = [k for k in range(len(order)) if needs[k] > problem.tether_length + paths.margin]
     for k in beyond:
         why = explain_unreached(plain, paths.outline, [k + 1])
@@ -216,9 +274,9 @@ def outside(problem: Problem, robot: Floats) -> tuple[float, float, float]:
     return (x, y, z)
 
 
-def _rest(problem: Problem, order: list[int], state: State) -> Problem:
+def _rest(problem: Problem, order: list[int], state: State, limit: float) -> Problem:
     goals = tuple(problem.goals[g] for g in order)
-    return problem.model_copy(update={"goals": goals, "state": state})
+    return problem.model_copy(update={"goals": goals, "state": state, "tether_length": limit})
 
 
 def _in_free_water(problem: Problem, order: list[int]) -> tuple[list[int], list[tuple[int, str]]]:

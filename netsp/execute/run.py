@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -12,11 +14,19 @@ from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.execute.aside import aside
 from netsp.execute.events import Event, Surprises, changed, index_of
-from netsp.execute.log import Arrival, Entry, Execution, ExecutionOptions, ExecutionRow
+from netsp.execute.log import (
+    Arrival,
+    Entry,
+    Execution,
+    ExecutionOptions,
+    ExecutionRow,
+)
 from netsp.execute.plan import HOME, Leg, legs_of
 from netsp.execute.ready import make_ready, should_make_ready
-from netsp.execute.repair import Repair, broken, reachable, repair
+from netsp.execute.repair import Repair, broken, reachable, repair, reserved_limit
 from netsp.execute.run_record import Begun, LeftOut, RunRecord, RunState
+from netsp.execute.tether_limits import RESOLUTION
+from netsp.execute.tether_reserve import ReservedLimit
 from netsp.fields import LARGEST, checked_argument, checked_instance
 from netsp.geometry import polylines
 from netsp.hsignature import signature
@@ -72,6 +82,25 @@ class LiveVehicle(Vehicle, Protocol):
         """Stay where it is, until it is told to go on."""
 
 
+@dataclass(frozen=True)
+class _Retreat:
+    """Way back along the tether, because more is out than there may be, and what is planned
+    afterwards.
+
+    Attributes
+    ----------
+    length
+        Length of tether at which the retreat ends.
+    why, left, event
+        Reason for a new plan, the goals in it and what happened, as of `_Run._mend`.
+    """
+
+    length: float
+    why: str
+    left: list[int]
+    event: str
+
+
 class _Run:
     """A run in progress."""
 
@@ -102,6 +131,12 @@ class _Run:
         self.water = Water(options.current, options.gusts, options.seed)
         self.mode, self.fresh, self.leg_s = "tour", True, 0.0
         self.shorten = False
+        self.retreat: _Retreat | None = None
+        if begun is None or options.reserve_policy.reserve is not None:
+            self.reserve = options.reserve_policy.of_plan(problem, solution)
+        else:
+            self.reserve = begun.reserve
+        self.out.reserve = self.reserve
         self.unreachable: set[int] = set()
         self.path = self.legs[0].path if self.legs else np.array([self.vehicle.position])
 
@@ -116,7 +151,7 @@ class _Run:
         """Plan what is left of a run from where the robot is."""
         self.out.left_out |= begun.left_out
         self.out.cancelled |= dict.fromkeys(begun.cancelled, 0.0)
-        self._mend(begun.why, list(begun.left), "resumed")
+        self._mend_within_limit(begun.why, list(begun.left), "resumed")
 
     @property
     def state(self) -> RunState:
@@ -125,20 +160,23 @@ class _Run:
             time=max(self.now, 0.0), tether=tuple(map(tuple, self.tether.nodes.tolist())),
             left=tuple(self.left), cancelled=tuple(sorted(self.out.cancelled)),
             left_out=tuple(LeftOut(goal=g, reason=why) for g, why in self.out.left_out.items()),
+            reserve=self.reserve,
         )  # fmt: skip
 
     # a step
 
     def note(self) -> ExecutionRow:
         x, y, z = (float(v) for v in self.vehicle.position)
-        goal = self.legs[0].goal if self.legs else HOME
+        goal = self.left[0] if self.left else HOME
         limit = self.problem.tether_length
         if self.shorten and self.tether.length <= limit:
             self.shorten = False
-        mode = self.mode if self.mode == "hold" or not self.shorten else "shorten"
+        goes_back = self.shorten or self.retreat is not None
+        mode = "shorten" if goes_back and self.mode != "hold" else self.mode
         row = ExecutionRow(
-            round(self.now, 6), x, y, z, goal, mode, self.tether.length, limit, self.shorten
-        )
+            round(self.now, 6), x, y, z, goal, mode, self.tether.length, limit, self.shorten,
+            self._is_over_limit,
+        )  # fmt: skip
         if len(self.out.rows) % 10 == 0:
             self.out.tethers.append((row.time, self.tether.nodes.copy()))
         self.out.rows.append(row)
@@ -159,9 +197,17 @@ class _Run:
         near = (
             1e-9 * self.problem.scale if self.options.vehicle == "kinematic" else self.options.reach
         )
-        if len(self.path) == 1 and float(np.linalg.norm(self.vehicle.position - end)) <= near:
+        is_there = (
+            len(self.path) == 1 and float(np.linalg.norm(self.vehicle.position - end)) <= near
+        )
+        is_late = self.leg_s > 60.0 + LEG_ALLOWANCE * self.legs[0].length / self.options.speed
+        if self.retreat is not None:
+            if is_there or is_late or self.tether.length <= self.retreat.length:
+                done, self.retreat = self.retreat, None
+                self._mend(done.why, done.left, done.event)
+        elif is_there:
             self._arrive()
-        elif self.leg_s > 60.0 + LEG_ALLOWANCE * self.legs[0].length / self.options.speed:
+        elif is_late:
             self._leave_out(self.legs[0].goal, "not reached in time")
 
     def _follow(self, points: Iterable[Floats]) -> None:
@@ -207,13 +253,15 @@ class _Run:
     @property
     def left(self) -> list[int]:
         """Goals that are planned, in their order."""
+        if self.retreat is not None:
+            return list(self.retreat.left)
         return [leg.goal for leg in self.legs if leg.goal != HOME]
 
     # events
 
     def happen(self, event: Event) -> None:
         """Let an event come about, and mend what it breaks."""
-        left, must = self.left, None
+        left, must = self.left, None if self.retreat is None else self.retreat.why
         if event.kind == "push":
             assert event.push is not None
             self._push(np.array(event.push))
@@ -240,8 +288,14 @@ class _Run:
             left, must = [*left, *back], f"within reach again: {names}"
             for goal in back:
                 del self.out.left_out[goal]
+        if self._is_over_limit and self.options.repair:
+            must = must or (
+                f"{self.tether.length:.4g} of {self.problem.tether_length:g} {self.problem.units} "
+                "of tether were out"
+            )
         if must is None:
-            must, legs = broken(self.problem, self.tether.nodes, self._from_here())
+            limit = self._reserved(left) if self.options.repair else None
+            must, legs = broken(self.problem, self.tether.nodes, self._from_here(), limit)
             if must is None:
                 self.legs = legs
                 self.path, self.leg_s = self.legs[0].path[1:], 0.0
@@ -252,7 +306,7 @@ class _Run:
             for goal in set(left) - set(self.left):
                 self.out.left_out[goal] = "was added, and plans are not repaired"
         else:
-            self._mend(must, left, event.kind)
+            self._mend_within_limit(must, left, event.kind)
 
     def asked(self, event: Event) -> None:
         """An event that nobody could check before."""
@@ -317,6 +371,45 @@ class _Run:
             self.tether = tether
             self.vehicle.stop_at(point)
 
+    @property
+    def _is_over_limit(self) -> bool:
+        return self.tether.length > self.problem.tether_length * (1.0 + RESOLUTION)
+
+    def _reserved(self, goals: list[int]) -> ReservedLimit:
+        """Return the length of tether that a plan through goals may use."""
+        return reserved_limit(self.problem, goals, self.reserve)
+
+    def _mend_within_limit(self, why: str, left: list[int], event: str) -> None:
+        """Plan anew, after going back along the tether if too much of it is out.
+
+        The tether gets shorter nowhere faster than along itself. While the limit is kept, only one
+        that was lowered below what is out and the reserve is a reason to go back: towards goals
+        that leave the reserve, tethers get shorter by themselves.
+        """
+        if self.live is not None and self._is_over_limit:
+            self.live.hold()  # it would go on outward while we think
+        limit = self._reserved(left).length
+        has_room = self.tether.length <= (limit if event == "tether_length" else np.inf)
+        if has_room and not self._is_over_limit:
+            self.retreat = None
+            self._mend(why, left, event)
+            return
+        out = self.tether.length
+        # a vehicle with dynamics ends somewhere within its reach of where it is sent
+        near = 0.0 if self.options.vehicle == "kinematic" else self.options.reach
+        length = max(min(limit, self.problem.tether_length - near), 0.0)
+        back = np.ascontiguousarray(self.tether.nodes[::-1])
+        self.retreat = _Retreat(length, why, left, event)
+        # the way to the base, left half-way: to a place nearby a vehicle slows down before it
+        self.legs = [Leg(HOME, back, (), 0.0)]
+        self.path, self.fresh, self.leg_s = back[1:], True, 0.0
+        units = self.problem.units
+        self._enter_log(
+            event, "shorten",
+            f"{out:.4g} of {self.problem.tether_length:g} {units} of tether are out: back along it "
+            f"to {length:.4g} {units}", 0.0,
+        )  # fmt: skip
+
     def _mend(self, why: str, left: list[int], event: str = "left out") -> None:
         if self.live is not None:
             # it has gone on since its tether was last looked at, perhaps past an obstacle
@@ -327,7 +420,7 @@ class _Run:
         try:
             made = repair(
                 self.problem, self.vehicle.position, self.tether.nodes, left, self.options.speed,
-                why, self.options.seed, self.options.planning_limit,
+                why, self.options.seed, self.options.planning_limit, self.reserve,
             )  # fmt: skip
         except Exception as error:
             # The robot must come home whatever is wrong with us; that something is, is logged and
@@ -479,6 +572,11 @@ def execute(
     except StopsFlightError as stop:
         run.out.stopped = stop.reason
         note()
+    except Exception:
+        if record is not None and run.out.rows:
+            with contextlib.suppress(Exception):  # the first exception is raised, not a second one
+                record.keep(run.problem, run.state)
+        raise
     run.out.tethers.append((round(run.now, 6), run.tether.nodes.copy()))
     # a corner may have held it back for the few rounds of an update
     run.out.free = tether_is_free(run.model.refine(run.tether), run.delta)

@@ -17,7 +17,7 @@ from pydantic import ConfigDict, Field
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.execute.log import ExecutionRow
-from netsp.fields import NonNegative, Point3
+from netsp.fields import Integer, NonNegative, Point3
 from netsp.files import FileModel, make_folder, write_text
 from netsp.models import Model
 from netsp.problem import Problem
@@ -30,15 +30,23 @@ PERIOD_S = 1.0
 """Seconds of the run between two states."""
 
 
+GoalIndex = Annotated[Integer, Field(ge=0)]
+"""Number of a goal of the problem, from 0."""
+
+
 class LeftOut(Model):
     """A goal that was left out."""
 
-    goal: Annotated[int, Field(description="its number, from 0", ge=0)]
-    reason: Annotated[str, Field(description="why")]
+    goal: Annotated[GoalIndex, Field(description="index of the goal from 0")]
+    reason: Annotated[str, Field(description="why it was left out, in words")]
 
 
 class RunState(FileModel):
-    """The state file of a run: all that it takes to go on."""
+    """State of a run (`state.json` of `netsp fly -o RUN`), from which it can be resumed.
+
+    Problem and plan are beside it, in `problem.json` and `solution.json`. Goals of the problem that
+    are not named in it were visited.
+    """
 
     file_kind: ClassVar[str] = "run state"
 
@@ -55,10 +63,27 @@ class RunState(FileModel):
         ),
     ]  # fmt: skip
     left: Annotated[
-        tuple[int, ...], Field(description="goals still to be visited, in the planned order")
+        tuple[GoalIndex, ...],
+        Field(description="indices from 0 of the goals still to be visited, in the planned order"),
     ]
-    left_out: Annotated[tuple[LeftOut, ...], Field(description="goals that were left out")] = ()
-    cancelled: Annotated[tuple[int, ...], Field(description="goals that were cancelled")] = ()
+    left_out: Annotated[
+        tuple[LeftOut, ...], Field(description="goals that were left out, each with the reason")
+    ] = ()
+    cancelled: Annotated[
+        tuple[GoalIndex, ...], Field(description="indices from 0 of the goals that were cancelled")
+    ] = ()
+    reserve: Annotated[
+        NonNegative,
+        Field(description="length of tether that repairs keep in reserve, in the problem's units"),
+    ] = 0.0
+    problem_sha256: Annotated[
+        tuple[str, ...],
+        Field(
+            description="hashes of the problem beside it, which must not be edited: one, or two "
+            "while the problem is replaced; none in states of earlier versions",
+            max_length=2,
+        ),
+    ] = ()  # fmt: skip
 
     def check(self, problem: Problem, source: str) -> None:
         """Refuse the state of another problem.
@@ -66,7 +91,7 @@ class RunState(FileModel):
         Parameters
         ----------
         problem : Problem
-            Problem that the run was of.
+            Problem of the run.
         source : str
             Name of the state in messages.
 
@@ -75,10 +100,25 @@ class RunState(FileModel):
         InputError
             A goal that the problem does not have, or a tether that begins elsewhere.
         """
-        for goal in (*self.left, *self.cancelled, *(g.goal for g in self.left_out)):
-            if not 0 <= goal < len(problem.goals):
+        if self.problem_sha256 and problem.sha256 not in self.problem_sha256:
+            raise InputError(
+                f"{source}: problem_sha256: is of another problem; expected the {PROBLEM} that the "
+                "run wrote, unchanged"
+            )
+        out = tuple(g.goal for g in self.left_out)
+        named = {"left": self.left, "left_out": out, "cancelled": self.cancelled}
+        for field_name, goals in named.items():
+            for goal in goals:
+                if goal >= len(problem.goals):
+                    raise InputError(
+                        f"{source}: {field_name}: expected goals below {len(problem.goals)}, got "
+                        f"{goal}"
+                    )
+        for goal in self.left:
+            if self.left.count(goal) > 1 or goal in (*out, *self.cancelled):
                 raise InputError(
-                    f"{source}: left: expected goals below {len(problem.goals)}, got {goal}"
+                    f"{source}: left: expected every goal once in left, left_out and cancelled, "
+                    f"got {goal} twice"
                 )
         away = float(np.linalg.norm(np.array(self.tether[0]) - np.array(problem.base)))
         if away > 1e-6 * problem.scale:
@@ -101,6 +141,8 @@ class Begun:
         Goals that were left out before, with the reason.
     cancelled
         Goals that were cancelled before.
+    reserve
+        Length of tether that repairs keep, in the problem's units.
     """
 
     tether: Floats
@@ -108,6 +150,7 @@ class Begun:
     why: str
     left_out: dict[int, str] = field(default_factory=dict)
     cancelled: tuple[int, ...] = ()
+    reserve: float = 0.0
 
 
 class RunRecord:
@@ -124,6 +167,8 @@ class RunRecord:
     def __init__(self, folder: str | Path, solution: Solution) -> None:
         self.folder, self.solution = Path(folder), solution
         self._problem: Problem | None = None
+        self._sha256 = ""
+        self._state: RunState | None = None
         self._due = -np.inf
 
     def take(self, row: ExecutionRow, problem: Problem, state: Callable[[], RunState]) -> None:
@@ -145,9 +190,29 @@ class RunRecord:
         with (self.folder / LOG).open("a") as log_file:
             log_file.write(",".join(map(str, cells)) + "\n")
         changed = problem is not self._problem
-        if changed:
-            write_text(self.folder / PROBLEM, problem.to_json())
-            self._problem = problem
         if changed or row.time >= self._due:
             self._due = row.time + PERIOD_S
-            write_text(self.folder / STATE, state().to_json())
+            self.keep(problem, state())
+
+    def keep(self, problem: Problem, state: RunState) -> None:
+        """Write the state now, regardless of when the last one was written.
+
+        Parameters
+        ----------
+        problem : Problem
+            The problem as it is now.
+        state : RunState
+            The state now.
+        """
+        if problem is not self._problem:
+            before, self._sha256 = self._sha256, problem.sha256
+            if self._state is not None:  # a run that is killed before the new state is written
+                self._write(self._state, before, self._sha256)
+            write_text(self.folder / PROBLEM, problem.to_json())
+            self._problem = problem
+        self._state = state
+        self._write(state, self._sha256)
+
+    def _write(self, state: RunState, *hashes: str) -> None:
+        state = state.model_copy(update={"problem_sha256": hashes})
+        write_text(self.folder / STATE, state.to_json())

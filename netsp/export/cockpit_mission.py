@@ -1,8 +1,8 @@
 """Mission files of Blue Robotics' Cockpit (.cmp), as its mission library imports them.
 
-Cockpit puts home before the waypoints when it uploads them, and the cruise speed of the file after
-the first one. It knows no fence. A waypoint has its place; the commands that are carried out there
-take their place from it.
+On upload, Cockpit adds a home item before the waypoints, and after the first waypoint it sets the
+file's cruise speed. It has no fences. Each waypoint has a place and a list of commands, which are
+carried out at that place.
 """
 
 from __future__ import annotations
@@ -17,38 +17,38 @@ from netsp.export.waypoints import Waypoint
 from netsp.site.projection import Projection
 
 NAMESPACE = uuid.UUID("bf7570c1-32a1-54d7-ba10-af9107bb67c8")
-"""Namespace of the ids of waypoints: the same mission has the same ids."""
+"""Namespace of waypoint ids; exporting a mission again gives the same ids."""
 
 MAP_PIXELS = 600.0
-"""Width of a map, pixels, that all waypoints are to be on when it is opened."""
+"""Width of the map view that shows all waypoints when the mission is opened, pixels."""
 
 EARTH_PIXEL_M = 156_543.0
-"""Size of a pixel of a web map at zoom 0 at the equator, metres."""
+"""Size of a pixel of a web map at zoom 0 on the equator, metres."""
 
 MIN_ZOOM, MAX_ZOOM = 2, 19
-"""Zooms that map tiles have."""
+"""Range of the zoom levels of web maps."""
 
 
 def cockpit_mission(
     name: str | None, points: Sequence[Waypoint], holds: Sequence[int],
     altitudes: Sequence[float], projection: Projection, speed: float | None,
 ) -> str:  # fmt: skip
-    """Return a mission of Cockpit as text.
+    """Return the text of a Cockpit mission file.
 
     Parameters
     ----------
     name : str or None
-        Name of the mission in Cockpit's library.
+        Name of the mission in Cockpit's library; None for a default.
     points : sequence of Waypoint
         Waypoints, the start first.
     holds : sequence of int
-        Seconds to hold at each.
+        Hold time at each waypoint, s.
     altitudes : sequence of float
-        Altitude of each above home, metres; negative under water.
+        Altitude of each waypoint above home, metres; negative under water.
     projection : Projection
-        From (x, y) to degrees.
+        Projection from (x, y) to degrees.
     speed : float or None
-        Cruise speed, m/s; None leaves the vehicle's own.
+        Cruise speed, m/s; None keeps the vehicle's own.
 
     Returns
     -------
@@ -96,13 +96,13 @@ def cockpit_mission(
 
 
 def _command(name: str, *params: float) -> dict[str, Any]:
-    """Return a command that is carried out where its waypoint is."""
+    """Return a command for the list of a waypoint."""
     numbered = {f"param{k}": value for k, value in enumerate(params, 1)}
     return {"type": "MAVLINK_NAV_COMMAND", "command": name, **numbered}
 
 
 def _zoom(points: Sequence[Waypoint], latitude: float) -> int:
-    """Return the largest whole zoom at which all waypoints are on the map."""
+    """Return the largest integer zoom level at which all waypoints are on the map."""
     extent = max(
         max(p.position[k] for p in points) - min(p.position[k] for p in points) for k in (0, 1)
     )

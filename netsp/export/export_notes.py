@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from netsp.errors import counted
@@ -58,7 +59,7 @@ def export_notes(
         notes.append(text)
     if kind in FOR_VEHICLES:
         if kind == "plan":
-            warnings += _fence_warnings(problem, fence_of_points(problem, points, settings))
+            warnings += fence_warnings(problem, fence_of_points(problem, points, settings))
         remedy = f"heights are negative below it; moved to {SHALLOWEST} m of depth"
         if (text := height_warning(problem, remedy)) is not None:
             warnings.append(text)
@@ -91,22 +92,46 @@ def bend_note(points: list[Waypoint], settings: Settings) -> str | None:
     )
 
 
-def _fence_warnings(problem: Problem, fence: Fence) -> list[str]:
-    """Return what of the obstacles the fence of a plan does not hold as it is, one line each."""
+def fence_warnings(problem: Problem, fence: Fence) -> list[str]:
+    """Return warnings about obstacles that the fence of a plan simplifies or leaves out, and about
+    zones that the tour touches.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem with the obstacles.
+    fence : Fence
+        Fence of the plan.
+
+    Returns
+    -------
+    list of str
+        One line for each kind of warning.
+    """
     lines = []
     if fence.simplified:
         most = max(z.growth for z in fence.simplified)
         lines.append(
-            f"{counted(len(fence.simplified), 'obstacle')} simplified in the fence, which reaches "
-            f"up to {most:.2g} {problem.units} beyond them: the vehicle does not store more; "
-            "expected a larger --fence-bytes if yours does"
+            f"{counted(len(fence.simplified), 'obstacle')} simplified in the fence, by up to "
+            f"{most:.2g} {problem.units}, to fit into the vehicle's storage; if your vehicle "
+            "stores more, raise --fence-bytes"
         )
     if fence.left_out:
-        names = [problem.obstacle_name(k) for k in fence.left_out[:3]]
-        more = ", …" if len(fence.left_out) > 3 else ""
         lines.append(
             f"{counted(len(fence.left_out), 'obstacle')} left out of the fence "
-            f"({', '.join(names)}{more}), the farthest from the tour: the vehicle does not store "
-            "more; expected a larger --fence-bytes if yours does"
+            f"({_names(problem, fence.left_out)}), which takes the nearest to the tour first and "
+            "is full; if your vehicle stores more, raise --fence-bytes"
+        )
+    if fence.touched:
+        lines.append(
+            f"the tour touches the fence at {counted(len(fence.touched), 'obstacle')} "
+            f"({_names(problem, fence.touched)}), where the vehicle may report a breach; plan with "
+            "a larger clearance"
         )
     return lines
+
+
+def _names(problem: Problem, obstacles: Sequence[int], most: int = 3) -> str:
+    """Return the names of the first few obstacles."""
+    names = [problem.obstacle_name(k) for k in obstacles[:most]]
+    return ", ".join(names) + (", …" if len(obstacles) > most else "")

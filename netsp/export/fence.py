@@ -1,9 +1,9 @@
 """Fence of a plan: obstacles as exclusion zones that fit into the vehicle's storage.
 
-ArduPilot stores a fence as records of bytes: a head and an end, for a circle its kind, two
-coordinates and the radius, for a polygon its kind, the number of its corners and two coordinates
-for each. So the bytes are limited, not the points: a flight controller of the Pixhawk family
-without a card takes 51 circles, or one polygon of 83 corners.
+ArduPilot stores a fence as one record of bytes per zone between a header and an end mark. A
+circle takes its kind, two coordinates and a radius; a polygon takes its kind, its number of corners
+and two coordinates per corner. So the limit counts bytes, not points: a flight controller of the
+Pixhawk family without a memory card stores 51 circles, or one polygon of 83 corners.
 """
 
 from __future__ import annotations
@@ -20,37 +20,43 @@ from netsp.fields import Point2
 from netsp.problem import Circle, Polygon, Problem
 
 GROWTH_STEPS = 8
-"""Number of tolerances that are tried before an obstacle is left out, at least 1."""
+"""Number of growth limits up to the largest one; zones grow by the smallest limit that makes the
+fence fit."""
 
 MIN_FENCE_BYTES = 18
-"""Bytes of the smallest fence that holds anything: head, end and one circle."""
+"""Bytes of the smallest fence with a zone: header, end mark and one circle."""
 
 QUARTER_SEGMENTS = 16
-"""Corners of a quarter circle where growth is checked: the limit is 0.5 % low there."""
+"""Segments per quarter circle of the region that a zone may fill; they cut its growth limit by up
+to 0.12 %."""
+
+ROUNDING = 2e-3
+"""Distance, m, below which a path counts as touching a zone: plan files round radii up to 1 mm and
+coordinates to 0.1 mm."""
 
 
 @dataclass(frozen=True)
 class FencePolicy:
-    """Policy of what a fence may take.
+    """Storage of a vehicle for its fence, and limits of the fence's zones.
 
     Attributes
     ----------
     max_bytes
-        Storage of the vehicle for its fence, bytes; 672 on flight controllers of the Pixhawk family
-        without a card, where ArduSub 4.7 was seen to take 51 circles. At least 18.
+        Storage of the vehicle for its fence, bytes. Flight controllers of the Pixhawk family
+        without a memory card have 672, and ArduSub 4.7 stored 51 circles there. At least 18.
     head_bytes
-        Bytes of the head and the end together.
+        Bytes of the header and the end mark together.
     circle_bytes
         Bytes of a circle.
     polygon_bytes
-        Bytes of a polygon besides its corners.
+        Bytes of a polygon without its corners.
     corner_bytes
         Bytes of a corner.
     max_corners
-        Largest number of corners of a polygon: it is stored in one byte.
+        Maximum number of corners of a polygon; the vehicle stores the number in one byte.
     max_growth
         Share of the clearance by which a simplified zone may reach beyond its obstacle, from 0 to
-        less than 1: the path keeps the whole clearance, and a vehicle needs some of it.
+        less than 1. The path keeps the whole clearance; the rest is room for the vehicle's errors.
     """
 
     max_bytes: int = 672
@@ -71,7 +77,7 @@ class FencePolicy:
             raise InputError(f"max_growth: expected 0 to less than 1, got {self.max_growth!r}")
 
     def size(self, zones: Sequence[Zone]) -> int:
-        """Return the bytes that a fence takes.
+        """Return the number of bytes of a fence.
 
         Parameters
         ----------
@@ -81,12 +87,12 @@ class FencePolicy:
         Returns
         -------
         int
-            Bytes, with head and end.
+            Bytes, with header and end mark.
         """
         return self.head_bytes + sum(self.size_of(z) for z in zones)
 
     def size_of(self, zone: Zone) -> int:
-        """Return the bytes that a zone takes.
+        """Return the number of bytes of a zone.
 
         Parameters
         ----------
@@ -96,7 +102,7 @@ class FencePolicy:
         Returns
         -------
         int
-            Bytes, without head and end.
+            Bytes, without header and end mark.
         """
         if isinstance(zone.shape, Circle):
             return self.circle_bytes
@@ -112,7 +118,7 @@ class Zone:
     obstacle
         Index of its obstacle in the problem.
     shape
-        Circle or polygon that holds the obstacle.
+        Circle or polygon that contains the obstacle.
     growth
         Upper bound on the distance by which the zone reaches beyond its obstacle, in the problem's
         units; 0 for the obstacle itself.
@@ -134,42 +140,46 @@ class Fence:
     left_out
         Indices of the obstacles without a zone.
     n_bytes
-        Bytes that it takes in the vehicle.
+        Number of bytes that the vehicle needs to store the fence.
+    touched
+        Indices of the obstacles whose zones the path touches or enters.
     """
 
     zones: tuple[Zone, ...]
     left_out: tuple[int, ...]
     n_bytes: int
+    touched: tuple[int, ...] = ()
 
     @property
     def simplified(self) -> tuple[Zone, ...]:
-        """Return the zones that reach beyond their obstacles."""
+        """Zones that reach beyond their obstacles."""
         return tuple(z for z in self.zones if z.growth > 0.0)
 
 
 def fence_of(
     problem: Problem, path: Sequence[Point2] | Floats, policy: FencePolicy | None = None
 ) -> Fence:
-    """Return the fence of the obstacles of a problem, small enough for the vehicle.
+    """Return a fence around the obstacles of a problem that fits into the vehicle's storage.
 
-    Where the obstacles as they are take too many bytes, polygons are simplified: each becomes a
-    polygon with fewer corners, or a circle, that holds it and reaches beyond it by a share of the
-    clearance at most, and never touches the path. The share grows until the fence fits. What still
-    is too much is left out, the obstacles farthest from the path first.
+    If the exact obstacles take too many bytes, polygons are simplified: a polygon with fewer
+    corners, or a circle, replaces each. A simplified zone contains its obstacle, reaches beyond it
+    by a share of the clearance at most, and does not touch the path. The share is the smallest of
+    `GROWTH_STEPS` shares at which the fence fits. If none fits, the fence takes obstacles by their
+    distance from the path, the nearest first, and leaves out those that do not fit any more.
 
     Parameters
     ----------
     problem : Problem
         Problem with obstacles.
     path : sequence of (x, y)
-        Straight lines of the tour, in the problem's units.
+        Vertices of the tour, in the problem's units.
     policy : FencePolicy, optional
-        Policy of what the fence may take.
+        Storage of the vehicle and limits of the zones.
 
     Returns
     -------
     Fence
-        The zones, and the obstacles left out.
+        Zones of the fence, and obstacles without one.
 
     Examples
     --------
@@ -181,21 +191,54 @@ def fence_of(
     """
     policy = policy or FencePolicy()
     line = shapely.LineString(np.asarray(path, dtype=float)[:, :2])
-    zones = [Zone(k, o) for k, o in enumerate(problem.obstacles)]
-    for step in range(1, GROWTH_STEPS + 1):
-        if policy.size(zones) <= policy.max_bytes and not any(_is_large(z, policy) for z in zones):
-            break
-        most = policy.max_growth * problem.clearance * step / GROWTH_STEPS
-        zones = [_simplified(z, problem.obstacles[z.obstacle], most, line, policy) for z in zones]
+    zones = _fitting_zones(problem, line, policy)
     far = {z.obstacle: problem.obstacles[z.obstacle].shape().distance(line) for z in zones}
-    kept = [z for z in zones if not _is_large(z, policy)]
-    for zone in sorted(kept, key=lambda z: (-far[z.obstacle], -z.obstacle)):
-        if policy.size(kept) <= policy.max_bytes:
-            break
-        kept.remove(zone)
+    kept: list[Zone] = []
+    for zone in sorted(zones, key=lambda z: (far[z.obstacle], z.obstacle)):
+        if not _is_large(zone, policy) and policy.size([*kept, zone]) <= policy.max_bytes:
+            kept.append(zone)
+    kept.sort(key=lambda z: z.obstacle)
     held = {z.obstacle for z in kept}
     out = tuple(k for k in range(len(problem.obstacles)) if k not in held)
-    return Fence(tuple(kept), out, policy.size(kept))
+    touched = tuple(z.obstacle for z in kept if _distance(z.shape, line) <= ROUNDING)
+    return Fence(tuple(kept), out, policy.size(kept), touched)
+
+
+def _fitting_zones(problem: Problem, line: shapely.LineString, policy: FencePolicy) -> list[Zone]:
+    """Return zones that grow as little as it takes to fit; zones of the largest growth if none
+    fit."""
+
+    def grown(step: int) -> list[Zone]:
+        most = policy.max_growth * problem.clearance * step / GROWTH_STEPS
+        return [_simplified(z, problem.obstacles[z.obstacle], most, line, policy) for z in exact]
+
+    def fits(zones: list[Zone]) -> bool:
+        return policy.size(zones) <= policy.max_bytes and not any(
+            _is_large(z, policy) for z in zones
+        )
+
+    exact = [Zone(k, o) for k, o in enumerate(problem.obstacles)]
+    if fits(exact):
+        return exact
+    too_small, step = 0, GROWTH_STEPS
+    zones = grown(step)
+    if not fits(zones):
+        return zones
+    while step - too_small > 1:
+        middle = (too_small + step) // 2
+        tried = grown(middle)
+        if fits(tried):
+            zones, step = tried, middle
+        else:
+            too_small = middle
+    return zones
+
+
+def _distance(shape: Circle | Polygon, line: shapely.LineString) -> float:
+    """Return the distance from a zone to a path; 0 if they touch."""
+    if isinstance(shape, Circle):  # the polygon that stands for a circle is inscribed in it
+        return max(0.0, float(line.distance(shapely.Point(shape.center))) - shape.radius)
+    return float(shape.shape().distance(line))
 
 
 def _is_large(zone: Zone, policy: FencePolicy) -> bool:
@@ -206,8 +249,8 @@ def _simplified(
     zone: Zone, obstacle: Circle | Polygon, most: float, line: shapely.LineString,
     policy: FencePolicy,
 ) -> Zone:  # fmt: skip
-    """Return the smallest zone found that holds an obstacle and reaches beyond it by a length at
-    most."""
+    """Return the zone of the fewest bytes found that contains an obstacle and reaches beyond it by
+    `most` at most."""
     if isinstance(obstacle, Circle) or most <= 0.0:
         return zone
     body = shapely.Polygon(obstacle.polygon)
@@ -218,7 +261,8 @@ def _simplified(
         for shape in (wide.simplify((1.0 - share) * most), wide.convex_hull.simplify(0.5 * most)):
             if shape.geom_type != "Polygon" or shape.interiors or len(shape.exterior.coords) < 4:
                 continue
-            if not (shape.covers(body) and limit.covers(shape) and shape.disjoint(line)):
+            is_clear = shape.distance(line) > ROUNDING
+            if not (is_clear and shape.covers(body) and limit.covers(shape)):
                 continue
             corners = tuple((float(x), float(y)) for x, y in shape.exterior.coords[:-1])
             tried = Zone(zone.obstacle, Polygon(polygon=corners), most)
@@ -230,7 +274,7 @@ def _simplified(
     round_zone = Zone(zone.obstacle, circle, most)
     if (
         limit.covers(disc)
-        and disc.disjoint(line)
+        and _distance(circle, line) > ROUNDING
         and policy.size_of(round_zone) < policy.size_of(best)
     ):
         best = round_zone
@@ -238,7 +282,7 @@ def _simplified(
 
 
 def _circle_about(obstacle: Polygon) -> Circle:
-    """Return the smallest circle that holds a polygon, larger by a rounding error."""
+    """Return the smallest circle around a polygon, enlarged by a rounding error."""
     corners = np.array(obstacle.polygon)
     middle = shapely.minimum_bounding_circle(shapely.MultiPoint(corners)).centroid
     radius = float(np.hypot(corners[:, 0] - middle.x, corners[:, 1] - middle.y).max())

@@ -29,6 +29,7 @@ from netsp.execute.plan import HOME
 from netsp.export.cockpit_mission import cockpit_mission
 from netsp.export.fence import Fence, FencePolicy, fence_of
 from netsp.export.kml import kml_of, kmz_of
+from netsp.export.leg_times import VehicleMotion, leg_times
 from netsp.export.waypoints import Waypoint, waypoints_of
 from netsp.fields import checked_argument, checked_instance
 from netsp.files import cell, write_bytes, write_text
@@ -51,10 +52,6 @@ FASTEST = 20.0
 NAV_WAYPOINT, CHANGE_SPEED, RELATIVE_ALTITUDE, MISSION_FRAME = 16, 178, 3, 2
 GROUND_SPEED, KEEP_THROTTLE = 1, -1
 
-STOP_S, STOP_GROWTH = 3.5, 0.4
-"""ArduSub stops at every waypoint. A leg takes so many seconds more than at full speed, when it is
-long enough to reach that at 0.5 m/s; with the speed that grows by the power given. On five
-simulated flights the times so predicted are within 7 % of those flown; 6 s were seen at 2 m/s."""
 ARDUPILOT, SUBMARINE = 3, 12
 
 
@@ -208,20 +205,26 @@ def start_of(problem: Problem, solution: Solution) -> Waypoint:
     return Waypoint((float(x), float(y), float(z)), None, start=True)
 
 
-def predicted_s(points: list[Waypoint], settings: Settings) -> float | None:
-    """Seconds that the vehicle will take from the first waypoint on; None without a speed."""
-    speed = settings.speed
-    if speed is None:
+def predicted_s(
+    points: list[Waypoint], settings: Settings, motion: VehicleMotion | None = None
+) -> float | None:
+    """Return the seconds that a mission takes from its first waypoint on; None without a speed.
+
+    Parameters
+    ----------
+    points : list of Waypoint
+        Waypoints of the mission, the start first.
+    settings : Settings
+        Speed and holds.
+    motion : VehicleMotion, optional
+        Motion of the vehicle; by default that of ArduSub as it comes.
+    """
+    if settings.speed is None:
         return None
-    settings = told_apart(points, settings)
-    places = np.array([p.position for p in points])
-    legs = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    stop = STOP_S * (speed / 0.5) ** STOP_GROWTH
-    # gathering way and losing it evenly, a short leg never gets to full speed
-    at_speed = legs / speed + stop
-    moving = np.where(legs >= stop * speed, at_speed,
-                      2.0 * np.sqrt(legs * stop / speed))  # fmt: skip
-    return float(moving.sum()) + sum(_hold(p, settings) for p in points)
+    told = told_apart(points, settings)
+    holds = [_hold(p, told) for p in points]
+    places = [(*p.position[:2], altitude(p.position[2])) for p in points]
+    return holds[0] + sum(leg_times(places, holds, settings.speed, motion))
 
 
 def fence_of_points(problem: Problem, points: list[Waypoint], settings: Settings) -> Fence:

@@ -35,7 +35,7 @@ def ready(
     should_stop : callable, optional
         Asked while it waits; a KeyboardInterrupt is raised then.
     any_vehicle : bool
-        Command any vehicle; by default only a submarine with ArduPilot, because others take the
+        Command any vehicle; by default only an ArduPilot submarine, because others use the
         same numbers for other modes and targets.
 
     Raises
@@ -53,6 +53,11 @@ def ready(
             raise RefusedError(
                 f"heard from system {', '.join(map(str, session.others))}, but nothing from system "
                 f"{session.system} for {WAIT_S:g} s: is that its id?"
+            )
+        if session.unplaced_s < np.inf:
+            raise RefusedError(
+                f"positions come from system {session.system}, but no heartbeat for {WAIT_S:g} s: "
+                "is the autopilot's stream forwarded whole?"
             )
         raise RefusedError(f"no vehicle has been heard for {WAIT_S:g} s: is the link right?")
     kind = session.kind

@@ -16,10 +16,10 @@ from netsp.fly.checks import ready
 from netsp.fly.flight_policy import FlightPolicy
 from netsp.fly.rehearsal import rehearse
 from netsp.fly.resume import BeginsAt
+from netsp.fly.standby import do_without_estimate
 from netsp.fly.vehicle import LOOK_S, LinkedVehicle
 from netsp.judge import verify
-from netsp.link.dialect import dialect
-from netsp.link.modes import ALT_HOLD, GUIDED, mode_name
+from netsp.link.modes import GUIDED, mode_name
 from netsp.link.session import Session
 from netsp.problem import Problem
 from netsp.solution import Solution
@@ -88,6 +88,9 @@ def fly(
         As of `execute`.
     RefusedError
         As of `netsp.fly.checks.ready`.
+    Exception
+        Anything that a callable or netsp itself raises under way, once the vehicle was told to hold
+        its place and the state was written.
     """
     options = options or ExecutionOptions(reach=0.3)
     judged = verify(problem, solution) if begins is None else None
@@ -100,11 +103,17 @@ def fly(
     near = NEAR_START if begins is None else np.inf
     ready(session, start, near, should_stop, any_vehicle=any_vehicle)
     begun = begins and begins(np.array(session.now.position))
+    session.places()  # of before the flight
     vehicle = LinkedVehicle(session, options.reach, policy)
-    done = execute(
-        problem, solution, replace(options, vehicle="linked"), surprises=surprises,
-        on_step=on_step, vehicle=vehicle, incoming=incoming, record=record, begun=begun,
-    )  # fmt: skip
+    try:
+        done = execute(
+            problem, solution, replace(options, vehicle="linked"), surprises=surprises,
+            on_step=on_step, vehicle=vehicle, incoming=incoming, record=record, begun=begun,
+        )  # fmt: skip
+    except (Exception, KeyboardInterrupt):
+        if vehicle.sent:
+            _leave(session, vehicle)
+        raise
     if done.stopped or done.interrupted:
         _leave(session, vehicle)
     return done
@@ -138,7 +147,9 @@ def _leave(session: Session, vehicle: LinkedVehicle) -> None:
     except StopsFlightError:
         if session.now.mode != mode_name(GUIDED) or session.now.armed is not True:
             return
-        if session.now.estimate is not False and vehicle.source_lost is not None:
+        if session.now.estimate is not False and not session.is_distrusted:
+            if vehicle.source_lost is None:
+                return
             # stop by the estimate while it is good for that, then do without it
             vehicle.halt()
             until = vehicle.time + vehicle.policy.max_unaided_hold_s
@@ -146,9 +157,6 @@ def _leave(session: Session, vehicle: LinkedVehicle) -> None:
                 session.sleep(LOOK_S)
             if vehicle.source_lost is None:
                 return
-        elif session.now.estimate is not False:
-            return
-        if session.now.mode == mode_name(GUIDED):
-            session.command(dialect().MAV_CMD_DO_SET_MODE, 1, ALT_HOLD)
+        do_without_estimate(session, vehicle.policy)
         return
-    vehicle.hold()
+    vehicle.halt()

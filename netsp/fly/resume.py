@@ -1,7 +1,7 @@
 """Beginning of a flight elsewhere than at the start of its tour.
 
-The class of the tether is known from the record of a flight that was broken off, from the state
-file of a guard, or by the operator's word.
+The class of the tether comes from the record of an interrupted flight, from the state file of a
+guard, or from the operator.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from netsp.errors import InputError, counted
 from netsp.execute.plan import HOME, legs_of
 from netsp.execute.repair import outside
 from netsp.execute.run_record import PROBLEM, SOLUTION, STATE, Begun, RunState
+from netsp.execute.tether_reserve import ReservePolicy
+from netsp.files import read_text
 from netsp.fly.flight_policy import FlightPolicy
 from netsp.fly.stopped import RefusedError
 from netsp.geometry import polylines
@@ -29,19 +31,19 @@ from netsp.roadmap.paths import TautPaths, UnknownPathError
 from netsp.solution import Solution
 
 BeginsAt = Callable[[Floats], Begun]
-"""Function that says how a flight begins, given the position of the vehicle, shape (3,)."""
+"""Function that returns how a flight begins, given the position of the vehicle, shape (3,)."""
 
 SAY_CLASS = "say with --class on which sides of the obstacles the tether lies"
 
 
 def parse_class(text: str) -> Word:
-    """Return the word that an operator gives.
+    """Parse a class given by an operator.
 
     Parameters
     ----------
     text : str
         Numbers of obstacles from 1, negative where the ray is crossed from right to left, with
-        commas or spaces between them; empty for a tether that is straight.
+        commas or spaces between them; empty for a straight tether.
 
     Raises
     ------
@@ -76,14 +78,16 @@ def read_run(folder: str | Path) -> tuple[Problem, Solution, RunState]:
     place = Path(folder)
     if not (place / STATE).is_file():
         raise InputError(f"--resume: {folder}: has no {STATE}; expected the folder of a flight")
-    problem, solution = Problem.load(place / PROBLEM), Solution.load(place / SOLUTION)
+    # an obstacle may have appeared on a goal since
+    problem = Problem.from_run(read_text(place / PROBLEM), str(place / PROBLEM))
+    solution = Solution.load(place / SOLUTION)
     state = RunState.load(place / STATE)
     state.check(problem, f"--resume: {place / STATE}")
     return problem, solution, state
 
 
 def from_record(problem: Problem, state: RunState, policy: FlightPolicy | None = None) -> BeginsAt:
-    """Return how a flight goes on that was broken off.
+    """Return how an interrupted flight goes on.
 
     Parameters
     ----------
@@ -219,7 +223,8 @@ def whole_tour(problem: Problem, solution: Solution) -> RunState:
     """
     left = tuple(leg.goal for leg in legs_of(problem, solution) if leg.goal != HOME)
     base = problem.base
-    return RunState(time=0.0, tether=(base, base), left=left)
+    reserve = ReservePolicy().of_plan(problem, solution)
+    return RunState(time=0.0, tether=(base, base), left=left, reserve=reserve)
 
 
 def _begun(problem: Problem, state: RunState, tether: Floats) -> Begun:
@@ -230,7 +235,7 @@ def _begun(problem: Problem, state: RunState, tether: Floats) -> Begun:
         tether, list(state.left),
         f"resumed with {counted(len(state.left), 'goal')} left, {length:.1f} {problem.units} along "
         "the tether from the base",
-        {g.goal: g.reason for g in state.left_out}, tuple(state.cancelled),
+        {g.goal: g.reason for g in state.left_out}, tuple(state.cancelled), state.reserve,
     )  # fmt: skip
 
 

@@ -1,8 +1,8 @@
-"""Standing by after a flight: a vehicle is not left alone until somebody else has it.
+"""Standby after a flight: hold the vehicle until another ground station takes over.
 
-ArduSub disarms, or does what its parameter FS_GCS_ENABLE says, a few seconds after it has heard
-the last heartbeat of a ground station, and drifts. So heartbeats go on after the flight, and the
-vehicle is held where it is.
+A few seconds after the last heartbeat of a ground station, ArduSub disarms and drifts, or does what
+its parameter FS_GCS_ENABLE says. So netsp keeps sending heartbeats after the flight, and holds the
+vehicle where it is.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from netsp.link.modes import ALT_HOLD, GUIDED, POSHOLD, SURFACE, mode_name
 from netsp.link.session import Session
 
 Ending = Literal["hold", "position-hold", "surface", "leave"]
-"""What a vehicle does after a flight: hold its place in GUIDED or in POSHOLD, come to the surface,
+"""Action of a vehicle after a flight: hold its place in GUIDED or in POSHOLD, come to the surface,
 or stay as it is with no heartbeats from us."""
 
 ENDINGS: tuple[Ending, ...] = get_args(Ending)
 
 ASKED = {"position-hold": POSHOLD, "surface": SURFACE}
-"""Mode that an ending asks for."""
+"""Mode that each ending asks for."""
 
 FAILSAFE, FAILSAFE_TIME = "FS_GCS_ENABLE", "FS_GCS_TIMEOUT"
 """Parameters: what the vehicle does without a ground station, and after how many seconds."""
@@ -39,10 +39,10 @@ CONSEQUENCES = {
     3: "holds its depth (ALT_HOLD) and drifts",
     4: "comes to the surface",
 }
-"""What the vehicle does without a ground station, by FS_GCS_ENABLE; nothing at 0 and 1."""
+"""Action of the vehicle without a ground station, by FS_GCS_ENABLE; none at 0 and 1."""
 
 LOOK_S = 0.1
-"""Seconds between two looks at what came."""
+"""Period of standby, s: messages are read and conditions checked this often."""
 
 
 def stand_by(
@@ -53,25 +53,25 @@ def stand_by(
     should_stop: Callable[[], bool] = lambda: False,
     policy: FlightPolicy | None = None,
 ) -> str:
-    """Keep a vehicle where it is, and its link alive, until somebody else has it.
+    """Hold a vehicle and keep its link alive until another ground station takes over.
 
     Parameters
     ----------
     session : Session
         The vehicle, after a flight.
     ending : {"hold", "position-hold", "surface", "leave"}
-        What it is to do.
+        Action of the vehicle.
     say : callable, optional
-        Called with what happens now, and what will happen.
+        Called with lines about the present and the next action of the vehicle.
     should_stop : callable, optional
-        Asked all the time; ends it, as does a KeyboardInterrupt.
+        Polled; True ends standby, as does a KeyboardInterrupt.
     policy : FlightPolicy, optional
         Limits.
 
     Returns
     -------
     str
-        Why it ended.
+        Reason why it ended.
     """
     if ending == "leave":
         return "as asked for"
@@ -83,15 +83,38 @@ def stand_by(
         return "Ctrl-C"
 
 
+def do_without_estimate(session: Session, policy: FlightPolicy) -> None:
+    """Put a vehicle that would follow a wrong estimate into ALT_HOLD; ask again until it is.
+
+    Parameters
+    ----------
+    session : Session
+        The vehicle.
+    policy : FlightPolicy
+        Limits.
+    """
+    waited, ask_at = 0.0, 0.0
+    while session.now.mode in (mode_name(GUIDED), mode_name(POSHOLD)):
+        if waited >= policy.max_answer_s or session.silent_s > policy.max_silence_s:
+            return
+        if waited >= ask_at:
+            ask_at = waited + policy.retry_s
+            session.command(dialect().MAV_CMD_DO_SET_MODE, 1, ALT_HOLD)
+        session.sleep(LOOK_S)
+        waited += LOOK_S
+
+
 class _Standby:
-    """A vehicle that is looked after.
+    """Vehicle on standby.
 
     Attributes
     ----------
     is_held
-        Whether it was told where to stay since the link was there last.
+        True once it was commanded where to stay, since the link was last up.
     is_unaided
-        Whether it was put into ALT_HOLD because it has no estimate.
+        True once it was put into ALT_HOLD because it has no estimate.
+    has_told
+        True once the loss of the estimate was reported.
     unaided_since
         Time by the vehicle's clock since which it has no source of its estimate.
     ask_again
@@ -107,19 +130,22 @@ class _Standby:
         self.session, self.ending, self.say = session, ending, say
         self.vehicle = LinkedVehicle(session, 1.0, policy)
         self.policy = self.vehicle.policy
-        self.is_held = self.is_unaided = False
+        self.is_held = self.is_unaided = self.has_told = False
         self.ask_again = -np.inf
         self.unaided_since: float | None = None
         self.strangers: set[int] = set()
 
     def run(self, should_stop: Callable[[], bool]) -> str:
-        """Look after it until one of the reasons to end; return the reason."""
+        """Stand by until a reason to end arises; return the reason."""
         session = self.session
-        for name in (FAILSAFE, FAILSAFE_TIME):
-            session.ask_parameter(name)
         self._hold()
-        waited, told = 0.0, False
+        waited, ask_at, told = 0.0, 0.0, False
         while True:
+            if waited >= ask_at and waited < self.policy.max_answer_s:
+                ask_at = waited + self.policy.retry_s
+                for name in (FAILSAFE, FAILSAFE_TIME):
+                    if session.parameter(name) is None:
+                        session.ask_parameter(name)
             if should_stop():
                 return "Ctrl-C"
             if session.now.armed is False:
@@ -152,7 +178,8 @@ class _Standby:
         mode that it is to have."""
         asked = ASKED.get(self.ending)
         is_so = asked is None or self.session.now.mode == mode_name(asked)
-        return is_so and self.session.parameter(FAILSAFE) is not None
+        names = (FAILSAFE, FAILSAFE_TIME)
+        return is_so and all(self.session.parameter(name) is not None for name in names)
 
     @property
     def needs_nobody(self) -> bool:
@@ -161,8 +188,7 @@ class _Standby:
         return enabled is not None and round(enabled) not in CONSEQUENCES
 
     def _hold(self) -> None:
-        """Have the vehicle do what it is to do, if it is ours: not while a pilot has it, and not
-        without an estimate."""
+        """Command the ending, unless a pilot controls the vehicle or it has no estimate."""
         session = self.session
         try:
             self.vehicle.check()
@@ -190,14 +216,18 @@ class _Standby:
             return
         if self.unaided_since is None:
             self.unaided_since = now.time
-        wait = 0.0 if now.estimate is False else self.policy.max_unaided_hold_s
-        if now.time - self.unaided_since >= wait and not self.is_unaided:
-            self.is_unaided = True
-            self.say(f"the position estimate is of no use ({lost or 'lost'}): ALT_HOLD")
-            self.session.command(dialect().MAV_CMD_DO_SET_MODE, 1, ALT_HOLD)
+        is_useless = now.estimate is False or self.session.is_distrusted
+        wait = 0.0 if is_useless else self.policy.max_unaided_hold_s
+        is_heard = self.session.silent_s <= self.policy.max_silence_s
+        if is_heard and now.time - self.unaided_since >= wait and not self.is_unaided:
+            if not self.has_told:
+                self.has_told = True
+                self.say(f"the position estimate is unusable ({lost or 'lost'}): ALT_HOLD")
+            do_without_estimate(self.session, self.policy)
+            self.is_unaided = self.session.now.mode == mode_name(ALT_HOLD)
 
     def _outlook(self) -> str:
-        """Tell what the vehicle does now, and what it will do."""
+        """Return a line about what the vehicle does now, and what it will do without netsp."""
         session, mode = self.session, self.session.now.mode
         doing = {
             "GUIDED": "the vehicle holds its place",

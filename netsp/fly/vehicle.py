@@ -18,6 +18,8 @@ from netsp.execute.run import StopsFlightError
 from netsp.export.write import altitude
 from netsp.fields import Point3
 from netsp.fly.flight_policy import FlightPolicy
+from netsp.fly.leg_corridor import LegCorridor
+from netsp.fly.stuck_position import StuckPosition
 from netsp.guard.fix import Fix
 from netsp.link.dialect import dialect
 from netsp.link.modes import GUIDED, mode_name
@@ -53,14 +55,14 @@ class LinkedVehicle:
         self._begin = session.now.time
         self._position = self._told()
         self._target: Point3 | None = None
-        self._sent = -np.inf
+        self._sent = self._first_sent = -np.inf
         self.sent: list[tuple[float, Point3]] = []
-        self._from = self._position
         self._resends = 0
         self._mark = 0.0, math.inf
         self._vertex: Floats | None = None
-        self._leg: tuple[Floats, Floats] | None = None
+        self._corridor: LegCorridor | None = None
         self._stages: list[Floats] = []
+        self._frozen = StuckPosition(self.policy)
         session.watch(_wrong)
 
     def _told(self) -> Floats:
@@ -119,7 +121,7 @@ class LinkedVehicle:
         """
         del yaw, water, fresh, pull
         until, passed = self.time + seconds, 0
-        points: list[Floats] = []
+        points: list[Floats] = self._hear()  # while a plan was made
         while True:
             self.check()
             while passed < len(path) and self._at(path[passed]):
@@ -129,11 +131,27 @@ class LinkedVehicle:
             if self.time >= until:
                 break
             self.session.sleep(LOOK_S)
-            for place in self.session.places():
-                points.append(place)
-                self._position = place
-                self._check_path()
+            points += self._hear()
         return points or [self._position.copy()], passed
+
+    def _hear(self) -> list[Floats]:
+        """Take the positions that have come, and stop the flight if one is off its path or none
+        ever changes; return them."""
+        velocity, places = self.session.now.velocity, self.session.places()
+        moving = None if velocity is None else np.array(velocity, dtype=float)
+        for place in places:
+            self._position = place
+            self._frozen.take(place, moving, self.time)
+            self._check_path()
+        if places and self._target is not None:
+            fault = self._frozen.fault(
+                self.time, np.array(self._target), self._first_sent, 0.5 * self.reach,
+                self._is_echoed,
+            )  # fmt: skip
+            if fault is not None:
+                self.session.distrust(fault)
+                raise StopsFlightError(f"the position is frozen: {fault}")
+        return places
 
     def _at(self, vertex: Floats) -> bool:
         there = np.array([*vertex[:2], altitude(float(vertex[2]))])
@@ -145,9 +163,9 @@ class LinkedVehicle:
         self.halt()
 
     def halt(self) -> None:
-        """Stay where it is, whatever its estimate is worth."""
+        """Stop the vehicle where it is, even if its estimate is unreliable."""
         self._position = self._told()
-        self._vertex = self._leg = None
+        self._vertex, self._corridor = None, self._corridor_to(self._position)
         self._send(self._position)
 
     def keep(self) -> None:
@@ -185,13 +203,18 @@ class LinkedVehicle:
                 f"the link is lost or carries no position: none for {session.unplaced_s:.0f} s"
             )
 
+        if session.stalled_s > self.policy.max_clock_stall_s:
+            raise StopsFlightError(
+                f"the vehicle's clock stands still: its messages have had the same time for "
+                f"{session.stalled_s:.0f} s"
+            )
         source = self.source_lost
         if source is not None:
             raise StopsFlightError(f"the position estimate drifts: {source}")
 
     @property
     def source_lost(self) -> str | None:
-        """What is wrong with the sources of the position estimate; None if nothing is."""
+        """Fault of the sources of the position estimate; None if there is none."""
         policy = self.policy
         return self.session.source_lost(policy.min_source_loss_s, policy.max_gps_age_s)
 
@@ -201,20 +224,22 @@ class LinkedVehicle:
 
         The plan and the depth are measured separately: on a sloping leg a vehicle may lag in depth.
         """
-        if self._target is None:
+        if self._corridor is None:
             return
-        a, b = self._leg if self._leg is not None else (self._from, np.array(self._target))
         here = self._position
-        along = (b - a)[:2]
-        size = float(along @ along)
-        share = 0.0 if size == 0.0 else float(np.clip((here - a)[:2] @ along / size, 0.0, 1.0))
-        off = float(np.hypot(*((here - a)[:2] - share * along)))
+        self._corridor.take(here)
+        off = self._corridor.distance(here)
         if off > self.policy.max_path_error:
             raise StopsFlightError(f"the vehicle is {off:.1f} m off its path")
-        off = float(max(min(a[2], b[2]) - here[2], here[2] - max(a[2], b[2])))
+        off, side = self._corridor.depth_error(here)
         if off > self.policy.max_depth_error:
-            where = "below" if here[2] < b[2] else "above"
-            raise StopsFlightError(f"the vehicle is {off:.1f} m {where} the depth of its path")
+            raise StopsFlightError(f"the vehicle is {off:.1f} m {side} the depth of its path")
+
+    def _corridor_to(self, vertex: Floats) -> LegCorridor:
+        """Return the corridor from where the vehicle is to a vertex."""
+        velocity = self.session.now.velocity
+        moving = np.zeros(3) if velocity is None else np.array(velocity, dtype=float)
+        return LegCorridor(self._position, moving, vertex, self.policy)
 
     def _stage(self, vertex: Floats) -> Floats:
         """Return the next target on the way to a vertex: on a leg that slopes, intermediate ones
@@ -222,7 +247,7 @@ class LinkedVehicle:
         if self._vertex is None or not np.array_equal(vertex, self._vertex):
             self._vertex = vertex.copy()
             end = np.array([*vertex[:2], altitude(float(vertex[2]))])
-            self._leg = self._position.copy(), end
+            self._corridor = self._corridor_to(end)
             self._stages = self._stages_to(vertex)
         while len(self._stages) > 1 and self._at(self._stages[0]):
             self._stages.pop(0)
@@ -241,12 +266,22 @@ class LinkedVehicle:
         now = self.time
         if target != self._target:
             self.sent.append((now, target))
-            self._from, self._resends = self._position, 0
+            self._resends, self._first_sent = 0, now
         elif not self._is_missed(now - self._sent):
             return
         self._target, self._sent = target, now
         self._mark = now, self._left()
         self.session.link.send(target_message(self.session, target))
+
+    @property
+    def _is_echoed(self) -> bool:
+        """Return whether the vehicle has said, since it was sent the target, that it goes there.
+        The depth of an echo may be told from another level."""
+        echo = self.session.echo
+        if echo is None or self._target is None or echo[1] >= self.time - self._first_sent:
+            return False
+        off = np.array(echo[0][:2]) - self._target[:2]
+        return float(np.linalg.norm(off)) <= self.policy.max_echo_error
 
     def _is_missed(self, waited_s: float) -> bool:
         """Return whether the vehicle does not have the last target, and should get it again."""
@@ -264,7 +299,7 @@ class LinkedVehicle:
         if off > self.policy.max_echo_error:
             if self._resends >= self.policy.max_resends:
                 raise StopsFlightError(
-                    f"the vehicle does not take its target: it goes {off:.1f} m beside it"
+                    f"the vehicle does not accept its target: it goes to one {off:.1f} m away"
                 )
             self._resends += 1
             return True

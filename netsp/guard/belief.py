@@ -114,19 +114,19 @@ class Belief:
         self._trim()
 
     def with_drift(self, drift: float, place: Floats) -> Belief:
-        """Return a belief in the same classes, of a position with another drift.
+        """Return a belief in the same classes for another drift of the position.
 
         Parameters
         ----------
         drift : float
-            Standard deviation of how far the estimate is off from now on, metres.
+            Standard deviation of the error of the estimate from now on, metres.
         place : ndarray, shape (2,) or (3,)
             The estimate, metres.
 
         Returns
         -------
         Belief
-            What was known of the offset is forgotten.
+            New belief, without what was known of the offset.
         """
         other = Belief(self.letters, drift, self._noise_left)
         self._gather(place)

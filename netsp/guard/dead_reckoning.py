@@ -1,4 +1,4 @@
-"""How far off a position is that no fixes correct.
+"""Error of a position that no fixes correct.
 
 A filter without fixes integrates the errors of its accelerometers and of its model of the vehicle,
 so that its error grows with the square of the time. ArduSub 4.7 with the GPS switched off was off
@@ -15,22 +15,22 @@ from netsp.errors import InputError
 
 @dataclass(frozen=True)
 class DeadReckoning:
-    """Growth of a position's error while nothing corrects it.
+    """Growth of a position's error without fixes.
 
     Attributes
     ----------
     acceleration
-        Twice the error by the square of the time, m/s²; from flights with a GPS switched off. 0 or
-        more.
+        Twice the error divided by the square of the time, m/s²; measured in flights with the GPS
+        switched off. 0 or more.
     notice_s
-        Time from the loss until it is noticed, s: the error has grown for that long. 0 or more.
+        Time from the loss until it is noticed, s; the error grows meanwhile. 0 or more.
     max_error
-        Error at which growth ends, m: nobody knows the class any more. Positive.
+        Largest error, m; the class is unknown by then. Positive.
     settle_s
-        Time for which the error counts after fixes are taken again, s: the filter sets its estimate
-        anew meanwhile. 0 or more.
+        Time for which the error still counts after fixes return, s; the filter resets its estimate
+        meanwhile. 0 or more.
     growth
-        Factor by which the error grows before the classes are sought anew. More than 1.
+        Factor of growth after which the classes are computed again. More than 1.
     """
 
     acceleration: float = 0.04
@@ -51,12 +51,12 @@ class DeadReckoning:
                 raise InputError(f"{name}: expected {expected}, got {getattr(self, name)!r}")
 
     def error(self, seconds: float) -> float:
-        """Return the error that has been added since the loss was noticed.
+        """Return the error some seconds after the loss was noticed.
 
         Parameters
         ----------
         seconds : float
-            Seconds since then.
+            Time since the loss was noticed, s.
 
         Returns
         -------

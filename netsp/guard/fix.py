@@ -30,7 +30,7 @@ class Fix:
     velocity : (x, y, z), optional
         As estimated with the position, m/s.
     aiding_fault : str, optional
-        Why no fixes of GPS or another system correct the position; empty while they do.
+        Reason why no fixes of GPS or another system correct the position; empty while they do.
     """
 
     time: float

@@ -56,7 +56,7 @@ class GuardOptions:
     speed : float
         Fastest speed, m/s.
     dead_reckoning : DeadReckoning
-        How the drift grows while no fixes correct the position.
+        Growth of the drift while no fixes correct the position.
     """
 
     noise: float = 0.3
@@ -237,10 +237,12 @@ class Guard:
             motion = self.track.take(fix)
             if motion is not None:
                 self._moved(motion)
+            elif self.track.frozen:
+                self._widen()
         return self._told(self._last)
 
     def _note_aiding(self) -> None:
-        """Note since when no fixes correct the position, or since when they do again."""
+        """Note the time at which fixes were lost, or taken again."""
         now = self._seen
         if self._last.aiding_fault:
             self._corrected_at = None
@@ -254,19 +256,33 @@ class Guard:
 
     @property
     def drift(self) -> float:
-        """Standard deviation of how far the position is off by now, metres."""
-        o, since = self.options, self._uncorrected_since
-        if since is None:
-            return o.drift
-        until = self._seen if self._corrected_at is None else self._corrected_at
-        return o.drift + o.dead_reckoning.error(until - since)
+        """Standard deviation of the position's error now, metres."""
+        o, since, error = self.options, self._uncorrected_since, 0.0
+        if since is not None:
+            until = self._seen if self._corrected_at is None else self._corrected_at
+            error = o.dead_reckoning.error(until - since)
+        if self.track.frozen:  # the robot may go on in any direction
+            gone = o.speed * max(0.0, self._seen - self.track.freeze.since)
+            error = min(max(error, gone), o.dead_reckoning.max_error)
+        return o.drift + error
 
     def _fit_drift(self, place: Floats) -> None:
-        """Have the belief know how far the position may be off by now."""
+        """Update the belief if the drift has changed enough."""
         drift, known = self.drift, self.belief.drift
-        least = 1.0 if self._uncorrected_since is None else self.options.dead_reckoning.growth
-        if drift > least * known or (self._uncorrected_since is None and drift < 0.999 * known):
+        is_growing = self._uncorrected_since is not None or self.track.frozen
+        least = self.options.dead_reckoning.growth if is_growing else 1.0
+        if drift > least * known or (not is_growing and drift < 0.999 * known):
             self.belief = self.belief.with_drift(drift, place)
+
+    def _widen(self) -> None:
+        """Widen the set of classes while the position is frozen and the guard still claims one."""
+        if self._motion is None or self.track.silence(self._seen) > GAP:
+            return
+        place = self._motion.after
+        known = self.belief
+        self._fit_drift(place)
+        if self.belief is not known:
+            self.strands.follow(self.belief.classes(), place, MOST_TETHERS)
 
     def _beyond(self, place: Point3) -> bool:
         """Whether a place is farther from the base than twice the tether."""
@@ -416,7 +432,7 @@ class Guard:
         if not claims:
             why = (
                 "the vehicle does not vouch for its position" if self._vouched is False
-                else "the position has stood still to the last digit" if self.track.frozen
+                else reasons.FROZEN if self.track.frozen
                 else "no position has come"
             )  # fmt: skip
             return [reasons.estimate_lost(silent, why)]
@@ -444,8 +460,11 @@ class Guard:
         ]  # fmt: skip
 
     def _uncorrected(self) -> list[Alarm]:
-        """Return the alarm that no fixes correct the position, if so."""
+        """Return the alarm that the position is frozen, or that no fixes correct it, if so."""
         since, why = self._uncorrected_since, self._last.aiding_fault
+        if self.track.frozen:
+            since, why = self.track.freeze.since, reasons.FROZEN
+            return [reasons.uncorrected(self._seen - since, why, self.drift, self.site.units)]
         if self._jumped_m is not None:
             return [reasons.set_anew(self._jumped_m, self.site.units)]
         if since is None or not why:

@@ -72,8 +72,7 @@ def watch(
     until : callable, optional
         Asked whether to end.
     ask_rates : bool
-        True to ask the vehicle to tell more often what the guard needs; nothing else is ever asked
-        of it.
+        True to ask the vehicle for the rates that the guard needs; it is asked for nothing else.
 
     Raises
     ------
@@ -99,7 +98,7 @@ def watch(
     listener, stream = Listener(frame, system), Stream(guard, on_note=tell)
     heard = saved = sent = told = time.monotonic()
     others: set[int] = set()
-    hints, rates = _Hints(), MessageRates(frame, ask_rates)
+    hints, rates = _Hints(), MessageRates(frame, ask_rates, sender=SYSTEM)
     numbers = itertools.count()
     try:
         tell(f"listening on {address}")
@@ -115,15 +114,19 @@ def watch(
                 fix = listener.understand(message)
                 for line in hints.about(message, fix, listener):
                     tell(line)
-                if listener.system is not None and message.get_srcSystem() == listener.system:
-                    for line in _rate_lines(rates, message, fix):
-                        tell(line)
-                if fix is None or message.get_srcSystem() != listener.system:
+                if (message.get_srcSystem(), message.get_srcComponent()) != (
+                    listener.system, AUTOPILOT
+                ):  # fmt: skip
+                    continue
+                clock = now if listener.time is None else listener.time
+                for line in _rate_lines(rates, message, fix, clock):
+                    tell(line)
+                link.answer(peer)
+                for request in rates.requests(message.get_srcSystem(), clock):
+                    link.send(request)
+                if fix is None:
                     continue
                 heard = now
-                link.answer(peer)
-                for request in rates.requests(message.get_srcSystem(), fix.time):
-                    link.send(request)
                 report = stream.take(fix)
                 if report is not None:
                     told = now
@@ -152,17 +155,17 @@ def watch(
             save(guard, state)
 
 
-def _rate_lines(rates: MessageRates, message: Any, fix: Fix | None) -> Iterator[str]:
-    """Yield what a message of the vehicle tells of the rates of its messages."""
+def _rate_lines(rates: MessageRates, message: Any, fix: Fix | None, clock: float) -> Iterator[str]:
+    """Yield lines about the rates of a vehicle's messages, after one of them."""
     if message.get_type() == "COMMAND_ACK":
-        yield from rates.take_ack(int(message.command), int(message.result))
-    elif fix is not None and fix.position is not None:
-        yield from rates.take(fix.time)
+        target = int(getattr(message, "target_system", 0))  # which MAVLink 1 does not have
+        yield from rates.take_ack(int(message.command), int(message.result), target)
+    yield from rates.take(clock, fix is not None and fix.position is not None)
 
 
 class _Hints:
-    """Hints at options that help while no position is understood, and a warning of vehicles whose
-    words may be misread; each is given once."""
+    """Hints at helpful options while no position is understood, and a warning about unknown kinds
+    of vehicles; each is given once."""
 
     def __init__(self) -> None:
         self._has_position = False

@@ -1,4 +1,4 @@
-"""How often a vehicle tells where it is, and how it is asked to tell it more often."""
+"""Rates of a vehicle's messages: how often it sends its position, and requests for more."""
 
 from __future__ import annotations
 
@@ -13,20 +13,23 @@ from netsp.link.frame import Frame
 
 @dataclass(frozen=True)
 class RatePolicy:
-    """Policy of how often a vehicle should tell what the guard needs.
+    """Policy of the rates that a guard needs.
 
     Attributes
     ----------
     position_hz
-        Positions a second that are asked for; the guard takes ten. Positive.
+        Positions per second to ask for; the guard updates ten times a second. Positive.
     status_hz
-        Messages a second on the filter, the heading and the sensors. Positive.
+        Messages per second to ask for about the filter, the heading and the sensors. Positive.
     min_position_hz
-        Positions a second below which it is said that they are few. Positive.
+        Positions per second below which the guard reports the rate. Positive.
     span_s
-        Time over which positions are counted, s, by the vehicle's clock. Positive.
+        Time over which positions are counted, s. Positive.
     ask_s
-        Time between two requests while positions are few, s. Positive.
+        Time between two requests while the rate is too low, s. Positive.
+    max_gap_s
+        Longest time between two messages within one count, s; after a longer one, the vehicle may
+        have restarted, so counting and asking begin anew. Positive.
     """
 
     position_hz: float = 10.0
@@ -34,79 +37,106 @@ class RatePolicy:
     min_position_hz: float = 8.0
     span_s: float = 5.0
     ask_s: float = 5.0
+    max_gap_s: float = 30.0
 
     def __post_init__(self) -> None:
-        for name in ("position_hz", "status_hz", "min_position_hz", "span_s", "ask_s"):
+        for name in (
+            "position_hz", "status_hz", "min_position_hz", "span_s", "ask_s", "max_gap_s"
+        ):  # fmt: skip
             if not getattr(self, name) > 0.0:
                 raise InputError(f"{name}: expected more than 0, got {getattr(self, name)!r}")
 
 
 class MessageRates:
-    """Counts the positions of a vehicle, says when they are few, and asks for more if it may.
+    """Monitor of how often a vehicle sends its position; it requests more if allowed.
 
     Parameters
     ----------
     frame : Frame
-        Frame of the site: which message tells positions.
+        Frame of the site, which decides which message tells positions.
     asks : bool
-        True to ask the vehicle (MAV_CMD_SET_MESSAGE_INTERVAL); otherwise it is only said.
+        True to send requests (MAV_CMD_SET_MESSAGE_INTERVAL); False only to report the rate.
     policy : RatePolicy, optional
-        How often is enough.
+        Policy of the rates that are needed.
+    sender : int
+        System id of the requests; answers to other systems are not ours.
 
     Attributes
     ----------
     hz : float or None
-        Positions a second over the last span; None before the first span is over.
+        Positions per second over the last span; None during the first span.
     """
 
-    def __init__(self, frame: Frame, asks: bool = False, policy: RatePolicy | None = None) -> None:
+    def __init__(
+        self, frame: Frame, asks: bool = False, policy: RatePolicy | None = None, *,
+        sender: int = 0,
+    ) -> None:  # fmt: skip
         self.frame, self.asks, self.policy = frame, asks, policy or RatePolicy()
+        self.sender = sender
         self.hz: float | None = None
         self._begin: float | None = None
+        self._heard = 0.0
         self._count = 0
         self._asked: float | None = None
-        self._first_asked: float | None = None
+        self._is_asked_before = False
         self._is_told = False
+        self._n_refused = 0
         self._is_refused = False
 
-    def take(self, time: float) -> Iterator[str]:
-        """Count a position, and yield what is to be said of their rate, once.
+    def take(self, time: float, is_position: bool = True) -> Iterator[str]:
+        """Count a message of the vehicle, and yield a line about the rate of positions, once.
 
         Parameters
         ----------
         time : float
-            Seconds, by the vehicle's clock.
+            Time by the vehicle's clock, s; by ours until the vehicle tells its time.
+        is_position : bool
+            True for a message with a position.
 
         Yields
         ------
         str
             One line of text.
         """
-        if self._begin is None or time < self._begin:  # the clock was set
-            self._begin, self._count = time, 0
+        begin, heard, self._heard = self._begin, self._heard, time
+        if begin is None or time < begin or time - heard > self.policy.max_gap_s:
+            # in the first span, this is the change from our clock to the vehicle's
+            self._asked = None if self.hz is not None or self._asked is None else time
+            self._begin, self._count, self.hz = time, 0, None
             return
-        self._count += 1
-        if time - self._begin < self.policy.span_s:
+        self._count += is_position
+        if time - begin < self.policy.span_s:
             return
-        self.hz = self._count / (time - self._begin)
+        self.hz = self._count / (time - begin)
         self._begin, self._count = time, 0
         if self.hz >= self.policy.min_position_hz or self._is_told:
             return
+        wanted = self.policy.position_hz
+        rate = f"{self.hz:.1f} times a second"
         if not self.asks:
             self._is_told = True
             yield (
-                f"positions come {self.hz:.1f} times a second, and so do reports; --ask-rates asks "
-                f"the vehicle for {self.policy.position_hz:g}"
-            )
-        elif self._first_asked is not None and time - self._first_asked > self.policy.span_s:
+                f"positions come {rate}, and so do reports; --ask-rates asks the vehicle for "
+                f"{wanted:g}" if self._has_positions
+                else f"no positions come; --ask-rates asks the vehicle for {wanted:g} a second"
+            )  # fmt: skip
+        elif self._is_asked_before and (self._asked is None or begin >= self._asked):
             self._is_told = True
             yield (
-                f"positions still come {self.hz:.1f} times a second, though the vehicle was asked "
-                f"for {self.policy.position_hz:g}"
+                f"positions still come {rate}, though the vehicle was asked for {wanted:g}"
+                if self._has_positions
+                else f"no positions come, though the vehicle was asked for {wanted:g} a second"
             )
 
-    def take_ack(self, command: int, result: int) -> Iterator[str]:
-        """Take the vehicle's answer to a request, and yield what is to be said of it, once.
+    @property
+    def _has_positions(self) -> bool:
+        return self.hz is not None and self.hz > 0.0
+
+    def take_ack(self, command: int, result: int, target: int = 0) -> Iterator[str]:
+        """Take the vehicle's answer to a request, and yield a line about a refusal, once.
+
+        An answer names the command, but not the message that was asked for. So requests end when
+        the vehicle does not know the command, or has refused as often as there are messages.
 
         Parameters
         ----------
@@ -114,6 +144,8 @@ class MessageRates:
             Number of the command.
         result : int
             MAV_RESULT.
+        target : int
+            System id that the answer is for; 0 if it says none.
 
         Yields
         ------
@@ -121,22 +153,27 @@ class MessageRates:
             One line of text.
         """
         m = dialect()
-        is_ours = self._asked is not None and command == m.MAV_CMD_SET_MESSAGE_INTERVAL
-        if is_ours and result != m.MAV_RESULT_ACCEPTED and not self._is_refused:
-            self._is_refused = True
-            entry = m.enums["MAV_RESULT"].get(result)
-            name = "MAV_RESULT " + str(result) if entry is None else entry.name
-            yield f"the vehicle refuses other rates of its messages ({name})"
+        is_ours = target in (0, self.sender) and command == m.MAV_CMD_SET_MESSAGE_INTERVAL
+        refusals = (m.MAV_RESULT_DENIED, m.MAV_RESULT_UNSUPPORTED, m.MAV_RESULT_FAILED)
+        if not (is_ours and self._is_asked_before and result in refusals):
+            return
+        self._n_refused += 1
+        is_unknown = result == m.MAV_RESULT_UNSUPPORTED
+        self._is_refused |= is_unknown or self._n_refused >= len(self._wanted())
+        if self._n_refused == 1:
+            name = m.enums["MAV_RESULT"][result].name
+            what = "other rates" if is_unknown else "another rate of some"
+            yield f"the vehicle refuses {what} of its messages ({name})"
 
     def requests(self, system: int, now: float) -> list[Any]:
-        """Return what to send to the vehicle now, if anything.
+        """Return the requests to send to the vehicle now, if any.
 
         Parameters
         ----------
         system : int
             System id of the vehicle.
         now : float
-            Seconds, by the vehicle's clock.
+            Time by the clock of `take`, s.
 
         Returns
         -------
@@ -148,25 +185,27 @@ class MessageRates:
             return []
         if self._asked is not None:
             is_enough = self.hz is None or self.hz >= p.min_position_hz
-            if 0.0 <= now - self._asked < p.ask_s or (is_enough and now >= self._asked):
+            if is_enough or now - self._asked < p.ask_s:
                 return []
-        self._asked = now
-        self._first_asked = now if self._first_asked is None else self._first_asked
+        self._asked, self._is_asked_before = now, True
         m = dialect()
-        position = (
-            m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT if self.frame.is_global
-            else m.MAVLINK_MSG_ID_LOCAL_POSITION_NED
-        )  # fmt: skip
-        wanted = {position: p.position_hz} | dict.fromkeys(
-            (
-                m.MAVLINK_MSG_ID_ATTITUDE, m.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
-                m.MAVLINK_MSG_ID_GPS_RAW_INT, m.MAVLINK_MSG_ID_SYS_STATUS,
-            ), p.status_hz,
-        )  # fmt: skip
         return [
             m.MAVLink_command_long_message(
                 system, 1, m.MAV_CMD_SET_MESSAGE_INTERVAL, 0, message, round(1e6 / hz), 0, 0, 0, 0,
                 0,
             )
-            for message, hz in wanted.items()
+            for message, hz in self._wanted().items()
         ]  # fmt: skip
+
+    def _wanted(self) -> dict[int, float]:
+        """Return the rate to ask for of each message, by its number."""
+        m = dialect()
+        position = (
+            m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT if self.frame.is_global
+            else m.MAVLINK_MSG_ID_LOCAL_POSITION_NED
+        )  # fmt: skip
+        status = (
+            m.MAVLINK_MSG_ID_ATTITUDE, m.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
+            m.MAVLINK_MSG_ID_GPS_RAW_INT, m.MAVLINK_MSG_ID_SYS_STATUS,
+        )  # fmt: skip
+        return {position: self.policy.position_hz} | dict.fromkeys(status, self.policy.status_hz)

@@ -54,6 +54,9 @@ OF_PLACES, OF_VELOCITIES = Course(1.3, LIKELY, 0.6), Course(0.6, 0.75, 0.0)
 """From where the robot has been alone, and where it tells its velocity, too
 (benchmarks/guard.py)."""
 
+FROZEN = "the position stands still to the last digit while the vehicle moves"
+"""Reason not to believe a frozen position."""
+
 DOUBT = 0.05
 """Share that a second class must have to be worth a word."""
 
@@ -86,7 +89,7 @@ def never_claimed(why: str, seconds: float) -> Alarm:
 
 
 def uncorrected(seconds: float, why: str, error: float, units: str) -> Alarm:
-    """Return the alarm that no fixes correct the position."""
+    """Return the alarm that the position may be wrong by more and more."""
     lasted = f", for {seconds:.0f} s" if seconds >= 1.0 else ""
     text = (
         f"{why}{lasted}: the position may be off by {error:.1f} {units} and more; stop "
@@ -96,7 +99,7 @@ def uncorrected(seconds: float, why: str, error: float, units: str) -> Alarm:
 
 
 def set_anew(far: float, units: str) -> Alarm:
-    """Return the alarm that the position jumped when fixes were taken again."""
+    """Return the alarm that the filter reset the position when it took fixes again."""
     text = (
         f"the position was set anew, {far:.1f} {units} from where it was: it was off, or the fixes "
         "are; say on which side of obstacles the tether passes, or go back along it"

@@ -93,8 +93,8 @@ class Report:
         Whether the likeliest class is the one that the tour means it to be in; None where the robot
         is at none of its stops, or there is no tour.
     drift : float or None
-        Standard deviation of how far the position is off, metres: as given, and more while no fixes
-        correct it.
+        Standard deviation of the position's error, metres: as given, and more while the position is
+        frozen or no fixes correct it.
     """
 
     time: float

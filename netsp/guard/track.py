@@ -15,6 +15,7 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.guard.fix import Fix
+from netsp.guard.frozen_position import FrozenPosition
 from netsp.guard.velocities import NOISE, Velocities
 
 ACCELERATION = 0.15
@@ -23,11 +24,8 @@ ACCELERATION = 0.15
 GAP = 2.0
 """Seconds without an estimate that are one."""
 
-FROZEN = 3.0
-"""Seconds for which an estimate of a moving robot may repeat to the last digit."""
-
 MOVING = 0.1
-"""Share of the speed: slower than that a robot is at rest."""
+"""Share of the full speed below which a robot counts as at rest."""
 
 JUMPED = "the position jumped"
 """Reason of a motion that no robot can have made."""
@@ -93,13 +91,16 @@ class Track:
         self.noise, self.speed = max(noise, 1e-3), speed
         self.velocities = Velocities(self.noise, speed)
         self.time: float | None = None
-        self.frozen = False
+        self.freeze = FrozenPosition(speed)
         self._state = np.zeros((2, 3))
         self._spread = np.zeros((2, 2, 2))
-        self._last: Floats | None = None
-        self._same_since, self._was_moving = 0.0, False
         self._doubt_since: float | None = None
         self._past: deque[tuple[float, Floats]] = deque()
+
+    @property
+    def frozen(self) -> bool:
+        """Return whether estimates repeat while the robot moves."""
+        return self.freeze.is_frozen
 
     @property
     def here(self) -> Floats:
@@ -121,12 +122,13 @@ class Track:
         position : ndarray, shape (3,)
             Metres.
         """
-        self.time, self._last, self._same_since = time, position, time
+        self.time = time
+        self.freeze.begin(time, position)
         self._state = np.array([position, np.zeros(3)])
         self._spread = np.array([np.diag([self.noise**2, self.speed**2])] * 2)
         self._past = deque([(time, position.copy())])
         self.velocities.begin()
-        self.frozen, self._doubt_since = False, None
+        self._doubt_since = None
 
     def shift(self, seconds: float) -> None:
         """The vehicle's clock was set.
@@ -189,16 +191,10 @@ class Track:
         dt = fix.time - self.time
         if dt <= 0.0:
             return None
-        same = self._last is not None and bool(np.array_equal(position, self._last))
-        if not same:
-            self._same_since = fix.time
-            self._was_moving = float(np.linalg.norm(self._state[1])) > MOVING * self.speed
-        if same and self._was_moving and not self.frozen and fix.time - self._same_since >= FROZEN:
-            self.frozen = True
-            self.lose(self._same_since)
-        if same and self.frozen:
+        speed = float(np.linalg.norm(self._state[1]))
+        if self.freeze.take(fix.time, position, fix.velocity, speed):
+            self.lose(self.freeze.since)
             return None
-        self._last = position
         before = self.here
         far = float(np.linalg.norm(position - before - self._state[1] * dt))
         # what noise of four deviations and a robot at full speed cannot explain
@@ -265,7 +261,7 @@ class Track:
         k = int(np.searchsorted(times, now - span))
         middle = self._past[k][1]
         first, second = (middle - start[1])[:2], (here - middle)[:2]
-        least = max(0.3, 2.0 * self.noise) * MOVING * 10.0 * self.speed * span
+        least = max(0.3, 2.0 * self.noise) * self.speed * span
         if min(np.hypot(*first), np.hypot(*second)) < min(least, 0.5 * self.speed * span):
             return 0.0
         cross = float(first[0] * second[1] - first[1] * second[0])

@@ -1,9 +1,9 @@
-"""What corrects a vehicle's position: fixes of GPS or another positioning system, or nothing.
+"""Aiding of a vehicle's position: whether GPS or another sensor corrects the filter's estimate.
 
-A filter that has lost its fixes goes on by itself and says so late: ArduSub 4.7 vouches for its
-estimate for 7 s more, when it is 1 m off. Its sensors tell sooner: the GPS has no fix or says the
-same as before, a sensor of position or velocity is not healthy, or fixes are so far off the
-estimate that the filter rejects them.
+A filter without fixes continues by dead reckoning and reports that late: ArduSub 4.7 vouches for
+its estimate for 7 s more, when the error is 1 m. The sensors tell sooner: the GPS has no fix or
+repeats itself, a sensor of position or velocity is unhealthy, or the filter rejects fixes because
+they are too far from its estimate.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from typing import Any
 from netsp.errors import InputError
 
 MIN_FIX_TYPE = 3
-"""Of GPS_RAW_INT: a fix in three dimensions."""
+"""Smallest fix type of GPS_RAW_INT that aids: a fix in three dimensions."""
 
 GPS = 32
 """Bit of SYS_STATUS for the GPS."""
 
 SENSORS = {GPS: "GPS", 64: "optical flow or DVL", 128: "visual or DVL odometry"}
-"""Bits of SYS_STATUS for what corrects the position, and what each is."""
+"""Sensors that aid the position, by their bit in SYS_STATUS."""
 
 GPS_FAULTS = 0x300
 """Bits of XKF4.GPS that are set while there is no fix: the eighth or the ninth, by version."""
@@ -29,7 +29,7 @@ GPS_FAULTS = 0x300
 
 @dataclass(frozen=True)
 class AidingPolicy:
-    """Policy that tells a position that fixes correct from one that nothing corrects.
+    """Policy that tells an aided position from one without aiding.
 
     Attributes
     ----------
@@ -51,15 +51,15 @@ class AidingPolicy:
 
 
 class PositionAiding:
-    """Watches what corrects a vehicle's position.
+    """Monitor of the sensors that correct a vehicle's position.
 
-    A sensor counts once it has worked: vehicles without GPS tell of one without a fix all the time.
-    One that is lost does not matter while another one works.
+    A sensor counts once it has worked, because vehicles without GPS report one without a fix. The
+    loss of a sensor does not matter while another one works.
 
     Parameters
     ----------
     policy : AidingPolicy, optional
-        Rule for what is too old, or too far off.
+        Limits of age and innovation.
 
     Examples
     --------
@@ -81,7 +81,7 @@ class PositionAiding:
         self._rejected: bool | None = None
 
     def take(self, message: Any, time: float) -> None:
-        """Learn from a MAVLink message; most say nothing of it.
+        """Take a MAVLink message; messages of other kinds change nothing.
 
         Parameters
         ----------
@@ -117,25 +117,25 @@ class PositionAiding:
         self._has_fix, self._gps_seen = has_fix, time
 
     def take_innovation(self, *ratios: float) -> None:
-        """Learn how far fixes are off the estimate.
+        """Take the innovations of the filter.
 
         Parameters
         ----------
         *ratios : float
-            Distance, and difference of the velocities, by what the filter accepts; NaN says
-            nothing.
+            Innovations of position and velocity over the filter's bounds of acceptance; NaN is
+            ignored.
         """
         known = [ratio for ratio in ratios if math.isfinite(ratio)]
         if known:
             self._rejected = max(known) >= self.policy.max_innovation
 
     def take_gps_checks(self, flags: int) -> None:
-        """Learn which checks of the GPS fail, from the log of a vehicle (XKF4.GPS).
+        """Take the failed GPS checks of a vehicle's log (XKF4.GPS).
 
         Parameters
         ----------
         flags : int
-            One bit for each check.
+            One bit per failed check.
         """
         bad = bool(flags & GPS_FAULTS)
         if bad and self._has_fix is None:
@@ -144,7 +144,7 @@ class PositionAiding:
         self._fix_since = self._gps_seen = math.inf  # the log has a row for each moment
 
     def fault(self, time: float) -> str | None:
-        """Return why nothing corrects the position.
+        """Return the reason why no sensor corrects the position.
 
         Parameters
         ----------
@@ -154,7 +154,7 @@ class PositionAiding:
         Returns
         -------
         str or None
-            The reason; empty while fixes correct it, None where nothing is known of that.
+            The reason; empty while fixes correct the position, None if the sensors are unknown.
         """
         if self._rejected:
             return "the filter rejects the fixes"

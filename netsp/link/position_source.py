@@ -9,25 +9,25 @@ from typing import Any
 import numpy as np
 
 FIX_3D = 3
-"""GPS_FIX_TYPE of a position with height; smaller numbers are no position to steer by."""
+"""Smallest GPS_FIX_TYPE that counts: a position with height."""
 
 OTHER_SOURCES = {0x40: "the optical flow sensor", 0x80: "the DVL or visual odometry"}
-"""Bits of SYS_STATUS for sensors that a filter may have its horizontal motion from."""
+"""Bits of SYS_STATUS for sensors that may give a filter its horizontal motion."""
 
 REJECTED = 1.0
-"""Innovation over the bound of acceptance (EKF_STATUS_REPORT) from which on a filter rejects a
+"""Innovation over the bound of acceptance (EKF_STATUS_REPORT) above which a filter rejects a
 measurement, by definition."""
 
 N_INTERVALS = 9
-"""Number of intervals between GPS messages that their usual rate is taken from."""
+"""Number of intervals between GPS messages whose median is the usual interval."""
 
 MAX_INTERVALS = 3.0
 """Number of usual intervals without a GPS message after which it is missed: two may get lost."""
 
 
 class PositionSources:
-    """Watches where a vehicle has its position from. Times are by the vehicle's clock, so that a
-    machine of ours that is busy misses nothing."""
+    """Monitor of the sources of a vehicle's position. Times are by the vehicle's clock, so that
+    load on this computer does not matter."""
 
     def __init__(self) -> None:
         self._had_fix = False

@@ -66,6 +66,7 @@ class Session:
         self._now = Fix(0.0)
         self._heard: float | None = None
         self._placed: float | None = None
+        self._ticked: tuple[float, float] | None = None
         self._holds: Callable[[Fix], str | None] | None = None
         self._broken: str | None = None
         self._places: deque[tuple[float, Point3]] = deque(maxlen=2000)
@@ -75,6 +76,7 @@ class Session:
         self._station: tuple[int, float] | None = None
         self._echoes = TargetEcho(frame)
         self._sources = PositionSources()
+        self._distrust: str | None = None
         self._echo: tuple[Point3, float] | None = None
         self._said = itertools.count()
         self._stop = threading.Event()
@@ -126,6 +128,13 @@ class Session:
         with self._lock:
             heard = self._heard
         return float("inf") if heard is None else (self._seconds() - heard) * self.pace
+
+    @property
+    def stalled_s(self) -> float:
+        """Seconds since the vehicle's clock last changed; infinite before its first time."""
+        with self._lock:
+            ticked = self._ticked
+        return float("inf") if ticked is None else (self._seconds() - ticked[1]) * self.pace
 
     @property
     def unplaced_s(self) -> float:
@@ -226,7 +235,26 @@ class Session:
         """
         with self._lock:
             time = self._listener.time
-            return None if time is None else self._sources.lost(time, confirm_s, max_age_s)
+            if self._distrust is not None or time is None:
+                return self._distrust
+            return self._sources.lost(time, confirm_s, max_age_s)
+
+    @property
+    def is_distrusted(self) -> bool:
+        """Return whether the positions are unusable, even to stop by."""
+        with self._lock:
+            return self._distrust is not None
+
+    def distrust(self, why: str) -> None:
+        """Treat the positions of the vehicle as lost from now on, whatever it reports.
+
+        Parameters
+        ----------
+        why : str
+            Reason, for messages.
+        """
+        with self._lock:
+            self._distrust = why
 
     @property
     def echo(self) -> tuple[Point3, float] | None:
@@ -237,7 +265,7 @@ class Session:
         return None if echo is None else (echo[0], (self._seconds() - echo[1]) * self.pace)
 
     def ask_for_positions(self) -> None:
-        """Ask for ten positions a second, and for all else that a flight watches."""
+        """Ask for ten positions a second, and for the other messages that a flight watches."""
         m = dialect()
         wanted = (
             m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT if self.frame.is_global
@@ -294,6 +322,8 @@ class Session:
             elif kind == "PARAM_VALUE":
                 self._parameters[str(message.param_id)] = float(message.param_value)
             if self._listener.time is not None:
+                if self._ticked is None or self._ticked[0] != self._listener.time:
+                    self._ticked = self._listener.time, self._seconds()
                 self._sources.take(message, self._listener.time)
             echo = self._echoes.understand(message)
             if echo is not None:

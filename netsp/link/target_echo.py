@@ -16,10 +16,10 @@ RELATIVE_FRAMES = (3, 6)
 
 
 class TargetEcho:
-    """Understands where a vehicle says that it goes.
+    """Decoder of the target that a vehicle reports.
 
-    ArduSub echoes in degrees and above the sea. Home and the origin of the estimate, which it tells
-    as well, lead from there to the site.
+    ArduSub echoes in degrees and above the sea. The decoder converts them into the site with home
+    and the origin of the estimate, which ArduSub reports as well.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Kind of a vehicle, and of the autopilot that steers it, as heartbeats tell them."""
+"""Kind of a vehicle and of its autopilot, as reported in heartbeats."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from netsp.pictures.problem import draw_obstacles
 
 RESPONSES = {
     "local": "mended on the spot", "replan": "planned anew", "home": "went home",
-    "kept": "plan kept", "defect": "defect, went home",
+    "kept": "plan kept", "defect": "defect, went home", "shorten": "tether shortened",
 }  # fmt: skip
 """What is said of what a robot did about an event."""
 
@@ -31,10 +31,11 @@ def save_execution(done: Execution, file: str | Path) -> None:
     draw_map(done, ax=left)
     draw_tether(done, ax=right)
     s, units = done.summary, done.problem.units
+    tethers = ", then ".join(f"{p.longest:.5g} of {p.limit:g}" for p in done.limit_periods)
     figure.suptitle(
         f"{done.problem.name}: {s['visited']} of {counted(len(done.problem.goals), 'goal')} in "
         f"{s['time_s']:.0f} s, path {s['path']:.5g} {units}, "
-        f"longest tether {s['longest_tether']:.5g} of {s['tether_length']:g} {units}"
+        f"longest tether {tethers or 'never out, of'} {units}"
     )
     style.save(figure, file, dpi=120)
 

@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from netsp.arrays import Bools, Floats
 from netsp.errors import InputError, counted
 from netsp.execute.plan import HOME
+from netsp.execute.tether_limits import describe_limits, limit_periods, overruns
 from netsp.files import write_text
 from netsp.hsignature.measures import measure
 from netsp.judge import verify
@@ -83,14 +85,14 @@ def page(what: Opened) -> str:
     found = briefing.of_tour(problem, solution) if run is None else None
     parts = [
         f"<h1>{html.escape(title)}</h1>",
-        _summary(problem, solution, run),
+        _summary(problem, solution, what),
         "<h2>Map</h2>",
         chart.draw(problem, solution, view, fates, what.maps, what.driven, what.order),
         chart.legend(run=run is not None),
         moving.CONTROLS, moving.STATE,
         "<h2>Goals in their order</h2>",
         briefing.stops(problem, solution, found) if run is None
-        else _reached(problem, solution, run, fates),
+        else _reached(problem, solution, run, fates, what.rows),
     ]  # fmt: skip
     if own and problem.state is None and solution.status is not Status.INVALID:
         parts += ["<h2>How the tether runs</h2>", briefing.tethers(problem, solution)]
@@ -126,7 +128,7 @@ def _proof(solution: Solution) -> str:
     return solution.proof if status.is_optimal else f"{status.value}, {solution.proof}"
 
 
-def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
+def _summary(problem: Problem, solution: Solution, what: Opened) -> str:
     units = html.escape(problem.units)
     lines = [
         f"{html.escape(problem.summary)}. The plan is {solution.length:.6g} "
@@ -135,19 +137,31 @@ def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
     ]
     if planned := briefing.planned_with(solution):
         lines.append(html.escape(planned))
-    if run is not None:
-        s = json_of(run / "summary.json")
+    if what.run is not None:
+        s = json_of(what.run / "summary.json")
+        lengths = lengths_of(what.rows)
+        told = describe_limits(limit_periods(*lengths[:3]), overruns(*lengths), units)
         lines.append(
             f"Carried out in {s['time_s']:.5g} s over {s['path']:.6g} {units}: "
-            f"{counted(s['visited'], 'goal')} visited, longest tether "
-            f"{s['longest_tether']:.5g} {units}, over the limit for {s['exceedance_s']:.3g} s, "
+            f"{counted(s['visited'], 'goal')} visited, tether {told}; "
             f"{'recovered free' if s['tether_free'] else 'not recovered free'} at the end."
         )
     return "".join(f"<p>{line}</p>" for line in lines)
 
 
-def _reached(problem: Problem, solution: Solution, run: Path, fates: dict[int, str]) -> str:
-    """The visits that were made, in their order, and the goals that were not reached."""
+def lengths_of(rows: Sequence[dict[str, str]]) -> tuple[Floats, Floats, Floats, Bools]:
+    """Return time, tether, limit, and whether the tether is being shortened, by rows of a log."""
+    t, tether, limit = (np.array([float(r[k]) for r in rows]) for k in ("time", "tether", "limit"))
+    return t, tether, limit, np.array([r.get("shortening") == "True" for r in rows], dtype=bool)
+
+
+def _reached(
+    problem: Problem, solution: Solution, run: Path, fates: dict[int, str],
+    rows_of_log: Sequence[dict[str, str]],
+) -> str:  # fmt: skip
+    """Return a table of the visits that were made, in their order, and of the goals that were not
+    reached."""
+    times, _, limits, _ = lengths_of(rows_of_log)
     u, planned = problem.units, {v.goal: v for v in solution.tour}
     head = ["visit", "goal", "reached at (s)", f"tether out ({u})", f"slack ({u})", "word",
             f"planned at the start ({u})", "word then"]  # fmt: skip
@@ -164,9 +178,11 @@ def _reached(problem: Problem, solution: Solution, run: Path, fates: dict[int, s
             continue
         missed = [g for g in missed if g != goal]
         out = float(row["tether"])
+        then = int(np.searchsorted(times, float(row["time"]), "right"))
+        limit = float(limits[max(then - 1, 0)])
         rows.append([
             str(len(rows) + 1), problem.goal_name(goal), f"{float(row['time']):.1f}", f"{out:.5g}",
-            f"{problem.tether_length - out:.5g}", str([int(a) for a in row["word"].split()]),
+            f"{limit - out:.5g}", str([int(a) for a in row["word"].split()]),
             *told(goal),
         ])  # fmt: skip
     for goal in missed:
@@ -201,10 +217,7 @@ def _measures(problem: Problem, solution: Solution) -> str:
 
 
 def _over_time(rows: Sequence[dict[str, str]], units: str) -> str:
-    times, lengths, limits = (
-        np.array([float(r[k]) for r in rows]) for k in ("time", "tether", "limit")
-    )
-    return log.over_time(times, lengths, limits, units)
+    return log.over_time(*lengths_of(rows)[:3], units)
 
 
 def _events(run: Path | None) -> str:

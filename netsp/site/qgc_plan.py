@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from netsp.errors import InputError
+from netsp.errors import InputError, counted
 from netsp.files import read_text
 from netsp.models import parse_json_object, shown
 from netsp.site.feature import Feature, Map, Unread
@@ -88,11 +88,30 @@ def read_plan(file: str | Path) -> Map:
         numbers = {k: _number(own.get(k)) for k in ("tether_length", "clearance", "heading")}
         add_home(found, "plannedHomePosition", _lonlat(home), **numbers)
     _fence(data.get("geoFence"), found, str(file))
+    found.notes += _fence_notes(_part(own, "fence"))
     _rally(data.get("rallyPoints"), found)
     return Map(
         tuple(found.features), True, found.layers(),
         tuple(f"{file}: {c}" for c in found.complaints), tuple(found.notes), tuple(found.unread),
     )  # fmt: skip
+
+
+def _fence_notes(fence: dict[str, Any]) -> list[str]:
+    """Return notes on obstacles that an export of ours left out of the fence or simplified."""
+    notes = []
+    for member, what in (
+        (
+            "left_out",
+            "the fence lacks {} of the planned problem, because the vehicle's storage is full",
+        ),
+        ("simplified", "the fence has {} simplified, and larger than in the planned problem"),
+    ):
+        names = fence.get(member)
+        if isinstance(names, list) and names:
+            said = ", ".join(shown(n) for n in names[:3]) + (", …" if len(names) > 3 else "")
+            about = what.format(f"{counted(len(names), 'obstacle')} ({said})")
+            notes.append(f"{about}; to plan again, use that problem")
+    return notes
 
 
 def _object(value: Any, where: str) -> dict[str, Any]:
