@@ -61,19 +61,6 @@ def mutants_listed() -> int:
     return text.count("[[mutant]]")
 
 
-def cold_start() -> tuple[str, bool]:
-    """CPU seconds of the first solve on a machine, its cache of compiled code empty."""
-    with tempfile.TemporaryDirectory() as folder:
-        env = dict(os.environ) | {"NUMBA_CACHE_DIR": folder}
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        command = [sys.executable, "-m", "netsp", "solve", str(ROOT / "problems" / "wharf.json"),
-                   "-o", f"{folder}/s.json"]  # fmt: skip
-        done = subprocess.run(command, env=env, capture_output=True, text=True)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return f"{spent:.1f} s CPU", done.returncode == 0 and spent <= ALLOWANCE * 4.0
-
-
 def next_start() -> tuple[str, bool]:
     """CPU seconds of a further solve: of starting, mostly."""
     command = [sys.executable, "-m", "netsp", "solve", str(ROOT / "problems" / "wharf.json")]
@@ -118,13 +105,6 @@ def page(name: str) -> Claim:
 
 def starting() -> Iterator[Claim]:
     """How long a command takes to start."""
-    yield Claim(
-        "cold start: first solve of the wharf",
-        "4 s CPU (x 3)",
-        cold_start,
-        timed=True,
-        beside=True,
-    )
     yield Claim("further solves of the wharf", "0.8 s CPU (x 3)", next_start, timed=True)
     yield Claim("`netsp --help` over the start of Python", "8 times", help_start, timed=True)
 

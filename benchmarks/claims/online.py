@@ -102,7 +102,14 @@ def site(name: str) -> Claim:
         return "; ".join(shown), good
 
     claimed = f"{SAFE}; {1e3 * SITE_REPLAN:.0f} ms (x {ALLOWANCE:g})"
-    return Claim(f"{name}: over the limit; visited; tether; replan", claimed, measure, timed=True)
+    # replans count CPU seconds, so that another claim may be measured meanwhile
+    return Claim(
+        f"{name}: over the limit; visited; tether; replan",
+        claimed,
+        measure,
+        timed=True,
+        beside=True,
+    )
 
 
 def no_slower() -> tuple[str, bool]:
