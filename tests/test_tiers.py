@@ -10,6 +10,7 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple
 from pathlib import Path
+from types import FunctionType
 
 import numpy as np
 import pytest
@@ -24,9 +25,11 @@ from netsp.compiled.compile_policy import (
     compiles,
     everything_compiled,
 )
-from netsp.compiled.interpretation import interpreted
+from netsp.compiled.interpretation import interpreted, names_used
 from netsp.compiled.overtime import Overtime, within
+from netsp.dp import labels, walks
 from netsp.errors import InputError
+from netsp.mip import parities
 from netsp.problem import Problem
 from netsp.roadmap import outline, tangents
 from netsp.solvers.solve import solve
@@ -175,6 +178,16 @@ def test_an_end_asked_for_during_an_interpreted_call_is_not_forgotten(kernels):
     assert x[-1] == 1.0
 
 
+def test_short_calls_do_not_look_for_compiled_code_each_time(kernels, monkeypatch):
+    looked, is_on_disk = [], disk_cache.is_on_disk
+    monkeypatch.setattr(disk_cache, "is_on_disk", lambda *a: looked.append(a) or is_on_disk(*a))
+    with compiled_by(CompilePolicy(load_s=0.1)):
+        for _ in range(50):
+            kernels.ratio(7, 2)
+    assert kernels.ratio.interpreted_s < 0.1
+    assert len(looked) == 1
+
+
 def test_work_that_threads_share_is_never_begun_again(kernels):
     x = np.ones(200_000)
     with (
@@ -277,6 +290,58 @@ def test_kernels_that_others_call_with_constants_are_compiled_once(tmp_path):
     with everything_compiled():
         assert module.caller(5) == 5
     assert len(module.scaled.signatures) == 1
+
+
+def _loops(kernel):
+    """Return a kernel as it is written, and the kernels that it calls as well."""
+    names = kernel.py_func.__globals__
+    called = {n: _loops(names[n]) for n in names_used(kernel.py_func.__code__)
+              if hasattr(names.get(n), "py_func")}  # fmt: skip
+    return FunctionType(kernel.py_func.__code__, {**names, **called})
+
+
+@given(
+    st.sets(st.tuples(st.integers(0, 5), st.integers(6, 11)), min_size=1),
+    st.lists(st.sampled_from([0.0, 0.1, 0.25, 1 / 3, 0.5, 0.7, 1.0]), min_size=72, max_size=72),
+    st.lists(st.booleans(), min_size=12, max_size=12),
+)
+@settings(deadline=None)
+def test_sides_of_parity_cuts_are_changed_alike_in_loops_and_at_once(pairs, flow, sides):
+    ends = np.array(sorted(pairs))
+    across = np.array(flow).reshape(-1, 2)[: len(ends)]
+    row = np.searchsorted(np.sort(ends.ravel()), np.arange(13))
+    by_loops, at_once = np.array(sides), np.array(sides)
+    cost, teeth = _loops(parities._cheapest)(ends, across, row, row, by_loops)
+    other, same = interpreted(parities._cheapest)(ends, across, row, row, at_once)
+    assert (cost, teeth.tolist(), by_loops.tolist()) == (other, same.tolist(), at_once.tolist())
+
+
+@given(st.data())
+@settings(deadline=None, max_examples=30)
+def test_labels_are_extended_alike_in_loops_and_at_once(data):
+    sizes = data.draw(st.lists(st.integers(1, 3), min_size=2, max_size=5))
+    cluster = np.repeat(np.arange(len(sizes) + 1), [1, *sizes])
+    costs = np.array(data.draw(st.lists(
+        st.sampled_from([1.0, 1.5, 2.0, 3.0, math.inf]),
+        min_size=len(cluster) ** 2, max_size=len(cluster) ** 2,
+    ))).reshape(len(cluster), -1)  # fmt: skip
+    walk = walks.Walks(cluster, np.minimum(costs, costs.T))
+    prices = np.array([0.0, *data.draw(st.lists(
+        st.sampled_from([0.0, 0.5, 1.0]), min_size=len(sizes), max_size=len(sizes)
+    ))])  # fmt: skip
+    cutoff = data.draw(st.sampled_from([5.0, 8.0, math.inf]))
+
+    def both(*args):
+        with np.errstate(all="ignore"):
+            by_loops, at_once = _loops(labels.extend)(*args), interpreted(labels.extend)(*args)
+        for one, other in zip(by_loops, at_once, strict=True):
+            assert one.dtype == other.dtype
+            assert one.tobytes() == other.tobytes()
+        return at_once
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(walks, "extend", both)
+        walk.solve(prices, cutoff, lambda: None)
 
 
 def test_random_numbers_are_the_same_interpreted_and_compiled():

@@ -38,19 +38,25 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
     ----------
     interpreted_s : float
         CPU seconds that the function has run interpreted.
+    was_on_disk : bool
+        Whether compiled code was found on the disk. Looking for it takes about a millisecond, so
+        that calls that take less do not look each time.
+    next_look_s : float
+        CPU seconds of `interpreted_s` from which on the disk is looked at again.
     has_compiled : bool
         Whether any kernel was compiled in this process; an attribute of the class.
     """
 
     interpreted_s = 0.0
+    was_on_disk = False
+    next_look_s = 0.0
     has_compiled = False
 
     def _compile_for_args(self, *args: Any, **kwargs: Any) -> Callable[..., Any]:
         policy = current_policy()
         if policy.is_eager or kwargs:
             return self._compiled(args, kwargs)
-        types = _general(self.typeof_pyval(a) for a in args)
-        on_disk = disk_cache.is_on_disk(self, types)
+        on_disk = self._is_on_disk(args, policy.load_s)
         budget_s = policy.load_s
         if not on_disk:
             budget_s = policy.price_share * policy.price_s(self.bytecode())
@@ -62,6 +68,15 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         if budget_s <= 0.0 or not can_be or (is_shared and on_disk):
             return self._compiled(args, kwargs)
         return self._run_pooled if is_shared else self._within(budget_s)
+
+    def _is_on_disk(self, args: tuple[Any, ...], look_s: float) -> bool:
+        """Return whether compiled code for these arguments is on the disk, or was not there before
+        the function ran interpreted for the last so many seconds."""
+        if not self.was_on_disk and self.interpreted_s >= self.next_look_s:
+            types = _general(self.typeof_pyval(a) for a in args)
+            self.was_on_disk = disk_cache.is_on_disk(self, types)
+            self.next_look_s = self.interpreted_s + look_s
+        return self.was_on_disk
 
     def compile(self, sig: Any) -> Any:
         """Compile for argument types, or load what another process has compiled for them.

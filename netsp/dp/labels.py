@@ -271,46 +271,45 @@ def _extend_in_numpy(
     stop: Ints,
 ) -> tuple[Ints, Floats, npt.NDArray[np.int32]]:
     """Do as `extend`, all labels at the vertices of a goal at once."""
-    costs, start = graph.costs, graph.start
+    costs, goal, start = graph
     pointer, cost, memory = labels
     vertex = np.repeat(np.arange(len(pointer) - 1), np.diff(pointer))
+    from_goal, parts = goal[vertex], (memory & LOW, (memory >> CHUNK) & LOW, memory >> (2 * CHUNK))
     out_pointer, out_cost, out_memory = [0], [0.0], [0]
     for h in range(first, last):
         own = slice(start[h], start[h + 1])
-        come, masks = [], []
-        for g in range(1, len(start) - 1):
-            if g == h or stop[0] != 0:
-                continue
-            there = np.arange(pointer[start[g]], pointer[start[g + 1]])
-            there = there[~(cost[there] > bounds.cut - bounds.onward[h, vertex[there]])]
-            m = memory[there]
-            m = (
-                tables[g, h, 0, m & LOW]
-                | tables[g, h, 1, (m >> CHUNK) & LOW]
-                | tables[g, h, 2, m >> (2 * CHUNK)]
-            )
-            come.append(there[m >= 0])
-            masks.append(m[m >= 0])
-        at = np.concatenate([*come, np.zeros(0, dtype=np.int64)])
+        is_dear = cost > bounds.cut - bounds.onward[h, vertex]
+        at = np.flatnonzero(~is_dear & (from_goal != h))
+        if stop[0] != 0:
+            at = at[:0]
+        masks = tables[from_goal[at], h, 0, parts[0][at]]
+        for k in (1, 2):
+            masks |= tables[from_goal[at], h, k, parts[k][at]]
+        at, masks = at[masks >= 0], masks[masks >= 0]
         if not len(at):
             out_pointer += [len(out_cost) - 1] * (own.stop - own.start)
             continue
         # memories in the order in which they were met, as ties are broken by it
-        kinds, met, kind = np.unique(np.concatenate(masks), return_index=True, return_inverse=True)
+        kinds, met, kind = np.unique(masks, return_index=True, return_inverse=True)
         by_kind = np.argsort(kind, kind="stable")
         begin = np.searchsorted(kind[by_kind], np.arange(len(kinds)))
         legs = cost[at, None] + costs[vertex[at], own]
         order = np.argsort(met)
         table = np.minimum.reduceat(legs[by_kind], begin, axis=0)[order]
-        seen = kinds[order]
-        for j, limit in enumerate(bounds.limit[own]):
-            fits = np.flatnonzero((table[:, j] <= limit) & (table[:, j] < np.inf))
-            fits = fits[np.argsort(table[fits, j], kind="stable")]
+        table[~((table <= bounds.limit[own]) & (table < np.inf))] = np.inf
+        cheapest_first = np.argsort(table, axis=0, kind="stable")
+        counts = np.count_nonzero(table < np.inf, axis=0).tolist()
+        seen, price = kinds[order], float(prices[h])
+        for j, count in enumerate(counts):
+            fits = cheapest_first[:count, j]
             kept: list[int] = []
-            for s, m in zip(fits.tolist(), seen[fits].tolist(), strict=True):
-                if not any(k & m == k for k in kept):
+            for c, m in zip(table[fits, j].tolist(), seen[fits].tolist(), strict=True):
+                for k in kept:
+                    if k & m == k:
+                        break
+                else:
                     kept.append(m)
-                    out_cost.append(float(table[s, j]) - float(prices[h]))
+                    out_cost.append(c - price)
             out_memory += kept
             out_pointer.append(len(out_cost) - 1)
     return np.array(out_pointer), np.array(out_cost[1:]), np.array(out_memory[1:], dtype=np.int32)

@@ -133,11 +133,12 @@ def _along_tree(ends: Ints, flow: Floats, clusters: int) -> Bools:
     cost = np.minimum(flow, 1.0 - flow)
     order = np.argsort(-cost.ravel(), kind="stable")
     root, turned = np.arange(clusters), np.zeros(clusters, dtype=bool)
+    at, costs = ends.tolist(), cost.ravel().tolist()
     for k in order.tolist():
         p, label = divmod(k, 2)
-        if cost[p, label] <= 1e-9:
+        if costs[k] <= 1e-9:
             break
-        a, b = ends[p]
+        a, b = at[p]
         if root[a] != root[b]:
             # that this pair does not cross: its sides differ as it writes letters or not
             wrong = bool(turned[a] ^ turned[b]) != bool(label)
@@ -204,16 +205,51 @@ def _cost(ends: Ints, flow: Floats, sides: Bools) -> tuple[float, int]:
     return total + least, at
 
 
+@interprets(_cheapest)
+def _cheapest_in_numpy(
+    ends: Ints, flow: Floats, row: Ints, beside: Ints, sides: Bools
+) -> tuple[float, Bools]:
+    """Do as `_cheapest`, the changes of all clusters at once until one of them is made."""
+    cost, change = _cost_in_numpy(ends, flow, sides)
+    movable = np.flatnonzero(row[:-1] != row[1:])
+    is_end = ((ends[:, :1] == movable) ^ (ends[:, 1:] == movable)).T
+    for _ in range(PASSES):
+        best, first = cost, 0
+        while first < len(movable):
+            is_whole = (sides[ends[:, 0]] == sides[ends[:, 1]]) ^ is_end[first:]
+            costs, changes = _costs_of(np.where(is_whole, flow[:, 1], flow[:, 0]))
+            cheaper = np.flatnonzero(costs < cost - 1e-9)
+            if not len(cheaper):
+                break
+            k = int(cheaper[0])
+            sides[movable[first + k]] ^= True
+            cost, change = float(costs[k]), int(changes[k])
+            first += k + 1
+        if cost > best - 1e-9:
+            break
+    is_whole = sides[ends[:, 0]] == sides[ends[:, 1]]
+    teeth = np.where(is_whole, flow[:, 1], flow[:, 0]) > 0.5
+    if change >= 0:
+        teeth[change] = not teeth[change]
+    return cost, teeth
+
+
 @interprets(_cost)
 def _cost_in_numpy(ends: Ints, flow: Floats, sides: Bools) -> tuple[float, int]:
     """Do as `_cost`, all pairs at once."""
-    if not len(ends):
-        return np.inf, -1
     q = np.where(sides[ends[:, 0]] == sides[ends[:, 1]], flow[:, 1], flow[:, 0])
-    is_tooth = q > 0.5
-    total = float(np.cumsum(np.where(is_tooth, 1.0 - q, q))[-1])  # in the order of the pairs
-    if np.count_nonzero(is_tooth) % 2:
-        return total, -1
-    off = np.abs(1.0 - 2.0 * q)
-    at = int(off.argmin())
-    return total + float(off[at]), at
+    costs, changes = _costs_of(q[None])
+    return float(costs[0]), int(changes[0])
+
+
+def _costs_of(across: Floats) -> tuple[Floats, Ints]:
+    """Return the cost of each row of what pairs have across, and the pair changed for it."""
+    if not across.shape[1]:
+        return np.full(len(across), np.inf), np.full(len(across), -1)
+    is_tooth = across > 0.5
+    # in the order of the pairs
+    total = np.cumsum(np.where(is_tooth, 1.0 - across, across), axis=1)[:, -1]
+    off = np.abs(1.0 - 2.0 * across)
+    at = off.argmin(axis=1)
+    is_odd = np.count_nonzero(is_tooth, axis=1) % 2 == 1
+    return np.where(is_odd, total, total + off[np.arange(len(at)), at]), np.where(is_odd, -1, at)

@@ -31,6 +31,7 @@ from netsp.mip.solve import MipRun, solve_merged
 from netsp.mip.solve import Params as MipParams
 from netsp.mip.solve import solve as prove
 from netsp.solvers import exact
+from netsp.solvers.search_effort import SearchEffort
 from netsp.solving.limits import Limits
 from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph, least_tethers
@@ -47,11 +48,8 @@ MOST_KEPT = 3_000
 FEW_GOALS = 24
 """Most goals for which walks come first: with more, remembering them costs more than cuts do."""
 
-LEAST_ROUNDS, ROUNDS_PER_GOAL, ROUNDS_PER_PAIR, MOST_PER_GOAL = 500, 40, 1.0, 100
-"""Rounds of ruin and recreate before and after the root: at least the first; for each goal the
-second, or for each pair of goals the third if that is more, up to the last for each goal. With 500
-goals (one world, 12 s) 40 for each goal leave a tour 1 % longer than 100 or 240 do; another turn,
-among classes beside a better tour, is worth more."""
+SEARCH_EFFORT = SearchEffort(max_proven_goals=FEW_GOALS)
+"""Rounds of ruin and recreate before and after the root."""
 
 FEW_CLASSES = 3
 """Of a goal, where the roadmap had to leave classes out: a tour over them comes first."""
@@ -150,10 +148,8 @@ def _beyond(graph: TravelGraph, limits: Limits) -> Result:
 
 
 def _rounds(graph: TravelGraph) -> int:
-    """Of one search."""
-    n = graph.goal_count
-    pairs = int(ROUNDS_PER_PAIR * n * (n - 1) / 2)
-    return max(LEAST_ROUNDS, ROUNDS_PER_GOAL * n, min(pairs, MOST_PER_GOAL * n))
+    """Return the rounds of one search."""
+    return SEARCH_EFFORT.rounds(graph.goal_count, len(graph))
 
 
 def _in_part_ordered(graph: TravelGraph, limits: Limits, backend: str) -> Result:

@@ -1,0 +1,34 @@
+"""Rounds of local search before a proof, by the size of the problem."""
+
+from dataclasses import fields
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from netsp.errors import InputError
+from netsp.solvers.search_effort import SearchEffort
+
+EFFORT = SearchEffort()
+
+
+@given(st.integers(1, 600), st.integers(1, 30_000))
+def test_problems_that_are_soon_proven_are_searched_for_less(goals, vertices):
+    is_soon_proven = (
+        goals <= EFFORT.max_proven_goals and vertices <= EFFORT.max_proven_vertices
+    )  # fmt: skip
+    rounds = EFFORT.rounds(goals, vertices)
+    assert (rounds < EFFORT.min_rounds) == is_soon_proven
+    assert rounds <= max(EFFORT.min_rounds, EFFORT.max_rounds_per_goal * goals)
+
+
+@given(st.integers(1, 600), st.integers(1, 30_000))
+def test_one_more_goal_or_vertex_never_means_fewer_rounds(goals, vertices):
+    assert EFFORT.rounds(goals + 1, vertices) >= EFFORT.rounds(goals, vertices)
+    assert EFFORT.rounds(goals, vertices + 1) >= EFFORT.rounds(goals, vertices)
+
+
+@pytest.mark.parametrize("field", [f.name for f in fields(SearchEffort)])
+def test_an_effort_has_no_negative_numbers(field):
+    with pytest.raises(InputError, match=f"{field}: expected a number that is not negative"):
+        SearchEffort(**{field: -1})
