@@ -97,13 +97,11 @@ def run(args: argparse.Namespace) -> int:
         style.check_format(args.plot)
     problem, paths = _inputs(args)
     solution = Solution.load(args.solution) if args.solution else None
-    from netsp.command.compiling import compile_messages
     from netsp.command.stages import Stages
 
     with contextlib.ExitStack() as stack:
         stage = None
         if not args.quiet:
-            stack.enter_context(compile_messages(sys.stderr))
             stage = stack.enter_context(Stages(sys.stderr, args.time_limit))
         found = compare_paths(
             problem, paths, solution, speed=args.speed or SPEED,

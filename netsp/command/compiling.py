@@ -9,32 +9,38 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, TextIO
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+from netsp.errors import InputError
+
+if TYPE_CHECKING:
+    from netsp.command.status_line import StatusLine
 
 SUBJECTS = {
     "online": "the simulation", "space": "planning in space", "cover": "the choice of viewpoints",
 }  # fmt: skip
 """Names of netsp's parts for users, by package; the others are the solver."""
 
-BAR_WIDTH = 20
-"""Width of the bar on a terminal, characters."""
+BAR_WIDTH, MIN_BAR_WIDTH = 20, 5
+"""Width of the bar on a wide and on a narrow terminal, characters."""
 
 
 @contextmanager
-def compile_messages(stream: TextIO) -> Iterator[None]:
+def compile_messages(stream: TextIO, line: StatusLine | None = None) -> Iterator[None]:
     """While the body runs, tell on a stream what is being prepared, and about how long it takes.
-
-    A terminal shows one line with a bar. Elsewhere a line is written, and another one only where
-    the work takes longer than the one before has said.
 
     Parameters
     ----------
     stream : file
         Stream of messages, as stderr.
+    line : StatusLine, optional
+        Line of a terminal to show a bar in; without it, few lines are written to the stream.
     """
-    from netsp.compiled.kernel import when_numba_is_loaded
+    from netsp.compiled.numba_loading import when_numba_is_loaded
 
-    preparation = Preparation(stream)
+    preparation = Preparation(stream, line)
     listeners: list[Any] = []
     is_over = False
 
@@ -122,6 +128,29 @@ def kernel_name(kernel: Any) -> str:
     return f"{kernel.py_func.__module__.removeprefix('netsp.')}.{kernel.py_func.__name__}"
 
 
+@dataclass(frozen=True)
+class PreparationPolicy:
+    """Policy of what is told while kernels are compiled.
+
+    Parameters
+    ----------
+    expected_share : float
+        Share of the kernels of a package, by their price, that a command is expected to compile
+        of those that are loaded and not kept on disk (a mission compiles 0.23). It only changes
+        what is told: a larger share announces a longer wait.
+    every_s : float
+        Seconds between two lines where there is no terminal.
+    """
+
+    expected_share: float = 0.25
+    every_s: float = 30.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if not getattr(self, field.name) > 0.0:
+                raise InputError(f"{field.name}: expected a positive number")
+
+
 class Preparation:
     """Progress of compiling, as it is shown.
 
@@ -129,22 +158,38 @@ class Preparation:
     ----------
     stream : file
         Stream of messages.
+    line : StatusLine, optional
+        Line of a terminal to show a bar in.
+    policy : PreparationPolicy
+        How much is told.
     """
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-        self._depth, self._total_s, self._done_s = 0, 0.0, 0.0
-        self._spent_s, self._said_s, self._since = 0.0, 0.0, 0.0
+    def __init__(
+        self,
+        stream: TextIO,
+        line: StatusLine | None = None,
+        policy: PreparationPolicy = PreparationPolicy(),
+    ) -> None:
+        self._stream, self._line, self._policy = stream, line, policy
+        self._depth, self._expected_s, self._done_s, self._spent_s = 0, 0.0, 0.0, 0.0
+        self._since = self._told = 0.0
         self._subject: str | None = None
+        self._packages: set[str] = set()
 
     def begin(self, kernel: Any) -> None:
         """Count a kernel in; the kernels that it calls are compiled within it."""
         if not kernel.py_func.__module__.startswith("netsp."):
             return
         if not self._depth:
-            part = kernel.py_func.__module__.split(".")[1]
-            self._subject = self._subject or SUBJECTS.get(part, "the solver")
-            self._total_s = max(self._total_s, self._done_s) + price_s(kernel, with_called=True)
+            if self._subject is None:
+                part = kernel.py_func.__module__.split(".")[1]
+                self._subject = SUBJECTS.get(part, "the solver")
+            package = kernel.py_func.__module__.rpartition(".")[0]
+            if package not in self._packages:
+                self._packages.add(package)
+                self._expected_s += self._policy.expected_share * _neighbours_price_s(kernel)
+            with_called_s = price_s(kernel, with_called=True)
+            self._expected_s = max(self._expected_s, self._done_s + with_called_s)
             self._since = time.monotonic()
         self._depth += 1
         self._show()
@@ -160,26 +205,66 @@ class Preparation:
         self._show()
 
     def close(self) -> None:
-        """End the line of the bar."""
-        if self._subject is not None and self._stream.isatty():
-            print(file=self._stream, flush=True)
+        """Remove the bar."""
+        if self._line is not None:
+            self._line.clear()
 
     def _show(self) -> None:
-        if self._stream.isatty():
-            share = min(self._done_s / self._total_s, 1.0) if self._total_s else 0.0
-            full = int(share * BAR_WIDTH)
-            print(
-                f"\r{self._line(self._total_s)} [{'#' * full}{' ' * (BAR_WIDTH - full)}]\x1b[K",
-                end="", file=self._stream, flush=True,
-            )  # fmt: skip
+        text = (
+            f"preparing {self._subject}, about {max(self._expected_s, 1.0):.0f} s, "
+            "once per installation"
+        )
+        if self._line is not None:
+            share = min(self._done_s / self._expected_s, 1.0)
+            self._line.show(f"{text} {bar(share, self._line.columns - len(text) - 4)}")
             return
-        running = time.monotonic() - self._since if self._depth else 0.0
-        if not self._said_s or self._spent_s + running > self._said_s:
-            self._said_s = max(self._total_s, 2.0 * self._said_s, 1.0)
-            print(self._line(self._said_s), file=self._stream, flush=True)
+        now = time.monotonic()
+        if not self._told:
+            print(text, file=self._stream, flush=True)
+        elif now - self._told >= self._policy.every_s and self._depth:
+            so_far_s = self._spent_s + now - self._since
+            left_s = max(self._expected_s - self._done_s, 1.0)
+            print(
+                f"preparing {self._subject}, {so_far_s:.0f} s so far, about {left_s:.0f} s left",
+                file=self._stream, flush=True,
+            )  # fmt: skip
+        else:
+            return
+        self._told = now
 
-    def _line(self, seconds: float) -> str:
-        return f"preparing {self._subject}, about {max(seconds, 1.0):.0f} s, once per installation"
+
+def bar(share: float, room: int) -> str:
+    """Return a bar that is filled so far.
+
+    Parameters
+    ----------
+    share : float
+        Share that is done, 0 to 1.
+    room : int
+        Characters that it may have, at most.
+    """
+    width = max(min(BAR_WIDTH, room), MIN_BAR_WIDTH)
+    full = int(share * width)
+    return f"[{'#' * full}{' ' * (width - full)}]"
+
+
+def _neighbours_price_s(kernel: Any) -> float:
+    """Return about how many seconds it takes to compile all kernels that are loaded from the folder
+    of a kernel, as far as none is kept on disk under their names."""
+    from netsp.compiled.compile_policy import current_policy
+    from netsp.compiled.disk_cache import lock_file
+    from netsp.compiled.kernel import functions_to_compile
+    from netsp.compiled.tiered import TieredDispatcher
+
+    if not isinstance(kernel, TieredDispatcher):
+        return 0.0
+    folder, total_s = Path(kernel.py_func.__code__.co_filename).parent, 0.0
+    kept = {index.name.rpartition("-")[0] for index in lock_file(kernel).parent.glob("*.nbi")}
+    for function in functions_to_compile():
+        file = Path(function.__code__.co_filename)
+        if file.parent == folder and f"{file.stem}.{function.__qualname__}" not in kept:
+            total_s += current_policy().price_s(len(function.__code__.co_code))
+    return total_s
 
 
 def price_s(kernel: Any, with_called: bool = False) -> float:

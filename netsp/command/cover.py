@@ -87,7 +87,6 @@ def run(args: argparse.Namespace) -> int:
     camera = _camera(args.camera, args.patch)
     anchor = vector(args.anchor, "--anchor")
     start = None if args.start is None else vector(args.start, "--start")
-    from netsp.command.compiling import compile_messages
     from netsp.command.plot_scene import note_scene
     from netsp.command.stages import Stages
     from netsp.cover import cover
@@ -99,8 +98,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.quiet:
         note_scene(scene.name, scene.reading_notes())
     stages = None if args.quiet else Stages(sys.stderr, clock.left)
-    compiling = contextlib.nullcontext() if args.quiet else compile_messages(sys.stderr)
-    with stages or contextlib.nullcontext(), compiling:
+    with stages or contextlib.nullcontext():
         found = cover(
             scene, anchor=anchor, start=start, camera=camera, standoff=args.standoff,
             tether_length=args.tether, clearance=args.clearance, share=args.share,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
-from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -135,7 +134,6 @@ def _mission(args: argparse.Namespace) -> int:
 
 def _problem(args: argparse.Namespace) -> int:
     """Of a problem in the plane."""
-    from netsp.command.compiling import compile_messages
     from netsp.execute.events import Surprises
     from netsp.execute.log import ExecutionOptions, describe_execution
     from netsp.execute.repair import REPLAN_S
@@ -165,8 +163,7 @@ def _problem(args: argparse.Namespace) -> int:
     )  # fmt: skip
     show = not args.quiet and sys.stderr.isatty()
     on_step = show_execution(problem) if show else None
-    messages = nullcontext() if args.quiet else compile_messages(sys.stderr)
-    with output_folder(args.output), messages:
+    with output_folder(args.output):
         done = execute(problem, solution, options, surprises=surprises, on_step=on_step)
     if show:
         print(file=sys.stderr)

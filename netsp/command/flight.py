@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -60,7 +59,6 @@ def _flown(
     mission: Mission, planners: Sequence[str], clock: Clock, *, output: str | None, quiet: bool,
     surprises: SceneSurprises | None, source: str | None, check: bool, **how: Any,
 ) -> list[Run]:  # fmt: skip
-    from netsp.command.compiling import compile_messages
     from netsp.command.plot_scene import note_scene, tell, warn_of_scene
     from netsp.files import output_folder
     from netsp.online.log import describe_run, write_run
@@ -69,8 +67,7 @@ def _flown(
 
     show = not quiet and sys.stderr.isatty()
     runs: list[Run] = []
-    messages = nullcontext() if quiet else compile_messages(sys.stderr)
-    with output_folder(output), messages:
+    with output_folder(output):
         scene = clock.bounded("reading the scene", mission.load_scene)
         if surprises is not None:
             surprises.check(scene, source or "", len(mission.waypoints))

@@ -7,7 +7,7 @@ import contextlib
 import queue
 import sys
 from collections.abc import Callable
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -297,7 +297,6 @@ def _flown(
     """Fly the tour, or return what ended the flight under way; the link stays open until the stack
     is left."""
     from netsp.clock import until_interrupt
-    from netsp.command.compiling import compile_messages
     from netsp.command.execute import show_execution
     from netsp.execute.events import Surprises
     from netsp.execute.log import ExecutionOptions
@@ -321,7 +320,6 @@ def _flown(
     address = Address.parse(args.link)
     check_options(options, surprises)
     stack.enter_context(output_folder(args.output))
-    stack.enter_context(nullcontext() if args.quiet else compile_messages(sys.stderr))
     rehearse()
     page, sources = None, []
     if args.events:

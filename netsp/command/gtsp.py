@@ -53,7 +53,6 @@ def run(args: argparse.Namespace) -> int:
     """Solve, write, and return the exit code."""
     told.check_stdout(args)
     check_writable(args.output, args.plot, inputs=(args.instance,))
-    from netsp.command.compiling import compile_messages
     from netsp.command.progress import ProgressTable
     from netsp.files import write_text
     from netsp.gtsplib import load
@@ -75,10 +74,7 @@ def run(args: argparse.Namespace) -> int:
     graph = instance.to_travel_graph()
     begin = time.monotonic()
     table = None if args.quiet else ProgressTable(sys.stderr)
-    with (
-        table or contextlib.nullcontext(),
-        compile_messages(sys.stderr) if table else contextlib.nullcontext(),
-    ):
+    with table or contextlib.nullcontext():
         if table:
             table.begin(instance, "looking for a first tour …")
         result = solve_graph(

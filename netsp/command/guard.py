@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any, TextIO
 
 from netsp.command import messages
@@ -93,7 +93,6 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--publish, --state, --ask-rates: are for links; a recording is over")
     output = None if args.output == "-" else args.output
     check_writable(output, args.state, inputs=(args.site, args.replay))
-    from netsp.command.compiling import compile_messages
     from netsp.guard.guard import Guard, GuardOptions
     from netsp.link.frame import Frame
     from netsp.online.mission import Mission
@@ -110,7 +109,6 @@ def run(args: argparse.Namespace) -> int:
         say = None if args.quiet else messages.note
         fixes = list(read_fixes(args.replay, frame, args.system, on_note=say))
     with ExitStack() as stack:
-        stack.enter_context(nullcontext() if args.quiet else compile_messages(sys.stderr))
         guard = Guard(told_of, options)
         told = _Told(guard.site, args.quiet)
         lines: TextIO | None = None

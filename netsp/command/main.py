@@ -14,12 +14,14 @@ import importlib
 import io
 import os
 import sys
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterator, Sequence
 from typing import Any, NoReturn
 
 from netsp.command import background_warm_up, messages
 from netsp.command.command_clock import begin_command
+from netsp.command.compiling import compile_messages
 from netsp.command.interrupts import interrupts_are_heard
+from netsp.command.status_line import status_line
 from netsp.errors import (
     EXIT_BAD_INPUT,
     EXIT_INTERRUPTED,
@@ -69,7 +71,8 @@ def _main(argv: Sequence[str] | None) -> int:
         except SystemExit:  # after --help or --version
             sys.stdout.flush()
             raise
-        with interrupts_are_heard(), messages.warnings_in_one_line():
+        told = _preparation_told(wanted, getattr(args, "quiet", False))
+        with interrupts_are_heard(), messages.warnings_in_one_line(), told:
             code = int(args.run(args))
         sys.stdout.flush()
         if argv is None and wanted is not None and wanted != "warm-up":
@@ -103,6 +106,17 @@ def _main(argv: Sequence[str] | None) -> int:
         _forget_stdout()
         messages.error(f"output cannot be written: {error.strerror}")
         return EXIT_BAD_INPUT
+
+
+@contextlib.contextmanager
+def _preparation_told(command: str | None, is_quiet: bool) -> Iterator[None]:
+    """Tell while the body runs that netsp compiles, unless the command is to be quiet; warm-up
+    tells by itself how far it is."""
+    if is_quiet or command == "warm-up":
+        yield
+        return
+    with status_line() as line, compile_messages(sys.stderr, line):
+        yield
 
 
 def _forget_stdout() -> None:

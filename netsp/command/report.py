@@ -6,7 +6,6 @@ import argparse
 import sys
 from pathlib import Path
 
-from netsp.command.compiling import compile_messages
 from netsp.command.solve_mission import is_mission
 from netsp.command.types import check_writable
 from netsp.errors import InputError
@@ -37,8 +36,7 @@ def run(args: argparse.Namespace) -> int:
             f"{args.output}: a page is HTML; expected a name ending in .html (a browser prints it "
             "to PDF)"
         )
-    with compile_messages(sys.stderr):
-        _written(args)
+    _written(args)
     if args.output != "-":
         print(f"page {args.output}", file=sys.stderr)
     return 0

@@ -194,12 +194,7 @@ def run(args: argparse.Namespace) -> int:
         if args.plot_trace:
             rows.append(row)
 
-    from netsp.command.compiling import compile_messages
-
-    with (
-        table or contextlib.nullcontext(),
-        compile_messages(sys.stderr) if table else contextlib.nullcontext(),
-    ):
+    with table or contextlib.nullcontext():
         if table:
             table.begin(problem)
         try:

@@ -72,7 +72,6 @@ def solve(
         from netsp.pictures import style
 
         style.check_format(plot)
-    from netsp.command.compiling import compile_messages
     from netsp.command.stages import Stages
     from netsp.space.solve import MissionPolicy, solve_mission
 
@@ -80,8 +79,7 @@ def solve(
     begin = time.monotonic()
     mission = clock.bounded("reading the mission", lambda: Mission.load(file))
     stages = None if quiet else Stages(sys.stderr, clock.left)
-    compiling = contextlib.nullcontext() if quiet else compile_messages(sys.stderr)
-    with stages or contextlib.nullcontext(), compiling:
+    with stages or contextlib.nullcontext():
         from netsp.command.plot_scene import note_scene, tell, warn_of_scene
 
         with clock.at_least(MissionPolicy().first_tour_s):

@@ -52,19 +52,23 @@ def run(args: argparse.Namespace) -> int:
 
 def _compile(every: list[Step], quiet: bool) -> None:
     """Run all steps, and tell how far they are."""
-    from netsp.command.compiling import compile_messages
+    from netsp.command.compiling import PreparationPolicy, bar
     from netsp.command.patience import span
+    from netsp.command.status_line import status_line
 
-    begin = time.monotonic()
-    with contextlib.nullcontext() if quiet else compile_messages(sys.stderr):
+    begin = told = time.monotonic()
+    with contextlib.nullcontext() if quiet else status_line() as line:
         for done, (name, step) in enumerate(every):
-            if not quiet:
-                left = (time.monotonic() - begin) / max(done, 1) * (len(every) - done)
-                more = f", about {span(left)} left" if done else ""
-                print(
-                    f"warm-up: {name} ({done + 1} of {len(every)}{more})",
-                    file=sys.stderr, flush=True,
-                )  # fmt: skip
+            now = time.monotonic()
+            left = (
+                f", about {span((now - begin) / done * (len(every) - done))} left" if done else ""
+            )
+            text = f"preparing netsp: {name} ({done + 1} of {len(every)}{left})"
+            if line is not None:
+                line.show(f"{bar(done / len(every), line.columns)} {text}")
+            elif not quiet and (not done or now - told >= PreparationPolicy().every_s):
+                print(text, file=sys.stderr, flush=True)
+                told = now
             step()
 
 

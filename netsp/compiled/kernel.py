@@ -15,6 +15,7 @@ from collections.abc import Callable
 from time import thread_time
 from typing import Any, TypeVar
 
+from netsp.compiled import numba_loading
 from netsp.compiled.arguments import call_within, can_be_interpreted
 from netsp.compiled.compile_policy import current_policy
 from netsp.compiled.interpretation import interpreted
@@ -61,6 +62,21 @@ def all_kernels() -> list[Any]:
     values = [v for m in modules for v in list(vars(m).values())]
     made = {v.dispatcher for v in values if isinstance(v, Kernel)}
     return list(made | {v for v in values if isinstance(v, TieredDispatcher)})
+
+
+def functions_to_compile() -> set[Callable[..., Any]]:
+    """Return the functions of all kernels in the modules that are imported and that have no
+    compiled form in this process."""
+    from netsp.compiled.tiered import TieredDispatcher
+
+    modules = [m for name, m in list(sys.modules.items()) if name.startswith("netsp.")]
+    values = [v for m in modules for v in list(vars(m).values())]
+    return {
+        v.py_func
+        for v in values
+        if (isinstance(v, Kernel) and (v._dispatcher is None or not v._dispatcher.overloads))
+        or (isinstance(v, TieredDispatcher) and not v.overloads)
+    }
 
 
 class Kernel:
@@ -162,22 +178,4 @@ def _register() -> None:
     def _type_of(value: Kernel, context: Any) -> Any:
         return Dispatcher(value.dispatcher)
 
-    for on_load in _on_load:
-        on_load()
-
-
-_on_load: list[Callable[[], None]] = []
-
-
-def when_numba_is_loaded(call: Callable[[], None]) -> None:
-    """Call a function once Numba is loaded for a kernel: now, if it is.
-
-    Parameters
-    ----------
-    call : callable
-        Function without arguments.
-    """
-    if "numba" in sys.modules:
-        call()
-    else:
-        _on_load.append(call)
+    numba_loading.tell()

@@ -1,0 +1,109 @@
+"""A line at the bottom of a terminal that other output does not run into."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, TextIO
+
+DEFAULT_COLUMNS = 80
+"""Width of a terminal that does not tell its own, characters."""
+
+
+class StatusLine:
+    """A line that is drawn over while work goes on, and removed before anything else is written.
+
+    An unfinished line of other output is drawn again once the status line is removed.
+
+    Parameters
+    ----------
+    stream : file
+        Stream of a terminal.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._lock = threading.RLock()
+        self._is_shown = False
+        self._unfinished = ""
+
+    def show(self, text: str) -> None:
+        """Draw the line, cut to the width of the terminal."""
+        with self._lock:
+            self._stream.write(f"\r{text[: self.columns - 1]}\x1b[K")
+            self._stream.flush()
+            self._is_shown = True
+
+    def clear(self) -> None:
+        """Remove the line."""
+        with self._lock:
+            if self._is_shown:
+                self._is_shown = False
+                self._stream.write(f"\r\x1b[K{self._unfinished}")
+                self._stream.flush()
+
+    def write(self, stream: TextIO, text: str) -> int:
+        """Write other output to a stream on the same terminal."""
+        with self._lock:
+            self.clear()
+            count = stream.write(text)
+            if text:
+                self._unfinished = (self._unfinished + text).rpartition("\n")[2]
+                self._unfinished = self._unfinished.rpartition("\r")[2]
+        return count
+
+    @property
+    def columns(self) -> int:
+        """Width of the terminal, characters."""
+        try:
+            columns = os.get_terminal_size(self._stream.fileno()).columns
+        except (OSError, ValueError):
+            columns = 0
+        return columns or DEFAULT_COLUMNS
+
+
+class _Beside:
+    """A stream on the terminal of a status line.
+
+    Parameters
+    ----------
+    stream : file
+        The stream.
+    line : StatusLine
+        The line, which is removed before anything is written.
+    """
+
+    def __init__(self, stream: TextIO, line: StatusLine) -> None:
+        self._stream, self._line = stream, line
+
+    def write(self, text: str) -> int:
+        return self._line.write(self._stream, text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+@contextmanager
+def status_line() -> Iterator[StatusLine | None]:
+    """Keep standard output and standard error apart from a status line while the body runs.
+
+    Yields
+    ------
+    StatusLine or None
+        The line, on standard error; None where that is no terminal.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    line, before = StatusLine(sys.stderr), (sys.stdout, sys.stderr)
+    sys.stderr = _Beside(sys.stderr, line)  # type: ignore[assignment]
+    if sys.stdout.isatty():
+        sys.stdout = _Beside(sys.stdout, line)  # type: ignore[assignment]
+    try:
+        yield line
+    finally:
+        sys.stdout, sys.stderr = before
+        line.clear()
