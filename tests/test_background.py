@@ -1,9 +1,14 @@
 """Tests of the process that compiles what is likely needed next."""
 
 import argparse
+import os
 import subprocess
+import sys
+import time
+from pathlib import Path
 from types import SimpleNamespace
 
+import psutil
 import pytest
 
 from netsp.command import background_warm_up, warm_up
@@ -12,6 +17,8 @@ from netsp.compiled.compile_lock import locked
 from netsp.compiled.compile_policy import compiles
 from netsp.compiled.disk_cache import lock_file
 from netsp.compiled.tiered import TieredDispatcher
+
+ROOT = Path(__file__).parent.parent
 
 pytestmark = pytest.mark.skipif(not compiles(), reason="NUMBA_DISABLE_JIT is set")
 
@@ -54,6 +61,95 @@ def test_a_second_one_ends_at_once(monkeypatch):
     assert warm_up.run(args) == 0
     assert ran == [1]
     assert niceness == [background_warm_up.LOWEST_PRIORITY] * 2
+
+
+SITE = """
+import netsp.command.warm_up as warm_up
+
+def compiled():
+    import os, time
+    from pathlib import Path
+    import likely_next
+    folder = Path(os.environ["FOLDER"])
+    with open(folder / "log", "a") as log:
+        print(os.getpid(), os.nice(0), file=log)
+    while not (folder / "go").exists():
+        time.sleep(0.01)
+    assert likely_next.double(21) == 42
+    with open(folder / "log", "a") as log:
+        print("compiled", sum(likely_next.double.stats.cache_misses.values()), file=log)
+
+warm_up.steps = lambda: [("solver", compiled)]
+"""
+
+COMMAND = """
+from netsp.command import background_warm_up
+from netsp.compiled.tiered import TieredDispatcher
+
+TieredDispatcher.has_compiled = True
+for _ in range(2):
+    background_warm_up.begin("solve")
+print("done")
+"""
+
+
+def _soon(condition):
+    """Wait until a condition holds."""
+    end = time.monotonic() + 120.0
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_one_process_at_the_lowest_priority_compiles_and_ends_while_the_command_has_ended(tmp_path):
+    (tmp_path / "sitecustomize.py").write_text(SITE)
+    (tmp_path / "likely_next.py").write_text(
+        "from netsp.compiled.kernel import kernel\n\n@kernel\ndef double(x):\n    return 2 * x\n"
+    )
+    log, cache = tmp_path / "log", tmp_path / "cache"
+    command = [sys.executable, "-c", COMMAND]
+    env = {
+        **os.environ, "FOLDER": str(tmp_path), "NUMBA_CACHE_DIR": str(cache),
+        "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}", background_warm_up.VARIABLE: "1",
+    }  # fmt: skip
+    done = subprocess.run(command, env=env, capture_output=True, text=True, cwd=tmp_path)
+    # standard output and standard error are closed, although the process goes on
+    assert (done.stdout, done.stderr) == ("done\n", "")
+    _soon(lambda: log.exists() and log.read_text().count("\n"))
+    pid, niceness = map(int, log.read_text().split())
+    assert niceness == background_warm_up.LOWEST_PRIORITY
+    assert os.getsid(pid) == pid  # no terminal's Ctrl-C or hang-up reaches it
+    (tmp_path / "go").touch()
+    _soon(lambda: "compiled" in log.read_text())
+    _soon(lambda: not list(cache.rglob("*.lock")))
+    _soon(lambda: not psutil.pid_exists(pid) or psutil.Process(pid).status() == "zombie")
+    # the other one ends at once, or finds nothing left to compile
+    compiled = [line for line in log.read_text().splitlines() if line.startswith("compiled")]
+    assert sum(int(line.split()[1]) for line in compiled) == 1
+    assert len(list(cache.rglob("likely_next.double-*.nbc"))) == 1
+
+
+def test_one_that_is_killed_leaves_no_lock_that_keeps_others_from_compiling(tmp_path):
+    file = tmp_path / "background.lock"
+    hold = f"""
+import time
+from pathlib import Path
+from netsp.compiled.compile_lock import locked
+with locked(Path({str(file)!r})):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+    held = subprocess.Popen(
+        [sys.executable, "-c", hold], stdout=subprocess.PIPE, text=True, cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert held.stdout.readline() == "held\n"
+    with locked(file, wait=False) as is_held:
+        assert not is_held
+    held.kill()
+    held.communicate()
+    with locked(file, wait=False) as is_held:
+        assert is_held
 
 
 def test_what_a_command_needs_is_compiled_first(monkeypatch):

@@ -1,6 +1,7 @@
 """Interpreted and compiled kernels: the same to the last bit, so it never matters which ran."""
 
 import contextlib
+import errno
 import importlib.util
 import math
 import os
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba.core.caching import FunctionCache
 
 from netsp.compiled import chance, disk_cache, tiered
 from netsp.compiled.compile_lock import is_locked, locked
@@ -242,6 +244,50 @@ def test_without_what_numba_keeps_private_kernels_are_compiled_at_once(monkeypat
     module = _module(tmp_path, MODULE)
     assert module.ratio(7, 2) == 3
     assert module.ratio.signatures
+
+
+def test_without_a_folder_that_takes_files_kernels_are_interpreted_and_compiled(
+    monkeypatch, tmp_path
+):
+    def refused(self, function):
+        raise RuntimeError("cannot cache function: no locator available")
+
+    monkeypatch.setattr(FunctionCache, "__init__", refused)
+    monkeypatch.setattr(tiered.TieredDispatcher, "has_compiled", False)
+    assert disk_cache.is_supported.__wrapped__()
+    module = _module(tmp_path, MODULE)
+    assert module.ratio(7, 2) == 3
+    assert not module.ratio.signatures
+    with everything_compiled():
+        assert module.ratio(7, 2) == 3
+    assert module.ratio.signatures
+    assert not disk_cache.is_any_on_disk(module.ratio)
+    assert not tiered.TieredDispatcher.has_compiled  # nothing to keep: no process in the background
+
+
+def test_a_full_disk_costs_the_next_command_time_and_nothing_else(monkeypatch, kernels):
+    def full(self, path):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(disk_cache.KernelFile, "_open_for_write", full)
+    monkeypatch.setattr(tiered.TieredDispatcher, "has_compiled", False)
+    with everything_compiled():
+        assert kernels.ratio(7, 2) == 3
+    assert kernels.ratio.signatures
+    assert not tiered.TieredDispatcher.has_compiled
+
+
+@pytest.mark.parametrize("pattern", ["*.nbi", "*.nbc"])
+def test_files_that_were_cut_off_are_compiled_anew(pattern, tmp_path):
+    (tmp_path / "cache").mkdir()
+    for broken in (False, True):
+        file = disk_cache.KernelFile(str(tmp_path / "cache"), "f", "stamp")
+        if broken:
+            (path,) = (tmp_path / "cache").glob(pattern)
+            path.write_bytes(path.read_bytes()[:20])
+            assert file.load("of floats") is None
+        file.save("of floats", "compiled" * 100)
+        assert file.load("of floats") == "compiled" * 100
 
 
 def test_this_release_of_numba_is_supported():

@@ -18,7 +18,8 @@ LOWEST_PRIORITY = 19
 def begin(command: str) -> None:
     """Start the process if a command had to compile something; the command need not wait for it.
 
-    Small problems compile nothing, so that they start no process.
+    Small problems compile nothing, so that they start no process. Neither does a command where
+    compiled code cannot be kept on disk.
 
     Parameters
     ----------
@@ -43,12 +44,16 @@ def begin(command: str) -> None:
 
 @contextlib.contextmanager
 def alone() -> Iterator[bool]:
-    """Run the body at the lowest priority; yield whether no other such process is under way."""
+    """Run the body at the lowest priority; yield whether no other such process is under way, and
+    compiled code is kept on disk."""
     from netsp.compiled import growing
     from netsp.compiled.compile_lock import locked
     from netsp.compiled.disk_cache import lock_file
 
     os.nice(LOWEST_PRIORITY)
-    file = lock_file(growing.longer).with_name("background.lock")
-    with locked(file, wait=False) as is_alone:
+    file = lock_file(growing.longer)
+    if file is None:  # nothing that it compiles would be kept
+        yield False
+        return
+    with locked(file.with_name("background.lock"), wait=False) as is_alone:
         yield is_alone

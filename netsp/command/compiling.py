@@ -259,7 +259,9 @@ def _neighbours_price_s(kernel: Any) -> float:
     if not isinstance(kernel, TieredDispatcher):
         return 0.0
     folder, total_s = Path(kernel.py_func.__code__.co_filename).parent, 0.0
-    kept = {index.name.rpartition("-")[0] for index in lock_file(kernel).parent.glob("*.nbi")}
+    lock = lock_file(kernel)
+    indexes = [] if lock is None else lock.parent.glob("*.nbi")
+    kept = {index.name.rpartition("-")[0] for index in indexes}
     for function in functions_to_compile():
         file = Path(function.__code__.co_filename)
         if file.parent == folder and f"{file.stem}.{function.__qualname__}" not in kept:

@@ -14,7 +14,7 @@ except ImportError:  # on Windows two processes may compile the same kernel; bot
 
 
 @contextlib.contextmanager
-def locked(file: Path, wait: bool = True) -> Iterator[bool]:
+def locked(file: Path | None, wait: bool = True) -> Iterator[bool]:
     """Hold a lock file while the body runs; yield whether this process has it.
 
     The lock ends with the process, however that ends. Where a folder takes no files there is no
@@ -22,18 +22,19 @@ def locked(file: Path, wait: bool = True) -> Iterator[bool]:
 
     Parameters
     ----------
-    file : Path
-        The lock file, which is removed in the end.
+    file : Path or None
+        The lock file, which is removed in the end; None for no lock.
     wait : bool
         Whether to wait for a process that holds it.
     """
-    descriptor, is_held = _taken(file, wait)
+    descriptor, is_held = (None, True) if file is None else _taken(file, wait)
     try:
         yield is_held
     finally:
-        if descriptor is not None:
+        if file is not None and descriptor is not None:
             if is_held:
-                file.unlink(missing_ok=True)  # whoever waits for it looks whether it is still there
+                with contextlib.suppress(OSError):
+                    file.unlink()  # whoever waits for it looks whether it is still there
             os.close(descriptor)
 
 
@@ -59,15 +60,15 @@ def _taken(file: Path, wait: bool) -> tuple[int | None, bool]:
         os.close(descriptor)  # removed by its last owner meanwhile
 
 
-def is_locked(file: Path) -> bool:
+def is_locked(file: Path | None) -> bool:
     """Return whether another process, or another thread, holds a lock file.
 
     Parameters
     ----------
-    file : Path
-        The lock file.
+    file : Path or None
+        The lock file; None for no lock.
     """
-    if fcntl is None or not file.exists():
+    if fcntl is None or file is None or not file.exists():
         return False
     with locked(file, wait=False) as is_held:
         return not is_held

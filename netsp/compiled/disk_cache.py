@@ -5,7 +5,8 @@ in another file that it calls (and that is compiled into it) has changed, and a 
 signature has another name (the kept index then cannot be read: AttributeError). And of two
 processes that compile one function for different types at the same time, both may call their file
 by the same number: then the one's is found under the other's types, in every run from then on. All
-three are mended here, so that no one ever has to delete a cache by hand.
+three are mended here, so that no one ever has to delete a cache by hand. Files that cannot be read
+(a full disk, a machine that lost power) count as absent.
 
 All of Numba that is not public and that this needs is in this file and in `netsp.compiled.tiered`;
 `is_supported` checks it.
@@ -16,6 +17,7 @@ from __future__ import annotations
 import contextlib
 import glob
 import hashlib
+import pickle
 import re
 from collections.abc import Callable
 from functools import cache
@@ -23,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from numba import njit
-from numba.core.caching import IndexDataCacheFile
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _IMPORTS = re.compile(r"^from (netsp[\w.]*) import (\([^)]*\)|[^\n]*)", re.M)
@@ -54,6 +56,12 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
         name = self._load_index().get(key)
         return name is not None and Path(self._data_path(name)).is_file()
 
+    def load(self, key: Any) -> Any:
+        """Return a compiled kernel, or None if there is none that can be read."""
+        with contextlib.suppress(EOFError, pickle.UnpicklingError):
+            return super().load(key)
+        return None
+
     @property
     def lock(self) -> Path:
         """The file that is locked while the kernel is compiled."""
@@ -69,21 +77,25 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
     def _load_index(self) -> Any:
         try:
             return super()._load_index()
-        except (AttributeError, ImportError):
+        except (AttributeError, ImportError, EOFError, OSError, ValueError, pickle.UnpicklingError):
             return {}
 
 
 def keep_on_disk(dispatcher: Any, function: Callable[..., Any]) -> None:
     """Have a cached dispatcher keep its compiled code in a `KernelFile`.
 
+    Where no folder takes files, its code is kept in memory only.
+
     Parameters
     ----------
     dispatcher : numba dispatcher
-        Dispatcher of the function, with `cache=True`.
+        Dispatcher of the function (`cached`).
     function : callable
         The function.
     """
-    kept = dispatcher._cache._cache_file
+    kept = getattr(dispatcher._cache, "_cache_file", None)
+    if kept is None:
+        return
     dispatcher._cache._cache_file = KernelFile(
         kept._cache_path,
         kept._index_name.removesuffix(".nbi"),
@@ -101,10 +113,10 @@ def is_on_disk(dispatcher: Any, types: tuple[Any, ...]) -> bool:
     types : tuple
         Numba's types of the arguments.
     """
-    own = dispatcher._cache
-    with contextlib.suppress(OSError):
-        return bool(own._cache_file.holds(own._index_key(types, dispatcher.targetctx.codegen())))
-    return False
+    own, file = dispatcher._cache, _file_of(dispatcher)
+    if file is None:
+        return False
+    return file.holds(own._index_key(types, dispatcher.targetctx.codegen()))
 
 
 def is_any_on_disk(dispatcher: Any) -> bool:
@@ -115,20 +127,40 @@ def is_any_on_disk(dispatcher: Any) -> bool:
     dispatcher : numba dispatcher
         Dispatcher that `keep_on_disk` was called for.
     """
-    with contextlib.suppress(OSError):
-        return bool(dispatcher._cache._cache_file._load_index())
-    return False
+    file = _file_of(dispatcher)
+    return file is not None and bool(file._load_index())
 
 
-def lock_file(dispatcher: Any) -> Path:
-    """Return the file that is locked while a kernel is compiled.
+def lock_file(dispatcher: Any) -> Path | None:
+    """Return the file that is locked while a kernel is compiled; None where none is kept on disk.
 
     Parameters
     ----------
     dispatcher : numba dispatcher
         Dispatcher that `keep_on_disk` was called for.
     """
-    return Path(dispatcher._cache._cache_file.lock)
+    file = _file_of(dispatcher)
+    return None if file is None else file.lock
+
+
+def _file_of(dispatcher: Any) -> KernelFile | None:
+    file = getattr(dispatcher._cache, "_cache_file", None)
+    return file if isinstance(file, KernelFile) else None
+
+
+def cached(function: Callable[..., Any]) -> Any:
+    """Return Numba's dispatcher of a function, which keeps its compiled code on disk where any
+    folder takes files.
+
+    Parameters
+    ----------
+    function : callable
+        The function.
+    """
+    try:
+        return njit(cache=True, nogil=True)(function)
+    except RuntimeError:  # neither the package nor the user has a folder that takes files
+        return njit(nogil=True)(function)
 
 
 @cache
@@ -142,19 +174,22 @@ def is_supported() -> bool:
     def probe() -> None:
         pass
 
-    needed = {
+    methods = {
         "_load_index", "_save_index", "_load_data", "_save_data", "_data_name", "_data_path",
-        "_dump",
+        "_dump", "load", "save",
     }  # fmt: skip
-    own = getattr(njit(cache=True)(probe), "_cache", None)
-    kept = getattr(own, "_cache_file", None)
+    fields = {"_cache_path", "_index_name", "_index_path", "_source_stamp"}
+    try:
+        kept = IndexDataCacheFile("", "probe", None)
+        cache = cached(probe)._cache
+    except (AttributeError, TypeError):
+        return False
     return (
-        isinstance(kept, IndexDataCacheFile)
-        and needed <= set(dir(kept))
-        and callable(getattr(own, "_index_key", None))
-        and all(
-            hasattr(kept, name)
-            for name in ("_cache_path", "_index_name", "_index_path", "_source_stamp")
+        methods | fields <= set(dir(kept))
+        and callable(getattr(FunctionCache, "_index_key", None))
+        and (
+            not isinstance(cache, FunctionCache)  # no folder takes files
+            or isinstance(getattr(cache, "_cache_file", None), IndexDataCacheFile)
         )
     )
 

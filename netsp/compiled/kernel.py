@@ -155,12 +155,10 @@ class _LoadedKernel(Kernel):
 def _dispatcher_of(function: Callable[..., Any]) -> Any:
     """Return Numba's dispatcher of a function; where nothing is compiled, the function."""
     _register()
-    from numba import njit
-
     from netsp.compiled import disk_cache, tiered
     from netsp.compiled.compile_policy import compiles
 
-    compiled = njit(cache=True, nogil=True)(function)
+    compiled = disk_cache.cached(function)
     if compiles() and disk_cache.is_supported():
         disk_cache.keep_on_disk(compiled, function)
         if tiered.is_supported():

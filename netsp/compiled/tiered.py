@@ -44,7 +44,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
     next_look_s : float
         CPU seconds of `interpreted_s` from which on the disk is looked at again.
     has_compiled : bool
-        Whether any kernel was compiled in this process; an attribute of the class.
+        Whether any kernel was compiled and kept on disk by this process; an attribute of the class.
     """
 
     interpreted_s = 0.0
@@ -87,9 +87,16 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         types = _general(sig) if isinstance(sig, tuple) else sig
         if types in self.overloads or disk_cache.is_on_disk(self, types):
             return super().compile(types)
-        with global_compiler_lock, locked(disk_cache.lock_file(self)):
-            TieredDispatcher.has_compiled = True
-            return super().compile(types)
+        file = disk_cache.lock_file(self)
+        with global_compiler_lock, locked(file):
+            try:
+                entry = super().compile(types)
+            except OSError:  # the folder takes no more files, after all was compiled
+                if types not in self.overloads:
+                    raise
+                return self.overloads[types].entry_point
+            TieredDispatcher.has_compiled |= file is not None
+            return entry
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Return what Numba needs to compile a call of this kernel by another one."""
