@@ -272,7 +272,7 @@ def test_a_planned_mission_is_a_film_and_a_page(flight, tmp_path, capsys):
     (tmp_path / "m.json").write_text(mission.model_dump_json(exclude_none=True))
     assert main(["animate", str(tmp_path / "m.json"), "-o", str(tmp_path / "x.gif")]) == 2
     assert "tour: the mission has none" in capsys.readouterr().err
-    found = solve_mission(mission, time_limit=10.0).mission
+    found = solve_mission(mission, time_limit=60.0).mission
     planned.write_text(found.model_dump_json(exclude_none=True))
     film = film_of_mission(Mission.load(planned), run.mission.load_scene(), 40)
     visited = [len(m.fates["visited"]) for m in film.moments]

@@ -591,8 +591,10 @@ def test_what_is_wrong_with_a_map_file_is_one_line(tmp_path, capsys, said, compl
             "--tether", "9"]  # fmt: skip
     assert main(argv) == 2
     err = capsys.readouterr().err
-    assert complaint in err
-    assert err.count("\n") == 1
+    # a busy machine may tell that reading takes a while
+    lines = [line for line in err.splitlines() if not line.startswith("reading ")]
+    assert len(lines) == 1
+    assert complaint in lines[0]
 
 
 def test_fields_that_matter_to_nobody_and_numbers_of_any_style_are_read(tmp_path):
