@@ -36,9 +36,14 @@ class CompilePolicy:
     price_share : float
         Share of its price that a kernel runs interpreted before it is compiled. The default wastes
         least where nothing is known of the work; less is better where it is known to be long.
+    numpy_share : float
+        The same of kernels that have a form in NumPy, which is not much slower than compiled code.
     max_copied_bytes : int
         Size of arguments above which a kernel is never interpreted: an interpreted call that takes
         too long is begun again from copies of its arguments.
+    min_numpy_items : int
+        Values, such as points times solids, from which on an interpreted kernel uses NumPy instead
+        of a loop. Either gives the same result; the default is about where both take as long.
     is_eager : bool
         Whether all kernels are compiled at their first call.
     """
@@ -48,7 +53,9 @@ class CompilePolicy:
     compile_s: float = 0.2
     compile_s_per_byte: float = 0.001
     price_share: float = 1.0
+    numpy_share: float = 1.0
     max_copied_bytes: int = 64 * 2**20
+    min_numpy_items: int = 16
     is_eager: bool = False
 
     def __post_init__(self) -> None:
@@ -103,15 +110,15 @@ def everything_compiled() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def long_work(price_share: float = 0.05) -> Iterator[None]:
+def long_work(price_share: float = 0.05, numpy_share: float = 0.3) -> Iterator[None]:
     """Compile kernels soon while the body runs, because its work is known to be long.
 
     Parameters
     ----------
-    price_share : float
-        Share of its price that a kernel runs interpreted (`CompilePolicy`).
+    price_share, numpy_share : float
+        Shares of its price that a kernel runs interpreted (`CompilePolicy`).
     """
-    with compiled_by(replace(_policy, price_share=price_share)):
+    with compiled_by(replace(_policy, price_share=price_share, numpy_share=numpy_share)):
         yield
 
 

@@ -46,6 +46,17 @@ def interprets(kernel: Any) -> Callable[[F], F]:
     return register
 
 
+def is_in_numpy(kernel: Any) -> bool:
+    """Return whether a kernel runs in NumPy where it is interpreted.
+
+    Parameters
+    ----------
+    kernel : dispatcher
+        Function that `netsp.compiled.kernel.kernel` decorates.
+    """
+    return getattr(kernel, "py_func", kernel) in _in_numpy
+
+
 def interpreted(kernel: Any) -> Callable[..., Any]:
     """Return a kernel as plain Python, and all kernels that it calls as well.
 

@@ -54,6 +54,20 @@ def is_kept(kernel: Any) -> bool:
     return disk_cache.is_supported() and disk_cache.is_any_on_disk(kernel)
 
 
+def runs_compiled(kernel: Any) -> bool:
+    """Return whether a kernel was compiled already, or is going to be at its next call; loads
+    Numba.
+
+    Parameters
+    ----------
+    kernel : callable
+        Function that `kernel` decorates.
+    """
+    from netsp.compiled.compile_policy import compiles
+
+    return compiles() and (current_policy().is_eager or bool(kernel.overloads) or is_kept(kernel))
+
+
 def all_kernels() -> list[Any]:
     """Return the dispatchers of all kernels in the modules that are imported; loads Numba."""
     from netsp.compiled.tiered import TieredDispatcher

@@ -21,7 +21,7 @@ from netsp.compiled import disk_cache
 from netsp.compiled.arguments import call_interpreted, call_within, can_be_interpreted
 from netsp.compiled.compile_lock import is_locked, locked
 from netsp.compiled.compile_policy import compiles, current_policy
-from netsp.compiled.interpretation import interpreted, names_used
+from netsp.compiled.interpretation import interpreted, is_in_numpy, names_used
 from netsp.compiled.overtime import Overtime
 
 OVERRIDDEN = ("compile", "get_call_template")
@@ -59,7 +59,8 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         on_disk = self._is_on_disk(args, policy.load_s)
         budget_s = policy.load_s
         if not on_disk:
-            budget_s = policy.price_share * policy.price_s(self.bytecode())
+            share = policy.numpy_share if is_in_numpy(self) else policy.price_share
+            budget_s = share * policy.price_s(self.bytecode())
         budget_s -= self.interpreted_s
         is_shared = threading.current_thread().name.startswith("ThreadPoolExecutor")
         can_be = can_be_interpreted(args, policy.max_copied_bytes)

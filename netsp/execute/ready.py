@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 
 from netsp.clock import interrupts_remembered
-from netsp.compiled.compile_policy import compiles, current_policy, everything_compiled
-from netsp.compiled.kernel import is_kept
+from netsp.compiled.compile_policy import compiles, everything_compiled
+from netsp.compiled.kernel import runs_compiled
 from netsp.dp.labels import extend
 from netsp.execute.repair import repair
 from netsp.problem import Circle, Goal, Problem, State
@@ -28,7 +28,7 @@ def should_make_ready() -> bool:
     that compiled nothing yet, a simulated tour is carried out interpreted, as far as that goes:
     compiling all that a repair may need would take a minute.
     """
-    return compiles() and (current_policy().is_eager or is_kept(extend))
+    return runs_compiled(extend)
 
 
 @cache

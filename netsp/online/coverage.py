@@ -14,11 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from netsp.arrays import Bools, ComparesArrays, Floats, Ints
+from netsp.compiled.interpretation import interprets
 from netsp.compiled.kernel import kernel
 from netsp.errors import InputError
 from netsp.online.equipment import Camera
 from netsp.online.scene.field import DistanceField
-from netsp.online.scene.sampling import Field, lowest_along
+from netsp.online.scene.sampling import Field, lowest_along, lowest_along_each
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.shapes import HalfSpace
 from netsp.online.scene.surfaces import drawn_points, extent, surface_of
@@ -181,6 +182,7 @@ class Coverage:
         self.seen_through = self.seen.copy()
         self.share = self.share_through = 0.0
         self._shares = patches.areas / patches.areas.sum()
+        self._latest: tuple[Floats, Floats] | None = None
 
     def look(self, eye: Floats, yaw: float) -> None:
         """Mark what the camera sees from a place (3,) looking in a horizontal direction (rad), as
@@ -214,8 +216,12 @@ class Coverage:
         return math.atan2(near[1], near[0])
 
     def _nearest(self, eye: Floats) -> Floats:
-        """From a place to the nearest patch."""
-        return np.asarray(self.patches.centres[nearest(self.patches.centres, eye)] - eye)
+        """Return the vector from a place to the nearest patch."""
+        # `heading` and `look` ask for the same place
+        if self._latest is None or not np.array_equal(self._latest[0], eye):
+            at = nearest(self.patches.centres, eye)
+            self._latest = (np.array(eye), np.asarray(self.patches.centres[at] - eye))
+        return self._latest[1]
 
 
 @kernel
@@ -231,6 +237,13 @@ def nearest(centres: Floats, eye: Floats) -> int:
         if d < best:
             best, at = d, i
     return at
+
+
+@interprets(nearest)
+def _nearest_in_numpy(centres: Floats, eye: Floats) -> int:
+    """Do as `nearest`, all points at once."""
+    x, y, z = (centres[:, axis] - eye[axis] for axis in range(3))
+    return int(np.argmin(x * x + y * y + z * z)) if len(centres) else 0
 
 
 @kernel
@@ -272,3 +285,36 @@ def mark(
             seen[i] = True
             new += shares[i]
     return new, new_through
+
+
+@interprets(mark)
+def _mark_in_numpy(
+    field: Field, surface: Surface, seen: Bools, seen_through: Bools, view: View
+) -> tuple[float, float]:
+    """Do as `mark`, all patches at once."""
+    at = np.flatnonzero(~seen)
+    x, y, z = (surface.centres[at, axis] - view.eye[axis] for axis in range(3))
+    nx, ny, nz = (surface.normals[at, axis] for axis in range(3))
+    near = ~(x * x + y * y + z * z > view.reach * view.reach)
+    near &= ~(x * nx + y * ny + z * nz >= 0.0)
+    at, x, y, z = at[near], x[near], y[near], z[near]
+    cy, sy = math.cos(view.yaw), math.sin(view.yaw)
+    cp, sp = math.cos(view.pitch), math.sin(view.pitch)
+    ahead = cp * (cy * x + sy * y) + sp * z
+    left = cy * y - sy * x
+    up = cp * z - sp * (cy * x + sy * y)
+    wide = view.half * ahead
+    at = at[~((ahead <= 0.0) | (abs(left) > wide) | (abs(up) > wide))]
+    fresh = at[~seen_through[at]]
+    seen_through[fresh] = True
+    targets = surface.centres[at] + view.off * surface.normals[at]
+    eyes = np.broadcast_to(view.eye, targets.shape)
+    least = lowest_along_each(field, eyes, targets, 0.5 * view.off)
+    open_ = at[least > -0.5 * view.off]
+    seen[open_] = True
+    return _in_order(surface.shares[open_]), _in_order(surface.shares[fresh])
+
+
+def _in_order(shares: Floats) -> float:
+    """Return a sum that is added up in order; NumPy's own adds in pairs."""
+    return float(np.add.accumulate(shares)[-1]) if len(shares) else 0.0

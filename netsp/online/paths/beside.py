@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from netsp.arrays import Bools, Floats
+from netsp.compiled.interpretation import interprets
 from netsp.compiled.kernel import kernel
 from netsp.online.scene.field import DistanceField
-from netsp.online.scene.sampling import Field, lowest_along
+from netsp.online.scene.sampling import Field, lowest_along, lowest_along_each
 
 CLIMB, STENCIL, SWEEPS = 1 / 6, 1 / 3, 80
 """Of the clearance, what a point goes at once, and over what the distance's rise is taken; and how
@@ -80,3 +81,9 @@ def sees(field: Field, a: Floats, b: Floats, depth: float) -> Bools:
         )  # fmt: skip
         out[k] = low > -depth
     return out
+
+
+@interprets(sees)
+def _sees_in_numpy(field: Field, a: Floats, b: Floats, depth: float) -> Bools:
+    """Do as `sees`, all points at once."""
+    return np.asarray(lowest_along_each(field, a, b, 0.5 * depth) > -depth)

@@ -16,11 +16,13 @@ import numpy.typing as npt
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import Flag, abandoned, end_if_abandoned
 from netsp.compiled.growing import more_int_rows
+from netsp.compiled.interpretation import interprets
 from netsp.compiled.kernel import kernel
 from netsp.errors import InputError
 from netsp.geometry import polylines
 from netsp.online.scene.field import DistanceField
-from netsp.online.scene.sampling import Field, distance, lowest_along
+from netsp.online.scene.point_batches import CHUNK, distances
+from netsp.online.scene.sampling import Field, distance, lowest_along, lowest_along_each
 from netsp.online.tether.geodesic import GeodesicTether
 
 MOST_CELLS = 20_000_000
@@ -246,6 +248,24 @@ def free_cells(
     return out
 
 
+@interprets(free_cells)
+def _free_cells_in_numpy(
+    field: Field, low: Floats, cell: float, shape: tuple[int, int, int], clearance: float,
+    stop: Flag,
+) -> Bools:  # fmt: skip
+    """Do as `free_cells`, some layers of cells at once."""
+    out = np.zeros(shape, dtype=np.bool_)
+    x, y, z = (low[axis] + (np.arange(shape[axis]) + 0.5) * cell for axis in range(3))
+    layers = max(1, CHUNK // max(1, shape[1] * shape[2]))
+    for i in range(0, shape[0], layers):
+        if stop[0] != 0:
+            break
+        centres = (v.ravel() for v in np.meshgrid(x[i : i + layers], y, z, indexing="ij"))
+        far = distances(field.data, field.offset, *centres)
+        out[i : i + layers] = (far >= clearance).reshape(-1, *shape[1:])
+    return out
+
+
 @kernel
 def states_of(free: Bools) -> npt.NDArray[np.uint8]:
     """(nx + 2, ny + 2, nz + 2) `BLOCKED`, `FREE` or `OPEN`, with a border that is blocked: then
@@ -267,6 +287,19 @@ def states_of(free: Bools) -> npt.NDArray[np.uint8]:
                         break
                 if about != BLOCKED:
                     out[i, j, k] = OPEN
+    return out
+
+
+@interprets(states_of)
+def _states_of_in_numpy(free: Bools) -> npt.NDArray[np.uint8]:
+    """Do as `states_of`, all cells at once."""
+    bordered = np.pad(free, 1)
+    is_open = bordered
+    for axis in range(3):
+        ends = [np.take(is_open, range(k, is_open.shape[axis] - 2 + k), axis) for k in range(3)]
+        is_open = ends[0] & ends[1] & ends[2]
+    out = np.where(bordered, np.uint8(FREE), np.uint8(BLOCKED))
+    out[1:-1, 1:-1, 1:-1][is_open] = OPEN
     return out
 
 
@@ -345,19 +378,98 @@ def grow(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> npt.NDArray
     return toward.reshape(states.shape)[1:-1, 1:-1, 1:-1]
 
 
+@interprets(grow)
+def _grow_in_numpy(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> npt.NDArray[np.int8]:
+    """Do as `grow`, all cells of a bucket at once.
+
+    What is in a bucket changes nothing else in it, so the order in it matters only where two steps
+    lead to a cell equally soon: the first one counts. Of the entries of one cell the last is the
+    first that `grow` comes to.
+    """
+    shape = np.array(states.shape)
+    strides = np.array([shape[1] * shape[2], shape[2], 1])
+    offset, size = STEPS @ strides, states.size
+    state = states.flatten()
+    lengths, toward = np.full(size, np.inf), np.full(size, -1, dtype=np.int8)
+    asked, place = np.zeros(size, dtype=np.bool_), np.empty(size, dtype=np.int64)
+
+    def first_of_each(cells: Ints) -> Bools:
+        numbers = np.arange(len(cells))
+        place[cells[::-1]] = numbers[::-1]
+        return np.asarray(place[cells] == numbers)
+
+    asked[(wanted + 1) @ strides] = True
+    left = np.count_nonzero(asked)
+    begin = (root + 1) @ strides
+    lengths[begin], toward[begin] = 0.0, 26
+    waiting: list[list[Ints]] = [[np.array([begin])], [], []]
+    floor = 0
+    while left > 0 and any(waiting):
+        entries, waiting[floor % 3] = waiting[floor % 3], []
+        floor += 1
+        if not entries:
+            continue
+        cells = np.concatenate(entries)[::-1]
+        cells = cells[state[cells] != BLOCKED]
+        cells = cells[first_of_each(cells)]
+        came = 25 - toward[cells].astype(np.int64)
+        steps = np.where((came < 0) | (state[cells] != OPEN), 26, came)
+        state[cells] = BLOCKED
+        left -= np.count_nonzero(asked[cells])
+        counts = _COUNTS[steps]
+        nth = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        step = _NEXT[np.repeat(steps, counts), nth]
+        beside = np.repeat(cells, counts) + offset[step]
+        onward = np.repeat(lengths[cells], counts) + _LONG[step]
+        is_shorter = (state[beside] != BLOCKED) & (onward < lengths[beside])
+        beside, onward, step = beside[is_shorter], onward[is_shorter], step[is_shorter]
+        np.minimum.at(lengths, beside, onward)
+        is_least = onward == lengths[beside]
+        beside, onward, step = beside[is_least], onward[is_least], step[is_least]
+        is_first = first_of_each(beside)
+        beside, onward, step = beside[is_first], onward[is_first], step[is_first]
+        toward[beside] = 25 - step
+        bucket = onward.astype(np.int64) % 3
+        for k in range(3):
+            if len(some := beside[bucket == k]):
+                waiting[k].append(some)
+    return toward.reshape(states.shape)[1:-1, 1:-1, 1:-1]
+
+
+_COUNTS = np.append(ONWARD[:, 0], 26)
+_NEXT = np.zeros((27, 26), dtype=np.int64)
+"""How many steps are looked at after each, and which; the last row is that of all steps."""
+_NEXT[:26, : ONWARD.shape[1] - 1], _NEXT[26] = ONWARD[:, 1:], np.arange(26)
+
+
 @kernel
 def way(toward: npt.NDArray[np.int8], start: Ints) -> Ints:
     """Cells (k, 3) from one that the tree has to its root, both ends among them."""
     out, count = np.empty((64, 3), dtype=np.int64), 1
-    out[0] = start
+    # axis by axis: assigning rows would compile NumPy's error messages, seconds of work
+    for axis in range(3):
+        out[0, axis] = start[axis]
     while True:
         step = toward[out[count - 1, 0], out[count - 1, 1], out[count - 1, 2]]
         if step >= 26:
             return out[:count].copy()
         if count == len(out):
             out = more_int_rows(out)
-        out[count] = out[count - 1] + STEPS[step]
+        for axis in range(3):
+            out[count, axis] = out[count - 1, axis] + STEPS[step, axis]
         count += 1
+
+
+@interprets(way)
+def _way_in_python(toward: npt.NDArray[np.int8], start: Ints) -> Ints:
+    """Do as `way`, with Python's numbers."""
+    i, j, k = start.tolist()
+    out, steps = [(i, j, k)], STEPS.tolist()
+    while (step := toward.item(i, j, k)) < 26:
+        di, dj, dk = steps[step]
+        i, j, k = i + di, j + dj, k + dk
+        out.append((i, j, k))
+    return np.array(out, dtype=np.int64)
 
 
 def taut(field: DistanceField, path: Floats, clearance: float, delta: float) -> Floats:
@@ -417,7 +529,8 @@ def shortcut(field: Field, path: Floats, tolerance: float) -> Floats:
     that it sees without a break. The triangles that are swept are as wide as the path's points are
     apart, so nothing wider is passed over."""
     out = np.empty_like(path)
-    out[0] = path[0]
+    for axis in range(3):  # a row at once would compile NumPy's error messages
+        out[0, axis] = path[0, axis]
     count, i = 1, 0
     while i < len(path) - 1:
         j = i + 1
@@ -429,7 +542,8 @@ def shortcut(field: Field, path: Floats, tolerance: float) -> Floats:
             if low < -tolerance:
                 break
             j += 1
-        out[count] = path[j]
+        for axis in range(3):
+            out[count, axis] = path[j, axis]
         count += 1
         i = j
     return out[:count].copy()
@@ -459,3 +573,9 @@ def all_see(field: Field, a: Floats, b: Floats, step: float) -> bool:
         if low < 0.0:
             return False
     return True
+
+
+@interprets(all_see)
+def _all_see_in_numpy(field: Field, a: Floats, b: Floats, step: float) -> bool:
+    """Do as `all_see`, all points at once."""
+    return not (lowest_along_each(field, a, b, step) < 0.0).any()

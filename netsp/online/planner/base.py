@@ -12,13 +12,14 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.clock import Clock
+from netsp.compiled.kernel import runs_compiled
 from netsp.errors import interrupted
 from netsp.geometry import polylines
 from netsp.online.mission import Mission, MissionWaypoint
 from netsp.online.paths.beside import beside
 from netsp.online.paths.refine import RefineParams, refined, stepped
 from netsp.online.paths.sampled import SampledPaths
-from netsp.online.paths.tree import Grid, Paths, ShortestTree, taut
+from netsp.online.paths.tree import Grid, Paths, ShortestTree, grow, taut
 from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
 from netsp.online.tether.load import Load, payout, payout_along
@@ -87,7 +88,7 @@ class PlannerOptions:
         Seconds that `repair` may take to plan the rest of a tour; the robot holds its place.
     prepared : bool
         Whether shortest paths to all waypoints are found before the mission, which takes seconds
-        where there are many; else when they are asked for.
+        where there are many; else, and where kernels are interpreted, when they are asked for.
     clock : Clock, optional
         When it is up, planning ends as at Ctrl-C, and so does the mission.
     """
@@ -444,8 +445,11 @@ class Planner:
 
     def prepare(self) -> None:
         """Find the shortest paths to all waypoints, and home, from everywhere, before the mission:
-        they depend on the map alone."""
-        if self.options.paths == "tree" and self.options.prepared:
+        they depend on the map alone.
+
+        Not where kernels are interpreted: then finding the paths that are asked for takes less time
+        than finding all of them before."""
+        if self.options.paths == "tree" and self.options.prepared and runs_compiled(grow):
             home = [] if self.track is not None else [np.array(self.mission.start)]
             self.grid.prepare([*self.mission.places, *home])
 

@@ -132,7 +132,8 @@ def candidates(data: Floats) -> tuple[Ints, Ints]:
                     least = min(least, found[n])
                 if size + count > len(items):
                     more = np.empty(2 * len(items) + count, dtype=np.int64)
-                    more[:size] = items[:size]
+                    for n in range(size):  # a slice would compile NumPy's error messages
+                        more[n] = items[n]
                     items = more
                 for n in range(count):
                     if found[n] <= least + reach:

@@ -12,7 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from netsp.arrays import Floats, Singles
+from netsp.compiled.interpretation import interpreted, interprets
 from netsp.compiled.kernel import kernel
+from netsp.online.scene import point_batches
 from netsp.online.scene.grid import SIDE
 from netsp.online.scene.packing import (
     BLOCKS,
@@ -224,6 +226,15 @@ def sample_many(field: Field, points: Floats) -> Floats:
     return out
 
 
+@interprets(sample_many)
+def _sample_many_in_numpy(field: Field, points: Floats) -> Floats:
+    """Do as `sample_many`, all points at once where there are many."""
+    if point_batches.is_short(field.data, len(points)):
+        sampled = interpreted(sample)
+        return np.array([sampled(field, x, y, z) for x, y, z in points]).reshape(-1, 5)
+    return point_batches.samples(field.data, field.offset, points)
+
+
 @kernel
 def lowest_along(
     field: Field, ax: float, ay: float, az: float, bx: float, by: float, bz: float, tolerance: float
@@ -246,3 +257,21 @@ def lowest_along(
         if s >= length:
             return best, where
         s = min(length, s + max(d, 0.0) + tolerance)
+
+
+def lowest_along_each(field: Field, a: Floats, b: Floats, tolerance: float) -> Floats:
+    """Return the least distance along each of some segments, where kernels run interpreted.
+
+    Parameters
+    ----------
+    field : Field
+        The field, without voxels.
+    a, b : ndarray, shape (n, 3)
+        Ends of the segments.
+    tolerance : float
+        As of `lowest_along`, which returns the same to the last bit.
+    """
+    if not point_batches.is_short(field.data, len(a)):
+        return point_batches.lowest_along(field.data, field.offset, a, b, tolerance)
+    lowest = interpreted(lowest_along)
+    return np.array([lowest(field, *a[k], *b[k], tolerance)[0] for k in range(len(a))], dtype=float)

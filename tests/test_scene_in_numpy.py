@@ -1,0 +1,128 @@
+"""Kernels of scenes have forms in NumPy that return what their loops return, to the last bit."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from netsp.compiled import interpretation
+from netsp.compiled.compile_policy import CompilePolicy, compiled_by
+from netsp.online import Scene
+from netsp.online.coverage import Surface, View, mark, nearest
+from netsp.online.paths.beside import sees
+from netsp.online.paths.tree import all_see, free_cells, grow, states_of, way
+from netsp.online.scene import packing, sampling
+
+SOLIDS = (
+    {"name": "ball", "sphere": {"center": [0, 0, 0], "radius": 1.0}},
+    {"name": "bar", "capsule": {"a": [2, 0, 0], "b": [4, 1, 1], "radius": 0.3}},
+    {"name": "pipe", "cylinder": {"a": [-3, 2, 0], "b": [-1, 2, 0], "radius": 0.5}},
+    {"name": "upright", "cylinder": {"a": [3, 3, -1], "b": [3, 3, 2], "radius": 0.4}},
+    {"name": "crate", "box": {"center": [0, -3, 0], "size": [2, 1, 1], "rotation": [30, 10, 0]}},
+    {"name": "ring", "torus": {"center": [-3, -2, 1], "major_radius": 1.0, "minor_radius": 0.2}},
+    {"name": "post", "post": {"center": [5, -2], "radius": 0.3}},
+    {"name": "quay", "prism": {"polygon": [[5, 2], [7, 2], [7, 4], [6, 3], [5, 4]], "grow": 0.1}},
+    {"name": "bed", "half_space": {"point": [0, 0, -5], "normal": [0, 0.1, 1]}},
+)
+LOW, HIGH = np.array([-6.0, -6.0, -6.0]), np.array([8.0, 6.0, 5.0])
+
+
+def field_of(names):
+    return Scene(solids=[s for s in SOLIDS if s["name"] in names]).field().arrays
+
+
+ALL = {s["name"] for s in SOLIDS}
+FIELDS = st.sets(st.sampled_from(sorted(ALL)), min_size=1, max_size=5).map(field_of) | st.just(
+    field_of(ALL)  # so many that they are looked up
+)
+
+
+def both(kernel, *args):
+    """Return what a kernel's loops return, and what its form in NumPy does."""
+    own = getattr(kernel, "py_func", kernel)
+    numpy = CompilePolicy(min_numpy_items=0)
+    with np.errstate(all="ignore"), pytest.MonkeyPatch.context() as patch, compiled_by(numpy):
+        by_numpy = interpretation._in_numpy[own](*args)
+        patch.setattr(interpretation, "_in_numpy", {})
+        return interpretation._interpreted.__wrapped__(own)(*args), by_numpy
+
+
+def assert_alike(loops, numpy):
+    for a, b in zip(*(v if isinstance(v, tuple) else (v,) for v in (loops, numpy)), strict=True):
+        a, b = np.asarray(a), np.asarray(b)
+        assert (a.shape, a.dtype) == (b.shape, b.dtype)
+        assert a.tobytes() == b.tobytes()
+
+
+def points(seed, n):
+    """Return random points, some of them on axes and faces of solids."""
+    drawn = np.random.default_rng(seed).uniform(LOW, HIGH, (n, 3))
+    drawn[::3] = np.round(drawn[::3])
+    return drawn
+
+
+@settings(max_examples=15, deadline=None)
+@given(field=FIELDS, seed=st.integers(0, 10**6))
+def test_points_and_segments(field, seed):
+    """Distances, gradients and sight are the same for solids of each kind, looked up or not."""
+    p = points(seed, 40)
+    assert_alike(*both(sampling.sample_many, field, p))
+    assert_alike(*both(sees, field, p[:6], p[6:12], 0.05))
+    for k in range(3):
+        assert_alike(*both(all_see, field, p[k : k + 2], p[k + 1 : k + 3], 0.1))
+
+
+def test_no_points():
+    """No points have no distances."""
+    assert_alike(*both(sampling.sample_many, field_of(ALL), np.zeros((0, 3))))
+
+
+@settings(max_examples=6, deadline=None)
+@given(field=FIELDS, seed=st.integers(0, 10**6))
+def test_grids(field, seed):
+    """Free cells, trees of shortest paths and the paths in them are the same."""
+    rng = np.random.default_rng(seed)
+    shape = (9, 8, 7)
+    free, by_numpy = both(free_cells, field, LOW, 1.5, shape, 0.1, np.zeros(1, dtype=np.int64))
+    assert_alike(free, by_numpy)
+    states, by_numpy = both(states_of, free)
+    assert_alike(states, by_numpy)
+    open_ = np.argwhere(free)
+    root, wanted = open_[rng.integers(len(open_))], open_[rng.integers(len(open_), size=2)]
+    for cells in (wanted, np.full((1, 3), -1)):
+        toward, by_numpy = both(grow, states, root, cells)
+        assert_alike(toward, by_numpy)
+    there = np.argwhere(toward >= 0)
+    for start in there[rng.integers(len(there), size=3)]:
+        assert_alike(*both(way, toward, start))
+
+
+def test_lookup():
+    """The solids that may be nearest in each cell of a look-up are the same."""
+    data = field_of(ALL).data
+    data = data[: int(data[packing.CELLS])].copy()
+    data[packing.NEAR + 3] *= 8.0
+    data[packing.NEAR + 4 : packing.NEAR + 7] = np.ceil(data[packing.NEAR + 4 :][:3] / 8.0)
+    assert_alike(*both(packing.candidates, data))
+
+
+@settings(max_examples=10, deadline=None)
+@given(field=FIELDS, seed=st.integers(0, 10**6), yaw=st.floats(-3.0, 3.0))
+def test_patches_in_view(field, seed, yaw):
+    """The same patches are seen, and the same shares are new."""
+    centres = points(seed, 120)
+    normals = points(seed + 1, 120)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1.0)[:, None]
+    surface = Surface(centres, normals, np.random.default_rng(seed).random(120))
+    view = View(centres[0] + 0.3, yaw, -0.2, 1.0, 6.0, 0.05)
+    assert_alike(*both(nearest, centres, view.eye))
+    seen = [np.zeros(120, dtype=bool) for _ in range(4)]
+    own, numpy = getattr(mark, "py_func", mark), CompilePolicy(min_numpy_items=0)
+    with np.errstate(all="ignore"), compiled_by(numpy):
+        new = interpretation._in_numpy[own](field, surface, *seen[:2], view)
+        loops = interpretation.FunctionType(
+            own.__code__,
+            {**own.__globals__, "lowest_along": interpretation.interpreted(sampling.lowest_along)},
+        )
+        assert_alike(loops(field, surface, *seen[2:], view), new)
+    assert_alike(tuple(seen[2:]), tuple(seen[:2]))
