@@ -22,6 +22,9 @@ from netsp.dp.memory import CHUNK
 
 LOW = (1 << CHUNK) - 1
 
+COMPARED = 32
+"""Memories that the interpreter compares with all others at once; a loop over fewer is quicker."""
+
 
 class Graph(NamedTuple):
     """Legs (V, V), the goal of each vertex (V,), and where the vertices of each goal begin."""
@@ -274,45 +277,72 @@ def _extend_in_numpy(
     costs, goal, start = graph
     pointer, cost, memory = labels
     vertex = np.repeat(np.arange(len(pointer) - 1), np.diff(pointer))
-    from_goal, parts = goal[vertex], (memory & LOW, (memory >> CHUNK) & LOW, memory >> (2 * CHUNK))
+    from_goal = goal[vertex]
+    slot = np.empty(1 << int(bits[first:last].max(initial=0)), dtype=np.int64)
     out_pointer, out_cost, out_memory = [0], [0.0], [0]
     for h in range(first, last):
         own = slice(start[h], start[h + 1])
-        is_dear = cost > bounds.cut - bounds.onward[h, vertex]
+        is_dear = cost > (bounds.cut - bounds.onward[h])[vertex]
         at = np.flatnonzero(~is_dear & (from_goal != h))
         if stop[0] != 0:
             at = at[:0]
-        masks = tables[from_goal[at], h, 0, parts[0][at]]
-        for k in (1, 2):
-            masks |= tables[from_goal[at], h, k, parts[k][at]]
+        masks = _translated(tables, from_goal[at], h, memory[at])
         at, masks = at[masks >= 0], masks[masks >= 0]
         if not len(at):
             out_pointer += [len(out_cost) - 1] * (own.stop - own.start)
             continue
         # memories in the order in which they were met, as ties are broken by it
-        kinds, met, kind = np.unique(masks, return_index=True, return_inverse=True)
+        place = np.arange(len(at))
+        slot[masks[::-1]] = place[::-1]
+        seen = masks[slot[masks] == place]
+        slot[seen] = place[: len(seen)]
+        kind = slot[masks]
         by_kind = np.argsort(kind, kind="stable")
-        begin = np.searchsorted(kind[by_kind], np.arange(len(kinds)))
-        legs = cost[at, None] + costs[vertex[at], own]
-        order = np.argsort(met)
-        table = np.minimum.reduceat(legs[by_kind], begin, axis=0)[order]
+        begin = np.searchsorted(kind[by_kind], place[: len(seen)])
+        at = at[by_kind]
+        table = np.minimum.reduceat(cost[at, None] + costs[vertex[at], own], begin, axis=0)
         table[~((table <= bounds.limit[own]) & (table < np.inf))] = np.inf
         cheapest_first = np.argsort(table, axis=0, kind="stable")
-        counts = np.count_nonzero(table < np.inf, axis=0).tolist()
-        seen, price = kinds[order], float(prices[h])
-        for j, count in enumerate(counts):
+        for j, count in enumerate(np.count_nonzero(table < np.inf, axis=0).tolist()):
             fits = cheapest_first[:count, j]
-            kept: list[int] = []
-            for c, m in zip(table[fits, j].tolist(), seen[fits].tolist(), strict=True):
-                for k in kept:
-                    if k & m == k:
-                        break
-                else:
-                    kept.append(m)
-                    out_cost.append(c - price)
-            out_memory += kept
+            kept = fits[_undominated(seen[fits])]
+            out_cost += (table[kept, j] - prices[h]).tolist()
+            out_memory += seen[kept].tolist()
             out_pointer.append(len(out_cost) - 1)
     return np.array(out_pointer), np.array(out_cost[1:]), np.array(out_memory[1:], dtype=np.int32)
+
+
+def _translated(
+    tables: npt.NDArray[np.int32], goals: Ints, h: int, memory: npt.NDArray[np.int32]
+) -> npt.NDArray[np.int32]:
+    """Return what `translate` does of many memories at goals."""
+    masks = tables[goals, h, 0, memory & LOW]
+    masks |= tables[goals, h, 1, (memory >> CHUNK) & LOW]
+    masks |= tables[goals, h, 2, memory >> (2 * CHUNK)]
+    return masks
+
+
+def _undominated(memory: npt.NDArray[np.int32]) -> Ints:
+    """Return the places of the memories that include none of those before them."""
+    if len(memory) <= COMPARED:
+        masks: list[int] = []
+        places = []
+        for place, m in enumerate(memory.tolist()):
+            for k in masks:
+                if k & m == k:
+                    break
+            else:
+                masks.append(m)
+                places.append(place)
+        return np.array(places, dtype=np.int64)
+    kept, left = [], np.arange(len(memory))
+    while len(left):
+        some, left = left[:COMPARED], left[COMPARED:]
+        masks_of = memory[some, None]
+        some = some[~np.triu((masks_of & masks_of.T) == masks_of, 1).any(axis=0)]
+        kept.append(some)
+        left = left[~((memory[left, None] & memory[some]) == memory[some]).any(axis=1)]
+    return np.concatenate(kept)
 
 
 @kernel
@@ -344,6 +374,32 @@ def join(
     return out
 
 
+@interprets(join)
+def _join_in_lists(goal: Ints, prices: Floats, a: Labels, b: Labels) -> Floats:
+    """Do as `join`, over lists, which the interpreter reads faster than arrays."""
+    a_pointer, a_cost, a_memory = (x.tolist() for x in a)
+    b_pointer, b_cost, b_memory = (x.tolist() for x in b)
+    out = np.full(len(goal), np.inf)
+    for v in range(1, len(goal)):
+        best = np.inf
+        low, high = b_pointer[v], b_pointer[v + 1]
+        if low == high:
+            continue
+        others = list(zip(b_cost[low:high], b_memory[low:high], strict=True))
+        own = slice(a_pointer[v], a_pointer[v + 1])
+        for cost, memory in zip(a_cost[own], a_memory[own], strict=True):
+            if cost + b_cost[low] >= best:
+                break
+            for other, mask in others:
+                if cost + other >= best:
+                    break
+                if memory & mask == 1:
+                    best = cost + other
+                    break
+        out[v] = best + prices[goal[v]]
+    return out
+
+
 @kernel
 def step_back(
     graph: Graph,
@@ -370,3 +426,28 @@ def step_back(
                 if e < off:
                     off, from_vertex, from_label = e, u, label
     return from_vertex, from_label
+
+
+@interprets(step_back)
+def _step_back_in_numpy(
+    graph: Graph,
+    prices: Floats,
+    tables: npt.NDArray[np.int32],
+    v: int,
+    at_cost: float,
+    at_memory: int,
+    labels: Labels,
+) -> tuple[int, int]:
+    """Do as `step_back`, all labels at once."""
+    costs, goal, _ = graph
+    pointer, cost, memory = labels
+    h = goal[v]
+    vertex = np.repeat(np.arange(len(pointer) - 1), np.diff(pointer))
+    masks = _translated(tables, goal[vertex], h, memory)
+    fits = (goal[vertex] != h) & (masks >= 0) & ((masks & at_memory) == masks)
+    off = np.abs(cost + costs[vertex, v] - prices[h] - at_cost)
+    off = np.where(fits & (off < np.inf), off, np.inf)
+    if not (off < np.inf).any():
+        return -1, -1
+    label = int(off.argmin())
+    return int(vertex[label]), label

@@ -22,8 +22,8 @@ class SearchEffort:
     max_proven_vertices : int
         Most vertices of the travel graph of such a problem.
     proven_rounds_per_goal : int
-        Rounds for each goal of such a problem. In 27 worlds of 14 to 20 goals, 8 rounds for each
-        goal from 10 seeds missed the shortest tour in 1 % of the searches.
+        Rounds for each goal of such a problem. In 19 worlds of 14 to 20 goals, 3 of 190 searches
+        with 8 rounds for each goal missed the shortest tour, by 0.4 % at most.
     min_rounds : int
         Least rounds for any other problem.
     rounds_per_goal : int
