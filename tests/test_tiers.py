@@ -19,7 +19,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba.core.caching import FunctionCache
 
-from netsp.compiled import chance, disk_cache, tiered
+from netsp.compiled import chance, disk_cache, interpretation, tiered
 from netsp.compiled.compile_lock import is_locked, locked
 from netsp.compiled.compile_policy import (
     CompilePolicy,
@@ -33,8 +33,8 @@ from netsp.dp import labels, walks
 from netsp.errors import InputError
 from netsp.mip import parities
 from netsp.problem import Problem
-from netsp.roadmap import outline, tangents
-from netsp.solvers.solve import solve
+from netsp.roadmap import branches, legs, outline, tangents
+from netsp.solvers.solve import solve, travel_graph
 from netsp.worlds import FAMILIES, random_world
 
 PROBLEMS = sorted((Path(__file__).parent.parent / "problems").glob("*.json"))
@@ -388,6 +388,31 @@ def test_labels_are_extended_alike_in_loops_and_at_once(data):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(walks, "extend", both)
         walk.solve(prices, cutoff, lambda: None)
+
+
+@pytest.mark.parametrize("depth", [0.0, 7.5])
+def test_legs_that_cross_over_alike_are_noted_alike_in_loops_and_at_once(depth, monkeypatch):
+    problem = random_world(3, goals=4, tether_length=450.0)
+    goals = [
+        goal.model_copy(update={"position": (*goal.position[:2], -depth * k)})
+        for k, goal in enumerate(problem.goals)
+    ]
+    at_once, compared = interpreted(branches.spread), []
+
+    def both(*args):
+        lengths = args[-1]._replace(out=args[-1].out.copy())
+        _loops(branches.spread)(*args[:-1], lengths)
+        at_once(*args)
+        compared.append(np.array_equal(lengths.out, args[-1].out, equal_nan=True))
+
+    monkeypatch.setitem(interpretation._in_numpy, branches.spread.py_func, both)
+    interpretation._interpreted.cache_clear()
+    monkeypatch.setattr(legs, "spread", both)
+    with everything_interpreted():
+        travel_graph(problem.model_copy(update={"goals": tuple(goals)})).costs  # noqa: B018
+    interpretation._interpreted.cache_clear()
+    assert len(compared) > 10
+    assert all(compared)
 
 
 def test_random_numbers_are_the_same_interpreted_and_compiled():

@@ -316,7 +316,7 @@ def _translated(
     tables: npt.NDArray[np.int32], goals: Ints, h: int, memory: npt.NDArray[np.int32]
 ) -> npt.NDArray[np.int32]:
     """Return what `translate` does of many memories at goals."""
-    masks = tables[goals, h, 0, memory & LOW]
+    masks: npt.NDArray[np.int32] = tables[goals, h, 0, memory & LOW]
     masks |= tables[goals, h, 1, (memory >> CHUNK) & LOW]
     masks |= tables[goals, h, 2, memory >> (2 * CHUNK)]
     return masks

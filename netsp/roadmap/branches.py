@@ -241,16 +241,24 @@ def _note(
         out[b] = share * length
 
 
-@interprets(_note)
-def _note_in_numpy(
-    out: Floats, a: int, begin: int, end: int, saved: float, order: Ints, lengths: Lengths
+@interprets(spread)
+def _spread_in_numpy(
+    u: int, v: int, length: float, count: int, on: Ints, at: Floats, branches: Branches,
+    lengths: Lengths,
 ) -> None:  # fmt: skip
-    """Do as `_note`, all legs at once."""
-    b = order[begin:end]
-    rise = lengths.height[b] - lengths.height[a]
-    length = lengths.planar[a] + lengths.planar[b] - saved
-    whole = np.sqrt(length * length + rise * rise)
-    out[b] = lengths.share * np.where(rise != 0.0, whole, length)
+    """Do as `spread`, all legs at once."""
+    i0, i1, j0, j1 = interpreted(_alike)(u, v, count, on, at, branches)
+    order, planar, row = branches.order, lengths.planar, lengths.row
+    saved = planar[u] + planar[v] - length
+    a, b = order[i0:i1], order[j0:j1]
+    legs = planar[a, None] + planar[b] - saved
+    rise = lengths.height[b] - lengths.height[a, None]
+    if rise.any():
+        legs = np.where(rise != 0.0, np.sqrt(legs * legs + rise * rise), legs)
+    legs = lengths.share * legs
+    for rows, others, block in ((row[i0:i1], b, legs), (row[j0:j1], a, legs.T)):
+        is_kept = rows >= 0
+        lengths.out[rows[is_kept, None], others] = block[is_kept]
 
 
 @kernel
