@@ -22,8 +22,12 @@ from netsp.dp.memory import CHUNK
 
 LOW = (1 << CHUNK) - 1
 
+SETS_PER_MEMORY = 64
+"""Most sets of goals for each memory for which the interpreter goes through all sets. With more, it
+compares memories with one another, which is as quick at about this number."""
+
 COMPARED = 32
-"""Memories that the interpreter compares with all others at once; a loop over fewer is quicker."""
+"""Memories that are compared with all others at once; more or fewer are a little slower."""
 
 
 class Graph(NamedTuple):
@@ -279,7 +283,7 @@ def _extend_in_numpy(
     vertex = np.repeat(np.arange(len(pointer) - 1), np.diff(pointer))
     from_goal = goal[vertex]
     slot = np.empty(1 << int(bits[first:last].max(initial=0)), dtype=np.int64)
-    out_pointer, out_cost, out_memory = [0], [0.0], [0]
+    out_pointer, out_cost, out_memory = [0], [np.zeros(0)], [np.zeros(0, dtype=np.int32)]
     for h in range(first, last):
         own = slice(start[h], start[h + 1])
         is_dear = cost > (bounds.cut - bounds.onward[h])[vertex]
@@ -288,8 +292,8 @@ def _extend_in_numpy(
             at = at[:0]
         masks = _translated(tables, from_goal[at], h, memory[at])
         at, masks = at[masks >= 0], masks[masks >= 0]
-        if not len(at):
-            out_pointer += [len(out_cost) - 1] * (own.stop - own.start)
+        if not len(at) or own.start == own.stop:
+            out_pointer += [out_pointer[-1]] * (own.stop - own.start)
             continue
         # memories in the order in which they were met, as ties are broken by it
         place = np.arange(len(at))
@@ -302,14 +306,16 @@ def _extend_in_numpy(
         at = at[by_kind]
         table = np.minimum.reduceat(cost[at, None] + costs[vertex[at], own], begin, axis=0)
         table[~((table <= bounds.limit[own]) & (table < np.inf))] = np.inf
-        cheapest_first = np.argsort(table, axis=0, kind="stable")
-        for j, count in enumerate(np.count_nonzero(table < np.inf, axis=0).tolist()):
-            fits = cheapest_first[:count, j]
-            kept = fits[_undominated(seen[fits])]
-            out_cost += (table[kept, j] - prices[h]).tolist()
-            out_memory += seen[kept].tolist()
-            out_pointer.append(len(out_cost) - 1)
-    return np.array(out_pointer), np.array(out_cost[1:]), np.array(out_memory[1:], dtype=np.int32)
+        # (vertex, place), cheapest first
+        count = np.count_nonzero(table < np.inf, axis=0)
+        order = np.argsort(table.T, axis=1, kind="stable")[:, : count.max()]
+        kept = _undominated(seen, order) & (np.arange(order.shape[1]) < count[:, None])
+        vertices, places = np.nonzero(kept)
+        labels_of = order[vertices, places]
+        out_pointer += (np.cumsum(np.count_nonzero(kept, axis=1)) + out_pointer[-1]).tolist()
+        out_cost.append(table[labels_of, vertices] - prices[h])
+        out_memory.append(seen[labels_of])
+    return np.array(out_pointer), np.concatenate(out_cost), np.concatenate(out_memory)
 
 
 def _translated(
@@ -322,27 +328,39 @@ def _translated(
     return masks
 
 
-def _undominated(memory: npt.NDArray[np.int32]) -> Ints:
-    """Return the places of the memories that include none of those before them."""
-    if len(memory) <= COMPARED:
-        masks: list[int] = []
-        places = []
-        for place, m in enumerate(memory.tolist()):
-            for k in masks:
-                if k & m == k:
-                    break
-            else:
-                masks.append(m)
-                places.append(place)
-        return np.array(places, dtype=np.int64)
-    kept, left = [], np.arange(len(memory))
+def _undominated(memory: npt.NDArray[np.int32], order: Ints) -> Bools:
+    """Return which memories, in each row of an order, include none of those before them.
+
+    Where memories are dense among all sets of the goals in them, the first place of any subset is
+    found by a minimum over one goal after the other (Yates 1937, "The design and analysis of
+    factorial experiments").
+    """
+    used = int(np.bitwise_or.reduce(memory)) & ~int(np.bitwise_and.reduce(memory))
+    goals = [k for k in range(used.bit_length()) if used >> k & 1]
+    if 1 << len(goals) > SETS_PER_MEMORY * len(memory):
+        return np.array([_undominated_of(memory[row]) for row in order])
+    sets = np.zeros(len(memory), dtype=np.int64)
+    for place, k in enumerate(goals):
+        sets |= (memory >> k & 1) << place
+    rows, places = np.arange(len(order))[:, None], np.arange(order.shape[1], dtype=np.int32)
+    first = np.full((1 << len(goals), len(order)), len(memory), dtype=np.int32)
+    first[sets[order], rows] = places
+    for place in range(len(goals)):
+        by_goal = first.reshape(-1, 2, len(order) << place)
+        np.minimum(by_goal[:, 1], by_goal[:, 0], out=by_goal[:, 1])
+    return np.asarray(first[sets[order], rows] == places)
+
+
+def _undominated_of(memory: npt.NDArray[np.int32]) -> Bools:
+    """Return which memories include none of those before them."""
+    kept, left = np.zeros(len(memory), dtype=bool), np.arange(len(memory))
     while len(left):
         some, left = left[:COMPARED], left[COMPARED:]
-        masks_of = memory[some, None]
-        some = some[~np.triu((masks_of & masks_of.T) == masks_of, 1).any(axis=0)]
-        kept.append(some)
+        own = memory[some, None]
+        some = some[~np.triu((own & own.T) == own, 1).any(axis=0)]
+        kept[some] = True
         left = left[~((memory[left, None] & memory[some]) == memory[some]).any(axis=1)]
-    return np.concatenate(kept)
+    return kept
 
 
 @kernel
