@@ -106,6 +106,38 @@ def test_a_kernel_that_runs_long_loads_numba_and_begins_again_compiled(tmp_path)
     assert done.returncode == 0, done.stderr
 
 
+PATIENT = """
+import sys
+from concurrent.futures import ThreadPoolExecutor
+import numpy as np
+import kernels
+from netsp.compiled.compile_policy import CompilePolicy, compiled_by
+
+stop, is_kept = np.zeros(1, dtype=np.int64), sys.argv[1] == "kept"
+with compiled_by(CompilePolicy(numba_s=0.0, compile_s=60.0)):
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(kernels.fill, np.zeros(3), stop).result() == 6.0
+    assert kernels.fill(np.zeros(3), stop) == 6.0
+assert ("numba" in sys.modules) == is_kept
+assert is_kept or not kernels.fill.signatures
+"""
+
+
+def test_numba_is_loaded_only_for_code_on_disk_or_to_compile(tmp_path):
+    (tmp_path / "kernels.py").write_text(KERNELS)
+    (tmp_path / "patient.py").write_text(PATIENT)
+    cache = tmp_path / "cache" / "kernels"
+    env = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(cache.parent)}
+    for how in ("absent", "kept"):
+        done = subprocess.run(
+            [sys.executable, "patient.py", how], cwd=tmp_path, capture_output=True, text=True,
+            env=env,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        cache.mkdir(parents=True, exist_ok=True)
+        (cache / "other.nbi").touch()
+
+
 LIMITED = {
     "solve": "solve problems/pool.json",
     "solve, a mission": "solve missions/basin.json",

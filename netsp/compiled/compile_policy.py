@@ -22,7 +22,8 @@ class CompilePolicy:
     Parameters
     ----------
     numba_s : float
-        Seconds that kernels run interpreted before Numba is loaded, about as many as that takes. A
+        Seconds that kernels run interpreted before Numba is loaded to look for compiled code on
+        disk, about as many as that takes; where none is, it is loaded once it has to compile. A
         smaller number loads it for small problems, which need it little; with a larger one, large
         problems begin more slowly.
     load_s : float

@@ -1,7 +1,8 @@
 """The decorator of compiled functions.
 
 Numba takes a third of a second to load, and a small problem is solved without it. So it is loaded
-once kernels have run interpreted for about as long (`CompilePolicy.numba_s`).
+once kernels have run interpreted for about as long (`CompilePolicy.numba_s`), or, where no compiled
+code is on disk, once a kernel has run interpreted for as long as compiling it takes.
 """
 
 from __future__ import annotations
@@ -16,9 +17,10 @@ from time import thread_time
 from typing import Any, TypeVar
 
 from netsp.compiled import numba_loading
-from netsp.compiled.arguments import call_within, can_be_interpreted
-from netsp.compiled.compile_policy import current_policy
-from netsp.compiled.interpretation import interpreted
+from netsp.compiled.arguments import call_interpreted, call_within, can_be_interpreted
+from netsp.compiled.compile_policy import CompilePolicy, current_policy
+from netsp.compiled.interpretation import interpreted, names_used
+from netsp.compiled.kept_code import may_be_kept
 from netsp.compiled.overtime import Overtime
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -117,16 +119,14 @@ class Kernel:
         """Call the function, interpreted or compiled."""
         if not kwargs and "numba" not in sys.modules:
             policy = current_policy()
-            budget_s = policy.numba_s - Kernel._total_s
-            if (
-                budget_s > 0.0
-                and not policy.is_eager
-                and not threading.current_thread().name.startswith("ThreadPoolExecutor")
-                and can_be_interpreted(args, policy.max_copied_bytes)
-            ):
+            budget_s = 0.0 if policy.is_eager else self._budget_s(policy)
+            if budget_s > 0.0 and can_be_interpreted(args, policy.max_copied_bytes):
                 begin = thread_time()
-                names = self.py_func.__code__.co_varnames
                 try:
+                    if threading.current_thread().name.startswith("ThreadPoolExecutor"):
+                        # to the end: arrays that other threads write to cannot be restored
+                        return call_interpreted(interpreted(self), args)
+                    names = self.py_func.__code__.co_varnames
                     return call_within(budget_s, interpreted(self), names, args)
                 except Overtime:
                     pass
@@ -135,6 +135,14 @@ class Kernel:
                     self._early_s += spent
                     Kernel._total_s += spent
         return self.dispatcher(*args, **kwargs)
+
+    def _budget_s(self, policy: CompilePolicy) -> float:
+        """Return the CPU seconds that a call may run interpreted before Numba is loaded for it."""
+        if may_be_kept():
+            is_shared = threading.current_thread().name.startswith("ThreadPoolExecutor")
+            return 0.0 if is_shared else policy.numba_s - Kernel._total_s
+        bytecode = sum(len(f.__code__.co_code) for f in _called(self.py_func))
+        return policy.price_share * policy.price_s(bytecode) - self._early_s
 
     @property
     def dispatcher(self) -> Any:
@@ -164,6 +172,17 @@ class _LoadedKernel(Kernel):
     """A kernel for which Numba is loaded: calls go to the dispatcher, without Python in between."""
 
     __call__ = property(operator.attrgetter("_dispatcher"))  # type: ignore[assignment]
+
+
+@functools.cache
+def _called(function: Callable[..., Any]) -> frozenset[Callable[..., Any]]:
+    """Return the function of a kernel, and those of all kernels that it calls."""
+    found = {function}
+    for name in names_used(function.__code__):
+        other = getattr(function.__globals__.get(name), "py_func", None)
+        if other is not None and other not in found:
+            found |= _called(other)
+    return frozenset(found)
 
 
 def _dispatcher_of(function: Callable[..., Any]) -> Any:

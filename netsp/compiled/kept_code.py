@@ -1,0 +1,38 @@
+"""Compiled code on disk, looked for without loading Numba."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from pathlib import Path
+
+_PACKAGE = Path(__file__).resolve().parent.parent
+
+
+@cache
+def may_be_kept() -> bool:
+    """Return whether compiled code may be on disk; Numba alone knows for sure.
+
+    Looks for indexes of compiled functions where Numba keeps them: in NUMBA_CACHE_DIR, else beside
+    the sources or in the user's folder for caches. Those of other packages count, too.
+    """
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    try:
+        if chosen:
+            return any(Path(chosen).glob("*/*.nbi"))
+        return any(_PACKAGE.glob("**/__pycache__/*.nbi")) or any(
+            any(folder.glob("*/*.nbi")) for folder in _user_folders()
+        )
+    except (OSError, RuntimeError):  # no home folder, or one that cannot be read
+        return True
+
+
+def _user_folders() -> list[Path]:
+    """Return where Numba keeps compiled code on Linux, macOS and Windows if the sources' folder
+    takes no files."""
+    home = Path.home()
+    return [
+        Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache") / "numba",
+        home / "Library" / "Caches" / "numba",
+        Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local") / "numba" / "Cache",
+    ]
