@@ -136,6 +136,12 @@ def warmed_up(folder: Path, cache: Path) -> float:
     return cpu_s(folder, cache, "warm-up", "--quiet")
 
 
+def limited(folder: Path, cache: Path) -> float:
+    """Solve a problem with 20,000 classes within two seconds, which compiling counts into."""
+    maze = ROOT / "problems" / "library" / "maze-30-0.json"
+    return cpu_s(folder, cache, "solve", maze, "-o", "tour.json", "--time-limit", "2")
+
+
 def random_problem(goals: int, seed: int, folder: Path, cache: Path) -> float:
     """Solve a random world."""
     from netsp.worlds import random_world
@@ -157,6 +163,7 @@ def first_tours(worlds: int) -> Iterator[FirstUse]:
     yield FirstUse("make demo, installing included", 45.0, fresh_demo)
     yield FirstUse("execute with surprises", 15.0, executed)
     yield FirstUse("simulate missions/basin.json", 8.0, simulated)
+    yield FirstUse("solve library/maze-30-0.json, --time-limit 2", 4.0, limited)
     for problem in sorted((ROOT / "problems").glob("*.json")):
         yield FirstUse(f"solve {problem.name}", 4.0, partial(solved, problem))
     for goals in GOALS:

@@ -39,12 +39,14 @@ def started(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("has_compiled", "variable", "count"), [(True, "1", 1), (True, "0", 0), (False, "1", 0)]
+    ("has_compiled", "is_disk_full", "variable", "count"),
+    [(True, False, "1", 1), (True, False, "0", 0), (False, False, "1", 0), (True, True, "1", 0)],
 )
 def test_it_starts_after_a_command_that_compiled_unless_it_is_turned_off(
-    has_compiled, variable, count, started, monkeypatch
+    has_compiled, is_disk_full, variable, count, started, monkeypatch
 ):
     monkeypatch.setattr(TieredDispatcher, "has_compiled", has_compiled)
+    monkeypatch.setattr(TieredDispatcher, "is_disk_full", is_disk_full)
     monkeypatch.setenv(background_warm_up.VARIABLE, variable)
     background_warm_up.begin("simulate")
     assert len(started) == count
@@ -150,6 +152,18 @@ with locked(Path({str(file)!r})):
     held.communicate()
     with locked(file, wait=False) as is_held:
         assert is_held
+
+
+def test_it_ends_once_the_disk_is_full(monkeypatch):
+    def fill():
+        monkeypatch.setattr(TieredDispatcher, "is_disk_full", True)
+
+    ran = []
+    steps = [("solver a", lambda: ran.append(1)), ("b", fill), ("c", lambda: ran.append(2))]
+    monkeypatch.setattr("os.nice", lambda _: 0)
+    monkeypatch.setattr(warm_up, "steps", lambda: steps)
+    assert warm_up.run(warm_up_arguments("--after", "solve")) == 0
+    assert ran == [1]
 
 
 def test_what_a_command_needs_is_compiled_first(monkeypatch):

@@ -270,10 +270,12 @@ def test_a_full_disk_costs_the_next_command_time_and_nothing_else(monkeypatch, k
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(disk_cache.KernelFile, "_open_for_write", full)
+    monkeypatch.setattr(tiered.TieredDispatcher, "is_disk_full", False)
     monkeypatch.setattr(tiered.TieredDispatcher, "has_compiled", False)
     with everything_compiled():
         assert kernels.ratio(7, 2) == 3
     assert kernels.ratio.signatures
+    assert tiered.TieredDispatcher.is_disk_full
     assert not tiered.TieredDispatcher.has_compiled
 
 

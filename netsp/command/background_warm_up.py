@@ -28,7 +28,10 @@ def begin(command: str) -> None:
     """
     tiered = sys.modules.get("netsp.compiled.tiered")
     is_wanted = os.environ.get(VARIABLE, "1") != "0" and os.name == "posix"
-    if tiered is None or not tiered.TieredDispatcher.has_compiled or not is_wanted:
+    if tiered is None or not is_wanted:
+        return
+    kernels = tiered.TieredDispatcher
+    if not kernels.has_compiled or kernels.is_disk_full:
         return
     import subprocess
 

@@ -44,7 +44,8 @@ def run(args: argparse.Namespace) -> int:
             _compile(list(steps()), args.quiet)
         else:
             with alone() as is_alone:
-                _compile(_likely_first(list(steps()), args.after) if is_alone else [], True)
+                if is_alone:
+                    _compile_likely(args.after)
     if args.list:
         _print(times.seconds)
     return 0
@@ -69,6 +70,16 @@ def _compile(every: list[Step], quiet: bool) -> None:
             elif not quiet and (not done or now - told >= PreparationPolicy().every_s):
                 print(text, file=sys.stderr, flush=True)
                 told = now
+            step()
+
+
+def _compile_likely(command: str) -> None:
+    """Run the steps that a user of a command needs next, then the others, as long as what is
+    compiled can be kept."""
+    from netsp.compiled.tiered import TieredDispatcher
+
+    for _, step in _likely_first(list(steps()), command):
+        if not TieredDispatcher.is_disk_full:
             step()
 
 

@@ -45,12 +45,15 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         CPU seconds of `interpreted_s` from which on the disk is looked at again.
     has_compiled : bool
         Whether any kernel was compiled and kept on disk by this process; an attribute of the class.
+    is_disk_full : bool
+        Whether a compiled kernel could not be kept on disk; an attribute of the class.
     """
 
     interpreted_s = 0.0
     was_on_disk = False
     next_look_s = 0.0
     has_compiled = False
+    is_disk_full = False
 
     def _compile_for_args(self, *args: Any, **kwargs: Any) -> Callable[..., Any]:
         policy = current_policy()
@@ -95,6 +98,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
             except OSError:  # the folder takes no more files, after all was compiled
                 if types not in self.overloads:
                     raise
+                TieredDispatcher.is_disk_full = True
                 return self.overloads[types].entry_point
             TieredDispatcher.has_compiled |= file is not None
             return entry
