@@ -158,3 +158,12 @@ def test_a_change_that_an_eye_would_see_is_seen(monkeypatch, tmp_path):
     monkeypatch.undo()
     save_classes(fewer, 2, tmp_path / "fewer.png")
     assert unlike(small(tmp_path / "one.png"), small(tmp_path / "fewer.png")) > MOST
+
+
+@pytest.mark.parametrize("ending", style.FORMATS)
+def test_the_same_picture_drawn_twice_is_the_same_file(tmp_path, ending):
+    """Names of an SVG's parts are not random, and files hold no dates."""
+    files = [tmp_path / f"{k}{ending}" for k in range(2)]
+    for file in files:
+        style.save(draw_tour(WHARF), file)
+    assert files[0].read_bytes() == files[1].read_bytes()

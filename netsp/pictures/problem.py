@@ -138,7 +138,10 @@ def draw(problem: Problem, solution: Solution | None = None) -> Any:
             ax.plot(tether[:, 0], tether[:, 1], color=style.TETHER, lw=1.3)
         ax.plot(*problem.base[:2], marker="*", ms=8, color=style.BASE, mec="none")
         ax.plot(*problem.points[visit.goal + 1, :2], "o", ms=4, color=style.PATH)
-        ax.set_title(f"{k + 1}: {visit.tether_length:.4g} {problem.units}", fontsize=7, pad=2)
+        # with y given, Matplotlib does not measure ticks, of which there are none, to place it
+        ax.set_title(
+            f"{k + 1}: {visit.tether_length:.4g} {problem.units}", fontsize=7, pad=2, y=1.0
+        )
         _frame(ax, problem, solution)
     return figure
 
@@ -249,7 +252,7 @@ def save_classes(problem: Problem, goal: int, path: str | Path) -> None:
         ax.plot(*problem.base[:2], marker="*", ms=9, color=style.BASE, mec="none", zorder=4)
         ax.plot(*problem.points[goal + 1, :2], "o", ms=5, color=style.PATH, zorder=4)
         word = list(roadmap.signatures[v])
-        ax.set_title(f"{roadmap.tethers[v]:.5g} {problem.units}: {word}", fontsize=7, pad=2)
+        ax.set_title(f"{roadmap.tethers[v]:.5g} {problem.units}: {word}", fontsize=7, pad=2, y=1.0)
         _frame(ax, problem, None)
     more = f", the {len(shown)} shortest shown" if len(shown) < len(rows) else ""
     figure.suptitle(
@@ -431,7 +434,7 @@ def draw_obstacles(
     ax: Axes, problem: Problem, *, label: Callable[[int], str] | None = None,
     wrapped: tuple[int, ...] = (),
 ) -> None:  # fmt: skip
-    """Obstacles, and dotted around them the clearance, on axes of the caller.
+    """Draw obstacles, and dotted around them the clearance, on axes of the caller.
 
     Parameters
     ----------
@@ -445,6 +448,7 @@ def draw_obstacles(
 
     xmin, ymin, xmax, ymax = view(problem, None)
     small = SMALL * max(xmax - xmin, ymax - ymin)
+    corners: list[tuple[float, float]] = []
     for i, o in enumerate(steps.each(problem.obstacles)):
         look: dict[str, Any] = {"fc": style.OBSTACLE, "ec": style.EDGE, "lw": 0.6, "zorder": 1}
         if i in wrapped:
@@ -453,15 +457,18 @@ def draw_obstacles(
             if problem.clearance:
                 grown = Disk(o.center, o.radius + problem.clearance)
                 grown.set(fc="none", ec=style.EDGE, lw=0.5, ls=":", zorder=1)
-                ax.add_patch(grown)
-            ax.add_patch(Disk(o.center, o.radius, **look))
+                ax.add_artist(grown)
+            ax.add_artist(Disk(o.center, o.radius, **look))
+            (x, y), reach = o.center, o.radius + problem.clearance
+            corners += [(x - reach, y - reach), (x + reach, y + reach)]
         else:
             if problem.clearance:
                 import shapely
 
                 ring = shapely.Polygon(o.polygon).buffer(problem.clearance).exterior
                 ax.plot(*ring.xy, color=style.EDGE, lw=0.5, ls=":", zorder=1)
-            ax.add_patch(Patch(o.polygon, closed=True, **look))
+            ax.add_artist(Patch(o.polygon, closed=True, **look))
+            corners += o.polygon
         if label is not None:
             inside = not isinstance(o, Circle) or o.radius >= small
             place: dict[str, Any] = (
@@ -473,6 +480,8 @@ def draw_obstacles(
                 label(i), o.representative_point, fontsize=6, color=style.BASE, zorder=6,
                 clip_on=True, path_effects=style.halo(), **place,
             )  # fmt: skip
+    # `add_patch` would measure the curves of each obstacle
+    ax.update_datalim(corners)
 
 
 def _arrows(ax: Axes, path: Any, count: int) -> None:

@@ -74,8 +74,8 @@ def save(figure: Any, path: str | Path, dpi: int = 150) -> None:
     if Path(path).exists() and not Path(path).is_file():
         raise InputError(f"{path}: cannot be written: expected a file, not a device or a folder")
     try:
-        metadata = {"Date": None} if Path(path).suffix.lower() == ".svg" else None
-        _write(figure, path, dpi=dpi, metadata=metadata)
+        dates = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+        _write(figure, path, dpi=dpi, metadata=dates.get(Path(path).suffix.lower()))
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
@@ -104,7 +104,10 @@ def svg(figure: Any, **more: Any) -> str:
 def _write(figure: Any, target: Any, **more: Any) -> None:
     """Save without Matplotlib's remarks on letters that no font has and names that leave no room:
     the first show as boxes, the second are cut."""
-    with warnings.catch_warnings():
+    from matplotlib import rc_context
+
+    # without a salt the names of an SVG's parts are random
+    with warnings.catch_warnings(), rc_context({"svg.hashsalt": "netsp"}):
         warnings.filterwarnings("ignore", message=r"Glyph \d+|constrained_layout not applied")
         with _steps_told(figure):
             literal(figure).savefig(target, **more)
