@@ -144,6 +144,7 @@ LIMITED = {
     "tether": "tether problems/pool.json",
     "base": "base problems/pool.json --grid 2,2",
     "gtsp": "gtsp examples/7ring28.gtsp",
+    "cover": "cover scenes/basin.json --anchor=-1,4.5,-1",
 }
 
 
