@@ -111,7 +111,7 @@ def everything_compiled() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def long_work(price_share: float = 0.05, numpy_share: float = 0.3) -> Iterator[None]:
+def long_work(price_share: float = 0.1, numpy_share: float = 0.2) -> Iterator[None]:
     """Compile kernels soon while the body runs, because its work is known to be long.
 
     Parameters
