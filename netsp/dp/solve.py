@@ -17,6 +17,7 @@ import numpy as np
 
 from netsp.arrangement import keeps
 from netsp.arrays import Floats
+from netsp.dp.handover import Handover
 from netsp.dp.walks import Walks
 from netsp.errors import InputError
 from netsp.solving.legcosts import MEASURE_AT_ONCE, LegCosts
@@ -45,6 +46,9 @@ SHRINK = 0.95
 
 MOST_CELLS = 100_000_000
 """Most (goal, goal, vertex) cells: tables of 0.8 GiB."""
+
+NO_HANDOVER = Handover()
+"""Walks prove all that they can."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +118,7 @@ def fits(graph: TravelGraph) -> bool:
     return (graph.goal_count + 1) ** 2 * len(graph) <= MOST_CELLS
 
 
-def bound_by_walks(run: SearchingRun, costs: LegCosts, *, few_legs: int = 0) -> None:
+def bound_by_walks(run: SearchingRun, costs: LegCosts, *, handover: Handover = NO_HANDOVER) -> None:
     """Raise the bound of a run and forget vertices, until the proof is done or progress stalls, or
     few legs are left that are all measured: what is proven of those is up to the caller."""
     before = run.graph.before
@@ -169,7 +173,7 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts, *, few_legs: int = 0) -> 
             history.clear()
         elif stalls:
             return
-        if costs.exact is None and len(costs) * (len(costs) - 1) // 2 <= few_legs:
+        if costs.exact is None and handover.is_due(len(costs), walk.labels):
             return
         widened = walk.labels < MOST_LABELS and walks.memory.widen(goals.tolist())
         if once:  # in an order that is not allowed, which prices cannot mend

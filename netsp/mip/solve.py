@@ -16,6 +16,7 @@ import numpy as np
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import Clock
+from netsp.dp.handover import Handover
 from netsp.dp.solve import bound_by_walks
 from netsp.lns import Search
 from netsp.mip.branching import Tree
@@ -93,8 +94,8 @@ it has closed such gaps."""
 SEARCH_AGAIN = 0.5
 """Share of the last gap at which the classes that the LP visits are searched once more."""
 
-FEW_LEGS = 600
-"""So few legs are left to cuts, where walks that remember ever more take long over them."""
+HANDOVER = Handover(few_legs=600, some_legs=10_000, max_labels=40_000)
+"""When walks leave the rest of the proof to cuts."""
 
 CORE_FIRST = 3000
 """With more vertices a first bound, and a proof over a core of them, come before that over all,
@@ -215,7 +216,7 @@ class MipRun(SearchingRun):
             self.search(costs)
             self.report("heuristic", vertices=len(costs))
         if walks and costs.rows is None:
-            bound_by_walks(self, costs, few_legs=FEW_LEGS)
+            bound_by_walks(self, costs, handover=HANDOVER)
         if not (self.done or self.infeasible):
             self.cut(costs, backend, warm)
 

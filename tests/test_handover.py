@@ -1,0 +1,43 @@
+"""When walks leave the rest of a proof to cutting planes."""
+
+import importlib
+from dataclasses import fields
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from netsp import solve_graph, travel_graph
+from netsp.dp.handover import Handover
+from netsp.errors import InputError
+from tests.worlds import random_world
+
+MIP = importlib.import_module("netsp.mip.solve")
+
+
+@given(st.integers(1, 200), st.integers(0, 10**6))
+def test_cuts_take_over_where_legs_are_few_or_labels_many(vertices, labels):
+    handover = Handover(few_legs=600, some_legs=10_000, max_labels=40_000)
+    legs = vertices * (vertices - 1) // 2
+    assert handover.is_due(vertices, labels) == (
+        legs <= 600 or (legs <= 10_000 and labels > 40_000)
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_tours_are_proven_alike_by_walks_and_by_cuts_that_take_over_at_once(seed, monkeypatch):
+    graph = travel_graph(random_world(seed, circles=10, goals=13, tether=300.0))
+    by_walks = solve_graph(graph, "auto")
+    monkeypatch.setattr(MIP, "HANDOVER", Handover(some_legs=10**6))
+    stages = []
+    by_cuts = solve_graph(graph, "auto", on_progress=lambda p: stages.append(p.stage))
+    assert stages.count("walks") == 1
+    assert "root" in stages
+    assert by_cuts.status == by_walks.status == "optimal"
+    assert by_cuts.length == pytest.approx(by_walks.length, rel=1e-9)
+
+
+@pytest.mark.parametrize("field", [f.name for f in fields(Handover)])
+def test_a_handover_has_no_negative_numbers(field):
+    with pytest.raises(InputError, match=f"{field}: expected a number that is not negative"):
+        Handover(**{field: -1})
