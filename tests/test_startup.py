@@ -156,3 +156,18 @@ def test_a_limit_counts_from_the_start_of_the_command(command, monkeypatch):
     monkeypatch.setattr(Clock, "policy", TimingPolicy(untimed_steps=0, grace_s=0.0))
     monkeypatch.chdir(ROOT)
     assert main.main([*LIMITED[command].split(), "--time-limit", "100", "--quiet"]) == 4
+
+
+FIGURES = """
+import sys
+from netsp.pictures.style import load_matplotlib
+load_matplotlib()
+from matplotlib import artist, figure
+assert figure.Figure().subplots().plot([0], [1]) and "alpha" in artist.kwdoc(artist.Artist)
+assert "pyplot" not in " ".join(sys.modules)
+"""
+
+
+def test_figures_are_loaded_without_pyplot_and_matplotlib_is_left_as_it_was():
+    done = subprocess.run([sys.executable, "-c", FIGURES], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -226,6 +226,8 @@ def run(args: argparse.Namespace) -> int:
         else:
             sys.stdout.write(text)
             sys.stdout.flush()
+    if args.plot or args.plot_trace:
+        style.load_matplotlib()
     if args.plot:
         plotting.save(problem, solution, args.plot)
     if args.plot_trace:

@@ -80,6 +80,19 @@ def save(figure: Any, path: str | Path, dpi: int = 150) -> None:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
+def load_matplotlib() -> None:
+    """Load Matplotlib's figures without the docstrings of their setters, which take a fifth of the
+    time to load; for commands, whose users do not read them."""
+    from matplotlib import artist as artists
+
+    kwdoc = artists.kwdoc
+    try:
+        artists.kwdoc = lambda artist: ""
+        import matplotlib.figure  # noqa: F401
+    finally:
+        artists.kwdoc = kwdoc
+
+
 def halo() -> list[Any]:
     """A white edge around letters, so that lines may pass beneath them."""
     from matplotlib.patheffects import withStroke
