@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import functools
 import importlib.util
 import math
 import os
@@ -366,7 +367,7 @@ def test_sides_of_parity_cuts_are_changed_alike_in_loops_and_at_once(pairs, flow
 
 @given(st.data())
 @settings(deadline=None, max_examples=30)
-def test_labels_are_extended_alike_in_loops_and_at_once(data):
+def test_labels_are_extended_and_joined_alike_in_loops_and_at_once(data):
     sizes = data.draw(st.lists(st.integers(1, 3), min_size=2, max_size=5))
     cluster = np.repeat(np.arange(len(sizes) + 1), [1, *sizes])
     costs = np.array(data.draw(st.lists(
@@ -379,16 +380,17 @@ def test_labels_are_extended_alike_in_loops_and_at_once(data):
     ))])  # fmt: skip
     cutoff = data.draw(st.sampled_from([5.0, 8.0, math.inf]))
 
-    def both(*args):
+    def both(kernel, *args):
         with np.errstate(all="ignore"):
-            by_loops, at_once = _loops(labels.extend)(*args), interpreted(labels.extend)(*args)
-        for one, other in zip(by_loops, at_once, strict=True):
+            by_loops, at_once = _loops(kernel)(*args), interpreted(kernel)(*args)
+        for one, other in zip(_arrays(by_loops), _arrays(at_once), strict=True):
             assert one.dtype == other.dtype
             assert one.tobytes() == other.tobytes()
         return at_once
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(walks, "extend", both)
+        for name in ("extend", "join", "step_back"):
+            patch.setattr(walks, name, functools.partial(both, getattr(labels, name)))
         walk.solve(prices, cutoff, lambda: None)
 
 
