@@ -19,13 +19,16 @@ import glob
 import hashlib
 import pickle
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from numba import njit
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+FORMAT = 2
+"""Format of the files; those of another one are compiled anew."""
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _IMPORTS = re.compile(r"^from (netsp[\w.]*) import (\([^)]*\)|[^\n]*)", re.M)
@@ -99,7 +102,7 @@ def keep_on_disk(dispatcher: Any, function: Callable[..., Any]) -> None:
     dispatcher._cache._cache_file = KernelFile(
         kept._cache_path,
         kept._index_name.removesuffix(".nbi"),
-        (kept._source_stamp, stamps(Path(function.__code__.co_filename))),
+        (kept._source_stamp, stamps(Path(function.__code__.co_filename)), FORMAT),
     )
 
 
@@ -148,7 +151,7 @@ def _file_of(dispatcher: Any) -> KernelFile | None:
     return file if isinstance(file, KernelFile) else None
 
 
-def cached(function: Callable[..., Any]) -> Any:
+def cached(function: Callable[..., Any], options: Mapping[str, bool]) -> Any:
     """Return Numba's dispatcher of a function, which keeps its compiled code on disk where any
     folder takes files.
 
@@ -156,11 +159,13 @@ def cached(function: Callable[..., Any]) -> Any:
     ----------
     function : callable
         The function.
+    options : dict
+        Options of Numba.
     """
     try:
-        return njit(cache=True, nogil=True)(function)
+        return njit(cache=True, **options)(function)
     except RuntimeError:  # neither the package nor the user has a folder that takes files
-        return njit(nogil=True)(function)
+        return njit(**options)(function)
 
 
 @cache
@@ -181,7 +186,7 @@ def is_supported() -> bool:
     fields = {"_cache_path", "_index_name", "_index_path", "_source_stamp"}
     try:
         kept = IndexDataCacheFile("", "probe", None)
-        cache = cached(probe)._cache
+        cache = cached(probe, {})._cache
     except (AttributeError, TypeError):
         return False
     return (

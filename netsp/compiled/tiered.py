@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
-from functools import cache
+from functools import cache, cached_property, partial
 from time import thread_time
 from typing import Any
 
@@ -17,14 +17,14 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.types import Boolean, Integer, unliteral  # type: ignore[attr-defined]
 
-from netsp.compiled import disk_cache
+from netsp.compiled import disk_cache, linked_library
 from netsp.compiled.arguments import call_interpreted, call_within, can_be_interpreted
 from netsp.compiled.compile_lock import is_locked, locked
 from netsp.compiled.compile_policy import compiles, current_policy
 from netsp.compiled.interpretation import interpreted, is_in_numpy, names_used
 from netsp.compiled.overtime import Overtime
 
-OVERRIDDEN = ("compile", "get_call_template")
+OVERRIDDEN = ("compile", "get_call_template", "add_overload")
 """Methods of Numba's dispatcher that `TieredDispatcher` refines."""
 
 
@@ -55,6 +55,24 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
     has_compiled = False
     is_disk_full = False
 
+    _is_for_kernel = False
+    """Whether a kernel that calls this one is being compiled."""
+
+    @cached_property
+    def entry(self) -> Any:
+        """The dispatcher of what Python calls: a function that calls this one, or this one."""
+        if not linked_library.is_supported():
+            return self
+        made = linked_library.entry_of(self, self.py_func)
+        disk_cache.keep_on_disk(made, made.py_func)
+        return made
+
+    @property
+    def signatures(self) -> list[Any]:
+        """The argument types that the function was compiled or loaded for."""
+        called = vars(self).get("entry", self).overloads
+        return list(dict.fromkeys([*self.overloads, *called]))
+
     def _compile_for_args(self, *args: Any, **kwargs: Any) -> Callable[..., Any]:
         policy = current_policy()
         if policy.is_eager or kwargs:
@@ -67,7 +85,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         budget_s -= self.interpreted_s
         is_shared = threading.current_thread().name.startswith("ThreadPoolExecutor")
         can_be = can_be_interpreted(args, policy.max_copied_bytes)
-        if budget_s <= 0.0 and not on_disk and is_locked(disk_cache.lock_file(self)):
+        if budget_s <= 0.0 and not on_disk and self._is_locked():
             budget_s = policy.price_s(self.bytecode())  # another process compiles it just now
         if budget_s <= 0.0 or not can_be or (is_shared and on_disk):
             return self._compiled(args, kwargs)
@@ -78,7 +96,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         the function ran interpreted for the last so many seconds."""
         if not self.was_on_disk and self.interpreted_s >= self.next_look_s:
             types = _general(self.typeof_pyval(a) for a in args)
-            self.was_on_disk = disk_cache.is_on_disk(self, types)
+            self.was_on_disk = disk_cache.is_on_disk(self.entry, types)
             self.next_look_s = self.interpreted_s + look_s
         return self.was_on_disk
 
@@ -89,25 +107,49 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         of 32 bits is compiled once.
         """
         types = _general(sig) if isinstance(sig, tuple) else sig
-        if types in self.overloads or disk_cache.is_on_disk(self, types):
-            return super().compile(types)
-        file = disk_cache.lock_file(self)
+        if not linked_library.is_supported():
+            return self._compiled_as(self, types)
+        with global_compiler_lock, linked_library.linked_libraries():
+            if self._is_for_kernel:
+                return self._compiled_as(self, types)
+            called = self._compiled_as(self.entry, types)
+            self._insert([kind._code for kind in types], called, False)
+            return called
+
+    def _compiled_as(self, dispatcher: Any, types: tuple[Any, ...]) -> Any:
+        """Compile for argument types, or load: this kernel, or its entry."""
+        compile_now = partial(CPUDispatcher.compile, dispatcher, types)
+        if types in dispatcher.overloads or disk_cache.is_on_disk(dispatcher, types):
+            return compile_now()
+        file = disk_cache.lock_file(dispatcher)
         with global_compiler_lock, locked(file):
             try:
-                entry = super().compile(types)
+                entry = compile_now()
             except OSError:  # the folder takes no more files, after all was compiled
-                if types not in self.overloads:
+                if types not in dispatcher.overloads:
                     raise
                 TieredDispatcher.is_disk_full = True
-                return self.overloads[types].entry_point
+                return dispatcher.overloads[types].entry_point
             TieredDispatcher.has_compiled |= file is not None
             return entry
 
+    def add_overload(self, result: Any) -> None:
+        """Take in what was compiled or loaded; Python cannot call what has no machine code."""
+        if linked_library.is_linked_only(result):
+            self.overloads[tuple(result.signature.args)] = result
+        else:
+            super().add_overload(result)
+
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Return what Numba needs to compile a call of this kernel by another one."""
-        return super().get_call_template(
-            _general(args), dict(zip(kws, _general(kws.values()), strict=True))
-        )
+        with global_compiler_lock:
+            before, self._is_for_kernel = self._is_for_kernel, True
+            try:
+                return super().get_call_template(
+                    _general(args), dict(zip(kws, _general(kws.values()), strict=True))
+                )
+            finally:
+                self._is_for_kernel = before
 
     def _compiled(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Callable[..., Any]:
         return super()._compile_for_args(*args, **kwargs)  # type: ignore[no-any-return]
@@ -140,7 +182,11 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
     def bytecode(self) -> int:
         """Return the bytes of the function's bytecode, with the kernels that it calls and that are
         not compiled."""
-        return sum(len(k.py_func.__code__.co_code) for k in _called(self) if not k.overloads)
+        return sum(len(k.py_func.__code__.co_code) for k in _called(self) if not k.signatures)
+
+    def _is_locked(self) -> bool:
+        """Return whether another process compiles the function."""
+        return any(is_locked(disk_cache.lock_file(d)) for d in {self, self.entry})
 
 
 def _general(types: Iterable[Any]) -> tuple[Any, ...]:
