@@ -19,9 +19,11 @@ from typing import Any
 
 import llvmlite.binding as llvm
 from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Flags
 from numba.core.dispatcher import Dispatcher
 from numba.core.environment import lookup_environment
 from numba.core.registry import cpu_target
+from numba.core.targetconfig import TargetConfig
 
 from netsp.compiled.disk_cache import cached
 
@@ -30,6 +32,10 @@ LINKED = {"nogil": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 ENTRY = {"nogil": True, "no_cfunc_wrapper": True}
 """Options of Numba for functions that Python calls."""
+
+FIRST_LEVEL = 1
+"""LLVM's level of optimisation for single functions, before they are linked; Numba's is 3, which
+takes twice as long. Linked code is optimised at Numba's level."""
 
 _WRAPPER = "_ZN7cpython"  # how the names of wrappers for Python begin
 _ENVIRONMENT = "_ZN08NumbaEnv"  # how the names of the variables of environments begin
@@ -88,7 +94,7 @@ class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
         ll_module.data_layout = self._codegen._data_layout
         for function in ll_module.functions:
             if not function.is_declaration:
-                passes, builder = self._codegen._function_pass_manager()
+                passes, builder = self._codegen._function_pass_manager(opt=FIRST_LEVEL)
                 passes.run(function, builder)
 
     @classmethod
@@ -124,14 +130,37 @@ def linked_libraries() -> Iterator[None]:
     """
     codegen = cpu_target.target_context.codegen()
     before, is_collecting = codegen._library_class, gc.isenabled()
+    if before is LinkedLibrary:
+        yield
+        return
     codegen._library_class = LinkedLibrary
+    Flags.__eq__, Flags.__hash__ = _are_equal, _hash_of  # type: ignore[method-assign,assignment]
     gc.disable()
     try:
         yield
     finally:
         codegen._library_class = before
+        del Flags.__eq__, Flags.__hash__
         if is_collecting:
             gc.enable()
+
+
+def _are_equal(flags: Any, others: Any) -> Any:
+    """Return whether two sets of flags are equal, as Numba does, which compares them millions of
+    times and looks up all flags each time."""
+    if isinstance(others, Flags) and flags._values == others._values:
+        return True
+    return TargetConfig.__eq__(flags, others)
+
+
+@cache
+def _hash_of_names() -> int:
+    return TargetConfig.__hash__(Flags())
+
+
+def _hash_of(flags: Any) -> int:
+    """Return the hash of a set of flags, as Numba does, which is one of the names of all flags."""
+    return _hash_of_names()
 
 
 def is_linked_only(result: Any) -> bool:
@@ -169,6 +198,8 @@ def is_supported() -> bool:
     codegen = cpu_target.target_context.codegen()
     library = codegen.create_library("probe")
     passes = getattr(codegen, "_function_pass_manager", None)
+    flags, others = Flags(), Flags()
+    others.nrt = True
     return (
         getattr(codegen, "_library_class", None) is JITCodeLibrary
         and all(hasattr(library, name) for name in _NEEDED_OF_LIBRARIES)
@@ -177,6 +208,9 @@ def is_supported() -> bool:
         and callable(getattr(Dispatcher, "_insert", None))
         and callable(passes)
         and "ll_module" not in inspect.signature(passes).parameters
+        and not {"__eq__", "__hash__"} & set(vars(Flags))
+        and TargetConfig.__hash__(flags) == TargetConfig.__hash__(others)
+        and hasattr(flags, "_values")
     )
 
 

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Bools, Floats, Ints
+from netsp.compiled.growing import order_of, write_floats
 from netsp.compiled.interpretation import interprets
 from netsp.compiled.kernel import kernel
 from netsp.dp.memory import CHUNK
@@ -225,7 +226,7 @@ def extend(
                         slots += 1
                         if slots * size > table_room:
                             bigger = np.empty(2 * slots * size)
-                            bigger[:table_room] = table
+                            write_floats(bigger, table, table_room)
                             table, table_room = bigger, len(bigger)
                         table[s * size : slots * size] = np.inf
                     row = table[s * size : (s + 1) * size]
@@ -244,7 +245,7 @@ def extend(
             if found == 0:
                 continue
             own = used_up
-            for i in np.argsort(found_cost[:found], kind="mergesort"):
+            for i in order_of(found_cost[:found]):
                 m = found_memory[i]
                 dominated = False
                 for label in range(own, used_up):
@@ -255,7 +256,9 @@ def extend(
                     continue
                 if used_up == room:
                     more_cost, more_memory = np.empty(2 * room), np.empty(2 * room, dtype=np.int32)
-                    more_cost[:room], more_memory[:room] = out_cost, out_memory
+                    write_floats(more_cost, out_cost, room)
+                    for k in range(room):
+                        more_memory[k] = out_memory[k]
                     out_cost, out_memory, room = more_cost, more_memory, 2 * room
                 out_cost[used_up], out_memory[used_up] = found_cost[i] - prices[h], m
                 used_up += 1

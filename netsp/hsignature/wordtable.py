@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from netsp.arrays import Ints
-from netsp.compiled.growing import more_int_rows
+from netsp.compiled.growing import more_int_rows, write_ints
 from netsp.compiled.kernel import kernel
 from netsp.hsignature.words import Word
 
@@ -166,7 +166,7 @@ def _rewritten(table: Table, rules: Rules, number: int, letter: int) -> tuple[in
             continue
         if n == len(kept):
             more = np.empty(2 * len(kept), dtype=np.int64)
-            more[:n] = kept
+            write_ints(more, kept, n)
             kept = more
         kept[n] = x
         n += 1
@@ -184,7 +184,7 @@ def _rewritten(table: Table, rules: Rules, number: int, letter: int) -> tuple[in
                 begin, size = rules.right_at[r], rules.right_at[r + 1] - rules.right_at[r]
                 if left + size > len(todo):
                     more = np.empty(2 * (left + size), dtype=np.int64)
-                    more[:left] = todo[:left]
+                    write_ints(more, todo, left)
                     todo = more
                 for k in range(size):
                     todo[left + k] = rules.right[begin + size - 1 - k]

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Bools, Floats, Ints
+from netsp.compiled.growing import write_ints
 from netsp.compiled.kernel import kernel
 from netsp.lns.layers import best_classes
 from netsp.lns.links import Links, Tables, best_place, link, put, take_out, write_order
@@ -57,7 +58,7 @@ def descend(
             measured = link(work, links, start, costs, row)
             if measured < length:
                 length = measured
-                order[:] = work
+                write_ints(order, work, len(order))
             else:
                 link(order, links, start, costs, row)
                 improved = False
@@ -113,13 +114,14 @@ def two_opt(order: Ints, tables: Tables, stop: Ints) -> float:
                 old = costs[tour[i - 1], tour[i]] + costs[tour[j], tour[after]]
                 if nearest[order[i - 1], order[j]] + nearest[order[i], order[after]] >= old:
                     continue
-                work[i : j + 1] = order[i : j + 1][::-1]
+                for k in range(i, j + 1):
+                    work[k] = order[i + j - k]
                 d, instead = best_classes(work[1:], start, costs)
                 if d < length * (1.0 - tables.min_gain):
                     length, tour, improved = d, instead, True
-                    order[i : j + 1] = work[i : j + 1]
+                    write_ints(order[i:], work[i:], j + 1 - i)
                 else:
-                    work[i : j + 1] = order[i : j + 1]
+                    write_ints(work[i:], order[i:], j + 1 - i)
     return float(length)
 
 

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from netsp.arrays import Floats, Ints
 from netsp.compiled.chance import below, uniform
+from netsp.compiled.growing import write_floats, write_ints, write_rows
 from netsp.compiled.kernel import kernel
 from netsp.lns.layers import best_classes
 from netsp.lns.links import Links, Tables, best_place, carry_on, put, tour_length, write_order
@@ -118,9 +119,7 @@ def ruin_and_recreate(
             )  # fmt: skip
             d += put(gone[r], p, after, prior, start, costs, ahead, behind, grown, rest, row)
         if d < length - theta * math.log(max(uniform(chance), 1e-300)):
-            links.after[:], links.prior[:] = after, prior
-            links.ahead[:], links.behind[:] = ahead, behind
-            links.grown[:], links.rest[:] = grown, rest
+            _write(links, Links(after, prior, ahead, behind, grown, rest))
             length = tour_length(after, grown)
             if length < best_length * (1.0 - 1e-12) and (
                 best_length - length > rounding or _is_shorter(after, best, start, costs, work)
@@ -128,11 +127,20 @@ def ruin_and_recreate(
                 best_length = length
                 write_order(after, best)
         else:
-            after[:], prior[:] = links.after, links.prior
-            ahead[:], behind[:] = links.ahead, links.behind
-            grown[:], rest[:] = links.grown, links.rest
+            _write(Links(after, prior, ahead, behind, grown, rest), links)
     write_order(links.after, order)
     return length, best_length
+
+
+@kernel
+def _write(to: Links, links: Links) -> None:
+    """Copy links to others."""
+    write_ints(to.after, links.after, len(links.after))
+    write_ints(to.prior, links.prior, len(links.prior))
+    write_rows(to.ahead, links.ahead, len(links.ahead))
+    write_rows(to.behind, links.behind, len(links.behind))
+    write_floats(to.grown, links.grown, len(links.grown))
+    write_floats(to.rest, links.rest, len(links.rest))
 
 
 @kernel

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
+from netsp.compiled.growing import order_of
 from netsp.compiled.kernel import kernel
 
 TINY = 1e-11
@@ -128,11 +129,11 @@ def min_cuts(
                 queue[high] = w
                 high += 1
             a = following[a]
-    far = np.full(max(cluster.max(), wanted.max() if len(wanted) else 0) + 1, nodes + 1)
+    far = np.full(max(cluster.max(), wanted.max() if len(wanted) else 0) + 1, nodes + 1.0)
     for v in range(n):
         far[cluster[v]] = min(far[cluster[v]], level[node[v]])
     met = np.zeros(nodes, dtype=np.bool_)
-    for c in wanted[np.argsort(far[wanted], kind="mergesort")]:
+    for c in wanted[order_of(far[wanted])]:
         rest[2 * edges :] = 0.0
         last, in_one = -1, True
         for v in range(n):

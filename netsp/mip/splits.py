@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
+from netsp.compiled.growing import order_of
 from netsp.compiled.kernel import kernel
 from netsp.mip.overcells import Cells
 from netsp.mip.towers import Tower
@@ -140,7 +141,7 @@ def frustration(ends: Ints, excess: Floats, sides: Bools) -> float:
         if sides[v, 0] != sides[v, 1]:
             parent[v], turned[v] = m, np.int64(sides[v, 1])
     clear = np.abs(excess[:, 0] - excess[:, 1])
-    for e in np.argsort(-clear, kind="mergesort"):
+    for e in order_of(-clear):
         u, v = ends[e]
         change = np.int64(excess[e, 1] < excess[e, 0])
         while parent[u] != u:

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Bools, Floats, Ints
+from netsp.compiled.growing import order_of
 from netsp.compiled.kernel import kernel
 from netsp.memory import ask
 
@@ -294,8 +295,10 @@ def _cheapest(most: int, rows: Rows) -> Ints:
     size = 0
     for u in range(len(rows.first)):
         first = rows.first[u]
-        order = np.argsort(rows.cost[first : first + rows.size[u]], kind="mergesort")
-        for k in order[:most]:
+        cost = np.empty(rows.size[u])
+        for k in range(rows.size[u]):
+            cost[k] = rows.cost[first + k]
+        for k in order_of(cost)[:most]:
             out[size, 0], out[size, 1] = u, rows.other[first + k]
             size += 1
     return out[:size].copy()

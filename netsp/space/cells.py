@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import Flag, abandoned, end_if_abandoned
+from netsp.compiled.growing import write_ints
 from netsp.compiled.kernel import kernel
 from netsp.errors import InputError
 from netsp.online.scene.field import DistanceField
@@ -152,7 +153,7 @@ def complex_of(
                 for axis in range(3):
                     if at[axis] == last[axis]:
                         continue
-                    to[:] = at
+                    write_ints(to, at, 3)
                     to[axis] += 1
                     if not flags[to[0], to[1], to[2]] & FREE:
                         continue
@@ -179,11 +180,11 @@ def complex_of(
                         continue
                     if not (flags[i, j, k] & (EDGE << a) and flags[i, j, k] & (EDGE << b)):
                         continue
-                    to[:] = at
+                    write_ints(to, at, 3)
                     to[a] += 1
                     if not flags[to[0], to[1], to[2]] & (EDGE << b):
                         continue
-                    to[:] = at
+                    write_ints(to, at, 3)
                     to[b] += 1
                     if not flags[to[0], to[1], to[2]] & (EDGE << a):
                         continue

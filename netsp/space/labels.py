@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from netsp.arrays import Bools, Ints
 from netsp.clock import Flag
-from netsp.compiled.growing import more_int_rows
+from netsp.compiled.growing import more_int_rows, write_ints
 from netsp.compiled.kernel import kernel
 from netsp.hsignature.wordtable import Rules, Table, times, times_inverse, times_letter
 from netsp.space.cells import EDGE, FREE, OPEN, SQUARE
@@ -260,7 +260,7 @@ def upper_end(cell: int, axis: int, ny: int, nz: int) -> int:
 def longer_ints(a: Ints) -> Ints:
     """The same with room for twice as many."""
     b = np.empty(2 * len(a), dtype=np.int64)
-    b[: len(a)] = a
+    write_ints(b, a, len(a))
     return b
 
 
@@ -354,7 +354,8 @@ def relations(
                 continue
             if word >= len(seen):
                 more = np.zeros(2 * word, dtype=np.bool_)
-                more[: len(seen)] = seen
+                for k in range(len(seen)):
+                    more[k] = seen[k]
                 seen = more
             if not seen[word]:
                 seen[word] = True

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from netsp.arrays import Floats, Ints
+from netsp.compiled.growing import order_of
 from netsp.compiled.kernel import kernel
 from netsp.hsignature.wordtable import Rules, Table, times, times_inverse
 from netsp.online.scene.sampling import Field, distance
@@ -108,7 +109,7 @@ def held(
                     far[count] = (p[0] - c[0]) ** 2 + (p[1] - c[1]) ** 2 + (p[2] - c[2]) ** 2
                     cells[count] = (i * ny + j) * nz + k
                     count += 1
-    for n in np.argsort(far[:count], kind="mergesort"):
+    for n in order_of(far[:count]):
         i, j, k = cells[n] // (ny * nz), cells[n] // nz % ny, cells[n] % nz
         c = centre_of(low, cell, i, j, k)
         if triangle_free(field, p, p, c, fine, into):

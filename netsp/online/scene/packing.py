@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats, Ints, Singles
+from netsp.compiled.growing import write_ints
 from netsp.compiled.kernel import kernel
 from netsp.online.scene.grid import SIDE, VoxelGrid
 from netsp.online.scene.solids import PRISM, solid_distance
@@ -132,8 +133,7 @@ def candidates(data: Floats) -> tuple[Ints, Ints]:
                     least = min(least, found[n])
                 if size + count > len(items):
                     more = np.empty(2 * len(items) + count, dtype=np.int64)
-                    for n in range(size):  # a slice would compile NumPy's error messages
-                        more[n] = items[n]
+                    write_ints(more, items, size)
                     items = more
                 for n in range(count):
                     if found[n] <= least + reach:

@@ -17,6 +17,7 @@ import math
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.compiled.growing import write_rows
 from netsp.compiled.kernel import kernel
 from netsp.online.scene.packing import VOXELS
 from netsp.online.scene.sampling import Field
@@ -47,7 +48,7 @@ def cut_off(field: Field, strand: Floats, count: int, settings: PullSettings) ->
     length, least = strand_length(strand, count), math.inf
     room = 4 * count + 64
     copy, n = np.zeros((count + 16, WIDTH)), count
-    copy[:count] = strand[:count]
+    write_rows(copy, strand, count)
     in_vain, worth = 0, ENOUGH * length
     for _ in range(TURNS):
         copy, n = mend(field, copy, n, slip, room, CUT * slip)

@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats
+from netsp.compiled.growing import write_rows
 from netsp.compiled.kernel import kernel
 from netsp.errors import InputError
 from netsp.geometry import polylines
@@ -227,7 +228,7 @@ def _shortcut(
         pieces = max(1, math.ceil(length / delta))
         while size + pieces > len(out):
             more = np.empty((2 * len(out), 3))
-            more[:size] = out[:size]
+            write_rows(more, out, size)
             out = more
         for p in range(1, pieces + 1):
             out[size] = nodes[i] + (nodes[j] - nodes[i]) * (p / pieces)

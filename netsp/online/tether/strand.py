@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.compiled.growing import write_rows
 from netsp.compiled.kernel import kernel
 from netsp.online.scene.sampling import Field, distance, lowest_along, sample
 
@@ -63,7 +64,7 @@ def grown(strand: Floats, count: int) -> Floats:
     if count < len(strand):
         return strand
     out = np.zeros((2 * len(strand) + 8, WIDTH))
-    out[:count] = strand[:count]
+    write_rows(out, strand, count)
     return out
 
 

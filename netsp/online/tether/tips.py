@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from netsp.arrays import Floats
+from netsp.compiled.growing import write_rows
 from netsp.compiled.kernel import kernel
 from netsp.online.scene.packing import VOXELS
 from netsp.online.scene.sampling import Field
@@ -82,7 +83,7 @@ def nudge(
                         continue
                     same = 1.0 if ux * vx + uy * vy + uz * vz > 0.0 else -1.0
                     vx, vy, vz = same * ux, same * uy, same * uz
-                strand[:count] = kept
+                write_rows(strand, kept, count)
         i = j + 1
     return strand, count, False
 

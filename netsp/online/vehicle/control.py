@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.compiled.growing import write_floats, write_rows
 from netsp.compiled.kernel import kernel
 from netsp.online.vehicle.dynamics import ALLOCATION, THRUST, linearised, step_into
 
@@ -58,14 +59,14 @@ def improved(
     """The thrusts after one iteration, from those (n, m) of the step before."""
     n, m = last.shape
     guess = np.empty((n, m))
-    guess[:-1] = last[1:]
-    guess[-1] = last[-1]
+    write_rows(guess, last[1:], n - 1)
+    write_floats(guess[-1], last[-1], m)
     forces = np.zeros((n, 4))
     for k in range(n):
         for i in range(m):
             forces[k] += guess[k, i] * allocation[:, i]
     states, room = np.empty((n + 1, 8)), np.empty((5, 8))
-    states[0] = state
+    write_floats(states[0], state, 8)
     for k in range(n):
         step_into(states[k + 1], states[k], forces[k], water, DT, room)
     by_state, by_force = linearised(states, forces, water, DT)
@@ -91,7 +92,8 @@ def improved(
                 wish[j] -= CHANGE_COST * (guess[k + 1, i] - guess[k, i])
             low[j], high[j] = -THRUST - guess[k, i], THRUST - guess[k, i]
     for j in range(m * n):
-        hessian[:j, j] = hessian[j, :j]
+        for a in range(j):
+            hessian[a, j] = hessian[j, a]
     change = within(hessian, wish, low, high, NEWTON_STEPS)
     out = np.empty((n, m))
     for k in range(n):

@@ -17,6 +17,7 @@ import math
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.compiled.growing import write_floats
 from netsp.compiled.kernel import kernel
 
 MASS, VOLUME, GRAVITY, DENSITY = 13.5, 0.0134, 9.82, 1000.0
@@ -112,7 +113,8 @@ def linearised(
     state, force = np.empty(8), np.empty(4)
     eps, newton = 1e-6, 1e-3
     for k in range(n):
-        state[:], force[:] = states[k], forces[k]
+        write_floats(state, states[k], 8)
+        write_floats(force, forces[k], 4)
         for i in range(3):
             by_state[k, i, i] = 1.0
         for i in range(3, 8):
