@@ -33,10 +33,6 @@ LINKED = {"nogil": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 ENTRY = {"nogil": True, "no_cfunc_wrapper": True}
 """Options of Numba for functions that Python calls."""
 
-FIRST_LEVEL = 1
-"""LLVM's level of optimisation for single functions, before they are linked; Numba's is 3, which
-takes twice as long. Linked code is optimised at Numba's level."""
-
 _WRAPPER = "_ZN7cpython"  # how the names of wrappers for Python begin
 _ENVIRONMENT = "_ZN08NumbaEnv"  # how the names of the variables of environments begin
 _KIND = "linked"  # name of this kind of file
@@ -94,7 +90,7 @@ class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
         ll_module.data_layout = self._codegen._data_layout
         for function in ll_module.functions:
             if not function.is_declaration:
-                passes, builder = self._codegen._function_pass_manager(opt=FIRST_LEVEL)
+                passes, builder = self._codegen._function_pass_manager()
                 passes.run(function, builder)
 
     @classmethod
@@ -155,7 +151,7 @@ def _are_equal(flags: Any, others: Any) -> Any:
 
 @cache
 def _hash_of_names() -> int:
-    return TargetConfig.__hash__(Flags())
+    return int(TargetConfig.__hash__(Flags()))
 
 
 def _hash_of(flags: Any) -> int:

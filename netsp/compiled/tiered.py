@@ -109,12 +109,18 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         types = _general(sig) if isinstance(sig, tuple) else sig
         if not linked_library.is_supported():
             return self._compiled_as(self, types)
-        with global_compiler_lock, linked_library.linked_libraries():
-            if self._is_for_kernel:
+        if self._is_for_kernel:
+            with global_compiler_lock, linked_library.linked_libraries():
                 return self._compiled_as(self, types)
-            called = self._compiled_as(self.entry, types)
-            self._insert([kind._code for kind in types], called, False)
-            return called
+        if types in self.entry.overloads:
+            called = self.entry.overloads[types].entry_point
+        else:
+            with global_compiler_lock, linked_library.linked_libraries():
+                called = self._compiled_as(self.entry, types)
+        with global_compiler_lock:  # later calls with narrow numbers, too, go there at once
+            for kinds in {types, tuple(sig)}:
+                self._insert([kind._code for kind in kinds], called, False)
+        return called
 
     def _compiled_as(self, dispatcher: Any, types: tuple[Any, ...]) -> Any:
         """Compile for argument types, or load: this kernel, or its entry."""
