@@ -20,7 +20,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba.core.caching import FunctionCache
 
-from netsp.compiled import chance, disk_cache, interpretation, tiered
+from netsp.compiled import chance, disk_cache, growing, interpretation, tiered
 from netsp.compiled.compile_lock import is_locked, locked
 from netsp.compiled.compile_policy import (
     CompilePolicy,
@@ -417,6 +417,15 @@ def test_legs_that_cross_over_alike_are_noted_alike_in_loops_and_at_once(depth, 
     interpretation._interpreted.cache_clear()
     assert len(compared) > 10
     assert all(compared)
+
+
+@pytest.mark.parametrize("n", [0, 1, 16, 17, 64, 1000])
+def test_compiled_sorting_keeps_the_order_of_equal_numbers(n):
+    values = np.random.default_rng(n).integers(0, 9, n).astype(float)
+    values[::7] = np.inf
+    with everything_compiled():
+        order = growing.order_of(values)
+    assert np.array_equal(order, np.argsort(values, kind="stable"))
 
 
 def test_random_numbers_are_the_same_interpreted_and_compiled():
