@@ -19,8 +19,8 @@ class Handover:
     some_legs : int
         Most legs for which cuts take a second or two.
     max_labels : int
-        Labels in a pass of the walks above which such a number of legs is left to cuts. Interpreted,
-        a pass over 25,000 takes about 0.2 s of CPU, and the next ones longer.
+        Labels in a pass of the walks above which such a number of legs is left to cuts. A pass over
+        25,000 takes the interpreter about 0.2 s of CPU, and the next ones take longer.
     """
 
     few_legs: int = 0
