@@ -6,9 +6,11 @@ import functools
 import importlib.util
 import math
 import os
+import signal
 import subprocess
 import sys
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple
 from pathlib import Path
@@ -20,7 +22,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba.core.caching import FunctionCache
 
-from netsp.compiled import chance, disk_cache, growing, interpretation, tiered
+from netsp.compiled import chance, disk_cache, growing, interpretation, overtime, tiered
 from netsp.compiled.compile_lock import is_locked, locked
 from netsp.compiled.compile_policy import (
     CompilePolicy,
@@ -238,6 +240,72 @@ def test_a_call_is_broken_off_in_time_or_not_at_all():
         with contextlib.suppress(Overtime):
             assert within(0.003, count, (60_000,)) == 60_000
     assert count(1000) == 1000
+
+
+def test_calls_are_still_broken_off_after_many_that_ended_just_then():
+    def spin(seconds):
+        end = time.thread_time() + seconds
+        while time.thread_time() < end:
+            pass
+
+    for k in range(150):
+        with contextlib.suppress(Overtime):
+            within(0.002, spin, (0.0021 + 0.00005 * (k * 37 % 100),))
+    with pytest.raises(Overtime):
+        within(0.02, spin, (5.0,))
+
+
+@pytest.mark.parametrize("is_python", [False, True])
+def test_a_signal_goes_before_the_end_of_a_budget(is_python):
+    def interrupt(number, frame):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, interrupt if is_python else signal.default_int_handler)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.1)  # the budget is used up before
+        with pytest.raises(KeyboardInterrupt):
+            within(0.0, time.sleep, (5.0,))
+    finally:
+        signal.signal(signal.SIGALRM, before)
+
+
+def test_a_call_ends_although_a_finalizer_got_the_exception(monkeypatch):
+    class Slow:
+        def __del__(self):
+            end = time.monotonic() + 5.0
+            while time.monotonic() < end:
+                sum(range(1000))
+
+    monkeypatch.setattr(sys, "unraisablehook", lambda _: None)
+    assert within(0.01, lambda: Slow() and 1, ()) == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here")
+def test_a_forked_process_watches_its_calls_whatever_the_other_did_just_then():
+    with overtime._watch._lock:
+        child = os.fork()
+        if child == 0:
+            try:
+                within(0.01, _forever, ())
+            except Overtime:
+                os._exit(7)
+            finally:
+                os._exit(1)
+    for _ in range(400):
+        done, status = os.waitpid(child, os.WNOHANG)
+        if done:
+            break
+        time.sleep(0.05)
+    else:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    assert done
+    assert os.waitstatus_to_exitcode(status) == 7
+
+
+def _forever():
+    while True:
+        pass
 
 
 def test_without_what_numba_keeps_private_kernels_are_compiled_at_once(monkeypatch, tmp_path):

@@ -8,8 +8,13 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import os
+import queue
+import signal
+import sys
 import threading
 import time
+import traceback
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -44,54 +49,71 @@ class _Call:
 
 
 class _Watch:
-    """The thread that watches calls."""
+    """The thread that watches calls.
+
+    An exception may come between any two steps of the thread that makes a call, so that thread uses
+    only locks and queues written in C: those in Python (`threading.Condition`) stay locked when one
+    comes while they are entered.
+    """
 
     def __init__(self) -> None:
-        self._wake = threading.Condition()
+        self._lock = threading.Lock()
+        self._wakes: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._under_way: set[_Call] = set()
         self._is_asleep = False
         self._thread: threading.Thread | None = None
 
-    def begin(self, budget_s: float) -> _Call:
-        call = _Call(budget_s)
-        with self._wake:
+    def begin(self, call: _Call) -> None:
+        """Watch a call; where no thread can be started, it is not broken off."""
+        with self._lock:
             self._under_way.add(call)
-            if self._thread is None or not self._thread.is_alive():  # not alive after a fork
+            if self._thread is None or not self._thread.is_alive():
                 self._thread = threading.Thread(
                     target=self._run, daemon=True, name="netsp-overtime"
                 )
-                self._thread.start()
+                with contextlib.suppress(RuntimeError):
+                    self._thread.start()
             elif self._is_asleep:
-                self._wake.notify()
-        return call
+                self._wakes.put(None)
 
     def end(self, call: _Call) -> None:
-        """Return once no exception can come any more; raise Overtime if one was on its way."""
-        with self._wake:
+        """Watch a call of this thread no more. An exception that is on its way comes now or never;
+        one that came in a finalizer is gone already."""
+        with self._lock:
             self._under_way.discard(call)
-            is_coming = call.was_ended
-        while is_coming:
-            time.sleep(0.0)
+            if call.was_ended:
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(call.thread), None)
 
     def _run(self) -> None:
         idle = 0
         while True:
-            with self._wake:
+            with self._lock:
                 idle = 0 if self._under_way else idle + 1
-                if idle > IDLE_LOOKS:
-                    self._is_asleep = True
-                    self._wake.wait()
-                    self._is_asleep, idle = False, 0
+                self._is_asleep = idle > IDLE_LOOKS
                 for call in [c for c in self._under_way if c.now() > c.deadline]:
                     self._under_way.discard(call)
                     call.was_ended = True
                     ctypes.pythonapi.PyThreadState_SetAsyncExc(
                         ctypes.c_ulong(call.thread), ctypes.py_object(Overtime)
                     )
-            time.sleep(LOOK_S)
+            if self._is_asleep:
+                self._wakes.get()
+                idle = 0
+            else:
+                time.sleep(LOOK_S)
 
 
 _watch = _Watch()
+
+
+def _watch_anew() -> None:
+    """Forget the watching thread, which a forked process does not have; its lock may be held."""
+    global _watch
+    _watch = _Watch()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_watch_anew)
 
 
 def within(budget_s: float, function: Callable[..., T], args: tuple[Any, ...]) -> T:
@@ -110,15 +132,40 @@ def within(budget_s: float, function: Callable[..., T], args: tuple[Any, ...]) -
     ------
     Overtime
         The budget is used up. The function may have done a part of its work.
+    BaseException
+        What the function has raised, or a handler of a signal meanwhile, even where the budget is
+        used up at the same time.
     """
-    call = _watch.begin(budget_s)
+    handled = sys.exception()
+    call = _Call(budget_s)
     try:
+        _watch.begin(call)
         out = function(*args)
-    except Overtime:
-        raise
-    except BaseException:
-        with contextlib.suppress(Overtime):  # the function has failed before
+        _watch.end(call)
+    except BaseException as error:
+        # what another thread asks for is raised where a function begins: none does outside of `try`
+        try:
             _watch.end(call)
+        except Overtime:
+            _watch.end(call)
+        except BaseException:
+            _watch.end(call)
+            raise
+        failed = error.__context__ if isinstance(error, Overtime) else None
+        # Overtime that came while an interrupt passed through a `with` of the function
+        if failed is not handled and isinstance(failed, KeyboardInterrupt | SystemExit):
+            raise failed from None
+        if isinstance(error, Overtime):
+            _repeat_cut_off_signals(error)
         raise
-    _watch.end(call)
     return out
+
+
+def _repeat_cut_off_signals(error: Overtime) -> None:
+    """Send this process the signals again whose handlers were running when an exception came."""
+    if threading.current_thread() is not threading.main_thread():
+        return
+    codes = {frame.f_code for frame, _ in traceback.walk_tb(error.__traceback__)}
+    for number in signal.valid_signals():
+        if getattr(signal.getsignal(number), "__code__", None) in codes:
+            signal.raise_signal(number)
