@@ -10,20 +10,20 @@ TESTERS = $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 .PHONY: demo test accept docs wheel wheel-installed pythons tables lint bench js clean
 .DELETE_ON_ERROR:
 
-# pip would compile every module of every package, most of which no one imports: half its time
+# --no-compile: byte-compiling modules that nobody imports takes half of pip's time
 $(VENV)/.core: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -e .
 	touch $@
 
-# all is compiled ahead: the tests run in several processes, and each would compile what it meets
+# compile everything ahead: otherwise each of the parallel test processes compiles what it needs
 $(VENV)/.installed: $(VENV)/.core
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -e '.[dev]'
 	$(BIN)/python -m compileall -qq -j 0 $(VENV)/lib || true
 	$(BIN)/netsp warm-up --quiet
 	touch $@
 
-# bytecode of what the demo imports is kept for the commands after it, whatever the shell says
+# write bytecode for later commands, even where the shell sets PYTHONDONTWRITEBYTECODE
 demo: export PYTHONDONTWRITEBYTECODE =
 demo: $(VENV)/.core
 	mkdir -p $(DEMO)

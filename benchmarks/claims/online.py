@@ -102,7 +102,7 @@ def site(name: str) -> Claim:
         return "; ".join(shown), good
 
     claimed = f"{SAFE}; {1e3 * SITE_REPLAN:.0f} ms (x {ALLOWANCE:g})"
-    # replans count CPU seconds, so that another claim may be measured meanwhile
+    # replans count CPU seconds, so another claim can be measured at the same time
     return Claim(
         f"{name}: over the limit; visited; tether; replan",
         claimed,
