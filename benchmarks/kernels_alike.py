@@ -4,7 +4,7 @@
 
 Only steps whose names contain one of the words are run. Prints each kernel whose results, or the
 arrays that it writes to, differ in any bit, and how many kernels and calls were compared. Calls
-that take the interpreter long are not compared, nor are those that it never makes.
+that take the interpreter too long are not compared, nor are calls that always run compiled.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ import numpy as np
 from numba.core.registry import CPUDispatcher
 
 from netsp.command.warm_up import steps
-from netsp.compiled.arguments import NARROW, arrays_in
+from netsp.compiled.arguments import NARROW_DTYPES, arrays_in
 from netsp.compiled.compile_policy import everything_compiled
 from netsp.compiled.interpretation import interpreted
 from netsp.compiled.overtime import Overtime, within
 from netsp.compiled.tiered import TieredDispatcher
 
-MAX_CALL_S, MAX_KERNEL_S = 0.3, 3.0
-"""Seconds of the interpreter for one call, and for one kernel in all."""
+MAX_CALL_S = 0.3  # CPU seconds of one interpreted call; longer calls are not compared
+MAX_KERNEL_S = 3.0  # CPU seconds of all interpreted calls of a kernel; then no more are compared
 
 
 class Comparison:
-    """Calls of kernels, made twice."""
+    """Comparison of calls that are made interpreted and compiled."""
 
     def __init__(self) -> None:
         self.spent: Counter[str] = Counter()
@@ -43,7 +43,7 @@ class Comparison:
         is_shared = threading.current_thread().name.startswith("ThreadPoolExecutor")
         if is_shared or self.spent[name] > MAX_KERNEL_S or name in self.unlike:
             return CPUDispatcher.__call__(kernel, *args)
-        if any(a.size and a.dtype.char in NARROW for a in arrays_in(args)):
+        if any(a.size and a.dtype.char in NARROW_DTYPES for a in arrays_in(args)):
             return CPUDispatcher.__call__(kernel, *args)
         copies = _copied(args)
         try:
@@ -57,9 +57,9 @@ class Comparison:
         out = CPUDispatcher.__call__(kernel, *args)
         self.spent[name] += 0.001
         self.compared[name] += 1
-        for what, a, b in (("result", out, other), ("arguments", args, copies)):
+        for part, a, b in (("result", out, other), ("arguments", args, copies)):
             if (how := _difference(a, b)) is not None:
-                self.unlike[name] = f"{what}{how}"
+                self.unlike[name] = f"{part}{how}"
         return out
 
 

@@ -86,8 +86,8 @@ class Clock:
         Asked every `ASKED` seconds, in a thread of its own: once it says so, the time is up for
         this clock and all within it. `close` ends that.
     begun
-        Time (`time.monotonic`) from which the limit counts, and the CPU seconds of the process at
-        that time; default now.
+        Time (`time.monotonic`) from which the limit counts, and CPU seconds of the process at that
+        time; default: now.
     """
 
     policy = TimingPolicy()

@@ -30,7 +30,7 @@ def started(monkeypatch):
 
     def note(words, **options):
         assert options["start_new_session"]
-        assert options["env"][background_warm_up.VARIABLE] == "0"
+        assert options["env"][background_warm_up.SWITCH_VARIABLE] == "0"
         commands.append(words)
         return SimpleNamespace()
 
@@ -47,7 +47,7 @@ def test_it_starts_after_a_command_that_compiled_unless_it_is_turned_off(
 ):
     monkeypatch.setattr(TieredDispatcher, "has_compiled", has_compiled)
     monkeypatch.setattr(TieredDispatcher, "is_disk_full", is_disk_full)
-    monkeypatch.setenv(background_warm_up.VARIABLE, variable)
+    monkeypatch.setenv(background_warm_up.SWITCH_VARIABLE, variable)
     background_warm_up.begin("simulate")
     assert len(started) == count
 
@@ -103,7 +103,7 @@ def _soon(condition):
         time.sleep(0.02)
 
 
-def test_one_process_at_the_lowest_priority_compiles_and_ends_while_the_command_has_ended(tmp_path):
+def test_one_process_at_the_lowest_priority_compiles_and_ends_after_the_command(tmp_path):
     (tmp_path / "sitecustomize.py").write_text(SITE)
     (tmp_path / "likely_next.py").write_text(
         "from netsp.compiled.kernel import kernel\n\n@kernel\ndef double(x):\n    return 2 * x\n"
@@ -112,7 +112,7 @@ def test_one_process_at_the_lowest_priority_compiles_and_ends_while_the_command_
     command = [sys.executable, "-c", COMMAND]
     env = {
         **os.environ, "FOLDER": str(tmp_path), "NUMBA_CACHE_DIR": str(cache),
-        "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}", background_warm_up.VARIABLE: "1",
+        "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}", background_warm_up.SWITCH_VARIABLE: "1",
     }  # fmt: skip
     done = subprocess.run(command, env=env, capture_output=True, text=True, cwd=tmp_path)
     # standard output and standard error are closed, although the process goes on

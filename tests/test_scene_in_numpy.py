@@ -38,7 +38,7 @@ FIELDS = st.sets(st.sampled_from(sorted(ALL)), min_size=1, max_size=5).map(field
 
 
 def both(kernel, *args):
-    """Return what a kernel's loops return, and what its form in NumPy does."""
+    """Return the results of a kernel's loops and of its form in NumPy."""
     own = getattr(kernel, "py_func", kernel)
     numpy = CompilePolicy(min_numpy_items=0)
     with np.errstate(all="ignore"), pytest.MonkeyPatch.context() as patch, compiled_by(numpy):
@@ -63,7 +63,7 @@ def points(seed, n):
 
 @settings(max_examples=15, deadline=None)
 @given(field=FIELDS, seed=st.integers(0, 10**6))
-def test_points_and_segments(field, seed):
+def test_points_and_segments_are_measured_alike(field, seed):
     """Distances, gradients and sight are the same for solids of each kind, looked up or not."""
     p = points(seed, 40)
     assert_alike(*both(sampling.sample_many, field, p))
@@ -72,14 +72,14 @@ def test_points_and_segments(field, seed):
         assert_alike(*both(all_see, field, p[k : k + 2], p[k + 1 : k + 3], 0.1))
 
 
-def test_no_points():
+def test_no_points_have_no_distances():
     """No points have no distances."""
     assert_alike(*both(sampling.sample_many, field_of(ALL), np.zeros((0, 3))))
 
 
 @settings(max_examples=6, deadline=None)
 @given(field=FIELDS, seed=st.integers(0, 10**6))
-def test_grids(field, seed):
+def test_cells_and_trees_are_alike(field, seed):
     """Free cells, trees of shortest paths and the paths in them are the same."""
     rng = np.random.default_rng(seed)
     shape = (9, 8, 7)
@@ -97,7 +97,7 @@ def test_grids(field, seed):
         assert_alike(*both(way, toward, start))
 
 
-def test_lookup():
+def test_the_lookup_lists_the_same_solids():
     """The solids that may be nearest in each cell of a look-up are the same."""
     data = field_of(ALL).data
     data = data[: int(data[packing.CELLS])].copy()
@@ -108,7 +108,7 @@ def test_lookup():
 
 @settings(max_examples=10, deadline=None)
 @given(field=FIELDS, seed=st.integers(0, 10**6), yaw=st.floats(-3.0, 3.0))
-def test_patches_in_view(field, seed, yaw):
+def test_the_same_patches_are_seen(field, seed, yaw):
     """The same patches are seen, and the same shares are new."""
     centres = points(seed, 120)
     normals = points(seed + 1, 120)

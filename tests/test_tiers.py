@@ -150,7 +150,7 @@ def kernels(tmp_path):
     return _module(tmp_path, MODULE)
 
 
-NEVER = np.zeros(1, dtype=np.int64)
+NO_STOP = np.zeros(1, dtype=np.int64)
 
 
 def test_a_kernel_is_interpreted_until_its_price_is_spent_then_compiled(kernels):
@@ -158,18 +158,18 @@ def test_a_kernel_is_interpreted_until_its_price_is_spent_then_compiled(kernels)
         calls = 0
         while not kernels.total.signatures:
             assert kernels.total.interpreted_s < 0.1
-            assert kernels.total(np.ones(1000), NEVER) == 1000.0
+            assert kernels.total(np.ones(1000), NO_STOP) == 1000.0
             calls += 1
     assert calls > 1
-    assert kernels.total(np.ones(1000), NEVER) == 1000.0
+    assert kernels.total(np.ones(1000), NO_STOP) == 1000.0
 
 
 def test_a_call_that_takes_too_long_begins_again_compiled_with_the_arguments_as_they_were(kernels):
     x, pair = np.ones(1_000_000), np.ones(3)
     with compiled_by(CompilePolicy(compile_s=0.05, compile_s_per_byte=0.0)):
-        assert kernels.total(pair, NEVER) == 3.0
+        assert kernels.total(pair, NO_STOP) == 3.0
         assert not kernels.total.signatures
-        assert kernels.total(x, NEVER) == 1e6
+        assert kernels.total(x, NO_STOP) == 1e6
     assert kernels.total.signatures
     assert np.array_equal(x, np.arange(1.0, 1e6 + 1.0))
 
@@ -199,17 +199,17 @@ def test_work_that_threads_share_is_never_begun_again(kernels):
         compiled_by(CompilePolicy(compile_s=0.01, compile_s_per_byte=0.0)),
         ThreadPoolExecutor(1) as pool,
     ):
-        assert pool.submit(kernels.total, x, NEVER).result() == 200_000.0
+        assert pool.submit(kernels.total, x, NO_STOP).result() == 200_000.0
         assert not kernels.total.signatures
-        assert pool.submit(kernels.total, np.ones(3), NEVER).result() == 3.0
+        assert pool.submit(kernels.total, np.ones(3), NO_STOP).result() == 3.0
     assert kernels.total.signatures
 
 
 def test_large_arguments_are_never_copied(kernels):
     with compiled_by(CompilePolicy(max_copied_bytes=100)):
-        kernels.total(np.ones(10), NEVER)
+        kernels.total(np.ones(10), NO_STOP)
         assert not kernels.total.signatures
-        kernels.total(np.ones(100), NEVER)
+        kernels.total(np.ones(100), NO_STOP)
     assert kernels.total.signatures
 
 
@@ -521,19 +521,19 @@ def test_a_kernel_that_another_process_compiles_is_waited_for_or_interpreted(ker
 
 def test_one_of_two_holds_a_lock_file(tmp_path):
     file = tmp_path / "a.lock"
-    inside, most = [], []
+    inside, counts = [], []
 
     def hold(_):
         for _ in range(20):
             with locked(file):
                 inside.append(1)
-                most.append(len(inside))
+                counts.append(len(inside))
                 inside.pop()
 
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(hold, range(4)))
-    assert max(most) == 1
-    assert len(most) == 80
+    assert max(counts) == 1
+    assert len(counts) == 80
 
 
 @pytest.mark.parametrize("field", ["load_s", "compile_s", "compile_s_per_byte", "max_copied_bytes"])

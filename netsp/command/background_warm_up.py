@@ -1,4 +1,4 @@
-"""Compiles what is likely needed next, in a process of its own, after a command has ended."""
+"""Background process that compiles, after a command, what the next one is likely to need."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-VARIABLE = "NETSP_BACKGROUND"
-"""Environment variable that turns this off where it is 0."""
+SWITCH_VARIABLE = "NETSP_BACKGROUND"
+"""Environment variable that turns the background process off where it is 0."""
 
 LOWEST_PRIORITY = 19
-"""Niceness of the process; anything else that wants the processor gets it first."""
+"""Niceness of the process: every other process gets the processor first."""
 
 
 def begin(command: str) -> None:
     """Start the process if a command had to compile something; the command need not wait for it.
 
-    Small problems compile nothing, so that they start no process. Neither does a command where
-    compiled code cannot be kept on disk.
+    Small problems compile nothing, so they start no process. Neither does a command where compiled
+    code cannot be kept on disk.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def begin(command: str) -> None:
         Name of the command, which tells what is likely needed next.
     """
     tiered = sys.modules.get("netsp.compiled.tiered")
-    is_wanted = os.environ.get(VARIABLE, "1") != "0" and os.name == "posix"
+    is_wanted = os.environ.get(SWITCH_VARIABLE, "1") != "0" and os.name == "posix"
     if tiered is None or not is_wanted:
         return
     kernels = tiered.TieredDispatcher
@@ -40,15 +40,15 @@ def begin(command: str) -> None:
             [sys.executable, "-m", "netsp", "warm-up", "--quiet", "--after", command],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
             cwd=Path(__file__).resolve().parents[2], start_new_session=True,
-            env={**os.environ, VARIABLE: "0"},
+            env={**os.environ, SWITCH_VARIABLE: "0"},
         )  # fmt: skip
-        process.returncode = 0  # nobody waits for it
+        process.returncode = 0  # keeps Popen from warning that the process still runs
 
 
 @contextlib.contextmanager
 def alone() -> Iterator[bool]:
-    """Run the body at the lowest priority; yield whether no other such process is under way, and
-    compiled code is kept on disk."""
+    """Run the body at the lowest priority; yield whether no other such process is running
+    and compiled code is kept on disk."""
     from netsp.compiled import growing
     from netsp.compiled.compile_lock import locked
     from netsp.compiled.disk_cache import lock_file

@@ -1,4 +1,4 @@
-"""The clock of a command: a limit counts from the command's start."""
+"""Clock of a command, whose time limit counts from the start of the command."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def begin_command() -> None:
 
 def command_clock(limit: float | None) -> Clock:
     """Return a clock that counts from the start of the command, so that loading netsp's modules and
-    reading files count.
+    reading files count too.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Tells the user that netsp is being prepared, while kernels are compiled.
+"""Messages that tell the user what netsp prepares while kernels are compiled.
 
-A kernel is compiled once per installation and kept on disk; without a word that looks like a
-program that hangs.
+A kernel is compiled once per installation and kept on disk. Without a message, a command that
+compiles looks as if it hung.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from netsp.errors import InputError
 if TYPE_CHECKING:
     from netsp.command.status_line import StatusLine
 
-SUBJECTS = {
+PACKAGE_SUBJECTS = {
     "online": "the simulation", "space": "planning in space", "cover": "the choice of viewpoints",
 }  # fmt: skip
-"""Names of netsp's parts for users, by package; the others are the solver."""
+"""Names of netsp's parts for users, by package; all other packages are called the solver."""
 
-BAR_WIDTH, MIN_BAR_WIDTH = 20, 5
-"""Width of the bar on a wide and on a narrow terminal, characters."""
+MAX_BAR_WIDTH = 20  # characters of the bar on a wide terminal, which leave room for the text
+MIN_BAR_WIDTH = 5  # characters of the bar on a narrow terminal, which still show progress
 
 
 @contextmanager
 def compile_messages(stream: TextIO, line: StatusLine | None = None) -> Iterator[None]:
-    """While the body runs, tell on a stream what is being prepared, and about how long it takes.
+    """Tell, while the body runs, what is being prepared and about how long it takes.
 
     Parameters
     ----------
     stream : file
-        Stream of messages, as stderr.
+        Stream for messages, such as stderr.
     line : StatusLine, optional
-        Line of a terminal to show a bar in; without it, few lines are written to the stream.
+        Line of a terminal in which a bar is drawn; without it, lines are written to the stream.
     """
     from netsp.compiled.numba_loading import when_numba_is_loaded
 
@@ -61,7 +61,7 @@ def compile_messages(stream: TextIO, line: StatusLine | None = None) -> Iterator
 
 
 def _listener(preparation: Preparation) -> Any:
-    """Return a listener that is told of all that is compiled."""
+    """Return a registered listener that reports each compilation."""
     from numba.core import event
 
     class Listener(event.Listener):  # type: ignore[misc]
@@ -77,12 +77,12 @@ def _listener(preparation: Preparation) -> Any:
 
 
 class CompileTimes:
-    """CPU seconds that each kernel took to compile, the kernels that it calls not counted.
+    """CPU seconds that compiling each kernel took, without the kernels that it calls.
 
     Attributes
     ----------
     seconds : dict
-        By module and name; the types of a kernel add up.
+        CPU seconds by module and name, added up over the signatures of a kernel.
     """
 
     def __init__(self) -> None:
@@ -130,16 +130,16 @@ def kernel_name(kernel: Any) -> str:
 
 @dataclass(frozen=True)
 class PreparationPolicy:
-    """Policy of what is told while kernels are compiled.
+    """Policy of the messages while kernels are compiled.
 
     Parameters
     ----------
     expected_share : float
-        Share of the kernels of a package, by their price, that a command is expected to compile
-        of those that are loaded and not kept on disk (a mission compiles 0.23). It only changes
-        what is told: a larger share announces a longer wait.
+        Share of the compile time of a package's kernels that a command is expected to need. It
+        counts the kernels that are loaded and not on disk. It only changes the messages: a larger
+        share announces a longer wait.
     every_s : float
-        Seconds between two lines where there is no terminal.
+        Seconds between two lines where there is no terminal; a smaller number writes more lines.
     """
 
     expected_share: float = 0.25
@@ -148,20 +148,22 @@ class PreparationPolicy:
     def __post_init__(self) -> None:
         for field in fields(self):
             if not getattr(self, field.name) > 0.0:
-                raise InputError(f"{field.name}: expected a positive number")
+                raise InputError(
+                    f"{field.name}: expected a positive number, got {getattr(self, field.name)}"
+                )
 
 
 class Preparation:
-    """Progress of compiling, as it is shown.
+    """Progress of compiling that is shown to the user.
 
     Parameters
     ----------
     stream : file
-        Stream of messages.
+        Stream for messages.
     line : StatusLine, optional
-        Line of a terminal to show a bar in.
+        Line of a terminal in which a bar is drawn.
     policy : PreparationPolicy
-        How much is told.
+        Policy of the messages.
     """
 
     def __init__(
@@ -177,13 +179,13 @@ class Preparation:
         self._packages: set[str] = set()
 
     def begin(self, kernel: Any) -> None:
-        """Count a kernel in; the kernels that it calls are compiled within it."""
+        """Note that compiling a kernel begins; kernels that it calls begin and end within it."""
         if not kernel.py_func.__module__.startswith("netsp."):
             return
         if not self._depth:
             if self._subject is None:
                 part = kernel.py_func.__module__.split(".")[1]
-                self._subject = SUBJECTS.get(part, "the solver")
+                self._subject = PACKAGE_SUBJECTS.get(part, "the solver")
             package = kernel.py_func.__module__.rpartition(".")[0]
             if package not in self._packages:
                 self._packages.add(package)
@@ -195,7 +197,7 @@ class Preparation:
         self._show()
 
     def end(self, kernel: Any) -> None:
-        """Count a kernel as done."""
+        """Note that compiling a kernel has ended."""
         if not kernel.py_func.__module__.startswith("netsp.") or not self._depth:
             return
         self._depth -= 1
@@ -234,23 +236,25 @@ class Preparation:
 
 
 def bar(share: float, room: int) -> str:
-    """Return a bar that is filled so far.
+    """Return a progress bar.
 
     Parameters
     ----------
     share : float
         Share that is done, 0 to 1.
     room : int
-        Characters that it may have, at most.
+        Characters that are free on the line.
     """
-    width = max(min(BAR_WIDTH, room), MIN_BAR_WIDTH)
+    width = max(min(MAX_BAR_WIDTH, room), MIN_BAR_WIDTH)
     full = int(share * width)
     return f"[{'#' * full}{' ' * (width - full)}]"
 
 
 def _neighbours_price_s(kernel: Any) -> float:
-    """Return about how many seconds it takes to compile all kernels that are loaded from the folder
-    of a kernel, as far as none is kept on disk under their names."""
+    """Return about how many seconds compiling the loaded kernels of a kernel's folder takes.
+
+    Kernels that are on disk under their names do not count.
+    """
     from netsp.compiled.compile_policy import current_policy
     from netsp.compiled.disk_cache import lock_file
     from netsp.compiled.kernel import functions_to_compile
@@ -270,14 +274,14 @@ def _neighbours_price_s(kernel: Any) -> float:
 
 
 def price_s(kernel: Any, with_called: bool = False) -> float:
-    """Return about how many seconds it takes to compile a kernel.
+    """Return about how many seconds compiling a kernel takes.
 
     Parameters
     ----------
     kernel : dispatcher
         The kernel.
     with_called : bool
-        Whether to count the kernels that it calls, too, as far as they are not compiled.
+        Whether to include the kernels that it calls and that are not compiled yet.
     """
     from netsp.compiled.compile_policy import current_policy
 

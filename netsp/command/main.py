@@ -37,7 +37,7 @@ from netsp.errors import (
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     if argv is None:
-        # as loading modules and drawing make objects that stay, looking for garbage among them
+        # loading modules and drawing create objects that stay: looking for garbage among them
         # every 700 objects takes a tenth of the time of a short command
         gc.set_threshold(GARBAGE_THRESHOLD)
     code = _main(argv)
@@ -47,7 +47,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 GARBAGE_THRESHOLD = 100_000
-"""Objects made between two collections of garbage, which hold some 20 MB at most."""
+"""Objects created between two garbage collections; the garbage holds about 20 MB at most."""
 
 ABANDONED_GRACE_S = 0.5
 """Seconds for abandoned work to end by itself, and to end the processes that it started."""
@@ -79,8 +79,8 @@ def _main(argv: Sequence[str] | None) -> int:
         except SystemExit:  # after --help or --version
             sys.stdout.flush()
             raise
-        told = _preparation_told(wanted, getattr(args, "quiet", False))
-        with interrupts_are_heard(), messages.warnings_in_one_line(), told:
+        preparing = _preparation_messages(wanted, getattr(args, "quiet", False))
+        with interrupts_are_heard(), messages.warnings_in_one_line(), preparing:
             code = int(args.run(args))
         sys.stdout.flush()
         if argv is None and wanted is not None and wanted != "warm-up":
@@ -117,9 +117,9 @@ def _main(argv: Sequence[str] | None) -> int:
 
 
 @contextlib.contextmanager
-def _preparation_told(command: str | None, is_quiet: bool) -> Iterator[None]:
-    """Tell while the body runs that netsp compiles, unless the command is to be quiet; warm-up
-    tells by itself how far it is."""
+def _preparation_messages(command: str | None, is_quiet: bool) -> Iterator[None]:
+    """Tell, while the body runs, what netsp compiles, unless the command is quiet; `warm-up` shows
+    its own progress."""
     if is_quiet or command == "warm-up":
         yield
         return

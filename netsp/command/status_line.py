@@ -1,4 +1,4 @@
-"""A line at the bottom of a terminal that other output does not run into."""
+"""Line at the bottom of a terminal that other output does not run into."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from contextlib import contextmanager
 from typing import Any, TextIO
 
 DEFAULT_COLUMNS = 80
-"""Width of a terminal that does not tell its own, characters."""
+"""Columns that are assumed where a terminal does not report its width."""
 
 
 class StatusLine:
-    """A line that is drawn over while work goes on, and removed before anything else is written.
+    """Line that is redrawn while work goes on, and removed before anything else is written.
 
     An unfinished line of other output is drawn again once the status line is removed.
 
@@ -65,8 +65,8 @@ class StatusLine:
         return columns or DEFAULT_COLUMNS
 
 
-class _Beside:
-    """A stream on the terminal of a status line.
+class _StreamAboveLine:
+    """Stream on the terminal of a status line.
 
     Parameters
     ----------
@@ -99,9 +99,9 @@ def status_line() -> Iterator[StatusLine | None]:
         yield None
         return
     line, before = StatusLine(sys.stderr), (sys.stdout, sys.stderr)
-    sys.stderr = _Beside(sys.stderr, line)  # type: ignore[assignment]
+    sys.stderr = _StreamAboveLine(sys.stderr, line)  # type: ignore[assignment]
     if sys.stdout.isatty():
-        sys.stdout = _Beside(sys.stdout, line)  # type: ignore[assignment]
+        sys.stdout = _StreamAboveLine(sys.stdout, line)  # type: ignore[assignment]
     try:
         yield line
     finally:

@@ -14,11 +14,11 @@ EXAMPLE = "netsp warm-up"
 Step = tuple[str, Callable[[], object]]
 """Name of a step, and the step."""
 
-NEEDED = {
+STEP_WORDS = {
     "simulate": "mission", "cover": "space", "execute": "carried out", "fly": "carried out",
     "guard": "guard",
 }  # fmt: skip
-"""Word in the names of the steps that compile what a command needs."""
+"""Word, by command, in the names of the steps that compile what the command needs."""
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
@@ -26,8 +26,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--quiet", action="store_true", help="no progress")
     p.add_argument(
         "--list", action="store_true",
-        help="print all functions with the CPU seconds that compiling each took, without those of "
-        "the functions that it calls; - for what was compiled before",
+        help="print all functions with the CPU seconds that compiling each took, without the "
+        "functions that it calls; - where it was on disk already",
     )  # fmt: skip
     p.add_argument("--after", default=None, metavar="COMMAND", help=argparse.SUPPRESS)
 
@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _compile(every: list[Step], quiet: bool) -> None:
-    """Run all steps, and tell how far they are."""
+    """Run all steps and show their progress."""
     from netsp.command.compiling import PreparationPolicy, bar
     from netsp.command.patience import span
     from netsp.command.status_line import status_line
@@ -74,8 +74,8 @@ def _compile(every: list[Step], quiet: bool) -> None:
 
 
 def _compile_likely(command: str) -> None:
-    """Run the steps that a user of a command needs next, then the others, as long as what is
-    compiled can be kept."""
+    """Run the steps that a user of a command needs next, then the others; end once the disk is
+    full."""
     from netsp.compiled.tiered import TieredDispatcher
 
     for _, step in _likely_first(list(steps()), command):
@@ -85,12 +85,12 @@ def _compile_likely(command: str) -> None:
 
 def _likely_first(every: list[Step], command: str) -> list[Step]:
     """Return the steps with those first that a user of a command needs next."""
-    words = NEEDED.get(command, "solver")
+    words = STEP_WORDS.get(command, "solver")
     return sorted(every, key=lambda step: words not in step[0])
 
 
 def _print(seconds: dict[str, float]) -> None:
-    """Print all kernels, the dearest first."""
+    """Print all kernels, those that took longest to compile first."""
     from netsp.command.compiling import kernel_name
     from netsp.compiled.kernel import all_kernels
 
@@ -102,7 +102,7 @@ def _print(seconds: dict[str, float]) -> None:
 
 
 def steps() -> Iterator[Step]:
-    """What to run so that all kernels are compiled, with names."""
+    """Yield named steps that together compile all kernels."""
     import numpy as np
 
     from netsp.clock import Clock

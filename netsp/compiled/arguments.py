@@ -1,4 +1,4 @@
-"""Arguments and results of kernels, where these run interpreted."""
+"""Arguments and results of kernels that run interpreted."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ import numpy as np
 
 from netsp.compiled.overtime import Overtime, within
 
-FLAGS = frozenset({"stop"})
-"""Names of parameters that other threads write to, to end a kernel; these are never restored."""
+STOP_PARAMETERS = frozenset({"stop"})
+"""Names of parameters that other threads write to in order to end a kernel; their arrays are never
+restored."""
 
-NARROW = frozenset("ef")
-"""Characters of dtypes in which the interpreter computes with fewer bits than compiled code does:
-NumPy's singles by Python's doubles are singles, Numba's are doubles. Kernels whose arguments have
-such numbers are never interpreted."""
+NARROW_DTYPES = frozenset("ef")
+"""Characters of dtypes in which the interpreter computes with fewer bits than compiled code does: a
+single times a Python float is a single in NumPy, but a double in Numba. Calls with arrays of these
+dtypes are never interpreted."""
 
 
 def arrays_in(value: Any) -> list[np.ndarray[Any, Any]]:
@@ -35,15 +36,15 @@ def can_be_interpreted(args: tuple[Any, ...], max_copied_bytes: int) -> bool:
     args : tuple
         Arguments of the call.
     max_copied_bytes : int
-        Size of all arrays above which none is copied (`CompilePolicy`).
+        Maximum size of all arrays together (`CompilePolicy`).
     """
     arrays = arrays_in(args)
-    is_narrow = any(a.size and a.dtype.char in NARROW for a in arrays)
+    is_narrow = any(a.size and a.dtype.char in NARROW_DTYPES for a in arrays)
     return not is_narrow and sum(a.nbytes for a in arrays) <= max_copied_bytes
 
 
 def call_interpreted(function: Callable[..., Any], args: tuple[Any, ...]) -> Any:
-    """Return what a kernel's interpreted function returns, as compiled code returns it."""
+    """Return the result of a kernel's interpreted function, with the types of compiled code."""
     with np.errstate(all="ignore"):  # compiled code does not warn either
         return _plain(function(*args))
 
@@ -51,7 +52,7 @@ def call_interpreted(function: Callable[..., Any], args: tuple[Any, ...]) -> Any
 def call_within(
     budget_s: float, function: Callable[..., Any], names: tuple[str, ...], args: tuple[Any, ...]
 ) -> Any:
-    """Return what a kernel's interpreted function returns, or break it off.
+    """Return the result of a kernel's interpreted function, or break the call off.
 
     Parameters
     ----------
@@ -67,9 +68,9 @@ def call_within(
     Raises
     ------
     Overtime
-        The budget is used up; the arguments are as they were.
+        The budget is used up; the arguments are restored.
     """
-    own = [a for name, a in zip(names, args, strict=False) if name not in FLAGS]
+    own = [a for name, a in zip(names, args, strict=False) if name not in STOP_PARAMETERS]
     before = [(a, a.copy()) for a in arrays_in(own) if a.flags.writeable]
     try:
         with np.errstate(all="ignore"):  # outside: what a signal raises passes through no `with`

@@ -9,7 +9,7 @@ from pathlib import Path
 
 try:
     import fcntl
-except ImportError:  # on Windows two processes may compile the same kernel; both keep the same
+except ImportError:  # on Windows two processes may compile one kernel, with the same result
     fcntl = None  # type: ignore[assignment]
 
 
@@ -17,13 +17,13 @@ except ImportError:  # on Windows two processes may compile the same kernel; bot
 def locked(file: Path | None, wait: bool = True) -> Iterator[bool]:
     """Hold a lock file while the body runs; yield whether this process has it.
 
-    The lock ends with the process, however that ends. Where a folder takes no files there is no
-    lock, and the body runs as if it had it.
+    The lock ends with the process, however that ends. Where a folder is not writable there is
+    no lock, and the body runs as if the process held it.
 
     Parameters
     ----------
     file : Path or None
-        The lock file, which is removed in the end; None for no lock.
+        The lock file, which is removed at the end; None for no lock.
     wait : bool
         Whether to wait for a process that holds it.
     """
@@ -34,12 +34,12 @@ def locked(file: Path | None, wait: bool = True) -> Iterator[bool]:
         if file is not None and descriptor is not None:
             if is_held:
                 with contextlib.suppress(OSError):
-                    file.unlink()  # whoever waits for it looks whether it is still there
+                    file.unlink()  # who waits for the lock checks that this file is still there
             os.close(descriptor)
 
 
 def _taken(file: Path, wait: bool) -> tuple[int | None, bool]:
-    """Return the descriptor of the lock file, if there is one, and whether it is locked by us."""
+    """Return the descriptor of the lock file, if there is one, and whether this process has it."""
     if fcntl is None:
         return None, True
     while True:

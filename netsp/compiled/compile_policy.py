@@ -1,4 +1,4 @@
-"""Policy of when kernels are compiled."""
+"""Policy that decides when kernels are compiled."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from netsp.errors import InputError
 
 @dataclass(frozen=True)
 class CompilePolicy:
-    """Policy of when a compiled kernel takes over from the interpreted one.
+    """Policy that decides when a compiled kernel takes over from the interpreted one.
 
     The rule is that of the ski rental problem (Karlin et al. 1988, "Competitive snoopy caching"):
-    a kernel runs interpreted until this has taken as long as compiling it would, and then is
-    compiled. Whatever work comes, this takes at most twice the time of the better choice.
+    a kernel runs interpreted until that has taken as long as compiling it would, and then is
+    compiled. However long the work is, this takes at most twice the time of the better choice.
 
     All seconds are CPU seconds.
 
@@ -23,28 +23,32 @@ class CompilePolicy:
     ----------
     numba_s : float
         Seconds that kernels run interpreted before Numba is loaded to look for compiled code on
-        disk, about as many as that takes; where none is, it is loaded once it has to compile. A
-        smaller number loads it for small problems, which need it little; with a larger one, large
-        problems begin more slowly.
+        disk. The default is about the time that loading Numba takes. Where no compiled code is on
+        disk, Numba is loaded once it has to compile. With a smaller number, small problems load
+        Numba and hardly use it; with a larger one, large problems begin more slowly.
     load_s : float
-        CPU seconds to load one compiled kernel from the disk, about. A smaller number loads kernels
-        that a small problem hardly needs; with a larger one, large problems begin more slowly.
+        Approximate seconds to load one compiled kernel from the disk. A smaller number loads
+        kernels that a small problem hardly needs; with a larger one, large problems begin more
+        slowly.
     compile_s : float
-        CPU seconds to compile an empty kernel, about.
+        Approximate seconds to compile an empty kernel.
     compile_s_per_byte : float
-        CPU seconds that each byte of a kernel, and of the kernels that it calls, adds. The
-        three are estimates; wrong ones cost time, and never change a result.
+        Seconds that each byte of bytecode of a kernel, and of the kernels that it calls, adds.
+        `load_s`, `compile_s` and `compile_s_per_byte` are estimates: wrong ones cost time, but
+        never change a result.
     price_share : float
-        Share of its price that a kernel runs interpreted before it is compiled. The default wastes
-        least where nothing is known of the work; less is better where it is known to be long.
+        Share of its compile time (`price_s`) that a kernel runs interpreted before it is compiled.
+        The default wastes least where the length of the work is unknown; a smaller share is better
+        where the work is known to be long.
     numpy_share : float
-        The same of kernels that have a form in NumPy, which is not much slower than compiled code.
+        Share like `price_share`, for kernels that have a form in NumPy, which is not much slower
+        than compiled code.
     max_copied_bytes : int
         Size of arguments above which a kernel is never interpreted: an interpreted call that takes
-        too long is begun again from copies of its arguments.
+        too long is restarted from copies of its arguments.
     min_numpy_items : int
-        Values, such as points times solids, from which on an interpreted kernel uses NumPy instead
-        of a loop. Either gives the same result; the default is about where both take as long.
+        Number of values, such as points times solids, from which on an interpreted kernel uses
+        NumPy instead of a loop. Both give the same result; at the default, both take about as long.
     is_eager : bool
         Whether all kernels are compiled at their first call.
     """
@@ -68,12 +72,12 @@ class CompilePolicy:
                 )
 
     def price_s(self, bytecode: int) -> float:
-        """Return about how many seconds it takes to compile a kernel.
+        """Return about how many seconds compiling a kernel takes.
 
         Parameters
         ----------
         bytecode : int
-            Size of its bytecode, and of the kernels that it calls, in bytes.
+            Size of the bytecode of the kernel and of the kernels that it calls, bytes.
         """
         return self.compile_s + self.compile_s_per_byte * bytecode
 
@@ -112,12 +116,12 @@ def everything_compiled() -> Iterator[None]:
 
 @contextlib.contextmanager
 def long_work(price_share: float = 0.1, numpy_share: float = 0.2) -> Iterator[None]:
-    """Compile kernels soon while the body runs, because its work is known to be long.
+    """Compile kernels early while the body runs, because its work is known to be long.
 
     Parameters
     ----------
     price_share, numpy_share : float
-        Shares of its price that a kernel runs interpreted (`CompilePolicy`).
+        Shares of its compile time that a kernel runs interpreted first (`CompilePolicy`).
     """
     with compiled_by(replace(_policy, price_share=price_share, numpy_share=numpy_share)):
         yield

@@ -1,15 +1,15 @@
 """Compiled kernels on disk.
 
 Numba keeps a compiled function until its own file changes. That is too long in two cases: a kernel
-in another file that it calls (and that is compiled into it) has changed, and a class in its
-signature has another name (the kept index then cannot be read: AttributeError). And of two
-processes that compile one function for different types at the same time, both may call their file
-by the same number: then the one's is found under the other's types, in every run from then on. All
-three are mended here, so that no one ever has to delete a cache by hand. Files that cannot be read
-(a full disk, a machine that lost power) count as absent.
+in another file that it calls (and that is compiled into it) has changed, or a class in its
+signature has another name (the kept index then cannot be read: AttributeError). Besides, two
+processes that compile one function for different types at the same time may give their files the
+same number: then the code of one is found under the types of the other, in every run from then on.
+This module mends all three, so that nobody ever has to delete a cache by hand. Files that cannot be
+read (a full disk, a machine that lost power) count as absent.
 
-All of Numba that is not public and that this needs is in this file and in `netsp.compiled.tiered`;
-`is_supported` checks it.
+This file, `netsp.compiled.tiered` and `netsp.compiled.linked_library` use parts of Numba that are
+not public. `is_supported` of each checks that they are there.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ _HAS_KERNELS = re.compile(r"^from netsp\.compiled\.kernel import", re.M)
 
 
 class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
-    """The files of one kernel: an index by signature, and one file a signature.
+    """Files of one kernel: an index by signature, and one file for each signature.
 
-    An index that names a class which is no more counts as empty. Files are named by their
+    An index that names a class that no longer exists counts as empty. Files are named by their
     signature.
     """
 
     def save(self, key: Any, data: Any) -> None:
-        """Keep a compiled kernel: first its file, then the index, so that no other process finds an
-        older one under its name."""
+        """Keep a compiled kernel: write its file first and the index after it, so that no other
+        process finds an older kernel under its name."""
         name = self._data_name(int(hashlib.sha256(self._dump(key)).hexdigest()[:15], 16))
         self._save_data(name, data)
         overloads = self._load_index()
@@ -71,7 +71,7 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
         return Path(self._index_path).with_suffix(".lock")
 
     def _tidy(self, named: set[str]) -> None:
-        """Remove files of sources that are no more; whoever looks for one compiles anew."""
+        """Remove files of older sources; a process that looks for one compiles anew."""
         of_all = glob.escape(self._index_name.removesuffix(".nbi")) + ".*.nbc"
         for old in Path(self._cache_path).glob(of_all):
             if old.name not in named:
@@ -85,14 +85,14 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
 
 
 def keep_on_disk(dispatcher: Any, function: Callable[..., Any]) -> None:
-    """Have a cached dispatcher keep its compiled code in a `KernelFile`.
+    """Make a cached dispatcher keep its compiled code in a `KernelFile`.
 
-    Where no folder takes files, its code is kept in memory only.
+    Where no folder is writable, its code is kept in memory only.
 
     Parameters
     ----------
     dispatcher : numba dispatcher
-        Dispatcher of the function (`cached`).
+        Dispatcher that `cached` returns for the function.
     function : callable
         The function.
     """
@@ -135,7 +135,8 @@ def is_any_on_disk(dispatcher: Any) -> bool:
 
 
 def lock_file(dispatcher: Any) -> Path | None:
-    """Return the file that is locked while a kernel is compiled; None where none is kept on disk.
+    """Return the file that is locked while a kernel is compiled; None where no code is
+    kept on disk.
 
     Parameters
     ----------
@@ -152,8 +153,8 @@ def _file_of(dispatcher: Any) -> KernelFile | None:
 
 
 def cached(function: Callable[..., Any], options: Mapping[str, bool]) -> Any:
-    """Return Numba's dispatcher of a function, which keeps its compiled code on disk where any
-    folder takes files.
+    """Return Numba's dispatcher of a function, which keeps its compiled code on disk where a
+    folder is writable.
 
     Parameters
     ----------
@@ -164,7 +165,7 @@ def cached(function: Callable[..., Any], options: Mapping[str, bool]) -> Any:
     """
     try:
         return njit(cache=True, **options)(function)
-    except RuntimeError:  # neither the package nor the user has a folder that takes files
+    except RuntimeError:  # neither the package's nor the user's folder is writable
         return njit(**options)(function)
 
 
@@ -172,8 +173,8 @@ def cached(function: Callable[..., Any], options: Mapping[str, bool]) -> Any:
 def is_supported() -> bool:
     """Return whether this release of Numba has all that `keep_on_disk` relies on.
 
-    Without it kernels are kept as Numba keeps them: then a change in a kernel may go unnoticed by
-    kernels in other files that call it, which concerns who changes netsp's own code.
+    Otherwise kernels are kept as Numba keeps them. A change in a kernel may then go unnoticed by
+    kernels in other files that call it, which only matters to those who change netsp's code.
     """
 
     def probe() -> None:
@@ -193,7 +194,7 @@ def is_supported() -> bool:
         methods | fields <= set(dir(kept))
         and callable(getattr(FunctionCache, "_index_key", None))
         and (
-            not isinstance(cache, FunctionCache)  # no folder takes files
+            not isinstance(cache, FunctionCache)  # no folder is writable
             or isinstance(getattr(cache, "_cache_file", None), IndexDataCacheFile)
         )
     )
@@ -202,7 +203,7 @@ def is_supported() -> bool:
 @cache
 def stamps(file: Path) -> tuple[tuple[str, int, int], ...]:
     """Return name, time of change (ns) and size of each file with kernels that a file imports,
-    directly or by way of others; without the file itself."""
+    directly or through others, without the file itself."""
     found: set[Path] = set()
     new = {file}
     while new:

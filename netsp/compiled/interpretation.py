@@ -1,9 +1,9 @@
 """Kernels as plain Python functions.
 
 An interpreted kernel and a compiled one return the same to the last bit (tests/test_tiers.py,
-benchmarks/kernels_alike.py), so that it never matters which of them ran. Python and compiled code
-round two things differently: powers with a constant whole exponent are products where they are
-compiled, and hypotenuses are those of the C library.
+benchmarks/kernels_alike.py), so it never matters which of them ran. Python and compiled code
+round two operations differently: compiled code computes powers with a constant integer exponent as
+products, and hypotenuses with the C library.
 """
 
 from __future__ import annotations
@@ -30,16 +30,17 @@ _in_numpy: dict[Any, Callable[..., Any]] = {}
 def interprets(kernel: Any) -> Callable[[F], F]:
     """Register a function in NumPy that runs where a kernel is interpreted.
 
-    It returns the same to the last bit, and changes the same arrays in the same way.
+    The function must return the same as the kernel to the last bit, and change the same arrays in
+    the same way.
 
     Parameters
     ----------
     kernel : dispatcher
-        The kernel whose loops it vectorises.
+        The kernel whose loops the function vectorises.
     """
 
     def register(function: F) -> F:
-        # by the function, because a kernel and its dispatcher are two objects
+        # the key is the function, because a kernel and its dispatcher are two objects
         _in_numpy[getattr(kernel, "py_func", kernel)] = function
         return function
 
@@ -58,7 +59,7 @@ def is_in_numpy(kernel: Any) -> bool:
 
 
 def interpreted(kernel: Any) -> Callable[..., Any]:
-    """Return a kernel as plain Python, and all kernels that it calls as well.
+    """Return a kernel as plain Python, with the kernels that it calls as plain Python too.
 
     Parameters
     ----------
@@ -90,7 +91,7 @@ def names_used(code: CodeType) -> Iterator[str]:
 
 
 class _Products(ast.NodeTransformer):
-    """Replaces powers with a constant whole exponent by calls of `_power`."""
+    """Transformer that replaces powers with a constant integer exponent by calls of `_power`."""
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         self.generic_visit(node)

@@ -1,4 +1,4 @@
-"""Compiled code on disk, looked for without loading Numba."""
+"""Search for compiled code on disk without loading Numba."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _PACKAGE = Path(__file__).resolve().parent.parent
 
 @cache
 def may_be_kept() -> bool:
-    """Return whether compiled code may be on disk; Numba alone knows for sure.
+    """Return whether compiled code may be on disk; only Numba knows for certain.
 
     Looks for indexes of compiled functions where Numba keeps them: in NUMBA_CACHE_DIR, else beside
     the sources or in the user's folder for caches. Those of other packages count, too.
@@ -28,8 +28,8 @@ def may_be_kept() -> bool:
 
 
 def _user_folders() -> list[Path]:
-    """Return where Numba keeps compiled code on Linux, macOS and Windows if the sources' folder
-    takes no files."""
+    """Return the folders in which Numba keeps compiled code on Linux, macOS and Windows if the
+    sources' folder is not writable."""
     home = Path.home()
     return [
         Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache") / "numba",

@@ -1,8 +1,8 @@
-"""The decorator of compiled functions.
+"""Decorator of compiled functions.
 
-Numba takes a third of a second to load, and a small problem is solved without it. So it is loaded
-once kernels have run interpreted for about as long (`CompilePolicy.numba_s`), or, where no compiled
-code is on disk, once a kernel has run interpreted for as long as compiling it takes.
+Loading Numba takes some tenths of a second, and small problems are solved without it. So it is
+loaded once kernels have run interpreted for about as long (`CompilePolicy.numba_s`), or, where no
+compiled code is on disk, once a kernel has run interpreted for as long as compiling it takes.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def kernel(function: F) -> F:
-    """Return a function that is interpreted until compiling it pays, and is kept on disk then.
+    """Return a function that is interpreted until compiling it pays; compiled code is kept on disk.
 
-    Its annotations are for the callers and the type checker; Numba infers types of its own. Other
-    threads run while its compiled form does. A parameter through which another thread ends it is
-    named `stop`.
+    The annotations are for callers and the type checker; Numba infers types of its own. The
+    compiled form releases the interpreter lock. A parameter through which another thread ends the
+    function is named `stop`.
 
     Parameters
     ----------
@@ -59,8 +59,7 @@ def is_kept(kernel: Any) -> bool:
 
 
 def runs_compiled(kernel: Any) -> bool:
-    """Return whether a kernel was compiled already, or is going to be at its next call; loads
-    Numba.
+    """Return whether a kernel is compiled, or will be at its next call; loads Numba.
 
     Parameters
     ----------
@@ -83,8 +82,8 @@ def all_kernels() -> list[Any]:
 
 
 def functions_to_compile() -> set[Callable[..., Any]]:
-    """Return the functions of all kernels in the modules that are imported and that have no
-    compiled form in this process."""
+    """Return the functions of all kernels, in the imported modules, that have no compiled form in
+    this process."""
     from netsp.compiled.tiered import TieredDispatcher
 
     modules = [m for name, m in list(sys.modules.items()) if name.startswith("netsp.")]
@@ -98,7 +97,7 @@ def functions_to_compile() -> set[Callable[..., Any]]:
 
 
 class Kernel:
-    """A kernel for which Numba may not be loaded yet.
+    """Kernel for which Numba may not be loaded yet.
 
     Parameters
     ----------
@@ -126,7 +125,7 @@ class Kernel:
                 begin = thread_time()
                 try:
                     if threading.current_thread().name.startswith("ThreadPoolExecutor"):
-                        # to the end: arrays that other threads write to cannot be restored
+                        # run to the end: arrays that other threads write to cannot be restored
                         return call_interpreted(interpreted(self), args)
                     names = self.py_func.__code__.co_varnames
                     return call_within(budget_s, interpreted(self), names, args)
@@ -171,7 +170,7 @@ class Kernel:
 
 
 class _LoadedKernel(Kernel):
-    """A kernel for which Numba is loaded: calls go to the dispatcher, without Python in between."""
+    """Kernel for which Numba is loaded: calls go straight to the dispatcher."""
 
     __call__ = property(operator.attrgetter("_dispatcher"))  # type: ignore[assignment]
 
@@ -196,7 +195,9 @@ def _dispatcher_of(function: Callable[..., Any]) -> Any:
     is_kept_on_disk = compiles() and disk_cache.is_supported()
     is_tiered = is_kept_on_disk and tiered.is_supported()
     is_linked = is_tiered and linked_library.is_supported()
-    compiled = disk_cache.cached(function, linked_library.LINKED if is_linked else {"nogil": True})
+    compiled = disk_cache.cached(
+        function, linked_library.LINKED_OPTIONS if is_linked else {"nogil": True}
+    )
     if is_kept_on_disk:
         disk_cache.keep_on_disk(compiled, function)
     if is_tiered:
@@ -206,7 +207,7 @@ def _dispatcher_of(function: Callable[..., Any]) -> Any:
 
 @functools.cache
 def _register() -> None:
-    """Have Numba take a `Kernel` in a kernel's globals for its dispatcher."""
+    """Make Numba treat a `Kernel` in a kernel's globals as its dispatcher."""
     from numba.core.types import Dispatcher
     from numba.extending import typeof_impl
 
@@ -214,4 +215,4 @@ def _register() -> None:
     def _type_of(value: Kernel, context: Any) -> Any:
         return Dispatcher(value.dispatcher)
 
-    numba_loading.tell()
+    numba_loading.on_numba_loaded()

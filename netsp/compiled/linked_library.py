@@ -1,11 +1,12 @@
-"""Machine code for what Python calls, and for nothing else.
+"""Libraries of compiled functions that get machine code only where Python calls them.
 
 Numba optimises each kernel, generates its machine code, and wraps it for Python and for C; then it
-links the kernel into those that call it, where all of this happens again. Here only a kernel that
-Python calls becomes machine code, with all that it calls; the others are kept as LLVM's
-intermediate representation, to be linked. That halves the time of compiling.
+links the kernel into its callers, where all of this happens again. With these libraries, only a
+kernel that Python calls becomes machine code, together with all kernels that it calls; the others
+are kept as LLVM's intermediate representation, to be linked. That nearly halves the time of
+compiling.
 
-All of Numba that is not public and that this needs is in this file; `is_supported` checks it.
+This file relies on parts of Numba that are not public; `is_supported` checks that they are there.
 """
 
 from __future__ import annotations
@@ -27,10 +28,10 @@ from numba.core.targetconfig import TargetConfig
 
 from netsp.compiled.disk_cache import cached
 
-LINKED = {"nogil": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+LINKED_OPTIONS = {"nogil": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """Options of Numba for kernels that are linked into others."""
 
-ENTRY = {"nogil": True, "no_cfunc_wrapper": True}
+ENTRY_OPTIONS = {"nogil": True, "no_cfunc_wrapper": True}
 """Options of Numba for functions that Python calls."""
 
 _WRAPPER = "_ZN7cpython"  # how the names of wrappers for Python begin
@@ -39,7 +40,7 @@ _KIND = "linked"  # name of this kind of file
 
 
 class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """The code of one function, which is machine code only where Python calls it."""
+    """Library of one function, which has machine code only where Python calls the function."""
 
     _is_linked_only = False
 
@@ -65,8 +66,7 @@ class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
         self._is_linked_only = self._finalized = True
 
     def get_pointer_to_function(self, name: str) -> int:
-        """Return the address of a function, which generates machine code if there is none; 0 if
-        there is no such function."""
+        """Return the address of a function, 0 if there is none; generate machine code if needed."""
         self._ensure_finalized()
         if self._is_linked_only:
             if not any(f.name == name and not f.is_declaration for f in self._own_functions()):
@@ -77,7 +77,7 @@ class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
         return super().get_pointer_to_function(name)  # type: ignore[no-any-return]
 
     def serialize_using_object_code(self) -> tuple[str, str, Any]:
-        """Return the library as it is kept on disk."""
+        """Return the library in the form that is kept on disk."""
         self._ensure_finalized()
         if self._is_linked_only:
             return self.name, _KIND, self._get_module_for_linking().as_bitcode()
@@ -114,15 +114,15 @@ class _WithoutVariables:
         return getattr(self._codegen, name)
 
     def set_env(self, name: str, environment: Any) -> None:
-        """Do nothing: what calls this library sets the variable once it has machine code."""
+        """Do nothing: the caller of this library sets the variable once it has machine code."""
 
 
 @contextlib.contextmanager
 def linked_libraries() -> Iterator[None]:
-    """Have Numba make a `LinkedLibrary` of each function that is compiled while the body runs.
+    """Make Numba create a `LinkedLibrary` for each function that is compiled while the body runs.
 
-    Python's collector of garbage pauses meanwhile: Numba makes millions of objects that live as
-    long as a function is compiled.
+    Python's garbage collector pauses meanwhile: Numba creates millions of objects that live as long
+    as the function is being compiled.
     """
     codegen = cpu_target.target_context.codegen()
     before, is_collecting = codegen._library_class, gc.isenabled()
@@ -142,8 +142,8 @@ def linked_libraries() -> Iterator[None]:
 
 
 def _are_equal(flags: Any, others: Any) -> Any:
-    """Return whether two sets of flags are equal, as Numba does, which compares them millions of
-    times and looks up all flags each time."""
+    """Return whether two sets of flags are equal. Numba compares flags millions of times and looks
+    up each of them; this gives the same answer sooner."""
     if isinstance(others, Flags) and flags._values == others._values:
         return True
     return TargetConfig.__eq__(flags, others)
@@ -155,7 +155,7 @@ def _hash_of_names() -> int:
 
 
 def _hash_of(flags: Any) -> int:
-    """Return the hash of a set of flags, as Numba does, which is one of the names of all flags."""
+    """Return the hash of a set of flags; Numba's depends on the names of all flags alone."""
     return _hash_of_names()
 
 
@@ -170,7 +170,7 @@ def entry_of(kernel: Any, function: Callable[..., Any]) -> Any:
     Parameters
     ----------
     kernel : dispatcher
-        The kernel, with the options `LINKED`.
+        The kernel, with the options `LINKED_OPTIONS`.
     function : callable
         The kernel's function.
     """
@@ -182,14 +182,14 @@ def entry_of(kernel: Any, function: Callable[..., Any]) -> Any:
     entry = scope[function.__name__]
     entry.__code__ = entry.__code__.replace(co_firstlineno=code.co_firstlineno)
     entry.__qualname__ = f"{function.__qualname__}.entry"
-    return cached(entry, ENTRY)
+    return cached(entry, ENTRY_OPTIONS)
 
 
 @cache
 def is_supported() -> bool:
     """Return whether this release of Numba has all that `LinkedLibrary` relies on.
 
-    Without it each kernel becomes machine code of its own, which takes twice the time.
+    Otherwise each kernel gets machine code of its own, which takes nearly twice the time.
     """
     codegen = cpu_target.target_context.codegen()
     library = codegen.create_library("probe")

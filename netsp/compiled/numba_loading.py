@@ -1,4 +1,4 @@
-"""Calls that wait until Numba is loaded for a kernel; without loading anything themselves."""
+"""Callbacks that run once Numba is loaded for a kernel; this module loads nothing itself."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _waiting: list[Callable[[], None]] = []
 
 
 def when_numba_is_loaded(call: Callable[[], None]) -> None:
-    """Call a function once Numba is loaded for a kernel: now, if it is.
+    """Call a function once Numba is loaded for a kernel, or now if it is loaded already.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def when_numba_is_loaded(call: Callable[[], None]) -> None:
         _waiting.append(call)
 
 
-def tell() -> None:
-    """Call the functions that wait; for the module that loads Numba."""
+def on_numba_loaded() -> None:
+    """Call the functions that wait; the module that loads Numba calls this."""
     while _waiting:
         _waiting.pop(0)()

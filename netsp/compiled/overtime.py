@@ -1,7 +1,7 @@
 """Calls that are broken off when they take too long.
 
 Python cannot end a function from outside, but it can raise an exception in the thread that runs it.
-One thread watches all calls that have a budget, and raises `Overtime` where it is used up.
+One thread watches all calls that have a budget, and raises `Overtime` where a budget is used up.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ IDLE_LOOKS = 20
 
 
 class Overtime(BaseException):
-    """The call has used up its budget."""
+    """Exception that ends a call whose budget is used up."""
 
 
 class _Call:
-    """A call under way: the thread that makes it, and when its budget is used up."""
+    """Call under way, with the thread that makes it and the deadline of its budget."""
 
     def __init__(self, budget_s: float) -> None:
         self.thread = threading.get_ident()
@@ -44,16 +44,16 @@ class _Call:
         self.was_ended = False
 
     def now(self) -> float:
-        """Return the CPU seconds of the thread; where these are not to be had, the time."""
+        """Return the CPU seconds of the thread; on systems without them, the time."""
         return time.perf_counter() if self._clock is None else time.clock_gettime(self._clock)
 
 
 class _Watch:
-    """The thread that watches calls.
+    """Thread that watches calls.
 
-    An exception may come between any two steps of the thread that makes a call, so that thread uses
-    only locks and queues written in C: those in Python (`threading.Condition`) stay locked when one
-    comes while they are entered.
+    `Overtime` may come between any two steps of the thread that makes a call. So that thread uses
+    only locks and queues written in C: those written in Python (`threading.Condition`) stay locked
+    if an exception comes while they are entered.
     """
 
     def __init__(self) -> None:
@@ -64,7 +64,7 @@ class _Watch:
         self._thread: threading.Thread | None = None
 
     def begin(self, call: _Call) -> None:
-        """Watch a call; where no thread can be started, it is not broken off."""
+        """Watch a call; where no thread can be started, the call is not broken off."""
         with self._lock:
             self._under_way.add(call)
             if self._thread is None or not self._thread.is_alive():
@@ -133,8 +133,8 @@ def within(budget_s: float, function: Callable[..., T], args: tuple[Any, ...]) -
     Overtime
         The budget is used up. The function may have done a part of its work.
     BaseException
-        What the function has raised, or a handler of a signal meanwhile, even where the budget is
-        used up at the same time.
+        The function, or the handler of a signal meanwhile, has raised it; it is raised even where
+        the budget is used up at the same time.
     """
     handled = sys.exception()
     call = _Call(budget_s)
@@ -162,7 +162,7 @@ def within(budget_s: float, function: Callable[..., T], args: tuple[Any, ...]) -
 
 
 def _repeat_cut_off_signals(error: Overtime) -> None:
-    """Send this process the signals again whose handlers were running when an exception came."""
+    """Raise again the signals whose handlers were running when `Overtime` came."""
     if threading.current_thread() is not threading.main_thread():
         return
     codes = {frame.f_code for frame, _ in traceback.walk_tb(error.__traceback__)}

@@ -1,7 +1,8 @@
 """Kernels that run interpreted until compiling them pays.
 
-Compiling a kernel takes up to seconds, and loading it up to a tenth of a second; small problems are
-solved sooner without. Whether a kernel runs interpreted or compiled changes no result.
+Compiling a kernel takes up to several seconds, and loading it up to a tenth of a second; small
+problems are solved sooner without either. Whether a kernel runs interpreted or compiled changes no
+result.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ OVERRIDDEN = ("compile", "get_call_template", "add_overload")
 
 
 class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
-    """A dispatcher that interprets its function until compiling it pays (`CompilePolicy`).
+    """Dispatcher that interprets its function until compiling it pays (`CompilePolicy`).
 
     Numba calls `_compile_for_args` when there is no compiled code for the types of a call, and then
     calls what it returns with the arguments of that call.
@@ -40,9 +41,9 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         CPU seconds that the function has run interpreted.
     was_on_disk : bool
         Whether compiled code was found on the disk. Looking for it takes about a millisecond, so
-        that calls that take less do not look each time.
+        short calls do not look each time.
     next_look_s : float
-        CPU seconds of `interpreted_s` from which on the disk is looked at again.
+        Value of `interpreted_s` at which the disk is looked at again.
     has_compiled : bool
         Whether any kernel was compiled and kept on disk by this process; an attribute of the class.
     is_disk_full : bool
@@ -86,14 +87,16 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         is_shared = threading.current_thread().name.startswith("ThreadPoolExecutor")
         can_be = can_be_interpreted(args, policy.max_copied_bytes)
         if budget_s <= 0.0 and not on_disk and self._is_locked():
-            budget_s = policy.price_s(self.bytecode())  # another process compiles it just now
+            budget_s = policy.price_s(self.bytecode())  # another process is compiling it
         if budget_s <= 0.0 or not can_be or (is_shared and on_disk):
             return self._compiled(args, kwargs)
         return self._run_pooled if is_shared else self._within(budget_s)
 
     def _is_on_disk(self, args: tuple[Any, ...], look_s: float) -> bool:
-        """Return whether compiled code for these arguments is on the disk, or was not there before
-        the function ran interpreted for the last so many seconds."""
+        """Return whether compiled code for these arguments is known to be on the disk.
+
+        The disk is looked at again after each further `look_s` CPU seconds of interpreted calls.
+        """
         if not self.was_on_disk and self.interpreted_s >= self.next_look_s:
             types = _general(self.typeof_pyval(a) for a in args)
             self.was_on_disk = disk_cache.is_on_disk(self.entry, types)
@@ -117,13 +120,13 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         else:
             with global_compiler_lock, linked_library.linked_libraries():
                 called = self._compiled_as(self.entry, types)
-        with global_compiler_lock:  # later calls with narrow numbers, too, go there at once
+        with global_compiler_lock:  # later calls with narrow numbers go there at once, too
             for kinds in {types, tuple(sig)}:
                 self._insert([kind._code for kind in kinds], called, False)
         return called
 
     def _compiled_as(self, dispatcher: Any, types: tuple[Any, ...]) -> Any:
-        """Compile for argument types, or load: this kernel, or its entry."""
+        """Compile this kernel or its entry for argument types, or load it."""
         compile_now = partial(CPUDispatcher.compile, dispatcher, types)
         if types in dispatcher.overloads or disk_cache.is_on_disk(dispatcher, types):
             return compile_now()
@@ -131,7 +134,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         with global_compiler_lock, locked(file):
             try:
                 entry = compile_now()
-            except OSError:  # the folder takes no more files, after all was compiled
+            except OSError:  # the folder takes no more files; the kernel is compiled all the same
                 if types not in dispatcher.overloads:
                     raise
                 TieredDispatcher.is_disk_full = True
@@ -140,14 +143,14 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
             return entry
 
     def add_overload(self, result: Any) -> None:
-        """Take in what was compiled or loaded; Python cannot call what has no machine code."""
+        """Add a compiled or loaded form; one without machine code cannot be called from Python."""
         if linked_library.is_linked_only(result):
             self.overloads[tuple(result.signature.args)] = result
         else:
             super().add_overload(result)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """Return what Numba needs to compile a call of this kernel by another one."""
+        """Return the template with which Numba compiles a call of this kernel by another one."""
         with global_compiler_lock:
             before, self._is_for_kernel = self._is_for_kernel, True
             try:
@@ -161,8 +164,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         return super()._compile_for_args(*args, **kwargs)  # type: ignore[no-any-return]
 
     def _within(self, budget_s: float) -> Callable[..., Any]:
-        """Return the interpreted function; where a call takes too long, it is begun again
-        compiled."""
+        """Return the interpreted function; a call that takes too long is restarted compiled."""
 
         def run(*args: Any) -> Any:
             begin = thread_time()
@@ -186,8 +188,8 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
             self.interpreted_s += thread_time() - begin
 
     def bytecode(self) -> int:
-        """Return the bytes of the function's bytecode, with the kernels that it calls and that are
-        not compiled."""
+        """Return the size of the bytecode, in bytes, of the function and of the kernels that it
+        calls, as far as they are not compiled."""
         return sum(len(k.py_func.__code__.co_code) for k in _called(self) if not k.signatures)
 
     def _is_locked(self) -> bool:
@@ -196,7 +198,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
 
 
 def _general(types: Iterable[Any]) -> tuple[Any, ...]:
-    """Return argument types with the widest type of each number, none for one value only."""
+    """Return argument types with integers widened to 64 bits and no literal types."""
     return tuple(map(_widest, types))
 
 
@@ -212,7 +214,7 @@ def _called(kernel: Any) -> frozenset[Any]:
     found = {kernel}
     for name in names_used(kernel.py_func.__code__):
         other = kernel.py_func.__globals__.get(name)
-        other = getattr(other, "dispatcher", other)  # of a `Kernel`
+        other = getattr(other, "dispatcher", other)  # a `Kernel` has one
         if isinstance(other, TieredDispatcher) and other not in found:
             found |= _called(other)
     return frozenset(found)
@@ -222,7 +224,7 @@ def _called(kernel: Any) -> frozenset[Any]:
 def is_supported() -> bool:
     """Return whether this release of Numba dispatches as `TieredDispatcher` expects.
 
-    Without it kernels are compiled at their first call.
+    Otherwise kernels are compiled at their first call.
     """
     if not compiles() or not disk_cache.is_supported():
         return False

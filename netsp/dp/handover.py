@@ -1,4 +1,4 @@
-"""When walks leave the rest of a proof to cutting planes."""
+"""Handover of a proof from walks to cutting planes."""
 
 from __future__ import annotations
 
@@ -14,13 +14,15 @@ class Handover:
     Parameters
     ----------
     few_legs : int
-        Most legs for which walks, which remember ever more, take longer than cuts. 0 leaves nothing
-        to cuts.
+        Maximum number of legs that is left to cuts at once, because walks, which remember more and
+        more, take longer. With 0 (no legs) walks go on to the end.
     some_legs : int
-        Most legs for which cuts take a second or two.
+        Maximum number of legs that is left to cuts once walks have many labels. Cuts take a second
+        or two for 10,000 legs.
     max_labels : int
-        Labels in a pass of the walks above which such a number of legs is left to cuts. A pass over
-        25,000 takes the interpreter about 0.2 s of CPU, and the next ones take longer.
+        Number of labels in a pass of the walks above which up to `some_legs` legs are left to cuts.
+        A pass over 25,000 labels takes the interpreter about 0.2 s of CPU, and later passes take
+        longer.
     """
 
     few_legs: int = 0
@@ -41,9 +43,9 @@ class Handover:
         Parameters
         ----------
         vertices : int
-            Vertices left, all legs between them measured.
+            Number of vertices left; all legs between them are measured.
         labels : int
-            Labels in the last pass.
+            Number of labels in the last pass.
         """
         legs = vertices * (vertices - 1) // 2
         return legs <= self.few_legs or (legs <= self.some_legs and labels > self.max_labels)

@@ -22,11 +22,11 @@ _SOLVERS = (("dp", None), ("mip", None), ("lns", 200), ("auto", 30))
 
 
 def should_make_ready() -> bool:
-    """Return whether all that a repair needs is to be loaded before there is one.
+    """Return whether to load all kernels that a repair may need before a simulated tour begins.
 
-    It is before a flight (`everything_compiled`), and where it was compiled before. On a machine
-    that compiled nothing yet, a simulated tour is carried out interpreted, as far as that goes:
-    compiling all that a repair may need would take a minute.
+    They are loaded where they are on disk already, and before a flight (`everything_compiled`).
+    On a machine that has compiled nothing yet, the tour is carried out interpreted until compiling
+    pays: compiling all kernels that a repair may need would take a minute.
     """
     return runs_compiled(extend)
 

@@ -138,7 +138,7 @@ def draw(problem: Problem, solution: Solution | None = None) -> Any:
             ax.plot(tether[:, 0], tether[:, 1], color=style.TETHER, lw=1.3)
         ax.plot(*problem.base[:2], marker="*", ms=8, color=style.BASE, mec="none")
         ax.plot(*problem.points[visit.goal + 1, :2], "o", ms=4, color=style.PATH)
-        # with y given, Matplotlib does not measure ticks, of which there are none, to place it
+        # with y given, Matplotlib does not measure ticks to place the title; there are no ticks
         ax.set_title(
             f"{k + 1}: {visit.tether_length:.4g} {problem.units}", fontsize=7, pad=2, y=1.0
         )
@@ -434,7 +434,7 @@ def draw_obstacles(
     ax: Axes, problem: Problem, *, label: Callable[[int], str] | None = None,
     wrapped: tuple[int, ...] = (),
 ) -> None:  # fmt: skip
-    """Draw obstacles, and dotted around them the clearance, on axes of the caller.
+    """Draw obstacles, and dotted lines at the clearance around them, on axes of the caller.
 
     Parameters
     ----------

@@ -81,8 +81,10 @@ def save(figure: Any, path: str | Path, dpi: int = 150) -> None:
 
 
 def load_matplotlib() -> None:
-    """Load Matplotlib's figures without the docstrings of their setters, which take a fifth of the
-    time to load; for commands, whose users do not read them."""
+    """Load Matplotlib's figures for a command, without the docstrings of their setters.
+
+    Making these takes a fifth of the loading time, and no user of a command reads them.
+    """
     from matplotlib import artist as artists
 
     kwdoc = artists.kwdoc
@@ -119,7 +121,7 @@ def _write(figure: Any, target: Any, **more: Any) -> None:
     the first show as boxes, the second are cut."""
     from matplotlib import rc_context
 
-    # without a salt the names of an SVG's parts are random
+    # without a salt, the element ids of an SVG are random
     with warnings.catch_warnings(), rc_context({"svg.hashsalt": "netsp"}):
         warnings.filterwarnings("ignore", message=r"Glyph \d+|constrained_layout not applied")
         with _steps_told(figure):
@@ -165,8 +167,8 @@ def literal(figure: Any) -> Any:
 
 
 def _texts(artist: Any) -> Iterator[Any]:
-    """Yield all texts in a Matplotlib artist but the labels of ticks, which are made where they are
-    asked for, and most of which no one sees."""
+    """Yield all texts in a Matplotlib artist except the labels of ticks: asking for these creates
+    them, most of them never to be drawn."""
     from matplotlib.axis import Axis
     from matplotlib.text import Text
 

@@ -148,7 +148,7 @@ def _beyond(graph: TravelGraph, limits: Limits) -> Result:
 
 
 def _rounds(graph: TravelGraph) -> int:
-    """Return the rounds of one search."""
+    """Return the number of rounds of one search."""
     return SEARCH_EFFORT.rounds(graph.goal_count, len(graph))
 
 

@@ -88,7 +88,8 @@ class PlannerOptions:
         Seconds that `repair` may take to plan the rest of a tour; the robot holds its place.
     prepared : bool
         Whether shortest paths to all waypoints are found before the mission, which takes seconds
-        where there are many; else, and where kernels are interpreted, when they are asked for.
+        where there are many. Otherwise, and where kernels are interpreted, each is found when it is
+        needed.
     clock : Clock, optional
         When it is up, planning ends as at Ctrl-C, and so does the mission.
     """
@@ -447,8 +448,8 @@ class Planner:
         """Find the shortest paths to all waypoints, and home, from everywhere, before the mission:
         they depend on the map alone.
 
-        Not where kernels are interpreted: then finding the paths that are asked for takes less time
-        than finding all of them before."""
+        Where kernels are interpreted, this does nothing: finding the paths that are needed takes
+        less time than finding all of them."""
         if self.options.paths == "tree" and self.options.prepared and runs_compiled(grow):
             home = [] if self.track is not None else [np.array(self.mission.start)]
             self.grid.prepare([*self.mission.places, *home])

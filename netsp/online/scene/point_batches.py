@@ -1,9 +1,9 @@
-"""The distance field at many points at once, in NumPy: for kernels that run interpreted.
+"""Distance field at many points at once, in NumPy, for kernels that run interpreted.
 
-Returns what `netsp.online.scene.sampling` and `netsp.online.scene.solids` return for each point, to
-the last bit: the same operations in the same order, and comparisons instead of NumPy's minimum and
-maximum, which treat signed zeros differently. NumPy's sines differ from those of the C library, so
-these are Python's.
+The results for each point are those of `netsp.online.scene.sampling` and
+`netsp.online.scene.solids` to the last bit. So the operations and their order are the same, and
+comparisons replace NumPy's minimum and maximum, which treat signed zeros differently. NumPy's sines
+differ from those of the C library, so this module uses Python's.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Samples = tuple[Floats, Floats, Floats, Floats]
 """Distances and the coordinates of their gradients."""
 
 Row = list[Any]
-"""The numbers of one solid, or arrays of those of a solid for each point
+"""Numbers of one solid, or arrays with the numbers of one solid for each point
 (`netsp.online.scene.packing`)."""
 
 CHUNK = 32_768  # points measured at once, so that the arrays of a chunk stay in the cache
@@ -108,7 +108,7 @@ def lowest_along(data: Floats, offset: float, a: Floats, b: Floats, tolerance: f
     a, b : ndarray, shape (n, 3)
         Ends of the segments.
     tolerance : float
-        How far the result may be off.
+        Maximum error of the result.
     """
     begins = [np.ascontiguousarray(a[:, axis]) for axis in range(3)]
     sides = [b[:, axis] - a[:, axis] for axis in range(3)]
@@ -150,8 +150,8 @@ def _candidates_in_numpy(data: Floats) -> tuple[Ints, Ints]:
 
 
 def _nearest(data: Floats, p: Vectors) -> tuple[Floats, Ints]:
-    """Return the distances of points, and the rows of the nearest solids; 0 where there is
-    none."""
+    """Return the distances of points, and the rows of the nearest solids, 0 where there is no
+    solid."""
     if data[CELLS] <= 0.0:
         return _nearest_of_all(data, p)
     size, counts = data[NEAR + 3], data[NEAR + 4 : NEAR + 7]
@@ -203,7 +203,7 @@ def _at(p: Vectors, some: Ints | Bools) -> Vectors:
 
 
 def _by_kind(data: Floats, rows: Ints) -> Iterator[tuple[int, Ints]]:
-    """Yield each kind of solids, and where in their rows those of this kind stand."""
+    """Yield each kind of solids, with the indices of the rows of this kind."""
     kinds = data[rows].astype(np.int64)
     for kind in np.flatnonzero(np.bincount(kinds)).tolist():
         yield kind, np.flatnonzero(kinds == kind)
@@ -220,7 +220,7 @@ def _solids(data: Floats, kind: int, at: Any, p: Vectors, has_gradient: bool = T
     kind : int
         Kind of all the solids.
     at : int or ndarray of int, shape (n,)
-        Row of one solid for all points, or of one for each.
+        Row of one solid for all points, or the row of one solid for each point.
     p : tuple of ndarray, shape (n,)
         The points.
     has_gradient : bool
@@ -243,7 +243,7 @@ def _larger(a: Any, b: Any) -> Any:
 
 
 def _share(t: Any) -> Any:
-    """Return numbers cut off below 0 and above 1."""
+    """Return numbers clipped to 0 … 1."""
     t = np.where(t > 0.0, t, 0.0)
     return np.where(t < 1.0, t, 1.0)
 
@@ -388,4 +388,4 @@ _BY_KIND: dict[int, tuple[int, Callable[[Row, Vectors, bool], Samples]]] = {
     CAPSULE: (7, _capsule), CYLINDER: (8, _cylinder), BOX: (15, _box), TORUS: (12, _torus),
     POST: (3, _post),
 }  # fmt: skip
-"""Kinds of solids, how many numbers each has, and what measures it."""
+"""By kind of solid: how many numbers a solid has, and the function that measures it."""
