@@ -73,7 +73,8 @@ def call_within(
     own = [a for name, a in zip(names, args, strict=False) if name not in STOP_PARAMETERS]
     before = [(a, a.copy()) for a in arrays_in(own) if a.flags.writeable]
     try:
-        with np.errstate(all="ignore"):  # outside: what a signal raises passes through no `with`
+        # outside `within`, so that `Overtime` cannot come while this `with` ends
+        with np.errstate(all="ignore"):
             out = within(budget_s, function, args)
         return _plain(out)
     except Overtime:

@@ -77,8 +77,10 @@ class _Watch:
                 self._wakes.put(None)
 
     def end(self, call: _Call) -> None:
-        """Watch a call of this thread no more. An exception that is on its way comes now or never;
-        one that came in a finalizer is gone already."""
+        """Stop watching a call of this thread, and cancel an exception that is on its way.
+
+        An exception that came in a finalizer is lost already.
+        """
         with self._lock:
             self._under_way.discard(call)
             if call.was_ended:
@@ -107,7 +109,7 @@ _watch = _Watch()
 
 
 def _watch_anew() -> None:
-    """Forget the watching thread, which a forked process does not have; its lock may be held."""
+    """Replace the watch in a forked process, which has no watching thread; its lock may be held."""
     global _watch
     _watch = _Watch()
 
@@ -143,7 +145,7 @@ def within(budget_s: float, function: Callable[..., T], args: tuple[Any, ...]) -
         out = function(*args)
         _watch.end(call)
     except BaseException as error:
-        # what another thread asks for is raised where a function begins: none does outside of `try`
+        # Python raises `Overtime` where a function begins; none begins outside of `try` here
         try:
             _watch.end(call)
         except Overtime:
@@ -152,7 +154,7 @@ def within(budget_s: float, function: Callable[..., T], args: tuple[Any, ...]) -
             _watch.end(call)
             raise
         failed = error.__context__ if isinstance(error, Overtime) else None
-        # Overtime that came while an interrupt passed through a `with` of the function
+        # `Overtime` came while an interrupt passed through a `with` of the function
         if failed is not handled and isinstance(failed, KeyboardInterrupt | SystemExit):
             raise failed from None
         if isinstance(error, Overtime):
