@@ -1,4 +1,4 @@
-"""When walks leave the rest of a proof to cutting planes."""
+"""Tests of the handover of a proof from walks to cutting planes."""
 
 import importlib
 from dataclasses import fields

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from netsp.compiled.interpretation import interprets
 from netsp.compiled.kernel import kernel
 
-WORD = 2**64 - 1  # mask of 64 bits
+UINT64_MASK = 2**64 - 1  # all bits of an unsigned integer of 64 bits, to which products wrap
 
 
 def seeded(rng: np.random.Generator) -> npt.NDArray[np.uint64]:
@@ -39,10 +39,10 @@ def _uniform_by_integers(state: npt.NDArray[np.uint64]) -> float:
     """Do as `uniform`, with Python's integers: NumPy warns where a product overflows."""
     x = int(state[0])
     x ^= x >> 12
-    x = (x ^ (x << 25)) & WORD
+    x = (x ^ (x << 25)) & UINT64_MASK
     x ^= x >> 27
     state[0] = x
-    return ((x * 2685821657736338717 & WORD) >> 11) / 9007199254740992.0
+    return ((x * 2685821657736338717 & UINT64_MASK) >> 11) / 9007199254740992.0
 
 
 @kernel

@@ -23,12 +23,12 @@ from netsp.dp.memory import CHUNK
 
 LOW = (1 << CHUNK) - 1
 
-SETS_PER_MEMORY = 64
-"""Most sets of goals for each memory for which the interpreter goes through all sets. With more, it
-compares memories with one another, which is as quick at about this number."""
+MAX_SETS_PER_MEMORY = 64
+"""Sets of goals for each memory up to which the interpreter goes through all sets. With more sets, it
+compares memories with one another; at about this number, both take as long."""
 
-COMPARED = 32
-"""Memories that are compared with all others at once; more or fewer are a little slower."""
+COMPARED_AT_ONCE = 32
+"""Number of memories that NumPy compares with all others at once; others are a little slower."""
 
 
 class Graph(NamedTuple):
@@ -324,7 +324,7 @@ def _extend_in_numpy(
 def _translated(
     tables: npt.NDArray[np.int32], goals: Ints, h: int, memory: npt.NDArray[np.int32]
 ) -> npt.NDArray[np.int32]:
-    """Return what `translate` does of many memories at goals."""
+    """Return the masks that `translate` returns, for many memories at once."""
     masks: npt.NDArray[np.int32] = tables[goals, h, 0, memory & LOW]
     masks |= tables[goals, h, 1, (memory >> CHUNK) & LOW]
     masks |= tables[goals, h, 2, memory >> (2 * CHUNK)]
@@ -340,7 +340,7 @@ def _undominated(memory: npt.NDArray[np.int32], order: Ints) -> Bools:
     """
     used = int(np.bitwise_or.reduce(memory)) & ~int(np.bitwise_and.reduce(memory))
     goals = [k for k in range(used.bit_length()) if used >> k & 1]
-    if 1 << len(goals) > SETS_PER_MEMORY * len(memory):
+    if 1 << len(goals) > MAX_SETS_PER_MEMORY * len(memory):
         return np.array([_undominated_of(memory[row]) for row in order])
     sets = np.zeros(len(memory), dtype=np.int64)
     for place, k in enumerate(goals):
@@ -358,7 +358,7 @@ def _undominated_of(memory: npt.NDArray[np.int32]) -> Bools:
     """Return which memories include none of those before them."""
     kept, left = np.zeros(len(memory), dtype=bool), np.arange(len(memory))
     while len(left):
-        some, left = left[:COMPARED], left[COMPARED:]
+        some, left = left[:COMPARED_AT_ONCE], left[COMPARED_AT_ONCE:]
         own = memory[some, None]
         some = some[~np.triu((own & own.T) == own, 1).any(axis=0)]
         kept[some] = True
