@@ -24,8 +24,8 @@ from netsp.dp.memory import CHUNK
 LOW = (1 << CHUNK) - 1
 
 MAX_SETS_PER_MEMORY = 64
-"""Sets of goals for each memory up to which the interpreter goes through all sets. With more sets, it
-compares memories with one another; at about this number, both take as long."""
+"""Sets of goals for each memory up to which the interpreter goes through all sets. With more sets,
+it compares memories with one another; at about this number, both take as long."""
 
 COMPARED_AT_ONCE = 32
 """Number of memories that NumPy compares with all others at once; others are a little slower."""
