@@ -146,11 +146,11 @@ with locked(Path({str(file)!r})):
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )  # fmt: skip
     assert held.stdout.readline() == "held\n"
-    with locked(file, wait=False) as is_held:
+    with locked(file, max_wait_s=0.0) as is_held:
         assert not is_held
     held.kill()
     held.communicate()
-    with locked(file, wait=False) as is_held:
+    with locked(file, max_wait_s=0.0) as is_held:
         assert is_held
 
 

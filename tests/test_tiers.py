@@ -519,6 +519,13 @@ def test_a_kernel_that_another_process_compiles_is_waited_for_or_interpreted(ker
     assert kernels.ratio.signatures
 
 
+def test_a_kernel_whose_other_compiling_process_was_stopped_is_compiled_all_the_same(kernels):
+    with locked(disk_cache.lock_file(kernels.ratio)):
+        with compiled_by(CompilePolicy(is_eager=True, max_wait_prices=0.1)):
+            assert kernels.ratio(7, 2) == 3
+        assert kernels.ratio.signatures
+
+
 def test_one_of_two_holds_a_lock_file(tmp_path):
     file = tmp_path / "a.lock"
     inside, counts = [], []

@@ -58,5 +58,5 @@ def alone() -> Iterator[bool]:
     if file is None:  # nothing that it compiles would be kept
         yield False
         return
-    with locked(file.with_name("background.lock"), wait=False) as is_alone:
+    with locked(file.with_name("background.lock"), max_wait_s=0.0) as is_alone:
         yield is_alone

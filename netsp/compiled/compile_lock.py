@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,9 +14,12 @@ try:
 except ImportError:  # on Windows two processes may compile one kernel, with the same result
     fcntl = None  # type: ignore[assignment]
 
+LOCK_LOOK_INTERVAL_S = 0.02
+"""Seconds between two looks whether a lock is free, a small part of what compiling takes."""
+
 
 @contextlib.contextmanager
-def locked(file: Path | None, wait: bool = True) -> Iterator[bool]:
+def locked(file: Path | None, max_wait_s: float = math.inf) -> Iterator[bool]:
     """Hold a lock file while the body runs; yield whether this process has it.
 
     The lock ends with the process, however that ends. Where a folder is not writable there is
@@ -24,10 +29,10 @@ def locked(file: Path | None, wait: bool = True) -> Iterator[bool]:
     ----------
     file : Path or None
         The lock file, which is removed at the end; None for no lock.
-    wait : bool
-        Whether to wait for a process that holds it.
+    max_wait_s : float
+        Seconds to wait for a process that holds it, which may have been stopped.
     """
-    descriptor, is_held = (None, True) if file is None else _taken(file, wait)
+    descriptor, is_held = (None, True) if file is None else _taken(file, max_wait_s)
     try:
         yield is_held
     finally:
@@ -38,10 +43,11 @@ def locked(file: Path | None, wait: bool = True) -> Iterator[bool]:
             os.close(descriptor)
 
 
-def _taken(file: Path, wait: bool) -> tuple[int | None, bool]:
+def _taken(file: Path, max_wait_s: float) -> tuple[int | None, bool]:
     """Return the descriptor of the lock file, if there is one, and whether this process has it."""
     if fcntl is None:
         return None, True
+    end = time.monotonic() + max_wait_s
     while True:
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
@@ -49,9 +55,13 @@ def _taken(file: Path, wait: bool) -> tuple[int | None, bool]:
         except OSError:
             return None, True
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            return descriptor, False
+            if time.monotonic() >= end:
+                return descriptor, False
+            os.close(descriptor)
+            time.sleep(LOCK_LOOK_INTERVAL_S)
+            continue
         except OSError:  # a file system without locks
             return descriptor, True
         with contextlib.suppress(OSError):
@@ -70,5 +80,5 @@ def is_locked(file: Path | None) -> bool:
     """
     if fcntl is None or file is None or not file.exists():
         return False
-    with locked(file, wait=False) as is_held:
+    with locked(file, max_wait_s=0.0) as is_held:
         return not is_held

@@ -43,6 +43,10 @@ class CompilePolicy:
     numpy_share : float
         Share like `price_share`, for kernels that have a form in NumPy, which is not much slower
         than compiled code.
+    max_wait_prices : float
+        Number of compile times (`price_s`), as wall-clock seconds, that a process waits for another
+        one that compiles the same kernel and may have been stopped. With a smaller number, two
+        processes compile the same kernel on a machine under load.
     max_copied_bytes : int
         Size of arguments above which a kernel is never interpreted: an interpreted call that takes
         too long is restarted from copies of its arguments.
@@ -59,6 +63,7 @@ class CompilePolicy:
     compile_s_per_byte: float = 0.001
     price_share: float = 1.0
     numpy_share: float = 1.0
+    max_wait_prices: float = 10.0
     max_copied_bytes: int = 64 * 2**20
     min_numpy_items: int = 16
     is_eager: bool = False

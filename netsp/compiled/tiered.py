@@ -131,7 +131,9 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         if types in dispatcher.overloads or disk_cache.is_on_disk(dispatcher, types):
             return compile_now()
         file = disk_cache.lock_file(dispatcher)
-        with global_compiler_lock, locked(file):
+        policy = current_policy()
+        max_wait_s = policy.max_wait_prices * policy.price_s(self.bytecode())
+        with global_compiler_lock, locked(file, max_wait_s):
             try:
                 entry = compile_now()
             except OSError:  # the folder takes no more files; the kernel is compiled all the same
