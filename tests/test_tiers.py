@@ -361,6 +361,25 @@ def test_files_that_were_cut_off_are_compiled_anew(pattern, tmp_path):
         assert file.load("of floats") == "compiled" * 100
 
 
+@pytest.mark.parametrize("pattern", ["*.nbi", "*.nbc"])
+def test_files_whose_bytes_have_changed_are_compiled_anew(pattern, tmp_path):
+    file = disk_cache.KernelFile(str(tmp_path), "f", "stamp")
+    kept = ("compiled" * 100, {"a": [1, 2.5]})
+    file.save("of floats", kept)
+    (path,) = tmp_path.glob(pattern)
+    whole, rng = path.read_bytes(), np.random.default_rng(0)
+    for changed in (1, 4, 64):
+        for _ in range(60):
+            bytes_ = np.frombuffer(whole, np.uint8).copy()
+            bytes_[rng.integers(len(whole), size=changed)] = rng.integers(256, size=changed)
+            path.write_bytes(bytes_.tobytes())
+            file.holds("of floats")
+            file.load("of floats")
+    path.unlink()
+    file.save("of floats", kept)
+    assert file.load("of floats") == kept
+
+
 def test_this_release_of_numba_is_supported():
     assert disk_cache.is_supported()
     assert tiered.is_supported()

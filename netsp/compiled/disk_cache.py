@@ -17,7 +17,6 @@ from __future__ import annotations
 import contextlib
 import glob
 import hashlib
-import pickle
 import re
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -61,7 +60,7 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
 
     def load(self, key: Any) -> Any:
         """Return a compiled kernel, or None if there is none that can be read."""
-        with contextlib.suppress(EOFError, pickle.UnpicklingError):
+        with contextlib.suppress(Exception):  # pickle raises anything where bytes have changed
             return super().load(key)
         return None
 
@@ -78,10 +77,11 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
                 old.unlink(missing_ok=True)
 
     def _load_index(self) -> Any:
-        try:
-            return super()._load_index()
-        except (AttributeError, ImportError, EOFError, OSError, ValueError, pickle.UnpicklingError):
-            return {}
+        with contextlib.suppress(Exception):  # pickle raises anything where bytes have changed
+            index = super()._load_index()
+            if isinstance(index, dict) and all(isinstance(name, str) for name in index.values()):
+                return index
+        return {}
 
 
 def keep_on_disk(dispatcher: Any, function: Callable[..., Any]) -> None:
