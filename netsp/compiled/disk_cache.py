@@ -8,8 +8,8 @@ same number: then the code of one is found under the types of the other, in ever
 This module mends all three, so that nobody ever has to delete a cache by hand. Files that cannot be
 read (a full disk, a machine that lost power) count as absent.
 
-This file, `netsp.compiled.tiered` and `netsp.compiled.linked_library` use parts of Numba that are
-not public. `is_supported` of each checks that they are there.
+This file and `netsp.compiled.tiered` use parts of Numba that are not public. `is_supported` of
+each checks that they are there.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from __future__ import annotations
 import contextlib
 import glob
 import hashlib
+import pickle
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,7 @@ from typing import Any
 from numba import njit
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-FORMAT = 2
+FORMAT = 3
 """Format of the files; those of another one are compiled anew."""
 
 _PACKAGE = Path(__file__).resolve().parent.parent
@@ -63,6 +64,16 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
         with contextlib.suppress(Exception):  # pickle raises anything where bytes have changed
             return super().load(key)
         return None
+
+    def _save_data(self, name: str, data: Any) -> None:
+        dumped = self._dump(data)
+        super()._save_data(name, (hashlib.sha256(dumped).digest(), dumped))
+
+    def _load_data(self, name: str) -> Any:
+        digest, dumped = super()._load_data(name)
+        if hashlib.sha256(dumped).digest() != digest:
+            raise ValueError(f"{name}: bytes have changed")
+        return pickle.loads(dumped)
 
     @property
     def lock(self) -> Path:
@@ -152,7 +163,7 @@ def _file_of(dispatcher: Any) -> KernelFile | None:
     return file if isinstance(file, KernelFile) else None
 
 
-def cached(function: Callable[..., Any], options: Mapping[str, bool]) -> Any:
+def cached(function: Callable[..., Any]) -> Any:
     """Return Numba's dispatcher of a function, which keeps its compiled code on disk where a
     folder is writable.
 
@@ -160,13 +171,12 @@ def cached(function: Callable[..., Any], options: Mapping[str, bool]) -> Any:
     ----------
     function : callable
         The function.
-    options : dict
-        Options of Numba.
     """
+    # nothing calls kernels from C, so that they need no wrappers for it
     try:
-        return njit(cache=True, **options)(function)
+        return njit(cache=True, nogil=True, no_cfunc_wrapper=True)(function)
     except RuntimeError:  # neither the package's nor the user's folder is writable
-        return njit(**options)(function)
+        return njit(nogil=True, no_cfunc_wrapper=True)(function)
 
 
 @cache
@@ -187,7 +197,7 @@ def is_supported() -> bool:
     fields = {"_cache_path", "_index_name", "_index_path", "_source_stamp"}
     try:
         kept = IndexDataCacheFile("", "probe", None)
-        cache = cached(probe, {})._cache
+        cache = cached(probe)._cache
     except (AttributeError, TypeError):
         return False
     return (

@@ -53,9 +53,7 @@ def is_kept(kernel: Any) -> bool:
     """
     from netsp.compiled import disk_cache
 
-    if not disk_cache.is_supported():
-        return False
-    return any(disk_cache.is_any_on_disk(d) for d in (kernel, getattr(kernel, "entry", kernel)))
+    return disk_cache.is_supported() and disk_cache.is_any_on_disk(kernel)
 
 
 def runs_compiled(kernel: Any) -> bool:
@@ -68,7 +66,7 @@ def runs_compiled(kernel: Any) -> bool:
     """
     from netsp.compiled.compile_policy import compiles
 
-    return compiles() and (current_policy().is_eager or bool(kernel.signatures) or is_kept(kernel))
+    return compiles() and (current_policy().is_eager or bool(kernel.overloads) or is_kept(kernel))
 
 
 def all_kernels() -> list[Any]:
@@ -91,8 +89,8 @@ def functions_to_compile() -> set[Callable[..., Any]]:
     return {
         v.py_func
         for v in values
-        if (isinstance(v, Kernel) and (v._dispatcher is None or not v._dispatcher.signatures))
-        or (isinstance(v, TieredDispatcher) and not v.signatures)
+        if (isinstance(v, Kernel) and (v._dispatcher is None or not v._dispatcher.overloads))
+        or (isinstance(v, TieredDispatcher) and not v.overloads)
     }
 
 
@@ -189,15 +187,12 @@ def _called(function: Callable[..., Any]) -> frozenset[Callable[..., Any]]:
 def _dispatcher_of(function: Callable[..., Any]) -> Any:
     """Return Numba's dispatcher of a function; where nothing is compiled, the function."""
     _register()
-    from netsp.compiled import disk_cache, linked_library, tiered
+    from netsp.compiled import disk_cache, tiered
     from netsp.compiled.compile_policy import compiles
 
     is_kept_on_disk = compiles() and disk_cache.is_supported()
     is_tiered = is_kept_on_disk and tiered.is_supported()
-    is_linked = is_tiered and linked_library.is_supported()
-    compiled = disk_cache.cached(
-        function, linked_library.LINKED_OPTIONS if is_linked else {"nogil": True}
-    )
+    compiled = disk_cache.cached(function)
     if is_kept_on_disk:
         disk_cache.keep_on_disk(compiled, function)
     if is_tiered:

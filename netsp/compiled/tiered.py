@@ -7,9 +7,11 @@ result.
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import threading
-from collections.abc import Callable, Iterable
-from functools import cache, cached_property, partial
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 from time import thread_time
 from typing import Any
 
@@ -18,14 +20,14 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.types import Boolean, Integer, unliteral  # type: ignore[attr-defined]
 
-from netsp.compiled import disk_cache, linked_library
+from netsp.compiled import disk_cache
 from netsp.compiled.arguments import call_interpreted, call_within, can_be_interpreted
 from netsp.compiled.compile_lock import is_locked, locked
 from netsp.compiled.compile_policy import compiles, current_policy
 from netsp.compiled.interpretation import interpreted, is_in_numpy, names_used
 from netsp.compiled.overtime import Overtime
 
-OVERRIDDEN = ("compile", "get_call_template", "add_overload")
+OVERRIDDEN = ("compile", "get_call_template")
 """Methods of Numba's dispatcher that `TieredDispatcher` refines."""
 
 
@@ -56,28 +58,14 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
     has_compiled = False
     is_disk_full = False
 
-    _is_for_kernel = False
-    """Whether a kernel that calls this one is being compiled."""
-
-    @cached_property
-    def entry(self) -> Any:
-        """The dispatcher of what Python calls: a function that calls this one, or this one."""
-        if not linked_library.is_supported():
-            return self
-        made = linked_library.entry_of(self, self.py_func)
-        disk_cache.keep_on_disk(made, made.py_func)
-        return made
-
-    @property
-    def signatures(self) -> list[Any]:
-        """The argument types that the function was compiled or loaded for."""
-        called = vars(self).get("entry", self).overloads
-        return list(dict.fromkeys([*self.overloads, *called]))
-
     def _compile_for_args(self, *args: Any, **kwargs: Any) -> Callable[..., Any]:
         policy = current_policy()
         if policy.is_eager or kwargs:
             return self._compiled(args, kwargs)
+        if self.overloads:  # compiled for wider integers, perhaps
+            types = _general(self.typeof_pyval(a) for a in args)
+            if types in self.overloads:
+                return self.overloads[types].entry_point  # type: ignore[no-any-return]
         on_disk = self._is_on_disk(args, policy.load_s)
         budget_s = policy.load_s
         if not on_disk:
@@ -99,7 +87,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         """
         if not self.was_on_disk and self.interpreted_s >= self.next_look_s:
             types = _general(self.typeof_pyval(a) for a in args)
-            self.was_on_disk = disk_cache.is_on_disk(self.entry, types)
+            self.was_on_disk = disk_cache.is_on_disk(self, types)
             self.next_look_s = self.interpreted_s + look_s
         return self.was_on_disk
 
@@ -110,57 +98,27 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         of 32 bits is compiled once.
         """
         types = _general(sig) if isinstance(sig, tuple) else sig
-        if not linked_library.is_supported():
-            return self._compiled_as(self, types)
-        if self._is_for_kernel:
-            with global_compiler_lock, linked_library.linked_libraries():
-                return self._compiled_as(self, types)
-        if types in self.entry.overloads:
-            called = self.entry.overloads[types].entry_point
-        else:
-            with global_compiler_lock, linked_library.linked_libraries():
-                called = self._compiled_as(self.entry, types)
-        with global_compiler_lock:  # later calls with narrow numbers go there at once, too
-            for kinds in {types, tuple(sig)}:
-                self._insert([kind._code for kind in kinds], called, False)
-        return called
-
-    def _compiled_as(self, dispatcher: Any, types: tuple[Any, ...]) -> Any:
-        """Compile this kernel or its entry for argument types, or load it."""
-        compile_now = partial(CPUDispatcher.compile, dispatcher, types)
-        if types in dispatcher.overloads or disk_cache.is_on_disk(dispatcher, types):
-            return compile_now()
-        file = disk_cache.lock_file(dispatcher)
+        if types in self.overloads or disk_cache.is_on_disk(self, types):
+            return super().compile(types)
+        file = disk_cache.lock_file(self)
         policy = current_policy()
         max_wait_s = policy.max_wait_prices * policy.price_s(self.bytecode())
-        with global_compiler_lock, locked(file, max_wait_s):
+        with global_compiler_lock, locked(file, max_wait_s), _garbage_kept():
             try:
-                entry = compile_now()
+                entry = super().compile(types)
             except OSError:  # the folder takes no more files; the kernel is compiled all the same
-                if types not in dispatcher.overloads:
+                if types not in self.overloads:
                     raise
                 TieredDispatcher.is_disk_full = True
-                return dispatcher.overloads[types].entry_point
+                return self.overloads[types].entry_point
             TieredDispatcher.has_compiled |= file is not None
             return entry
 
-    def add_overload(self, result: Any) -> None:
-        """Add a compiled or loaded form; one without machine code cannot be called from Python."""
-        if linked_library.is_linked_only(result):
-            self.overloads[tuple(result.signature.args)] = result
-        else:
-            super().add_overload(result)
-
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Return the template with which Numba compiles a call of this kernel by another one."""
-        with global_compiler_lock:
-            before, self._is_for_kernel = self._is_for_kernel, True
-            try:
-                return super().get_call_template(
-                    _general(args), dict(zip(kws, _general(kws.values()), strict=True))
-                )
-            finally:
-                self._is_for_kernel = before
+        return super().get_call_template(
+            _general(args), dict(zip(kws, _general(kws.values()), strict=True))
+        )
 
     def _compiled(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Callable[..., Any]:
         return super()._compile_for_args(*args, **kwargs)  # type: ignore[no-any-return]
@@ -192,11 +150,24 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
     def bytecode(self) -> int:
         """Return the size of the bytecode, in bytes, of the function and of the kernels that it
         calls, as far as they are not compiled."""
-        return sum(len(k.py_func.__code__.co_code) for k in _called(self) if not k.signatures)
+        return sum(len(k.py_func.__code__.co_code) for k in _called(self) if not k.overloads)
 
     def _is_locked(self) -> bool:
         """Return whether another process compiles the function."""
-        return any(is_locked(disk_cache.lock_file(d)) for d in {self, self.entry})
+        return is_locked(disk_cache.lock_file(self))
+
+
+@contextlib.contextmanager
+def _garbage_kept() -> Iterator[None]:
+    """Pause Python's garbage collector: Numba makes millions of objects that live as long as a
+    function is compiled."""
+    is_collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if is_collecting:
+            gc.enable()
 
 
 def _general(types: Iterable[Any]) -> tuple[Any, ...]:
