@@ -148,11 +148,11 @@ def limited_cpu_s(folder: Path, cache: Path) -> float:
 
 
 def random_cpu_s(goals: int, seed: int, folder: Path, cache: Path) -> float:
-    """Return the CPU seconds of solving a random world."""
+    """Return the CPU seconds of solving a random world with the tether of `netsp world`."""
     from netsp.worlds import random_world
 
     problem = folder / "world.json"
-    world = random_world(seed, goals=goals, tether_length=250.0)
+    world = random_world(seed, goals=goals, tether_length=300.0)
     problem.write_text(json.dumps(json.loads(world.to_json())), encoding="utf-8")
     return solve_cpu_s(problem, folder, cache)
 
