@@ -334,6 +334,36 @@ def test_without_a_folder_that_takes_files_kernels_are_interpreted_and_compiled(
     assert not tiered.TieredDispatcher.has_compiled  # nothing to keep: no process in the background
 
 
+PROFILED = """
+import sys
+from netsp.compiled.overtime import Overtime, within
+
+def spin(seconds):
+    import time
+    end = time.thread_time() + seconds
+    while time.thread_time() < end:
+        pass
+
+for k in range(40):
+    try:
+        within(0.002, spin, (0.002 + 0.0002 * k,))
+    except Overtime:
+        pass
+seen = []
+sys.setprofile(lambda frame, event, _: seen.append(event))
+spin(0.0)
+sys.setprofile(None)
+print("call" in seen)
+"""
+
+
+def test_functions_can_be_profiled_after_a_budget_has_ended():
+    done = subprocess.run(
+        [sys.executable, "-c", PROFILED], capture_output=True, text=True, timeout=60
+    )
+    assert done.stdout == "True\n"
+
+
 def test_a_full_disk_costs_the_next_command_time_and_nothing_else(monkeypatch, kernels):
     def full(self, path):
         raise OSError(errno.ENOSPC, "No space left on device")

@@ -26,6 +26,9 @@ LOOK_S = 0.005
 IDLE_LOOKS = 20
 """Looks without a call under way after which the watching thread sleeps until the next one."""
 
+MAX_STEPS_TO_EXCEPTION = 1000
+"""Steps of a loop after which an exception has surely come: Python looks for it at each step."""
+
 
 class Overtime(BaseException):
     """Exception that ends a call whose budget is used up."""
@@ -77,14 +80,12 @@ class _Watch:
                 self._wakes.put(None)
 
     def end(self, call: _Call) -> None:
-        """Stop watching a call of this thread, and cancel an exception that is on its way.
-
-        An exception that came in a finalizer is lost already.
-        """
+        """Stop watching a call of this thread, and catch an exception that is on its way."""
         with self._lock:
             self._under_way.discard(call)
-            if call.was_ended:
-                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(call.thread), None)
+            was_ended = call.was_ended
+        if was_ended:
+            _catch_pending(call.thread)
 
     def _run(self) -> None:
         idle = 0
@@ -103,6 +104,22 @@ class _Watch:
                 idle = 0
             else:
                 time.sleep(LOOK_S)
+
+
+def _catch_pending(thread: int) -> None:
+    """Catch an exception that is on its way to this thread; one that came already does no harm.
+
+    CPython 3.11 never forgets that an exception was on its way if that is cancelled: each call of
+    a function is slower from then on, and hangs under a profiler. So one more is sent and caught.
+    """
+    try:
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(
+            ctypes.c_ulong(thread), ctypes.py_object(Overtime)
+        )
+        for _ in range(MAX_STEPS_TO_EXCEPTION):
+            pass
+    except Overtime:
+        return  # in a function of Python, suppress() would begin outside of `try`
 
 
 _watch = _Watch()
