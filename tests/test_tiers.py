@@ -413,6 +413,21 @@ def test_files_whose_bytes_have_changed_are_compiled_anew(pattern, tmp_path):
     assert file.load("of floats") == kept
 
 
+def test_numba_calls_compiled_code_at_once_for_narrow_integers(kernels, monkeypatch):
+    with everything_compiled():
+        assert kernels.ratio(7, 2) == 3
+    asked = []
+    slow = tiered.TieredDispatcher._compile_for_args
+    monkeypatch.setattr(
+        tiered.TieredDispatcher, "_compile_for_args",
+        lambda self, *args: asked.append(args) or slow(self, *args),
+    )  # fmt: skip
+    for _ in range(3):
+        assert kernels.ratio(np.int32(7), np.int16(2)) == 3
+    assert len(asked) == 1
+    assert len(kernels.ratio.overloads) == 1
+
+
 def test_this_release_of_numba_is_supported():
     assert disk_cache.is_supported()
     assert tiered.is_supported()

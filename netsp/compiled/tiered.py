@@ -58,14 +58,17 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
     has_compiled = False
     is_disk_full = False
 
+    _narrow_types: frozenset[tuple[Any, ...]] = frozenset()
+    """Argument types with narrow integers for which Numba calls the code for wider ones."""
+
     def _compile_for_args(self, *args: Any, **kwargs: Any) -> Callable[..., Any]:
         policy = current_policy()
         if policy.is_eager or kwargs:
             return self._compiled(args, kwargs)
-        if self.overloads:  # compiled for wider integers, perhaps
-            types = _general(self.typeof_pyval(a) for a in args)
-            if types in self.overloads:
-                return self.overloads[types].entry_point  # type: ignore[no-any-return]
+        if self.overloads:
+            types = tuple(self.typeof_pyval(a) for a in args)
+            if _general(types) in self.overloads:
+                return self._entry_for_narrow(types)
         on_disk = self._is_on_disk(args, policy.load_s)
         budget_s = policy.load_s
         if not on_disk:
@@ -79,6 +82,15 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         if budget_s <= 0.0 or not can_be or (is_shared and on_disk):
             return self._compiled(args, kwargs)
         return self._run_pooled if is_shared else self._within(budget_s)
+
+    def _entry_for_narrow(self, types: tuple[Any, ...]) -> Callable[..., Any]:
+        """Return the compiled code for wider integers, and have Numba call it at once next time."""
+        with global_compiler_lock:
+            entry = self.overloads[_general(types)].entry_point
+            if types != _general(types) and types not in self._narrow_types:
+                self._narrow_types |= {types}
+                self._insert([kind._code for kind in types], entry, False)
+        return entry  # type: ignore[no-any-return]
 
     def _is_on_disk(self, args: tuple[Any, ...], look_s: float) -> bool:
         """Return whether compiled code for these arguments is known to be on the disk.
