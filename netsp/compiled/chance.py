@@ -15,7 +15,7 @@ import numpy.typing as npt
 from netsp.compiled.interpretation import interprets
 from netsp.compiled.kernel import kernel
 
-UINT64_MASK = 2**64 - 1  # all bits of an unsigned integer of 64 bits, to which products wrap
+UINT64_MASK = 2**64 - 1  # keeps the low 64 bits, as arithmetic with uint64 does
 
 
 def seeded(rng: np.random.Generator) -> npt.NDArray[np.uint64]:
@@ -36,7 +36,7 @@ def uniform(state: npt.NDArray[np.uint64]) -> float:
 
 @interprets(uniform)
 def _uniform_by_integers(state: npt.NDArray[np.uint64]) -> float:
-    """Do as `uniform`, with Python's integers: NumPy warns where a product overflows."""
+    """Compute `uniform` with Python's integers, because NumPy warns when a product overflows."""
     x = int(state[0])
     x ^= x >> 12
     x = (x ^ (x << 25)) & UINT64_MASK

@@ -1,7 +1,7 @@
-"""Arrays that compiled loops copy, order and let grow.
+"""Kernels that copy, sort and enlarge arrays.
 
-The loops are written out: assigning one slice to another would compile NumPy's broadcasting and its
-error messages, and sorting would compile NumPy's sort, each of which takes seconds.
+Their loops are explicit, because a slice assignment would compile NumPy's broadcasting and its
+error messages, and sorting would compile NumPy's sort; each takes seconds.
 """
 
 from __future__ import annotations
@@ -12,13 +12,12 @@ from netsp.arrays import Floats, Ints
 from netsp.compiled.interpretation import interprets
 from netsp.compiled.kernel import kernel
 
-RUN = 16
-"""Length of the stretches that `order_of` sorts by insertion before it merges them."""
+RUN_LENGTH = 16  # entries that `order_of` sorts by insertion before it merges the runs
 
 
 @kernel
 def more_rows(a: Floats) -> Floats:
-    """Return the same rows with room for twice as many."""
+    """Return a copy of an array with room for twice as many rows."""
     b = np.empty((2 * a.shape[0], a.shape[1]))
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):
@@ -28,7 +27,7 @@ def more_rows(a: Floats) -> Floats:
 
 @kernel
 def sort_in_place(a: Floats, n: int) -> None:
-    """Sort the first n entries, few as they are, by insertion."""
+    """Sort the first n entries by insertion, which is fast for few entries."""
     for i in range(1, n):
         x = a[i]
         j = i - 1
@@ -40,7 +39,7 @@ def sort_in_place(a: Floats, n: int) -> None:
 
 @kernel
 def more_int_rows(a: Ints) -> Ints:
-    """Return the same rows with room for twice as many."""
+    """Return a copy of an array with room for twice as many rows."""
     b = np.empty((2 * a.shape[0], a.shape[1]), dtype=np.int64)
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):
@@ -59,21 +58,21 @@ def longer(a: Floats) -> Floats:
 
 @kernel
 def write_ints(to: Ints, values: Ints, n: int) -> None:
-    """Copy the first n whole numbers of an array to another one."""
+    """Copy the first n integers of an array to another array."""
     for i in range(n):
         to[i] = values[i]
 
 
 @kernel
 def write_floats(to: Floats, values: Floats, n: int) -> None:
-    """Copy the first n numbers of an array to another one."""
+    """Copy the first n floats of an array to another array."""
     for i in range(n):
         to[i] = values[i]
 
 
 @kernel
 def write_rows(to: Floats, rows: Floats, n: int) -> None:
-    """Copy the first n rows of an array to another one."""
+    """Copy the first n rows of an array to another array."""
     for i in range(n):
         for j in range(rows.shape[1]):
             to[i, j] = rows[i, j]
@@ -83,23 +82,23 @@ def write_rows(to: Floats, rows: Floats, n: int) -> None:
 @interprets(write_floats)
 @interprets(write_rows)
 def _write_in_numpy(to: Floats, values: Floats, n: int) -> None:
-    """Do as `write_ints`, `write_floats` and `write_rows`."""
+    """Vectorise `write_ints`, `write_floats` and `write_rows`."""
     to[:n] = values[:n]
 
 
 @kernel
 def order_of(values: Floats) -> Ints:
-    """Return the indices that sort numbers, none of them NaN; equal ones keep their order."""
+    """Return the indices that sort numbers without NaN; equal numbers keep their order."""
     n = len(values)
     order, merged = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    for begin in range(0, n, RUN):
-        for i in range(begin, min(begin + RUN, n)):
+    for begin in range(0, n, RUN_LENGTH):
+        for i in range(begin, min(begin + RUN_LENGTH, n)):
             j = i
             while j > begin and values[order[j - 1]] > values[i]:
                 order[j] = order[j - 1]
                 j -= 1
             order[j] = i
-    size = RUN
+    size = RUN_LENGTH
     while size < n:
         for begin in range(0, n, 2 * size):
             middle, end = min(begin + size, n), min(begin + 2 * size, n)
@@ -118,5 +117,5 @@ def order_of(values: Floats) -> Ints:
 
 @interprets(order_of)
 def _order_in_numpy(values: Floats) -> Ints:
-    """Do as `order_of`."""
+    """Vectorise `order_of`."""
     return np.argsort(values, kind="stable")

@@ -24,11 +24,12 @@ from netsp.dp.memory import CHUNK
 LOW = (1 << CHUNK) - 1
 
 MAX_SETS_PER_MEMORY = 64
-"""Sets of goals for each memory up to which the interpreter goes through all sets. With more sets,
-it compares memories with one another; at about this number, both take as long."""
+"""Maximum number of goal sets per memory for which `_undominated` goes through all sets. With more,
+it compares the memories pairwise; at about this ratio both take the same time."""
 
-COMPARED_AT_ONCE = 32
-"""Number of memories that NumPy compares with all others at once; others are a little slower."""
+COMPARED_BLOCK_SIZE = 32
+"""Number of memories that `_undominated_of` compares with all others in one NumPy operation.
+Smaller and larger blocks are a little slower."""
 
 
 class Graph(NamedTuple):
@@ -126,7 +127,7 @@ def completions(
 def _completions_in_numpy(
     graph: Graph, prices: Floats, alive: Bools, least: Floats, onward: Floats, stop: Ints
 ) -> None:
-    """Do as `completions`, all vertices of a goal at once."""
+    """Vectorise `completions` over the vertices of a goal."""
     costs, goal, start = graph
     n = len(start) - 2
     second = np.full(least.shape, np.inf)
@@ -280,7 +281,7 @@ def _extend_in_numpy(
     prices: Floats,
     stop: Ints,
 ) -> tuple[Ints, Floats, npt.NDArray[np.int32]]:
-    """Do as `extend`, all labels at the vertices of a goal at once."""
+    """Vectorise `extend` over all labels that are extended to a goal."""
     costs, goal, start = graph
     pointer, cost, memory = labels
     vertex = np.repeat(np.arange(len(pointer) - 1), np.diff(pointer))
@@ -298,7 +299,7 @@ def _extend_in_numpy(
         if not len(at) or own.start == own.stop:
             out_pointer += [out_pointer[-1]] * (own.stop - own.start)
             continue
-        # memories in the order in which they were met, as ties are broken by it
+        # distinct memories, in the order in which `extend` finds them, which breaks ties
         place = np.arange(len(at))
         slot[masks[::-1]] = place[::-1]
         seen = masks[slot[masks] == place]
@@ -309,7 +310,7 @@ def _extend_in_numpy(
         at = at[by_kind]
         table = np.minimum.reduceat(cost[at, None] + costs[vertex[at], own], begin, axis=0)
         table[~((table <= bounds.limit[own]) & (table < np.inf))] = np.inf
-        # (vertex, place), cheapest first
+        # for each vertex of the goal, indices into `seen`, cheapest first
         count = np.count_nonzero(table < np.inf, axis=0)
         order = np.argsort(table.T, axis=1, kind="stable")[:, : count.max()]
         kept = _undominated(seen, order) & (np.arange(order.shape[1]) < count[:, None])
@@ -324,7 +325,7 @@ def _extend_in_numpy(
 def _translated(
     tables: npt.NDArray[np.int32], goals: Ints, h: int, memory: npt.NDArray[np.int32]
 ) -> npt.NDArray[np.int32]:
-    """Return the masks that `translate` returns, for many memories at once."""
+    """Vectorise `translate` over memories and the goals that they come from."""
     masks: npt.NDArray[np.int32] = tables[goals, h, 0, memory & LOW]
     masks |= tables[goals, h, 1, (memory >> CHUNK) & LOW]
     masks |= tables[goals, h, 2, memory >> (2 * CHUNK)]
@@ -332,11 +333,11 @@ def _translated(
 
 
 def _undominated(memory: npt.NDArray[np.int32], order: Ints) -> Bools:
-    """Return which memories, in each row of an order, include none of those before them.
+    """Return, for each row of an order, which memories have no subset earlier in the row.
 
-    Where memories are dense among all sets of the goals in them, the first place of any subset is
-    found by a minimum over one goal after the other (Yates 1937, "The design and analysis of
-    factorial experiments").
+    Where the memories are a large part of all sets of their goals, the first place of a subset is
+    found for all sets together, by a minimum over one goal after another (Yates 1937, "The design
+    and analysis of factorial experiments").
     """
     used = int(np.bitwise_or.reduce(memory)) & ~int(np.bitwise_and.reduce(memory))
     goals = [k for k in range(used.bit_length()) if used >> k & 1]
@@ -355,10 +356,10 @@ def _undominated(memory: npt.NDArray[np.int32], order: Ints) -> Bools:
 
 
 def _undominated_of(memory: npt.NDArray[np.int32]) -> Bools:
-    """Return which memories include none of those before them."""
+    """Return which memories have no subset among the earlier memories."""
     kept, left = np.zeros(len(memory), dtype=bool), np.arange(len(memory))
     while len(left):
-        some, left = left[:COMPARED_AT_ONCE], left[COMPARED_AT_ONCE:]
+        some, left = left[:COMPARED_BLOCK_SIZE], left[COMPARED_BLOCK_SIZE:]
         own = memory[some, None]
         some = some[~np.triu((own & own.T) == own, 1).any(axis=0)]
         kept[some] = True
@@ -397,7 +398,7 @@ def join(
 
 @interprets(join)
 def _join_in_lists(goal: Ints, prices: Floats, a: Labels, b: Labels) -> Floats:
-    """Do as `join`, over lists, which the interpreter reads faster than arrays."""
+    """Compute `join` over lists, which the interpreter reads faster than arrays."""
     a_pointer, a_cost, a_memory = (x.tolist() for x in a)
     b_pointer, b_cost, b_memory = (x.tolist() for x in b)
     out = np.full(len(goal), np.inf)
@@ -459,7 +460,7 @@ def _step_back_in_numpy(
     at_memory: int,
     labels: Labels,
 ) -> tuple[int, int]:
-    """Do as `step_back`, all labels at once."""
+    """Vectorise `step_back` over all labels."""
     costs, goal, _ = graph
     pointer, cost, memory = labels
     h = goal[v]

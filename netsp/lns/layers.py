@@ -197,7 +197,7 @@ def best_classes(clusters: Ints, start: Ints, costs: Floats) -> tuple[float, Int
 
 @interprets(best_classes)
 def _best_classes_in_numpy(clusters: Ints, start: Ints, costs: Floats) -> tuple[float, Ints]:
-    """Do as `best_classes`, all vertices of a cluster at once."""
+    """Vectorise `best_classes` over the vertices of a cluster."""
     n = len(clusters)
     own = [slice(start[c], start[c + 1]) for c in clusters]
     reach, back = costs[0, own[0]], []

@@ -116,7 +116,7 @@ def _carry_on_in_numpy(
     c: int, sure: int, after: Ints, prior: Ints, start: Ints, costs: Floats, ahead: Floats,
     grown: Floats, row: Floats,
 ) -> float:  # fmt: skip
-    """Do as `carry_on`, all vertices of a cluster at once."""
+    """Vectorise `carry_on` over the vertices of a cluster."""
     longer = 0.0
     while True:
         p, begin, end = prior[c], start[c], start[c + 1]
@@ -230,7 +230,7 @@ def _between_in_numpy(
     c: int, p: int, most: float, after: Ints, start: Ints, costs: Floats, nearest: Floats,
     ahead: Floats, behind: Floats, rest: Floats,
 ) -> float:  # fmt: skip
-    """Do as `between`, all vertices of the clusters at once."""
+    """Vectorise `between` over the vertices of the clusters."""
     q = after[p]
     left, right = start[p], start[q]
     left_end, right_end = start[p + 1], start[q + 1]

@@ -209,7 +209,7 @@ def _cost(ends: Ints, flow: Floats, sides: Bools) -> tuple[float, int]:
 def _cheapest_in_numpy(
     ends: Ints, flow: Floats, row: Ints, beside: Ints, sides: Bools
 ) -> tuple[float, Bools]:
-    """Do as `_cheapest`, the changes of all clusters at once until one of them is made."""
+    """Vectorise `_cheapest`: cost the moves of all clusters together, and again after each move."""
     cost, change = _cost_in_numpy(ends, flow, sides)
     movable = np.flatnonzero(row[:-1] != row[1:])
     is_end = ((ends[:, :1] == movable) ^ (ends[:, 1:] == movable)).T
@@ -236,18 +236,21 @@ def _cheapest_in_numpy(
 
 @interprets(_cost)
 def _cost_in_numpy(ends: Ints, flow: Floats, sides: Bools) -> tuple[float, int]:
-    """Do as `_cost`, all pairs at once."""
+    """Vectorise `_cost` over all pairs."""
     q = np.where(sides[ends[:, 0]] == sides[ends[:, 1]], flow[:, 1], flow[:, 0])
     costs, changes = _costs_of(q[None])
     return float(costs[0]), int(changes[0])
 
 
 def _costs_of(across: Floats) -> tuple[Floats, Ints]:
-    """Return the cost of each row of what pairs have across, and the pair changed for it."""
+    """Return the costs of several sets of sides, and the pairs changed for them, -1 for none.
+
+    Each row of `across` holds the values that `_across` returns for one set of sides.
+    """
     if not across.shape[1]:
         return np.full(len(across), np.inf), np.full(len(across), -1)
     is_tooth = across > 0.5
-    # in the order of the pairs
+    # a cumulative sum adds in the order of the pairs, as `_cost` does
     total = np.cumsum(np.where(is_tooth, 1.0 - across, across), axis=1)[:, -1]
     off = np.abs(1.0 - 2.0 * across)
     at = off.argmin(axis=1)

@@ -217,7 +217,7 @@ class Coverage:
 
     def _nearest(self, eye: Floats) -> Floats:
         """Return the vector from a place to the nearest patch."""
-        # `heading` and `look` ask for the same place
+        # kept, because `heading` and `look` ask for the same place in turn
         if self._latest is None or not np.array_equal(self._latest[0], eye):
             at = nearest(self.patches.centres, eye)
             self._latest = (np.array(eye), np.asarray(self.patches.centres[at] - eye))
@@ -241,7 +241,7 @@ def nearest(centres: Floats, eye: Floats) -> int:
 
 @interprets(nearest)
 def _nearest_in_numpy(centres: Floats, eye: Floats) -> int:
-    """Do as `nearest`, all points at once."""
+    """Vectorise `nearest` over all points."""
     x, y, z = (centres[:, axis] - eye[axis] for axis in range(3))
     return int(np.argmin(x * x + y * y + z * z)) if len(centres) else 0
 
@@ -291,7 +291,7 @@ def mark(
 def _mark_in_numpy(
     field: Field, surface: Surface, seen: Bools, seen_through: Bools, view: View
 ) -> tuple[float, float]:
-    """Do as `mark`, all patches at once."""
+    """Vectorise `mark` over all patches."""
     at = np.flatnonzero(~seen)
     x, y, z = (surface.centres[at, axis] - view.eye[axis] for axis in range(3))
     nx, ny, nz = (surface.normals[at, axis] for axis in range(3))
@@ -316,5 +316,5 @@ def _mark_in_numpy(
 
 
 def _in_order(shares: Floats) -> float:
-    """Return a sum that is added up in order; NumPy's own adds in pairs."""
+    """Return the sum of shares, added in order as `mark` does; np.sum adds pairwise."""
     return float(np.add.accumulate(shares)[-1]) if len(shares) else 0.0

@@ -181,7 +181,7 @@ def _fill_in_numpy(
     branches: Branches, lengths: Lengths, point: Ints, ends: Ends, slits: Slits, arcs: Arcs,
     stop: Ints, i: int, j: int,
 ) -> tuple[int, int]:  # fmt: skip
-    """Do as `fill`, and look for open legs in a whole row at once."""
+    """Vectorise the search of `fill` for the open legs of a row."""
     order, out, row = branches.order, lengths.out, lengths.row
     whole, place = len(out) == len(order), point[order]
     longest = interpreted(longest_word)(ends.row)
@@ -195,7 +195,7 @@ def _fill_in_numpy(
             for k in (np.flatnonzero(is_asked) + j).tolist():
                 v = order[k]
                 if own[v] != OPEN:
-                    continue  # noted with a leg before it
+                    continue  # filled together with an earlier leg
                 a, b = (u, v) if i < k else (v, u)
                 length, _, count = pull_one(a, b, ends, point, slits, arcs, room, path)
                 if length < 0.0:
@@ -246,7 +246,7 @@ def _spread_in_numpy(
     u: int, v: int, length: float, count: int, on: Ints, at: Floats, branches: Branches,
     lengths: Lengths,
 ) -> None:  # fmt: skip
-    """Do as `spread`, all legs at once."""
+    """Vectorise `spread` over all legs."""
     i0, i1, j0, j1 = interpreted(_alike)(u, v, count, on, at, branches)
     order, planar, row = branches.order, lengths.planar, lengths.row
     saved = planar[u] + planar[v] - length

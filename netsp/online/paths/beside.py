@@ -85,5 +85,5 @@ def sees(field: Field, a: Floats, b: Floats, depth: float) -> Bools:
 
 @interprets(sees)
 def _sees_in_numpy(field: Field, a: Floats, b: Floats, depth: float) -> Bools:
-    """Do as `sees`, all points at once."""
+    """Vectorise `sees` over all points."""
     return np.asarray(lowest_along_each(field, a, b, 0.5 * depth) > -depth)

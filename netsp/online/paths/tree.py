@@ -253,7 +253,7 @@ def _free_cells_in_numpy(
     field: Field, low: Floats, cell: float, shape: tuple[int, int, int], clearance: float,
     stop: Flag,
 ) -> Bools:  # fmt: skip
-    """Do as `free_cells`, some layers of cells at once."""
+    """Vectorise `free_cells` over blocks of layers of cells."""
     out = np.zeros(shape, dtype=np.bool_)
     x, y, z = (low[axis] + (np.arange(shape[axis]) + 0.5) * cell for axis in range(3))
     layers = max(1, CHUNK // max(1, shape[1] * shape[2]))
@@ -292,7 +292,7 @@ def states_of(free: Bools) -> npt.NDArray[np.uint8]:
 
 @interprets(states_of)
 def _states_of_in_numpy(free: Bools) -> npt.NDArray[np.uint8]:
-    """Do as `states_of`, all cells at once."""
+    """Vectorise `states_of` over all cells."""
     bordered = np.pad(free, 1)
     is_open = bordered
     for axis in range(3):
@@ -380,11 +380,11 @@ def grow(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> npt.NDArray
 
 @interprets(grow)
 def _grow_in_numpy(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> npt.NDArray[np.int8]:
-    """Do as `grow`, all cells of a bucket at once.
+    """Vectorise `grow` over the cells of a bucket.
 
-    What is in a bucket changes nothing else in it, so the order in it matters only where two steps
-    lead to a cell equally soon: the first one counts. Of the entries of one cell the last is the
-    first that `grow` comes to.
+    The cells of a bucket do not change one another, so their order only matters where two paths to
+    a cell have the same length: the first one stays. `grow` reads a bucket from its last entry to
+    its first, so the last entry of a cell is the one that `grow` uses.
     """
     shape = np.array(states.shape)
     strides = np.array([shape[1] * shape[2], shape[2], 1])
@@ -416,9 +416,9 @@ def _grow_in_numpy(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> n
         steps = np.where((came < 0) | (state[cells] != OPEN), 26, came)
         state[cells] = BLOCKED
         left -= np.count_nonzero(asked[cells])
-        counts = _COUNTS[steps]
+        counts = _NEXT_COUNTS[steps]
         nth = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-        step = _NEXT[np.repeat(steps, counts), nth]
+        step = _NEXT_STEPS[np.repeat(steps, counts), nth]
         beside = np.repeat(cells, counts) + offset[step]
         onward = np.repeat(lengths[cells], counts) + _LONG[step]
         is_shorter = (state[beside] != BLOCKED) & (onward < lengths[beside])
@@ -436,17 +436,19 @@ def _grow_in_numpy(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> n
     return toward.reshape(states.shape)[1:-1, 1:-1, 1:-1]
 
 
-_COUNTS = np.append(ONWARD[:, 0], 26)
-_NEXT = np.zeros((27, 26), dtype=np.int64)
-"""How many steps are looked at after each, and which; the last row is that of all steps."""
-_NEXT[:26, : ONWARD.shape[1] - 1], _NEXT[26] = ONWARD[:, 1:], np.arange(26)
+_NEXT_COUNTS = np.append(ONWARD[:, 0], 26)
+"""Number of next steps that `grow` tries after each step; the last entry is for trying all."""
+
+_NEXT_STEPS = np.zeros((27, 26), dtype=np.int64)
+"""Next steps that `grow` tries after each step, one row a step; the last row has all steps."""
+_NEXT_STEPS[:26, : ONWARD.shape[1] - 1], _NEXT_STEPS[26] = ONWARD[:, 1:], np.arange(26)
 
 
 @kernel
 def way(toward: npt.NDArray[np.int8], start: Ints) -> Ints:
     """Cells (k, 3) from one that the tree has to its root, both ends among them."""
     out, count = np.empty((64, 3), dtype=np.int64), 1
-    # axis by axis: assigning rows would compile NumPy's error messages, seconds of work
+    # axis by axis: assigning a row would compile NumPy's error messages, which takes seconds
     for axis in range(3):
         out[0, axis] = start[axis]
     while True:
@@ -462,7 +464,7 @@ def way(toward: npt.NDArray[np.int8], start: Ints) -> Ints:
 
 @interprets(way)
 def _way_in_python(toward: npt.NDArray[np.int8], start: Ints) -> Ints:
-    """Do as `way`, with Python's numbers."""
+    """Compute `way` with Python's integers, which the interpreter handles faster than arrays."""
     i, j, k = start.tolist()
     out, steps = [(i, j, k)], STEPS.tolist()
     while (step := toward.item(i, j, k)) < 26:
@@ -529,7 +531,7 @@ def shortcut(field: Field, path: Floats, tolerance: float) -> Floats:
     that it sees without a break. The triangles that are swept are as wide as the path's points are
     apart, so nothing wider is passed over."""
     out = np.empty_like(path)
-    for axis in range(3):  # a row at once would compile NumPy's error messages
+    for axis in range(3):  # assigning a row would compile NumPy's error messages
         out[0, axis] = path[0, axis]
     count, i = 1, 0
     while i < len(path) - 1:
@@ -577,5 +579,5 @@ def all_see(field: Field, a: Floats, b: Floats, step: float) -> bool:
 
 @interprets(all_see)
 def _all_see_in_numpy(field: Field, a: Floats, b: Floats, step: float) -> bool:
-    """Do as `all_see`, all points at once."""
+    """Vectorise `all_see` over all segments."""
     return not (lowest_along_each(field, a, b, step) < 0.0).any()

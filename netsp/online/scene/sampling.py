@@ -228,7 +228,7 @@ def sample_many(field: Field, points: Floats) -> Floats:
 
 @interprets(sample_many)
 def _sample_many_in_numpy(field: Field, points: Floats) -> Floats:
-    """Do as `sample_many`, all points at once where there are many."""
+    """Vectorise `sample_many` over the points, where there are many."""
     if point_batches.is_short(field.data, len(points)):
         sampled = interpreted(sample)
         return np.array([sampled(field, x, y, z) for x, y, z in points]).reshape(-1, 5)
@@ -260,7 +260,7 @@ def lowest_along(
 
 
 def lowest_along_each(field: Field, a: Floats, b: Floats, tolerance: float) -> Floats:
-    """Return the least distance along each of some segments, where kernels run interpreted.
+    """Return the least distance along each segment, for kernels that run interpreted.
 
     Parameters
     ----------
@@ -269,7 +269,7 @@ def lowest_along_each(field: Field, a: Floats, b: Floats, tolerance: float) -> F
     a, b : ndarray, shape (n, 3)
         Ends of the segments.
     tolerance : float
-        As of `lowest_along`, which returns the same to the last bit.
+        Tolerance of `lowest_along`; the distances are the same to the last bit.
     """
     if not point_batches.is_short(field.data, len(a)):
         return point_batches.lowest_along(field.data, field.offset, a, b, tolerance)
