@@ -153,7 +153,7 @@ def kernels(tmp_path):
 NO_STOP = np.zeros(1, dtype=np.int64)
 
 
-def test_a_kernel_is_interpreted_until_its_price_is_spent_then_compiled(kernels):
+def test_a_kernel_is_compiled_once_it_has_run_interpreted_for_its_compile_time(kernels):
     with compiled_by(CompilePolicy(compile_s=0.02, compile_s_per_byte=0.0)):
         calls = 0
         while not kernels.total.overloads:
@@ -403,7 +403,7 @@ def test_files_whose_bytes_have_changed_are_compiled_anew(pattern, tmp_path):
             bytes_ = np.frombuffer(whole, np.uint8).copy()
             bytes_[rng.integers(len(whole), size=changed)] = rng.integers(256, size=changed)
             path.write_bytes(bytes_.tobytes())
-            file.holds("of floats")
+            file.contains("of floats")
             assert file.load("of floats") in (None, kept)
     begin = len(whole) // 2
     path.write_bytes(whole[:begin] + bytes(100) + whole[begin + 100 :])
@@ -573,7 +573,7 @@ def test_random_numbers_are_the_same_interpreted_and_compiled():
 
 def test_a_kernel_that_another_process_compiles_is_waited_for_or_interpreted(kernels):
     file = disk_cache.lock_file(kernels.ratio)
-    kernels.ratio.interpreted_s = 60.0  # more than its price
+    kernels.ratio.interpreted_s = 60.0  # longer than its compile time
     with locked(file) as is_held:
         assert is_held
         assert is_locked(file)
@@ -588,7 +588,7 @@ def test_a_kernel_that_another_process_compiles_is_waited_for_or_interpreted(ker
 
 def test_a_kernel_whose_other_compiling_process_was_stopped_is_compiled_all_the_same(kernels):
     with locked(disk_cache.lock_file(kernels.ratio)):
-        with compiled_by(CompilePolicy(is_eager=True, max_wait_prices=0.1)):
+        with compiled_by(CompilePolicy(is_eager=True, max_wait_ratio=0.1)):
             assert kernels.ratio(7, 2) == 3
         assert kernels.ratio.overloads
 

@@ -189,8 +189,8 @@ class Preparation:
             package = kernel.py_func.__module__.rpartition(".")[0]
             if package not in self._packages:
                 self._packages.add(package)
-                self._expected_s += self._policy.expected_share * _neighbours_price_s(kernel)
-            with_called_s = price_s(kernel, with_called=True)
+                self._expected_s += self._policy.expected_share * _folder_compile_time_s(kernel)
+            with_called_s = compile_time_s(kernel, with_called=True)
             self._expected_s = max(self._expected_s, self._done_s + with_called_s)
             self._since = time.monotonic()
         self._depth += 1
@@ -201,7 +201,7 @@ class Preparation:
         if not kernel.py_func.__module__.startswith("netsp.") or not self._depth:
             return
         self._depth -= 1
-        self._done_s += price_s(kernel)
+        self._done_s += compile_time_s(kernel)
         if not self._depth:
             self._spent_s += time.monotonic() - self._since
         self._show()
@@ -250,7 +250,7 @@ def bar(share: float, room: int) -> str:
     return f"[{'#' * full}{' ' * (width - full)}]"
 
 
-def _neighbours_price_s(kernel: Any) -> float:
+def _folder_compile_time_s(kernel: Any) -> float:
     """Return about how many seconds compiling the loaded kernels of a kernel's folder takes.
 
     Kernels that are on disk under their names do not count.
@@ -269,11 +269,11 @@ def _neighbours_price_s(kernel: Any) -> float:
     for function in functions_to_compile():
         file = Path(function.__code__.co_filename)
         if file.parent == folder and f"{file.stem}.{function.__qualname__}" not in kept:
-            total_s += current_policy().price_s(len(function.__code__.co_code))
+            total_s += current_policy().compile_time_s(len(function.__code__.co_code))
     return total_s
 
 
-def price_s(kernel: Any, with_called: bool = False) -> float:
+def compile_time_s(kernel: Any, with_called: bool = False) -> float:
     """Return about how many seconds compiling a kernel takes.
 
     Parameters
@@ -287,4 +287,4 @@ def price_s(kernel: Any, with_called: bool = False) -> float:
 
     own = len(kernel.py_func.__code__.co_code)
     whole = getattr(kernel, "bytecode", None) if with_called else None
-    return current_policy().price_s(whole() if whole is not None else own)
+    return current_policy().compile_time_s(whole() if whole is not None else own)

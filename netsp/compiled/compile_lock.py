@@ -14,23 +14,23 @@ try:
 except ImportError:  # on Windows two processes may compile one kernel, with the same result
     fcntl = None  # type: ignore[assignment]
 
-LOCK_LOOK_INTERVAL_S = 0.02
-"""Seconds between two looks whether a lock is free, a small part of what compiling takes."""
+LOCK_CHECK_INTERVAL_S = 0.02
+"""Seconds between two attempts to take a lock, a small part of a compile time."""
 
 
 @contextlib.contextmanager
 def locked(file: Path | None, max_wait_s: float = math.inf) -> Iterator[bool]:
-    """Hold a lock file while the body runs; yield whether this process has it.
+    """Lock a file while the body runs; yield whether this process has the lock.
 
-    The lock ends with the process, however that ends. Where a folder is not writable there is
-    no lock, and the body runs as if the process held it.
+    The system releases the lock when the process ends, even if it is killed. Where the folder is
+    not writable there is no lock, and the body runs as if the process had it.
 
     Parameters
     ----------
     file : Path or None
-        The lock file, which is removed at the end; None for no lock.
+        The lock file, which is removed afterwards; None for no lock.
     max_wait_s : float
-        Seconds to wait for a process that holds it, which may have been stopped.
+        Maximum wall-clock seconds to wait for another process, which may have been stopped.
     """
     descriptor, is_held = (None, True) if file is None else _taken(file, max_wait_s)
     try:
@@ -39,12 +39,12 @@ def locked(file: Path | None, max_wait_s: float = math.inf) -> Iterator[bool]:
         if file is not None and descriptor is not None:
             if is_held:
                 with contextlib.suppress(OSError):
-                    file.unlink()  # who waits for the lock checks that this file is still there
+                    file.unlink()  # a waiting process checks that the file it locked still exists
             os.close(descriptor)
 
 
 def _taken(file: Path, max_wait_s: float) -> tuple[int | None, bool]:
-    """Return the descriptor of the lock file, if there is one, and whether this process has it."""
+    """Return the descriptor of the lock file, if any, and whether this process has the lock."""
     if fcntl is None:
         return None, True
     end = time.monotonic() + max_wait_s
@@ -60,18 +60,18 @@ def _taken(file: Path, max_wait_s: float) -> tuple[int | None, bool]:
             if time.monotonic() >= end:
                 return descriptor, False
             os.close(descriptor)
-            time.sleep(LOCK_LOOK_INTERVAL_S)
+            time.sleep(LOCK_CHECK_INTERVAL_S)
             continue
         except OSError:  # a file system without locks
             return descriptor, True
         with contextlib.suppress(OSError):
             if os.fstat(descriptor).st_ino == file.stat().st_ino:
                 return descriptor, True
-        os.close(descriptor)  # removed by its last owner meanwhile
+        os.close(descriptor)  # its last owner has removed the file: try again
 
 
 def is_locked(file: Path | None) -> bool:
-    """Return whether another process, or another thread, holds a lock file.
+    """Return whether another process or thread has locked a file.
 
     Parameters
     ----------

@@ -14,45 +14,45 @@ class CompilePolicy:
     """Policy that decides when a compiled kernel takes over from the interpreted one.
 
     The rule is that of the ski rental problem (Karlin et al. 1988, "Competitive snoopy caching"):
-    a kernel runs interpreted until that has taken as long as compiling it would, and then is
-    compiled. However long the work is, this takes at most twice the time of the better choice.
+    a kernel runs interpreted for as long as compiling it would take, and then is compiled. However
+    long the work turns out to be, this takes at most twice the time of the better choice.
 
     All seconds are CPU seconds.
 
     Parameters
     ----------
     numba_s : float
-        Seconds that kernels run interpreted before Numba is loaded to look for compiled code on
+        Seconds that kernels run interpreted before Numba is loaded to search for compiled code on
         disk. The default is about the time that loading Numba takes. Where no compiled code is on
-        disk, Numba is loaded once it has to compile. With a smaller number, small problems load
-        Numba and hardly use it; with a larger one, large problems begin more slowly.
+        disk, Numba is loaded only to compile. With a smaller value, small problems load Numba and
+        hardly use it; with a larger one, large problems begin more slowly.
     load_s : float
-        Approximate seconds to load one compiled kernel from the disk. A smaller number loads
-        kernels that a small problem hardly needs; with a larger one, large problems begin more
+        Approximate seconds to load one compiled kernel from disk. With a smaller value, small
+        problems load kernels that they hardly need; with a larger one, large problems begin more
         slowly.
     compile_s : float
         Approximate seconds to compile an empty kernel.
     compile_s_per_byte : float
-        Seconds that each byte of bytecode of a kernel, and of the kernels that it calls, adds.
-        `load_s`, `compile_s` and `compile_s_per_byte` are estimates: wrong ones cost time, but
-        never change a result.
-    price_share : float
-        Share of its compile time (`price_s`) that a kernel runs interpreted before it is compiled.
-        The default wastes least where the length of the work is unknown; a smaller share is better
-        where the work is known to be long.
+        Approximate seconds added by each byte of bytecode of a kernel and of the kernels that it
+        calls. `load_s`, `compile_s` and `compile_s_per_byte` are estimates: poor ones cost time,
+        but never change a result.
+    interpreted_share : float
+        Share of its compile time (`compile_time_s`) that a kernel runs interpreted before it is
+        compiled. The default is best where the length of the work is unknown, a smaller share where
+        the work is known to be long.
     numpy_share : float
-        Share like `price_share`, for kernels that have a form in NumPy, which is not much slower
-        than compiled code.
-    max_wait_prices : float
-        Number of compile times (`price_s`), as wall-clock seconds, that a process waits for another
-        one that compiles the same kernel and may have been stopped. With a smaller number, two
-        processes compile the same kernel on a machine under load.
+        Same share for kernels that have a vectorised form in NumPy, which is not much slower than
+        compiled code.
+    max_wait_ratio : float
+        Maximum wall-clock time that a process waits while another process compiles the same kernel,
+        as a multiple of `compile_time_s`. The other process may have been stopped. With a smaller
+        ratio, two processes compile the same kernel on a machine under load.
     max_copied_bytes : int
-        Size of arguments above which a kernel is never interpreted: an interpreted call that takes
-        too long is restarted from copies of its arguments.
+        Maximum size of the arguments of an interpreted call, bytes. The arguments are copied, so
+        that a call that takes too long can start again compiled.
     min_numpy_items : int
-        Number of values, such as points times solids, from which on an interpreted kernel uses
-        NumPy instead of a loop. Both give the same result; at the default, both take about as long.
+        Minimum number of values, such as points times solids, for which an interpreted kernel uses
+        NumPy instead of a loop. Results are the same; at the default, so is the time.
     is_eager : bool
         Whether all kernels are compiled at their first call.
     """
@@ -61,9 +61,9 @@ class CompilePolicy:
     load_s: float = 0.02
     compile_s: float = 0.2
     compile_s_per_byte: float = 0.001
-    price_share: float = 1.0
+    interpreted_share: float = 1.0
     numpy_share: float = 1.0
-    max_wait_prices: float = 10.0
+    max_wait_ratio: float = 10.0
     max_copied_bytes: int = 64 * 2**20
     min_numpy_items: int = 16
     is_eager: bool = False
@@ -76,8 +76,8 @@ class CompilePolicy:
                     f"got {getattr(self, field.name)}"
                 )
 
-    def price_s(self, bytecode: int) -> float:
-        """Return about how many seconds compiling a kernel takes.
+    def compile_time_s(self, bytecode: int) -> float:
+        """Return the approximate CPU seconds to compile a kernel.
 
         Parameters
         ----------
@@ -120,20 +120,21 @@ def everything_compiled() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def long_work(price_share: float = 0.1, numpy_share: float = 0.2) -> Iterator[None]:
+def long_work(interpreted_share: float = 0.1, numpy_share: float = 0.2) -> Iterator[None]:
     """Compile kernels early while the body runs, because its work is known to be long.
 
     Parameters
     ----------
-    price_share, numpy_share : float
-        Shares of its compile time that a kernel runs interpreted first (`CompilePolicy`).
+    interpreted_share, numpy_share : float
+        Shares of the compile time that kernels run interpreted first (`CompilePolicy`).
     """
-    with compiled_by(replace(_policy, price_share=price_share, numpy_share=numpy_share)):
+    policy = replace(_policy, interpreted_share=interpreted_share, numpy_share=numpy_share)
+    with compiled_by(policy):
         yield
 
 
 def compiles() -> bool:
-    """Return whether anything is compiled at all; with NUMBA_DISABLE_JIT nothing is."""
+    """Return whether kernels are compiled at all; not with `NUMBA_DISABLE_JIT=1`."""
     from numba import config
 
     return not config.DISABLE_JIT

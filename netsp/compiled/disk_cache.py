@@ -1,15 +1,20 @@
 """Compiled kernels on disk.
 
-Numba keeps a compiled function until its own file changes. That is too long in two cases: a kernel
-in another file that it calls (and that is compiled into it) has changed, or a class in its
-signature has another name (the kept index then cannot be read: AttributeError). Besides, two
-processes that compile one function for different types at the same time may give their files the
-same number: then the code of one is found under the types of the other, in every run from then on.
-This module mends all three, so that nobody ever has to delete a cache by hand. Files that cannot be
-read (a full disk, a machine that lost power) count as absent.
+Numba recompiles a function only when the function's own file changes. Its cache fails in three
+cases, which this module handles, so that no user has to delete a cache:
 
-This file and `netsp.compiled.tiered` use parts of Numba that are not public. `is_supported` of
-each checks that they are there.
+- A kernel in another file, which was compiled into the function, has changed. The index of a kernel
+  therefore depends on all files with kernels that the kernel's file imports.
+- A class in the signature was renamed. Loading the index then raises AttributeError; here such an
+  index counts as empty.
+- Two processes compile one function for different types at the same time. Numba may give both files
+  the same number, so that the code of one is loaded for the types of the other. Here, files are
+  named by their signature.
+
+Files that cannot be read, as after a full disk or a power failure, count as absent.
+
+This module and `netsp.compiled.tiered` use private parts of Numba. The function `is_supported` of
+each module checks that these exist.
 """
 
 from __future__ import annotations
@@ -27,8 +32,8 @@ from typing import Any
 from numba import njit
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-FORMAT = 3
-"""Format of the files; those of another one are compiled anew."""
+FORMAT_VERSION = 3
+"""Version of the file format; kernels in files of another version are compiled again."""
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _IMPORTS = re.compile(r"^from (netsp[\w.]*) import (\([^)]*\)|[^\n]*)", re.M)
@@ -36,15 +41,11 @@ _HAS_KERNELS = re.compile(r"^from netsp\.compiled\.kernel import", re.M)
 
 
 class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
-    """Files of one kernel: an index by signature, and one file for each signature.
-
-    An index that names a class that no longer exists counts as empty. Files are named by their
-    signature.
-    """
+    """Files of one kernel: an index by signature, and a file for each signature, named by it."""
 
     def save(self, key: Any, data: Any) -> None:
-        """Keep a compiled kernel: write its file first and the index after it, so that no other
-        process finds an older kernel under its name."""
+        """Save a compiled kernel: first its file, then the index, so that no other process loads an
+        older kernel under the same name."""
         name = self._data_name(int(hashlib.sha256(self._dump(key)).hexdigest()[:15], 16))
         self._save_data(name, data)
         overloads = self._load_index()
@@ -54,14 +55,14 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
         if fresh:
             self._tidy(set(overloads.values()))
 
-    def holds(self, key: Any) -> bool:
+    def contains(self, key: Any) -> bool:
         """Return whether a compiled kernel is on disk, without loading it."""
         name = self._load_index().get(key)
         return name is not None and Path(self._data_path(name)).is_file()
 
     def load(self, key: Any) -> Any:
-        """Return a compiled kernel, or None if there is none that can be read."""
-        with contextlib.suppress(Exception):  # pickle raises anything where bytes have changed
+        """Return a compiled kernel, or None if there is none or it cannot be read."""
+        with contextlib.suppress(Exception):  # pickle may raise anything on damaged bytes
             return super().load(key)
         return None
 
@@ -72,23 +73,23 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
     def _load_data(self, name: str) -> Any:
         digest, dumped = super()._load_data(name)
         if hashlib.sha256(dumped).digest() != digest:
-            raise ValueError(f"{name}: bytes have changed")
+            raise ValueError(f"{name}: the file is damaged")
         return pickle.loads(dumped)
 
     @property
     def lock(self) -> Path:
-        """The file that is locked while the kernel is compiled."""
+        """File that is locked while the kernel is compiled."""
         return Path(self._index_path).with_suffix(".lock")
 
     def _tidy(self, named: set[str]) -> None:
-        """Remove files of older sources; a process that looks for one compiles anew."""
+        """Remove files of older sources; a process that still needs one compiles again."""
         of_all = glob.escape(self._index_name.removesuffix(".nbi")) + ".*.nbc"
         for old in Path(self._cache_path).glob(of_all):
             if old.name not in named:
                 old.unlink(missing_ok=True)
 
     def _load_index(self) -> Any:
-        with contextlib.suppress(Exception):  # pickle raises anything where bytes have changed
+        with contextlib.suppress(Exception):  # pickle may raise anything on damaged bytes
             index = super()._load_index()
             if isinstance(index, dict) and all(isinstance(name, str) for name in index.values()):
                 return index
@@ -96,14 +97,14 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
 
 
 def keep_on_disk(dispatcher: Any, function: Callable[..., Any]) -> None:
-    """Make a cached dispatcher keep its compiled code in a `KernelFile`.
+    """Make a cached dispatcher save its compiled code in a `KernelFile`.
 
-    Where no folder is writable, its code is kept in memory only.
+    Where no folder is writable, the code stays in memory only.
 
     Parameters
     ----------
     dispatcher : numba dispatcher
-        Dispatcher that `cached` returns for the function.
+        Dispatcher that `cached` returned for the function.
     function : callable
         The function.
     """
@@ -113,12 +114,12 @@ def keep_on_disk(dispatcher: Any, function: Callable[..., Any]) -> None:
     dispatcher._cache._cache_file = KernelFile(
         kept._cache_path,
         kept._index_name.removesuffix(".nbi"),
-        (kept._source_stamp, stamps(Path(function.__code__.co_filename)), FORMAT),
+        (kept._source_stamp, stamps(Path(function.__code__.co_filename)), FORMAT_VERSION),
     )
 
 
 def is_on_disk(dispatcher: Any, types: tuple[Any, ...]) -> bool:
-    """Return whether a kernel was compiled for argument types before.
+    """Return whether a kernel is on disk, compiled for given argument types.
 
     Parameters
     ----------
@@ -130,11 +131,11 @@ def is_on_disk(dispatcher: Any, types: tuple[Any, ...]) -> bool:
     own, file = dispatcher._cache, _file_of(dispatcher)
     if file is None:
         return False
-    return file.holds(own._index_key(types, dispatcher.targetctx.codegen()))
+    return file.contains(own._index_key(types, dispatcher.targetctx.codegen()))
 
 
 def is_any_on_disk(dispatcher: Any) -> bool:
-    """Return whether a kernel was compiled for any argument types before.
+    """Return whether a kernel is on disk, compiled for any argument types.
 
     Parameters
     ----------
@@ -146,8 +147,8 @@ def is_any_on_disk(dispatcher: Any) -> bool:
 
 
 def lock_file(dispatcher: Any) -> Path | None:
-    """Return the file that is locked while a kernel is compiled; None where no code is
-    kept on disk.
+    """Return the file that is locked while a kernel is compiled; None where nothing is saved on
+    disk.
 
     Parameters
     ----------
@@ -164,15 +165,15 @@ def _file_of(dispatcher: Any) -> KernelFile | None:
 
 
 def cached(function: Callable[..., Any]) -> Any:
-    """Return Numba's dispatcher of a function, which keeps its compiled code on disk where a
-    folder is writable.
+    """Return Numba's dispatcher of a function; it saves compiled code on disk where a folder is
+    writable.
 
     Parameters
     ----------
     function : callable
         The function.
     """
-    # nothing calls kernels from C, so that they need no wrappers for it
+    # no wrappers for calls from C, because nothing calls kernels from C
     try:
         return njit(cache=True, nogil=True, no_cfunc_wrapper=True)(function)
     except RuntimeError:  # neither the package's nor the user's folder is writable
@@ -181,10 +182,10 @@ def cached(function: Callable[..., Any]) -> Any:
 
 @cache
 def is_supported() -> bool:
-    """Return whether this release of Numba has all that `keep_on_disk` relies on.
+    """Return whether this release of Numba has the private parts that `keep_on_disk` uses.
 
-    Otherwise kernels are kept as Numba keeps them. A change in a kernel may then go unnoticed by
-    kernels in other files that call it, which only matters to those who change netsp's code.
+    Otherwise Numba's own cache is used. A kernel is then not compiled again when a kernel that it
+    calls changes in another file, which only matters to developers of netsp.
     """
 
     def probe() -> None:
@@ -212,8 +213,8 @@ def is_supported() -> bool:
 
 @cache
 def stamps(file: Path) -> tuple[tuple[str, int, int], ...]:
-    """Return name, time of change (ns) and size of each file with kernels that a file imports,
-    directly or through others, without the file itself."""
+    """Return name, modification time (ns) and size of each file with kernels that a file imports,
+    directly or indirectly, without the file itself."""
     found: set[Path] = set()
     new = {file}
     while new:

@@ -13,8 +13,9 @@ _PACKAGE = Path(__file__).resolve().parent.parent
 def may_be_kept() -> bool:
     """Return whether compiled code may be on disk; only Numba knows for certain.
 
-    Looks for indexes of compiled functions where Numba keeps them: in NUMBA_CACHE_DIR, else beside
-    the sources or in the user's folder for caches. Those of other packages count, too.
+    Searches the folders in which Numba keeps indexes of compiled functions: `NUMBA_CACHE_DIR`, or
+    else the folders of the sources and the user's cache folder. Indexes of other packages count
+    too.
     """
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     try:

@@ -141,7 +141,7 @@ class Kernel:
             is_shared = threading.current_thread().name.startswith("ThreadPoolExecutor")
             return 0.0 if is_shared else policy.numba_s - Kernel._total_s
         bytecode = sum(len(f.__code__.co_code) for f in _called(self.py_func))
-        return policy.price_share * policy.price_s(bytecode) - self._early_s
+        return policy.interpreted_share * policy.compile_time_s(bytecode) - self._early_s
 
     @property
     def dispatcher(self) -> Any:

@@ -1,4 +1,4 @@
-"""Callbacks that run once Numba is loaded for a kernel; this module loads nothing itself."""
+"""Callbacks that run once a kernel has loaded Numba; this module does not load it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _waiting: list[Callable[[], None]] = []
 
 
 def when_numba_is_loaded(call: Callable[[], None]) -> None:
-    """Call a function once Numba is loaded for a kernel, or now if it is loaded already.
+    """Call a function once a kernel has loaded Numba, or at once if Numba is loaded already.
 
     Parameters
     ----------
@@ -23,6 +23,6 @@ def when_numba_is_loaded(call: Callable[[], None]) -> None:
 
 
 def on_numba_loaded() -> None:
-    """Call the functions that wait; the module that loads Numba calls this."""
+    """Run the registered callbacks; `netsp.compiled.kernel` calls this when it has loaded Numba."""
     while _waiting:
         _waiting.pop(0)()

@@ -1,7 +1,7 @@
-"""Calls that are broken off when they take too long.
+"""Function calls with a budget of CPU seconds.
 
 Python cannot end a function from outside, but it can raise an exception in the thread that runs it.
-One thread watches all calls that have a budget, and raises `Overtime` where a budget is used up.
+A watching thread raises `Overtime` in each call whose budget is used up.
 """
 
 from __future__ import annotations
@@ -20,14 +20,15 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 
-LOOK_S = 0.005
-"""Seconds between two looks at the calls under way."""
+CHECK_INTERVAL_S = 0.005
+"""Seconds between two checks of the running calls. A shorter interval ends calls more punctually
+and takes more CPU."""
 
-IDLE_LOOKS = 20
-"""Looks without a call under way after which the watching thread sleeps until the next one."""
+MAX_IDLE_CHECKS = 20
+"""Checks without a running call after which the watching thread sleeps until the next call."""
 
 MAX_STEPS_TO_EXCEPTION = 1000
-"""Steps of a loop after which an exception has surely come: Python looks for it at each step."""
+"""Loop steps within which Python raises an exception that is pending; it checks at each step."""
 
 
 class Overtime(BaseException):
@@ -35,11 +36,11 @@ class Overtime(BaseException):
 
 
 class _Call:
-    """Call under way, with the thread that makes it and the deadline of its budget."""
+    """Running call, with its thread and its deadline."""
 
     def __init__(self, budget_s: float) -> None:
         self.thread = threading.get_ident()
-        # CPU time of the thread: other processes do not use up the budget
+        # CPU time of the thread, so that other processes do not use up the budget
         self._clock: int | None = None
         if hasattr(time, "pthread_getcpuclockid"):
             self._clock = time.pthread_getcpuclockid(self.thread)
@@ -47,16 +48,16 @@ class _Call:
         self.was_ended = False
 
     def now(self) -> float:
-        """Return the CPU seconds of the thread; on systems without them, the time."""
+        """Return the CPU seconds of the thread, or the wall-clock time where a system has none."""
         return time.perf_counter() if self._clock is None else time.clock_gettime(self._clock)
 
 
 class _Watch:
-    """Thread that watches calls.
+    """Thread that ends calls at their deadlines.
 
-    `Overtime` may come between any two steps of the thread that makes a call. So that thread uses
-    only locks and queues written in C: those written in Python (`threading.Condition`) stay locked
-    if an exception comes while they are entered.
+    `Overtime` may be raised between any two steps of a calling thread. Calling threads therefore
+    only use locks and queues that are written in C: those written in Python
+    (`threading.Condition`) stay locked if an exception is raised while they are entered.
     """
 
     def __init__(self) -> None:
@@ -67,7 +68,7 @@ class _Watch:
         self._thread: threading.Thread | None = None
 
     def begin(self, call: _Call) -> None:
-        """Watch a call; where no thread can be started, the call is not broken off."""
+        """Watch a call. Where no thread can be started, the call has no deadline."""
         with self._lock:
             self._under_way.add(call)
             if self._thread is None or not self._thread.is_alive():
@@ -80,7 +81,7 @@ class _Watch:
                 self._wakes.put(None)
 
     def end(self, call: _Call) -> None:
-        """Stop watching a call of this thread, and catch an exception that is on its way."""
+        """Stop watching a call of this thread, and catch `Overtime` if it is pending."""
         with self._lock:
             self._under_way.discard(call)
             was_ended = call.was_ended
@@ -92,7 +93,7 @@ class _Watch:
         while True:
             with self._lock:
                 idle = 0 if self._under_way else idle + 1
-                self._is_asleep = idle > IDLE_LOOKS
+                self._is_asleep = idle > MAX_IDLE_CHECKS
                 for call in [c for c in self._under_way if c.now() > c.deadline]:
                     self._under_way.discard(call)
                     call.was_ended = True
@@ -103,14 +104,15 @@ class _Watch:
                 self._wakes.get()
                 idle = 0
             else:
-                time.sleep(LOOK_S)
+                time.sleep(CHECK_INTERVAL_S)
 
 
 def _catch_pending(thread: int) -> None:
-    """Catch an exception that is on its way to this thread; one that came already does no harm.
+    """Catch `Overtime` if it is pending in this thread; do nothing if it was raised already.
 
-    CPython 3.11 never forgets that an exception was on its way if that is cancelled: each call of
-    a function is slower from then on, and hangs under a profiler. So one more is sent and caught.
+    CPython 3.11 can cancel a pending exception, but afterwards it still checks for one: every call
+    becomes slower, and hangs under a profiler. So this function sends `Overtime` again and catches
+    it.
     """
     try:
         ctypes.pythonapi.PyThreadState_SetAsyncExc(
@@ -119,41 +121,40 @@ def _catch_pending(thread: int) -> None:
         for _ in range(MAX_STEPS_TO_EXCEPTION):
             pass
     except Overtime:
-        return  # in a function of Python, suppress() would begin outside of `try`
+        return  # `suppress` is a Python function, which could be interrupted before its `try`
 
 
 _watch = _Watch()
 
 
-def _watch_anew() -> None:
-    """Replace the watch in a forked process, which has no watching thread; its lock may be held."""
+def _reset_watch() -> None:
+    """Replace the watch in a forked process: its thread is gone, and its lock may be locked."""
     global _watch
     _watch = _Watch()
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_watch_anew)
+    os.register_at_fork(after_in_child=_reset_watch)
 
 
 def within(budget_s: float, function: Callable[..., T], args: tuple[Any, ...]) -> T:
-    """Call a function, and break it off where it takes too long.
+    """Call a function and end the call when its budget is used up.
 
     Parameters
     ----------
     budget_s : float
-        CPU seconds that it may take.
+        CPU seconds that the call may take.
     function : callable
-        Function in Python; what it calls in other languages is not broken off.
+        Python function. Code in other languages that it calls runs to its end.
     args : tuple
-        Its arguments.
+        Arguments of the function.
 
     Raises
     ------
     Overtime
-        The budget is used up. The function may have done a part of its work.
+        The budget is used up. The function may have done part of its work.
     BaseException
-        The function, or the handler of a signal meanwhile, has raised it; it is raised even where
-        the budget is used up at the same time.
+        The function, or the handler of a signal, raised it. It takes precedence over `Overtime`.
     """
     handled = sys.exception()
     call = _Call(budget_s)
@@ -162,7 +163,7 @@ def within(budget_s: float, function: Callable[..., T], args: tuple[Any, ...]) -
         out = function(*args)
         _watch.end(call)
     except BaseException as error:
-        # Python raises `Overtime` where a function begins; none begins outside of `try` here
+        # `Overtime` is raised where a function is entered: enter none outside of a `try`
         try:
             _watch.end(call)
         except Overtime:
@@ -171,7 +172,7 @@ def within(budget_s: float, function: Callable[..., T], args: tuple[Any, ...]) -
             _watch.end(call)
             raise
         failed = error.__context__ if isinstance(error, Overtime) else None
-        # `Overtime` came while an interrupt passed through a `with` of the function
+        # `Overtime` was raised while an interrupt unwound the function
         if failed is not handled and isinstance(failed, KeyboardInterrupt | SystemExit):
             raise failed from None
         if isinstance(error, Overtime):
@@ -181,7 +182,7 @@ def within(budget_s: float, function: Callable[..., T], args: tuple[Any, ...]) -
 
 
 def _repeat_cut_off_signals(error: Overtime) -> None:
-    """Raise again the signals whose handlers were running when `Overtime` came."""
+    """Raise again the signals whose handlers `Overtime` cut off."""
     if threading.current_thread() is not threading.main_thread():
         return
     codes = {frame.f_code for frame, _ in traceback.walk_tb(error.__traceback__)}

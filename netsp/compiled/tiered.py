@@ -42,10 +42,10 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
     interpreted_s : float
         CPU seconds that the function has run interpreted.
     was_on_disk : bool
-        Whether compiled code was found on the disk. Looking for it takes about a millisecond, so
-        short calls do not look each time.
-    next_look_s : float
-        Value of `interpreted_s` at which the disk is looked at again.
+        Whether compiled code was found on disk. A search takes about a millisecond, so short calls
+        do not search each time.
+    next_check_s : float
+        Value of `interpreted_s` at which the next call searches the disk again.
     has_compiled : bool
         Whether any kernel was compiled and kept on disk by this process; an attribute of the class.
     is_disk_full : bool
@@ -54,7 +54,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
 
     interpreted_s = 0.0
     was_on_disk = False
-    next_look_s = 0.0
+    next_check_s = 0.0
     has_compiled = False
     is_disk_full = False
 
@@ -72,13 +72,13 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         on_disk = self._is_on_disk(args, policy.load_s)
         budget_s = policy.load_s
         if not on_disk:
-            share = policy.numpy_share if is_in_numpy(self) else policy.price_share
-            budget_s = share * policy.price_s(self.bytecode())
+            share = policy.numpy_share if is_in_numpy(self) else policy.interpreted_share
+            budget_s = share * policy.compile_time_s(self.bytecode())
         budget_s -= self.interpreted_s
         is_shared = threading.current_thread().name.startswith("ThreadPoolExecutor")
         can_be = can_be_interpreted(args, policy.max_copied_bytes)
         if budget_s <= 0.0 and not on_disk and self._is_locked():
-            budget_s = policy.price_s(self.bytecode())  # another process is compiling it
+            budget_s = policy.compile_time_s(self.bytecode())  # another process is compiling it
         if budget_s <= 0.0 or not can_be or (is_shared and on_disk):
             return self._compiled(args, kwargs)
         return self._run_pooled if is_shared else self._within(budget_s)
@@ -92,15 +92,15 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
                 self._insert([kind._code for kind in types], entry, False)
         return entry  # type: ignore[no-any-return]
 
-    def _is_on_disk(self, args: tuple[Any, ...], look_s: float) -> bool:
-        """Return whether compiled code for these arguments is known to be on the disk.
+    def _is_on_disk(self, args: tuple[Any, ...], interval_s: float) -> bool:
+        """Return whether compiled code for these arguments is known to be on disk.
 
-        The disk is looked at again after each further `look_s` CPU seconds of interpreted calls.
+        The disk is searched again after each further `interval_s` CPU seconds of interpreted calls.
         """
-        if not self.was_on_disk and self.interpreted_s >= self.next_look_s:
+        if not self.was_on_disk and self.interpreted_s >= self.next_check_s:
             types = _general(self.typeof_pyval(a) for a in args)
             self.was_on_disk = disk_cache.is_on_disk(self, types)
-            self.next_look_s = self.interpreted_s + look_s
+            self.next_check_s = self.interpreted_s + interval_s
         return self.was_on_disk
 
     def compile(self, sig: Any) -> Any:
@@ -114,8 +114,8 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
             return super().compile(types)
         file = disk_cache.lock_file(self)
         policy = current_policy()
-        max_wait_s = policy.max_wait_prices * policy.price_s(self.bytecode())
-        with global_compiler_lock, locked(file, max_wait_s), _garbage_kept():
+        max_wait_s = policy.max_wait_ratio * policy.compile_time_s(self.bytecode())
+        with global_compiler_lock, locked(file, max_wait_s), _collector_paused():
             try:
                 entry = super().compile(types)
             except OSError:  # the folder takes no more files; the kernel is compiled all the same
@@ -170,9 +170,9 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
 
 
 @contextlib.contextmanager
-def _garbage_kept() -> Iterator[None]:
-    """Pause Python's garbage collector: Numba makes millions of objects that live as long as a
-    function is compiled."""
+def _collector_paused() -> Iterator[None]:
+    """Pause Python's garbage collector: Numba creates millions of objects, nearly all of which live
+    until the function is compiled."""
     is_collecting = gc.isenabled()
     gc.disable()
     try:
