@@ -24,7 +24,8 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from netsp.errors import InputError, LimitReachedError
+from netsp.errors import LimitReachedError
+from netsp.number_ranges import check_not_negative
 
 Flag = npt.NDArray[np.int64]
 T = TypeVar("T")
@@ -62,15 +63,7 @@ class TimingPolicy:
     stop_grace_s: float = 5.0
 
     def __post_init__(self) -> None:
-        for name in ("grace_s", "stop_grace_s"):
-            if not getattr(self, name) >= 0.0:
-                raise InputError(
-                    f"{name}: expected a number that is not negative, got {getattr(self, name)}"
-                )
-        if self.untimed_steps < 0:
-            raise InputError(
-                f"untimed_steps: expected a number that is not negative, got {self.untimed_steps}"
-            )
+        check_not_negative(self)
 
 
 class Clock:

@@ -41,11 +41,12 @@ with everything_compiled():
 """
 
 
-def _imported_by(folder, source):
-    """Return the modules of netsp's ground that a package's modules import."""
-    text = "".join(file.read_text() for file in folder.glob("*.py"))
+def _imported_by(files, source):
+    """Return the modules of netsp's ground that files import, directly or through others."""
+    text = "".join(file.read_text() for file in files)
     names = re.findall(r"^from netsp\.(\w+) import", text, re.M)
-    return {source / f"{name}.py" for name in names if (source / f"{name}.py").is_file()}
+    found = {source / f"{name}.py" for name in names if (source / f"{name}.py").is_file()}
+    return found | (_imported_by(found, source) if found else set())
 
 
 @pytest.fixture
@@ -55,7 +56,7 @@ def package(tmp_path):
     (tmp_path / "netsp").mkdir()
     (tmp_path / "netsp" / "__init__.py").touch()
     shutil.copytree(source / "compiled", tmp_path / "netsp" / "compiled")
-    for needed in _imported_by(source / "compiled", source):
+    for needed in _imported_by((source / "compiled").glob("*.py"), source):
         shutil.copy(needed, tmp_path / "netsp" / needed.name)
 
     def run(name: str, factor: float) -> float:

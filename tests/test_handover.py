@@ -17,7 +17,7 @@ MIP = importlib.import_module("netsp.mip.solve")
 
 @given(st.integers(1, 200), st.integers(0, 10**6))
 def test_cuts_take_over_where_legs_are_few_or_labels_many(vertices, labels):
-    handover = Handover(few_legs=600, some_legs=10_000, max_labels=40_000)
+    handover = Handover(max_legs=600, max_legs_of_slow_walks=10_000, max_labels=40_000)
     legs = vertices * (vertices - 1) // 2
     assert handover.is_due(vertices, labels) == (
         legs <= 600 or (legs <= 10_000 and labels > 40_000)
@@ -28,7 +28,7 @@ def test_cuts_take_over_where_legs_are_few_or_labels_many(vertices, labels):
 def test_tours_are_proven_alike_by_walks_and_by_cuts_that_take_over_at_once(seed, monkeypatch):
     graph = travel_graph(random_world(seed, circles=10, goals=13, tether=300.0))
     by_walks = solve_graph(graph, "auto")
-    monkeypatch.setattr(MIP, "HANDOVER", Handover(some_legs=10**6))
+    monkeypatch.setattr(MIP, "HANDOVER", Handover(max_legs_of_slow_walks=10**6))
     stages = []
     by_cuts = solve_graph(graph, "auto", on_progress=lambda p: stages.append(p.stage))
     assert stages.count("walks") == 1

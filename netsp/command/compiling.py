@@ -9,11 +9,11 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from netsp.errors import InputError
+from netsp.number_ranges import check_positive
 
 if TYPE_CHECKING:
     from netsp.command.status_line import StatusLine
@@ -146,11 +146,7 @@ class PreparationPolicy:
     every_s: float = 30.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            if not getattr(self, field.name) > 0.0:
-                raise InputError(
-                    f"{field.name}: expected a positive number, got {getattr(self, field.name)}"
-                )
+        check_positive(self)
 
 
 class Preparation:

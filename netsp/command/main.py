@@ -20,7 +20,6 @@ from typing import Any, NoReturn
 
 from netsp.command import background_warm_up, messages
 from netsp.command.command_clock import begin_command
-from netsp.command.compiling import compile_messages
 from netsp.command.interrupts import interrupts_are_heard
 from netsp.command.status_line import status_line
 from netsp.errors import (
@@ -123,6 +122,8 @@ def _preparation_messages(command: str | None, is_quiet: bool) -> Iterator[None]
     if is_quiet or command == "warm-up":
         yield
         return
+    from netsp.command.compiling import compile_messages
+
     with status_line() as line, compile_messages(sys.stderr, line):
         yield
 

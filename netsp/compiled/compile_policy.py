@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
-from netsp.errors import InputError
+from netsp.number_ranges import check_not_negative
 
 
 @dataclass(frozen=True)
@@ -69,12 +69,7 @@ class CompilePolicy:
     is_eager: bool = False
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            if not getattr(self, field.name) >= 0:
-                raise InputError(
-                    f"{field.name}: expected a number that is not negative, "
-                    f"got {getattr(self, field.name)}"
-                )
+        check_not_negative(self)
 
     def compile_time_s(self, bytecode: int) -> float:
         """Return the approximate CPU seconds to compile a kernel.

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
-from netsp.errors import InputError
+from netsp.number_ranges import check_positive
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,4 @@ class FlightPolicy:
     max_standby_silence_s: float = 60.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, float | int) and not value > 0.0:
-                raise InputError(f"{field.name}: expected a positive number, got {value!r}")
+        check_positive(self)

@@ -94,7 +94,7 @@ it has closed such gaps."""
 SEARCH_AGAIN = 0.5
 """Share of the last gap at which the classes that the LP visits are searched once more."""
 
-HANDOVER = Handover(few_legs=600, some_legs=10_000, max_labels=25_000)
+HANDOVER = Handover(max_legs=600, max_legs_of_slow_walks=10_000, max_labels=25_000)
 """Limits from which on walks leave the rest of the proof to cuts."""
 
 CORE_FIRST = 3000

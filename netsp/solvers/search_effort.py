@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
-from netsp.errors import InputError
+from netsp.number_ranges import check_not_negative
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,7 @@ class SearchEffort:
     max_rounds_per_goal: int = 100
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            if not getattr(self, field.name) >= 0:
-                raise InputError(
-                    f"{field.name}: expected a number that is not negative, "
-                    f"got {getattr(self, field.name)}"
-                )
+        check_not_negative(self)
 
     def rounds(self, goals: int, vertices: int) -> int:
         """Return the number of rounds of one search.
