@@ -180,7 +180,7 @@ def test_warm_up_lists_all_functions(monkeypatch, capsys):
     assert warm_up.run(warm_up_arguments("--list", "--quiet")) == 0
     *rows, last = capsys.readouterr().out.splitlines()
     assert "      -  compiled.growing.longer" in rows
-    assert last.endswith(f"in all, {len(rows)} functions")
+    assert last.endswith(f"total, {len(rows)} functions")
 
 
 def warm_up_arguments(*words):

@@ -1,4 +1,4 @@
-"""Background process that compiles, after a command, what the next one is likely to need."""
+"""Background process that compiles, after a command, what the next command is likely to need."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from collections.abc import Iterator
 from pathlib import Path
 
 SWITCH_VARIABLE = "NETSP_BACKGROUND"
-"""Environment variable that turns the background process off where it is 0."""
+"""Environment variable whose value 0 turns the background process off."""
 
 LOWEST_PRIORITY = 19
-"""Niceness of the process: every other process gets the processor first."""
+"""Niceness of the process, the highest of Linux: other processes get the processor first."""
 
 
 def begin(command: str) -> None:
-    """Start the process if a command had to compile something; the command need not wait for it.
+    """Start the process if a command compiled something; the command does not wait for it.
 
-    Small problems compile nothing, so they start no process. Neither does a command where compiled
-    code cannot be kept on disk.
+    No process starts after small problems, which compile nothing, or where compiled code cannot be
+    kept on disk.
 
     Parameters
     ----------
     command : str
-        Name of the command, which tells what is likely needed next.
+        Name of the command, which decides what is compiled first.
     """
     tiered = sys.modules.get("netsp.compiled.tiered")
     is_wanted = os.environ.get(SWITCH_VARIABLE, "1") != "0" and os.name == "posix"
@@ -47,15 +47,18 @@ def begin(command: str) -> None:
 
 @contextlib.contextmanager
 def alone() -> Iterator[bool]:
-    """Run the body at the lowest priority; yield whether no other such process is running
-    and compiled code is kept on disk."""
+    """Give this process the lowest priority; yield whether it should compile.
+
+    It should not while another background process runs, nor where compiled code cannot be kept on
+    disk.
+    """
     from netsp.compiled import growing
     from netsp.compiled.compile_lock import locked
     from netsp.compiled.disk_cache import lock_file
 
     os.nice(LOWEST_PRIORITY)
     file = lock_file(growing.longer)
-    if file is None:  # nothing that it compiles would be kept
+    if file is None:  # no folder is writable
         yield False
         return
     with locked(file.with_name("background.lock"), max_wait_s=0.0) as is_alone:

@@ -10,11 +10,11 @@ if TYPE_CHECKING:
     from netsp.clock import Clock
 
 _start: ContextVar[tuple[float, float] | None] = ContextVar("start", default=None)
-"""Time, and CPU seconds of the process, at the start of the command."""
+"""Monotonic time and CPU seconds of the process at the start of the command, s."""
 
 
 def begin_command() -> None:
-    """Note that a command starts now."""
+    """Record that a command starts now."""
     _start.set((time.monotonic(), time.process_time()))
 
 

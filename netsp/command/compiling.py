@@ -1,7 +1,7 @@
-"""Messages that tell the user what netsp prepares while kernels are compiled.
+"""Messages for users while kernels are compiled.
 
 A kernel is compiled once per installation and kept on disk. Without a message, a command that
-compiles looks as if it hung.
+compiles would seem to hang.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 PACKAGE_SUBJECTS = {
     "online": "the simulation", "space": "planning in space", "cover": "the choice of viewpoints",
 }  # fmt: skip
-"""Names of netsp's parts for users, by package; all other packages are called the solver."""
+"""Name of each package in messages; other packages are called the solver."""
 
 MAX_BAR_WIDTH = 20  # characters of the bar on a wide terminal, which leave room for the text
 MIN_BAR_WIDTH = 5  # characters of the bar on a narrow terminal, which still show progress
@@ -29,14 +29,14 @@ MIN_BAR_WIDTH = 5  # characters of the bar on a narrow terminal, which still sho
 
 @contextmanager
 def compile_messages(stream: TextIO, line: StatusLine | None = None) -> Iterator[None]:
-    """Tell, while the body runs, what is being prepared and about how long it takes.
+    """Show, while the body runs, what is being compiled and about how long it takes.
 
     Parameters
     ----------
     stream : file
         Stream for messages, such as stderr.
     line : StatusLine, optional
-        Line of a terminal in which a bar is drawn; without it, lines are written to the stream.
+        Line of a terminal, in which a bar is drawn. Without it, lines are written to the stream.
     """
     from netsp.compiled.numba_loading import when_numba_is_loaded
 
@@ -77,7 +77,7 @@ def _listener(preparation: Preparation) -> Any:
 
 
 class CompileTimes:
-    """CPU seconds that compiling each kernel took, without the kernels that it calls.
+    """CPU seconds of compiling each kernel, without the kernels that it calls.
 
     Attributes
     ----------
@@ -135,11 +135,11 @@ class PreparationPolicy:
     Parameters
     ----------
     expected_share : float
-        Share of the compile time of a package's kernels that a command is expected to need. It
-        counts the kernels that are loaded and not on disk. It only changes the messages: a larger
-        share announces a longer wait.
+        Share of the compile time of a package's kernels that a command is expected to need, among
+        kernels that are imported and not on disk. It only changes messages: with a larger share,
+        they announce a longer wait.
     every_s : float
-        Seconds between two lines where there is no terminal; a smaller number writes more lines.
+        Seconds between two lines where there is no terminal; a smaller value writes more lines.
     """
 
     expected_share: float = 0.25
@@ -170,12 +170,12 @@ class Preparation:
     ) -> None:
         self._stream, self._line, self._policy = stream, line, policy
         self._depth, self._expected_s, self._done_s, self._spent_s = 0, 0.0, 0.0, 0.0
-        self._since = self._told = 0.0
+        self._begun_at = self._printed_at = 0.0
         self._subject: str | None = None
         self._packages: set[str] = set()
 
     def begin(self, kernel: Any) -> None:
-        """Note that compiling a kernel begins; kernels that it calls begin and end within it."""
+        """Record the start of compiling a kernel; kernels that it calls start and end within it."""
         if not kernel.py_func.__module__.startswith("netsp."):
             return
         if not self._depth:
@@ -188,18 +188,18 @@ class Preparation:
                 self._expected_s += self._policy.expected_share * _folder_compile_time_s(kernel)
             with_called_s = compile_time_s(kernel, with_called=True)
             self._expected_s = max(self._expected_s, self._done_s + with_called_s)
-            self._since = time.monotonic()
+            self._begun_at = time.monotonic()
         self._depth += 1
         self._show()
 
     def end(self, kernel: Any) -> None:
-        """Note that compiling a kernel has ended."""
+        """Record the end of compiling a kernel."""
         if not kernel.py_func.__module__.startswith("netsp.") or not self._depth:
             return
         self._depth -= 1
         self._done_s += compile_time_s(kernel)
         if not self._depth:
-            self._spent_s += time.monotonic() - self._since
+            self._spent_s += time.monotonic() - self._begun_at
         self._show()
 
     def close(self) -> None:
@@ -217,10 +217,10 @@ class Preparation:
             self._line.show(f"{text} {bar(share, self._line.columns - len(text) - 4)}")
             return
         now = time.monotonic()
-        if not self._told:
+        if not self._printed_at:
             print(text, file=self._stream, flush=True)
-        elif now - self._told >= self._policy.every_s and self._depth:
-            so_far_s = self._spent_s + now - self._since
+        elif now - self._printed_at >= self._policy.every_s and self._depth:
+            so_far_s = self._spent_s + now - self._begun_at
             left_s = max(self._expected_s - self._done_s, 1.0)
             print(
                 f"preparing {self._subject}, {so_far_s:.0f} s so far, about {left_s:.0f} s left",
@@ -228,7 +228,7 @@ class Preparation:
             )  # fmt: skip
         else:
             return
-        self._told = now
+        self._printed_at = now
 
 
 def bar(share: float, room: int) -> str:
@@ -237,7 +237,7 @@ def bar(share: float, room: int) -> str:
     Parameters
     ----------
     share : float
-        Share that is done, 0 to 1.
+        Share of the work that is done, 0 to 1.
     room : int
         Characters that are free on the line.
     """
@@ -247,9 +247,9 @@ def bar(share: float, room: int) -> str:
 
 
 def _folder_compile_time_s(kernel: Any) -> float:
-    """Return about how many seconds compiling the loaded kernels of a kernel's folder takes.
+    """Return the approximate CPU seconds to compile the imported kernels of a kernel's folder.
 
-    Kernels that are on disk under their names do not count.
+    Kernels that are on disk do not count.
     """
     from netsp.compiled.compile_policy import current_policy
     from netsp.compiled.disk_cache import lock_file
@@ -270,14 +270,14 @@ def _folder_compile_time_s(kernel: Any) -> float:
 
 
 def compile_time_s(kernel: Any, with_called: bool = False) -> float:
-    """Return about how many seconds compiling a kernel takes.
+    """Return the approximate CPU seconds to compile a kernel.
 
     Parameters
     ----------
     kernel : dispatcher
         The kernel.
     with_called : bool
-        Whether to include the kernels that it calls and that are not compiled yet.
+        Whether to include the kernels that it calls, as far as they are not compiled.
     """
     from netsp.compiled.compile_policy import current_policy
 

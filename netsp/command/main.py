@@ -36,8 +36,8 @@ from netsp.errors import (
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     if argv is None:
-        # loading modules and drawing create objects that stay: looking for garbage among them
-        # every 700 objects takes a tenth of the time of a short command
+        # modules and pictures consist of objects that stay: collecting garbage at each 700 new
+        # objects, as by default, takes a tenth of the time of a short command
         gc.set_threshold(GARBAGE_THRESHOLD)
     code = _main(argv)
     if argv is None:
@@ -46,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 GARBAGE_THRESHOLD = 100_000
-"""Objects created between two garbage collections; the garbage holds about 20 MB at most."""
+"""New objects between two garbage collections; the garbage among them takes about 20 MB at most."""
 
 ABANDONED_GRACE_S = 0.5
 """Seconds for abandoned work to end by itself, and to end the processes that it started."""
@@ -117,8 +117,8 @@ def _main(argv: Sequence[str] | None) -> int:
 
 @contextlib.contextmanager
 def _preparation_messages(command: str | None, is_quiet: bool) -> Iterator[None]:
-    """Tell, while the body runs, what netsp compiles, unless the command is quiet; `warm-up` shows
-    its own progress."""
+    """Show messages about compiling while the body runs, unless the command is quiet; `warm-up`
+    shows its own progress."""
     if is_quiet or command == "warm-up":
         yield
         return

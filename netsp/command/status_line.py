@@ -1,4 +1,4 @@
-"""Line at the bottom of a terminal that other output does not run into."""
+"""Line at the bottom of a terminal, kept apart from other output."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from contextlib import contextmanager
 from typing import Any, TextIO
 
 DEFAULT_COLUMNS = 80
-"""Columns that are assumed where a terminal does not report its width."""
+"""Width of a terminal that does not report it, characters."""
 
 
 class StatusLine:
-    """Line that is redrawn while work goes on, and removed before anything else is written.
+    """Line that is redrawn while work goes on, and removed before other output is written.
 
-    An unfinished line of other output is drawn again once the status line is removed.
+    When the status line is removed, an unfinished line of other output is drawn again.
 
     Parameters
     ----------
@@ -66,14 +66,14 @@ class StatusLine:
 
 
 class _StreamAboveLine:
-    """Stream on the terminal of a status line.
+    """Stream that removes a status line before it writes.
 
     Parameters
     ----------
     stream : file
         The stream.
     line : StatusLine
-        The line, which is removed before anything is written.
+        The line on the same terminal.
     """
 
     def __init__(self, stream: TextIO, line: StatusLine) -> None:
@@ -88,12 +88,12 @@ class _StreamAboveLine:
 
 @contextmanager
 def status_line() -> Iterator[StatusLine | None]:
-    """Keep standard output and standard error apart from a status line while the body runs.
+    """Provide a status line, apart from standard output and standard error, while the body runs.
 
     Yields
     ------
     StatusLine or None
-        The line, on standard error; None where that is no terminal.
+        The line, on standard error; None where standard error is not a terminal.
     """
     if not sys.stderr.isatty():
         yield None

@@ -18,7 +18,7 @@ STEP_WORDS = {
     "simulate": "mission", "cover": "space", "execute": "carried out", "fly": "carried out",
     "guard": "guard",
 }  # fmt: skip
-"""Word, by command, in the names of the steps that compile what the command needs."""
+"""Word in the names of the steps that a command needs, by command; other commands need `solver`."""
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
@@ -26,8 +26,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--quiet", action="store_true", help="no progress")
     p.add_argument(
         "--list", action="store_true",
-        help="print all functions with the CPU seconds that compiling each took, without the "
-        "functions that it calls; - where it was on disk already",
+        help="print all functions and the CPU seconds of compiling each, without the functions "
+        "that it calls; - if it was on disk already",
     )  # fmt: skip
     p.add_argument("--after", default=None, metavar="COMMAND", help=argparse.SUPPRESS)
 
@@ -57,7 +57,7 @@ def _compile(every: list[Step], quiet: bool) -> None:
     from netsp.command.patience import span
     from netsp.command.status_line import status_line
 
-    begin = told = time.monotonic()
+    begin = printed_at = time.monotonic()
     with contextlib.nullcontext() if quiet else status_line() as line:
         for done, (name, step) in enumerate(every):
             now = time.monotonic()
@@ -67,14 +67,14 @@ def _compile(every: list[Step], quiet: bool) -> None:
             text = f"preparing netsp: {name} ({done + 1} of {len(every)}{left})"
             if line is not None:
                 line.show(f"{bar(done / len(every), line.columns)} {text}")
-            elif not quiet and (not done or now - told >= PreparationPolicy().every_s):
+            elif not quiet and (not done or now - printed_at >= PreparationPolicy().every_s):
                 print(text, file=sys.stderr, flush=True)
-                told = now
+                printed_at = now
             step()
 
 
 def _compile_likely(command: str) -> None:
-    """Run the steps that a user of a command needs next, then the others; end once the disk is
+    """Run all steps, first those that a user of the command likely needs next, until the disk is
     full."""
     from netsp.compiled.tiered import TieredDispatcher
 
@@ -84,13 +84,13 @@ def _compile_likely(command: str) -> None:
 
 
 def _likely_first(every: list[Step], command: str) -> list[Step]:
-    """Return the steps with those first that a user of a command needs next."""
+    """Return all steps, first those that a user of the command likely needs next."""
     words = STEP_WORDS.get(command, "solver")
     return sorted(every, key=lambda step: words not in step[0])
 
 
 def _print(seconds: dict[str, float]) -> None:
-    """Print all kernels, those that took longest to compile first."""
+    """Print all kernels by compile time, longest first."""
     from netsp.command.compiling import kernel_name
     from netsp.compiled.kernel import all_kernels
 
@@ -98,7 +98,7 @@ def _print(seconds: dict[str, float]) -> None:
     for name in sorted(names, key=lambda name: (-seconds.get(name, 0.0), name)):
         spent = f"{seconds[name]:7.2f}" if name in seconds else f"{'-':>7}"
         print(f"{spent}  {name}")
-    print(f"{sum(seconds.values()):7.2f}  in all, {len(names)} functions")
+    print(f"{sum(seconds.values()):7.2f}  total, {len(names)} functions")
 
 
 def steps() -> Iterator[Step]:
@@ -136,7 +136,7 @@ def steps() -> Iterator[Step]:
     for solver in SOLVERS:
         # the published program refuses the many legs of the larger problem
         world = fewest if solver == "mip-2017" else problem
-        # on a busy machine a time limit alone would leave kernels out
+        # with a time limit alone, a busy machine would not call all kernels
         yield (
             f"solver {solver}",
             partial(solve, world, solver, iteration_limit=20_000, time_limit=60.0),

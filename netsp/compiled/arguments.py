@@ -10,8 +10,7 @@ import numpy as np
 from netsp.compiled.overtime import Overtime, within
 
 STOP_PARAMETERS = frozenset({"stop"})
-"""Names of parameters that other threads write to in order to end a kernel; their arrays are never
-restored."""
+"""Names of parameters through which other threads end a kernel; their arrays are never restored."""
 
 NARROW_DTYPES = frozenset("ef")
 """Characters of dtypes in which the interpreter computes with fewer bits than compiled code does: a
@@ -52,18 +51,18 @@ def call_interpreted(function: Callable[..., Any], args: tuple[Any, ...]) -> Any
 def call_within(
     budget_s: float, function: Callable[..., Any], names: tuple[str, ...], args: tuple[Any, ...]
 ) -> Any:
-    """Return the result of a kernel's interpreted function, or break the call off.
+    """Return the result of a kernel's interpreted function, or end the call at its budget.
 
     Parameters
     ----------
     budget_s : float
-        CPU seconds that it may take.
+        CPU seconds that the call may take.
     function : callable
         The interpreted function.
     names : tuple of str
-        Names of its parameters.
+        Names of the parameters.
     args : tuple
-        Its arguments.
+        Arguments of the call.
 
     Raises
     ------
@@ -73,7 +72,7 @@ def call_within(
     own = [a for name, a in zip(names, args, strict=False) if name not in STOP_PARAMETERS]
     before = [(a, a.copy()) for a in arrays_in(own) if a.flags.writeable]
     try:
-        # outside `within`, so that `Overtime` cannot come while this `with` ends
+        # outside `within`, so that `Overtime` is never raised while this `with` exits
         with np.errstate(all="ignore"):
             out = within(budget_s, function, args)
         return _plain(out)
@@ -84,7 +83,7 @@ def call_within(
 
 
 def _plain(value: Any) -> Any:
-    """Return a result with Python's numbers instead of NumPy's, as compiled code returns it."""
+    """Return a result with Python's numbers instead of NumPy's, as compiled code does."""
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, tuple):

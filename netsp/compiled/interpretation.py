@@ -1,8 +1,8 @@
 """Kernels as plain Python functions.
 
-An interpreted kernel and a compiled one return the same to the last bit (tests/test_tiers.py,
-benchmarks/kernels_alike.py), so it never matters which of them ran. Python and compiled code
-round two operations differently: compiled code computes powers with a constant integer exponent as
+An interpreted and a compiled kernel return the same result to the last bit (tests/test_tiers.py,
+benchmarks/kernels_alike.py). Python rounds two operations differently from compiled code, so
+interpreted kernels compute these as compiled code does: powers with a constant integer exponent as
 products, and hypotenuses with the C library.
 """
 
@@ -28,15 +28,15 @@ _in_numpy: dict[Any, Callable[..., Any]] = {}
 
 
 def interprets(kernel: Any) -> Callable[[F], F]:
-    """Register a function in NumPy that runs where a kernel is interpreted.
+    """Register the vectorised form of a kernel, which runs where the kernel is interpreted.
 
-    The function must return the same as the kernel to the last bit, and change the same arrays in
-    the same way.
+    It must return the same result as the kernel to the last bit, and write the same values to the
+    same arrays.
 
     Parameters
     ----------
     kernel : dispatcher
-        The kernel whose loops the function vectorises.
+        The kernel that the decorated function vectorises.
     """
 
     def register(function: F) -> F:
@@ -48,7 +48,7 @@ def interprets(kernel: Any) -> Callable[[F], F]:
 
 
 def is_in_numpy(kernel: Any) -> bool:
-    """Return whether a kernel runs in NumPy where it is interpreted.
+    """Return whether a kernel has a vectorised form.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def is_in_numpy(kernel: Any) -> bool:
 
 
 def interpreted(kernel: Any) -> Callable[..., Any]:
-    """Return a kernel as plain Python, with the kernels that it calls as plain Python too.
+    """Return a kernel as a plain Python function that calls other kernels as plain Python too.
 
     Parameters
     ----------
@@ -137,6 +137,6 @@ def _power(x: Any, exponent: int) -> Any:
 
 @cache
 def _c_math() -> SimpleNamespace:
-    """Return `math` as compiled code sees it: Python rounds hypotenuses better than the C
-    library."""
+    """Return `math` with the `hypot` of the C library, as compiled code has it; Python's is more
+    accurate."""
     return SimpleNamespace(**{**vars(math), "hypot": np.hypot})

@@ -1,8 +1,8 @@
 """Decorator of compiled functions.
 
-Loading Numba takes some tenths of a second, and small problems are solved without it. So it is
-loaded once kernels have run interpreted for about as long (`CompilePolicy.numba_s`), or, where no
-compiled code is on disk, once a kernel has run interpreted for as long as compiling it takes.
+Loading Numba takes a few tenths of a second, and small problems do not need it. Numba is loaded
+once kernels have run interpreted for about that time (`CompilePolicy.numba_s`) or, where no
+compiled code is on disk, once a kernel has run interpreted for its compile time.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def kernel(function: F) -> F:
-    """Return a function that is interpreted until compiling it pays; compiled code is kept on disk.
+    """Return a function that runs interpreted until compiling it pays.
 
-    The annotations are for callers and the type checker; Numba infers types of its own. The
-    compiled form releases the interpreter lock. A parameter through which another thread ends the
-    function is named `stop`.
+    Compiled code is kept on disk and releases the interpreter lock. The annotations are for callers
+    and the type checker; Numba infers types of its own. A parameter through which another thread
+    ends the function is named `stop`.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def kernel(function: F) -> F:
 
 
 def is_kept(kernel: Any) -> bool:
-    """Return whether a kernel was compiled on this machine before, for any types; loads Numba.
+    """Return whether compiled code of a kernel is on disk, for any types; loads Numba.
 
     Parameters
     ----------
@@ -80,8 +80,8 @@ def all_kernels() -> list[Any]:
 
 
 def functions_to_compile() -> set[Callable[..., Any]]:
-    """Return the functions of all kernels, in the imported modules, that have no compiled form in
-    this process."""
+    """Return the functions of all kernels in the imported modules that this process has not
+    compiled or loaded."""
     from netsp.compiled.tiered import TieredDispatcher
 
     modules = [m for name, m in list(sys.modules.items()) if name.startswith("netsp.")]
@@ -95,7 +95,7 @@ def functions_to_compile() -> set[Callable[..., Any]]:
 
 
 class Kernel:
-    """Kernel for which Numba may not be loaded yet.
+    """Kernel that loads Numba only when a call needs it.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class Kernel:
     """
 
     _total_s = 0.0
-    """CPU seconds that all kernels have run interpreted before Numba was loaded."""
+    """CPU seconds that all kernels together ran interpreted before Numba was loaded."""
 
     _lock = threading.RLock()
 
@@ -168,7 +168,7 @@ class Kernel:
 
 
 class _LoadedKernel(Kernel):
-    """Kernel for which Numba is loaded: calls go straight to the dispatcher."""
+    """Kernel that has loaded Numba: calls go straight to the dispatcher."""
 
     __call__ = property(operator.attrgetter("_dispatcher"))  # type: ignore[assignment]
 

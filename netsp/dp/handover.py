@@ -9,19 +9,19 @@ from netsp.number_ranges import check_not_negative
 
 @dataclass(frozen=True)
 class Handover:
-    """Limits from which on cutting planes prove sooner than walks.
+    """Sizes of the rest of a proof at which cutting planes take over from walks.
 
     Parameters
     ----------
     max_legs : int
-        Maximum number of legs that is left to cuts however few labels walks have, because walks,
-        which remember more and more, take longer. With 0 (no legs) walks go on to the end.
+        Maximum number of remaining legs at which cuts take over at once, because they finish such a
+        proof sooner than walks. With 0, walks go on to the end.
     max_legs_of_slow_walks : int
-        Maximum number of legs that is left to cuts once walks have many labels. Cuts take a second
-        or two for 10,000 legs.
+        Maximum number of remaining legs at which cuts take over if walks have become slow. For
+        10,000 legs, cuts take a second or two.
     max_labels : int
-        Number of labels in a pass above which walks are slow. A pass over 25,000 labels takes the
-        interpreter about 0.2 s of CPU, and later passes take longer.
+        Number of labels in a pass above which walks count as slow. A pass over 25,000 labels takes
+        about 0.2 s of CPU interpreted, and later passes take longer.
     """
 
     max_legs: int = 0
@@ -37,7 +37,7 @@ class Handover:
         Parameters
         ----------
         vertices : int
-            Number of vertices left; all legs between them are measured.
+            Number of remaining vertices; all legs between them are measured.
         labels : int
             Number of labels in the last pass.
         """

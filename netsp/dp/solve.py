@@ -48,7 +48,7 @@ MOST_CELLS = 100_000_000
 """Most (goal, goal, vertex) cells: tables of 0.8 GiB."""
 
 NO_HANDOVER = Handover()
-"""Handover of nothing: walks prove all that they can."""
+"""Handover that never happens: walks go on as long as they make progress."""
 
 
 @dataclass(frozen=True)

@@ -22,11 +22,10 @@ _SOLVERS = (("dp", None), ("mip", None), ("lns", 200), ("auto", 30))
 
 
 def should_make_ready() -> bool:
-    """Return whether to load all kernels that a repair may need before a simulated tour begins.
+    """Return whether to call `make_ready` before a simulated tour: only where kernels are on disk.
 
-    They are loaded where they are on disk already, and before a flight (`everything_compiled`).
-    On a machine that has compiled nothing yet, the tour is carried out interpreted until compiling
-    pays: compiling all kernels that a repair may need would take a minute.
+    On a machine that has compiled nothing yet, `make_ready` would take a minute, so a simulated
+    tour runs interpreted until compiling pays. Flights always call `make_ready`.
     """
     return runs_compiled(extend)
 

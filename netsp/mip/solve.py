@@ -95,7 +95,7 @@ SEARCH_AGAIN = 0.5
 """Share of the last gap at which the classes that the LP visits are searched once more."""
 
 HANDOVER = Handover(max_legs=600, max_legs_of_slow_walks=10_000, max_labels=25_000)
-"""Limits from which on walks leave the rest of the proof to cuts."""
+"""Sizes of the rest of a proof at which cuts take over from walks."""
 
 CORE_FIRST = 3000
 """With more vertices a first bound, and a proof over a core of them, come before that over all,

@@ -138,7 +138,7 @@ def draw(problem: Problem, solution: Solution | None = None) -> Any:
             ax.plot(tether[:, 0], tether[:, 1], color=style.TETHER, lw=1.3)
         ax.plot(*problem.base[:2], marker="*", ms=8, color=style.BASE, mec="none")
         ax.plot(*problem.points[visit.goal + 1, :2], "o", ms=4, color=style.PATH)
-        # with y given, Matplotlib does not measure ticks to place the title; there are no ticks
+        # y=1.0 keeps Matplotlib from measuring ticks to place the title: there are none
         ax.set_title(
             f"{k + 1}: {visit.tether_length:.4g} {problem.units}", fontsize=7, pad=2, y=1.0
         )
@@ -480,7 +480,7 @@ def draw_obstacles(
                 label(i), o.representative_point, fontsize=6, color=style.BASE, zorder=6,
                 clip_on=True, path_effects=style.halo(), **place,
             )  # fmt: skip
-    # `add_patch` would measure the curves of each obstacle
+    # faster than `add_patch`, which computes the extent of each curve
     ax.update_datalim(corners)
 
 

@@ -81,9 +81,9 @@ def save(figure: Any, path: str | Path, dpi: int = 150) -> None:
 
 
 def load_matplotlib() -> None:
-    """Load Matplotlib's figures for a command, without the docstrings of their setters.
+    """Load Matplotlib's figures without generating the docstrings of their setters.
 
-    Making these takes a fifth of the loading time, and no user of a command reads them.
+    These docstrings take a fifth of the loading time, and commands never show them.
     """
     from matplotlib import artist as artists
 
@@ -167,8 +167,8 @@ def literal(figure: Any) -> Any:
 
 
 def _texts(artist: Any) -> Iterator[Any]:
-    """Yield all texts in a Matplotlib artist except the labels of ticks: asking for these creates
-    them, most of them never to be drawn."""
+    """Yield all texts in a Matplotlib artist except tick labels, which Matplotlib would create on
+    access although it draws few of them."""
     from matplotlib.axis import Axis
     from matplotlib.text import Text
 

@@ -1,9 +1,9 @@
-"""Distance field at many points at once, in NumPy, for kernels that run interpreted.
+"""Distance field at many points, vectorised in NumPy for kernels that run interpreted.
 
-The results for each point are those of `netsp.online.scene.sampling` and
-`netsp.online.scene.solids` to the last bit. So the operations and their order are the same, and
-comparisons replace NumPy's minimum and maximum, which treat signed zeros differently. NumPy's sines
-differ from those of the C library, so this module uses Python's.
+The results are those of `netsp.online.scene.sampling` and `netsp.online.scene.solids` to the last
+bit. For that, operations have the same order, and comparisons replace NumPy's minimum and maximum,
+which treat signed zeros differently. Sines and cosines come from `math`, which calls the C library
+as compiled code does; NumPy's own differ.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Row = list[Any]
 """Numbers of one solid, or arrays with the numbers of one solid for each point
 (`netsp.online.scene.packing`)."""
 
-CHUNK = 32_768  # points measured at once, so that the arrays of a chunk stay in the cache
+CHUNK = 32_768  # points of a block, few enough that its arrays fit in the processor's cache
 
 
 def is_short(data: Floats, count: int) -> bool:
@@ -130,7 +130,7 @@ def lowest_along(data: Floats, offset: float, a: Floats, b: Floats, tolerance: f
 
 @interprets(candidates)
 def _candidates_in_numpy(data: Floats) -> tuple[Ints, Ints]:
-    """Do as `packing.candidates`, many cells at once."""
+    """Vectorise `packing.candidates` over cells."""
     size, counts = data[NEAR + 3], [int(n) for n in data[NEAR + 4 : NEAR + 7]]
     along = [data[NEAR + axis] + (np.arange(counts[axis]) + 0.5) * size for axis in range(3)]
     x, y, z = (v.ravel() for v in np.meshgrid(*along, indexing="ij"))
@@ -193,7 +193,7 @@ def _nearest_of_listed(data: Floats, p: Vectors, cell: Ints) -> tuple[Floats, In
         d[some] = _solids(data, kind, solids[some], _at(p, points[some]), has_gradient=False)[0]
     np.minimum.at(out, points, d)
     least = np.flatnonzero((d == out[points]) & (d < np.inf))
-    least = least[::-1]  # of equally near solids the first one in the list counts
+    least = least[::-1]  # among equally near solids, the first one in the list is written last
     out[points[least]], rows[points[least]] = d[least], solids[least]
     return out, rows
 
@@ -388,4 +388,4 @@ _BY_KIND: dict[int, tuple[int, Callable[[Row, Vectors, bool], Samples]]] = {
     CAPSULE: (7, _capsule), CYLINDER: (8, _cylinder), BOX: (15, _box), TORUS: (12, _torus),
     POST: (3, _post),
 }  # fmt: skip
-"""By kind of solid: how many numbers a solid has, and the function that measures it."""
+"""Number of values in the row of a solid, and the function that measures it, by kind of solid."""
