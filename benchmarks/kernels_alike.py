@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import struct
 import sys
-import threading
 from collections import Counter
 from typing import Any
 
@@ -19,7 +18,7 @@ import numpy as np
 from numba.core.registry import CPUDispatcher
 
 from netsp.command.warm_up import steps
-from netsp.compiled.arguments import NARROW_DTYPES, arrays_in
+from netsp.compiled.arguments import NARROW_DTYPES, arrays_in, is_in_pool
 from netsp.compiled.compile_policy import everything_compiled
 from netsp.compiled.interpretation import interpreted
 from netsp.compiled.overtime import Overtime, within
@@ -40,8 +39,7 @@ class Comparison:
     def call(self, kernel: Any, *args: Any) -> Any:
         """Call a kernel compiled, and on copies of its arguments interpreted."""
         name = f"{kernel.py_func.__module__}.{kernel.py_func.__name__}"
-        is_shared = threading.current_thread().name.startswith("ThreadPoolExecutor")
-        if is_shared or self.spent[name] > MAX_KERNEL_S or name in self.unlike:
+        if is_in_pool() or self.spent[name] > MAX_KERNEL_S or name in self.unlike:
             return CPUDispatcher.__call__(kernel, *args)
         if any(a.size and a.dtype.char in NARROW_DTYPES for a in arrays_in(args)):
             return CPUDispatcher.__call__(kernel, *args)

@@ -7,8 +7,8 @@ compiles would seem to hang.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -22,9 +22,6 @@ PACKAGE_SUBJECTS = {
     "online": "the simulation", "space": "planning in space", "cover": "the choice of viewpoints",
 }  # fmt: skip
 """Name of each package in messages; other packages are called the solver."""
-
-MAX_BAR_WIDTH = 20  # characters of the bar on a wide terminal, which leave room for the text
-MIN_BAR_WIDTH = 5  # characters of the bar on a narrow terminal, which still show progress
 
 
 @contextmanager
@@ -41,39 +38,40 @@ def compile_messages(stream: TextIO, line: StatusLine | None = None) -> Iterator
     from netsp.compiled.numba_loading import when_numba_is_loaded
 
     preparation = Preparation(stream, line)
-    listeners: list[Any] = []
     is_over = False
+    with ExitStack() as listening:
 
-    def listen() -> None:
-        if not is_over:
-            listeners.append(_listener(preparation))
+        def listen() -> None:
+            if not is_over:
+                listening.enter_context(_heard(preparation.begin, preparation.end))
 
-    when_numba_is_loaded(listen)
-    try:
-        yield
-    finally:
-        is_over = True
-        for listener in listeners:
-            from numba.core import event
-
-            event.unregister("numba:compile", listener)
-        preparation.close()
+        listening.callback(preparation.close)
+        when_numba_is_loaded(listen)
+        try:
+            yield
+        finally:
+            is_over = True
 
 
-def _listener(preparation: Preparation) -> Any:
-    """Return a registered listener that reports each compilation."""
+@contextmanager
+def _heard(on_begin: Callable[[Any], None], on_end: Callable[[Any], None]) -> Iterator[None]:
+    """Call functions with the dispatcher of each kernel whose compilation begins or ends while the
+    body runs; loads Numba."""
     from numba.core import event
 
     class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, record: Any) -> None:
-            preparation.begin(record.data["dispatcher"])
+            on_begin(record.data["dispatcher"])
 
         def on_end(self, record: Any) -> None:
-            preparation.end(record.data["dispatcher"])
+            on_end(record.data["dispatcher"])
 
     listener = Listener()
     event.register("numba:compile", listener)
-    return listener
+    try:
+        yield
+    finally:
+        event.unregister("numba:compile", listener)
 
 
 class CompileTimes:
@@ -92,29 +90,20 @@ class CompileTimes:
     @contextmanager
     def measured(self) -> Iterator[None]:
         """Measure while the body runs."""
-        from numba.core import event
-
-        times = self
-
-        class Listener(event.Listener):  # type: ignore[misc]
-            def on_start(self, record: Any) -> None:
-                times._within.append((time.thread_time(), 0.0))
-
-            def on_end(self, record: Any) -> None:
-                begin, called_s = times._within.pop()
-                whole_s = time.thread_time() - begin
-                name = kernel_name(record.data["dispatcher"])
-                times.seconds[name] = times.seconds.get(name, 0.0) + whole_s - called_s
-                if times._within:
-                    outer, so_far_s = times._within[-1]
-                    times._within[-1] = outer, so_far_s + whole_s
-
-        listener = Listener()
-        event.register("numba:compile", listener)
-        try:
+        with _heard(self._begin, self._end):
             yield
-        finally:
-            event.unregister("numba:compile", listener)
+
+    def _begin(self, kernel: Any) -> None:
+        self._within.append((time.thread_time(), 0.0))
+
+    def _end(self, kernel: Any) -> None:
+        begin, called_s = self._within.pop()
+        whole_s = time.thread_time() - begin
+        name = kernel_name(kernel)
+        self.seconds[name] = self.seconds.get(name, 0.0) + whole_s - called_s
+        if self._within:
+            outer, so_far_s = self._within[-1]
+            self._within[-1] = outer, so_far_s + whole_s
 
 
 def kernel_name(kernel: Any) -> str:
@@ -140,13 +129,33 @@ class PreparationPolicy:
         they announce a longer wait.
     every_s : float
         Seconds between two lines where there is no terminal; a smaller value writes more lines.
+    max_bar_columns : int
+        Characters of the bar on a wide terminal; a longer one leaves less room for the text.
+    min_bar_columns : int
+        Characters of the bar on a narrow terminal; a shorter one hardly shows progress.
     """
 
     expected_share: float = 0.25
     every_s: float = 30.0
+    max_bar_columns: int = 20
+    min_bar_columns: int = 5
 
     def __post_init__(self) -> None:
         check_positive(self)
+
+    def bar(self, share: float, room: int) -> str:
+        """Return a progress bar.
+
+        Parameters
+        ----------
+        share : float
+            Share of the work that is done, 0 to 1.
+        room : int
+            Characters that are free on the line.
+        """
+        width = max(min(self.max_bar_columns, room), self.min_bar_columns)
+        full = int(share * width)
+        return f"[{'#' * full}{' ' * (width - full)}]"
 
 
 class Preparation:
@@ -214,7 +223,8 @@ class Preparation:
         )
         if self._line is not None:
             share = min(self._done_s / self._expected_s, 1.0)
-            self._line.show(f"{text} {bar(share, self._line.columns - len(text) - 4)}")
+            room = self._line.columns - len(text) - 4
+            self._line.show(f"{text} {self._policy.bar(share, room)}")
             return
         now = time.monotonic()
         if not self._printed_at:
@@ -229,21 +239,6 @@ class Preparation:
         else:
             return
         self._printed_at = now
-
-
-def bar(share: float, room: int) -> str:
-    """Return a progress bar.
-
-    Parameters
-    ----------
-    share : float
-        Share of the work that is done, 0 to 1.
-    room : int
-        Characters that are free on the line.
-    """
-    width = max(min(MAX_BAR_WIDTH, room), MIN_BAR_WIDTH)
-    full = int(share * width)
-    return f"[{'#' * full}{' ' * (width - full)}]"
 
 
 def _folder_compile_time_s(kernel: Any) -> float:

@@ -53,11 +53,12 @@ def run(args: argparse.Namespace) -> int:
 
 def _compile(every: list[Step], quiet: bool) -> None:
     """Run all steps and show their progress."""
-    from netsp.command.compiling import PreparationPolicy, bar
+    from netsp.command.compiling import PreparationPolicy
     from netsp.command.patience import span
     from netsp.command.status_line import status_line
 
-    begin = printed_at = time.monotonic()
+    policy, begin = PreparationPolicy(), time.monotonic()
+    printed_at = begin
     with contextlib.nullcontext() if quiet else status_line() as line:
         for done, (name, step) in enumerate(every):
             now = time.monotonic()
@@ -66,8 +67,8 @@ def _compile(every: list[Step], quiet: bool) -> None:
             )
             text = f"preparing netsp: {name} ({done + 1} of {len(every)}{left})"
             if line is not None:
-                line.show(f"{bar(done / len(every), line.columns)} {text}")
-            elif not quiet and (not done or now - printed_at >= PreparationPolicy().every_s):
+                line.show(f"{policy.bar(done / len(every), line.columns)} {text}")
+            elif not quiet and (not done or now - printed_at >= policy.every_s):
                 print(text, file=sys.stderr, flush=True)
                 printed_at = now
             step()

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import threading
 from typing import Any
 
 import numpy as np
 
+from netsp.compiled.interpretation import interpreted
 from netsp.compiled.overtime import Overtime, within
 
 STOP_PARAMETERS = frozenset({"stop"})
@@ -42,25 +43,25 @@ def can_be_interpreted(args: tuple[Any, ...], max_copied_bytes: int) -> bool:
     return not is_narrow and sum(a.nbytes for a in arrays) <= max_copied_bytes
 
 
-def call_interpreted(function: Callable[..., Any], args: tuple[Any, ...]) -> Any:
-    """Return the result of a kernel's interpreted function, with the types of compiled code."""
-    with np.errstate(all="ignore"):  # compiled code does not warn either
-        return _plain(function(*args))
+def is_in_pool() -> bool:
+    """Return whether this thread belongs to a pool, so that other threads may write to the arrays
+    of its calls."""
+    return threading.current_thread().name.startswith("ThreadPoolExecutor")
 
 
-def call_within(
-    budget_s: float, function: Callable[..., Any], names: tuple[str, ...], args: tuple[Any, ...]
-) -> Any:
-    """Return the result of a kernel's interpreted function, or end the call at its budget.
+def call_within(budget_s: float, kernel: Any, args: tuple[Any, ...]) -> Any:
+    """Return the result of a kernel that runs interpreted, with the types of compiled code, or
+    end the call at its budget.
+
+    In a thread of a pool the call has no budget: arrays that other threads write to cannot be
+    restored.
 
     Parameters
     ----------
     budget_s : float
         CPU seconds that the call may take.
-    function : callable
-        The interpreted function.
-    names : tuple of str
-        Names of the parameters.
+    kernel : callable
+        Function that `netsp.compiled.kernel.kernel` decorates.
     args : tuple
         Arguments of the call.
 
@@ -69,6 +70,11 @@ def call_within(
     Overtime
         The budget is used up; the arguments are restored.
     """
+    function = interpreted(kernel)
+    if is_in_pool():
+        with np.errstate(all="ignore"):  # compiled code does not warn either
+            return _plain(function(*args))
+    names = kernel.py_func.__code__.co_varnames
     own = [a for name, a in zip(names, args, strict=False) if name not in STOP_PARAMETERS]
     before = [(a, a.copy()) for a in arrays_in(own) if a.flags.writeable]
     try:

@@ -9,13 +9,12 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from netsp.compiled.compile_policy import current_policy
+
 try:
     import fcntl
 except ImportError:  # on Windows two processes may compile one kernel, with the same result
     fcntl = None  # type: ignore[assignment]
-
-LOCK_CHECK_INTERVAL_S = 0.02
-"""Seconds between two attempts to take a lock, a small part of a compile time."""
 
 
 @contextlib.contextmanager
@@ -60,7 +59,7 @@ def _taken(file: Path, max_wait_s: float) -> tuple[int | None, bool]:
             if time.monotonic() >= end:
                 return descriptor, False
             os.close(descriptor)
-            time.sleep(LOCK_CHECK_INTERVAL_S)
+            time.sleep(current_policy().lock_interval_s)
             continue
         except OSError:  # a file system without locks
             return descriptor, True

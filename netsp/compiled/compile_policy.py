@@ -17,7 +17,7 @@ class CompilePolicy:
     a kernel runs interpreted for as long as compiling it would take, and then is compiled. However
     long the work turns out to be, this takes at most twice the time of the better choice.
 
-    All seconds are CPU seconds.
+    All seconds are CPU seconds, unless they are called wall-clock seconds.
 
     Parameters
     ----------
@@ -53,6 +53,17 @@ class CompilePolicy:
     min_numpy_items : int
         Minimum number of values, such as points times solids, for which an interpreted kernel uses
         NumPy instead of a loop. Results are the same; at the default, so is the time.
+    check_interval_s : float
+        Wall-clock seconds between two checks of the interpreted calls that run. A shorter interval
+        ends calls more punctually and takes more CPU.
+    max_idle_checks : int
+        Number of checks without an interpreted call after which the checking thread sleeps until
+        the next call. With a smaller number, more calls have to wake it; with a larger one, it
+        takes CPU for longer.
+    lock_interval_s : float
+        Wall-clock seconds between two attempts to take the lock of a kernel that another process
+        compiles; a small part of a compile time. A shorter interval waits more punctually and takes
+        more CPU.
     is_eager : bool
         Whether all kernels are compiled at their first call.
     """
@@ -66,6 +77,9 @@ class CompilePolicy:
     max_wait_ratio: float = 10.0
     max_copied_bytes: int = 64 * 2**20
     min_numpy_items: int = 16
+    check_interval_s: float = 0.005
+    max_idle_checks: int = 20
+    lock_interval_s: float = 0.02
     is_eager: bool = False
 
     def __post_init__(self) -> None:

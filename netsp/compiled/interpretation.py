@@ -90,6 +90,23 @@ def names_used(code: CodeType) -> Iterator[str]:
             yield from names_used(inner)
 
 
+@cache
+def called_kernels(kernel: Any) -> frozenset[Any]:
+    """Return a kernel and all kernels that it calls, directly or through others.
+
+    Parameters
+    ----------
+    kernel : dispatcher
+        Function that `netsp.compiled.kernel.kernel` decorates.
+    """
+    found = {kernel}
+    for name in names_used(kernel.py_func.__code__):
+        other = kernel.py_func.__globals__.get(name)
+        if hasattr(other, "py_func") and other.py_func is not kernel.py_func:
+            found |= called_kernels(other)
+    return frozenset(found)
+
+
 class _Products(ast.NodeTransformer):
     """Transformer that replaces powers with a constant integer exponent by calls of `_power`."""
 

@@ -12,14 +12,14 @@ import operator
 import os
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from time import thread_time
 from typing import Any, TypeVar
 
 from netsp.compiled import numba_loading
-from netsp.compiled.arguments import call_interpreted, call_within, can_be_interpreted
+from netsp.compiled.arguments import call_within, can_be_interpreted, is_in_pool
 from netsp.compiled.compile_policy import CompilePolicy, current_policy
-from netsp.compiled.interpretation import interpreted, names_used
+from netsp.compiled.interpretation import called_kernels
 from netsp.compiled.kept_code import may_be_kept
 from netsp.compiled.overtime import Overtime
 
@@ -71,27 +71,27 @@ def runs_compiled(kernel: Any) -> bool:
 
 def all_kernels() -> list[Any]:
     """Return the dispatchers of all kernels in the modules that are imported; loads Numba."""
-    from netsp.compiled.tiered import TieredDispatcher
-
-    modules = [m for name, m in list(sys.modules.items()) if name.startswith("netsp.")]
-    values = [v for m in modules for v in list(vars(m).values())]
-    made = {v.dispatcher for v in values if isinstance(v, Kernel)}
-    return list(made | {v for v in values if isinstance(v, TieredDispatcher)})
+    return list({getattr(kernel, "dispatcher", kernel) for kernel in _imported_kernels()})
 
 
 def functions_to_compile() -> set[Callable[..., Any]]:
     """Return the functions of all kernels in the imported modules that this process has not
     compiled or loaded."""
+    return {
+        kernel.py_func
+        for kernel in _imported_kernels()
+        if (isinstance(kernel, Kernel) and kernel._dispatcher is None) or not kernel.overloads
+    }
+
+
+def _imported_kernels() -> Iterator[Any]:
+    """Yield all kernels in the modules that are imported."""
     from netsp.compiled.tiered import TieredDispatcher
 
     modules = [m for name, m in list(sys.modules.items()) if name.startswith("netsp.")]
-    values = [v for m in modules for v in list(vars(m).values())]
-    return {
-        v.py_func
-        for v in values
-        if (isinstance(v, Kernel) and (v._dispatcher is None or not v._dispatcher.overloads))
-        or (isinstance(v, TieredDispatcher) and not v.overloads)
-    }
+    for value in [v for m in modules for v in list(vars(m).values())]:
+        if isinstance(value, Kernel | TieredDispatcher):
+            yield value
 
 
 class Kernel:
@@ -122,11 +122,7 @@ class Kernel:
             if budget_s > 0.0 and can_be_interpreted(args, policy.max_copied_bytes):
                 begin = thread_time()
                 try:
-                    if threading.current_thread().name.startswith("ThreadPoolExecutor"):
-                        # run to the end: arrays that other threads write to cannot be restored
-                        return call_interpreted(interpreted(self), args)
-                    names = self.py_func.__code__.co_varnames
-                    return call_within(budget_s, interpreted(self), names, args)
+                    return call_within(budget_s, self, args)
                 except Overtime:
                     pass
                 finally:
@@ -138,9 +134,8 @@ class Kernel:
     def _budget_s(self, policy: CompilePolicy) -> float:
         """Return the CPU seconds that a call may run interpreted before Numba is loaded for it."""
         if may_be_kept():
-            is_shared = threading.current_thread().name.startswith("ThreadPoolExecutor")
-            return 0.0 if is_shared else policy.numba_s - Kernel._total_s
-        bytecode = sum(len(f.__code__.co_code) for f in _called(self.py_func))
+            return 0.0 if is_in_pool() else policy.numba_s - Kernel._total_s
+        bytecode = sum(len(k.py_func.__code__.co_code) for k in called_kernels(self))
         return policy.interpreted_share * policy.compile_time_s(bytecode) - self._early_s
 
     @property
@@ -171,17 +166,6 @@ class _LoadedKernel(Kernel):
     """Kernel that has loaded Numba: calls go straight to the dispatcher."""
 
     __call__ = property(operator.attrgetter("_dispatcher"))  # type: ignore[assignment]
-
-
-@functools.cache
-def _called(function: Callable[..., Any]) -> frozenset[Callable[..., Any]]:
-    """Return the function of a kernel, and those of all kernels that it calls."""
-    found = {function}
-    for name in names_used(function.__code__):
-        other = getattr(function.__globals__.get(name), "py_func", None)
-        if other is not None and other not in found:
-            found |= _called(other)
-    return frozenset(found)
 
 
 def _dispatcher_of(function: Callable[..., Any]) -> Any:

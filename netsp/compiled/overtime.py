@@ -18,14 +18,9 @@ import traceback
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from netsp.compiled.compile_policy import current_policy
+
 T = TypeVar("T")
-
-CHECK_INTERVAL_S = 0.005
-"""Seconds between two checks of the running calls. A shorter interval ends calls more punctually
-and takes more CPU."""
-
-MAX_IDLE_CHECKS = 20
-"""Checks without a running call after which the watching thread sleeps until the next call."""
 
 MAX_STEPS_TO_EXCEPTION = 1000
 """Loop steps within which Python raises an exception that is pending; it checks at each step."""
@@ -91,9 +86,10 @@ class _Watch:
     def _run(self) -> None:
         idle = 0
         while True:
+            policy = current_policy()
             with self._lock:
                 idle = 0 if self._under_way else idle + 1
-                self._is_asleep = idle > MAX_IDLE_CHECKS
+                self._is_asleep = idle > policy.max_idle_checks
                 for call in [c for c in self._under_way if c.now() > c.deadline]:
                     self._under_way.discard(call)
                     call.was_ended = True
@@ -104,7 +100,7 @@ class _Watch:
                 self._wakes.get()
                 idle = 0
             else:
-                time.sleep(CHECK_INTERVAL_S)
+                time.sleep(policy.check_interval_s)
 
 
 def _catch_pending(thread: int) -> None:

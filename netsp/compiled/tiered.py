@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import threading
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from time import thread_time
@@ -21,10 +20,10 @@ from numba.core.registry import CPUDispatcher
 from numba.core.types import Boolean, Integer, unliteral  # type: ignore[attr-defined]
 
 from netsp.compiled import disk_cache
-from netsp.compiled.arguments import call_interpreted, call_within, can_be_interpreted
+from netsp.compiled.arguments import call_within, can_be_interpreted, is_in_pool
 from netsp.compiled.compile_lock import is_locked, locked
 from netsp.compiled.compile_policy import compiles, current_policy
-from netsp.compiled.interpretation import interpreted, is_in_numpy, names_used
+from netsp.compiled.interpretation import called_kernels, is_in_numpy
 from netsp.compiled.overtime import Overtime
 
 OVERRIDDEN = ("compile", "get_call_template")
@@ -75,13 +74,12 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
             share = policy.numpy_share if is_in_numpy(self) else policy.interpreted_share
             budget_s = share * policy.compile_time_s(self.bytecode())
         budget_s -= self.interpreted_s
-        is_shared = threading.current_thread().name.startswith("ThreadPoolExecutor")
         can_be = can_be_interpreted(args, policy.max_copied_bytes)
         if budget_s <= 0.0 and not on_disk and self._is_locked():
             budget_s = policy.compile_time_s(self.bytecode())  # another process is compiling it
-        if budget_s <= 0.0 or not can_be or (is_shared and on_disk):
+        if budget_s <= 0.0 or not can_be or (on_disk and is_in_pool()):
             return self._compiled(args, kwargs)
-        return self._run_pooled if is_shared else self._within(budget_s)
+        return self._within(budget_s)
 
     def _entry_for_narrow(self, types: tuple[Any, ...]) -> Callable[..., Any]:
         """Return the compiled code for wider integers, and have Numba call it at once next time."""
@@ -141,8 +139,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         def run(*args: Any) -> Any:
             begin = thread_time()
             try:
-                names = self.py_func.__code__.co_varnames
-                return call_within(budget_s, interpreted(self), names, args)
+                return call_within(budget_s, self, args)
             except Overtime:
                 pass
             finally:
@@ -151,18 +148,10 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
 
         return run
 
-    def _run_pooled(self, *args: Any) -> Any:
-        """Run interpreted to the end: arrays that other threads write to cannot be restored."""
-        begin = thread_time()
-        try:
-            return call_interpreted(interpreted(self), args)
-        finally:
-            self.interpreted_s += thread_time() - begin
-
     def bytecode(self) -> int:
         """Return the size of the bytecode, in bytes, of the function and of the kernels that it
         calls, as far as they are not compiled."""
-        return sum(len(k.py_func.__code__.co_code) for k in _called(self) if not k.overloads)
+        return sum(len(k.py_func.__code__.co_code) for k in called_kernels(self) if not k.overloads)
 
     def _is_locked(self) -> bool:
         """Return whether another process compiles the function."""
@@ -191,18 +180,6 @@ def _widest(kind: Any) -> Any:
     kind = unliteral(kind)
     is_narrow = isinstance(kind, Integer) and kind.bitwidth < 64  # type: ignore[attr-defined]
     return int64 if is_narrow and not isinstance(kind, Boolean) else kind
-
-
-@cache
-def _called(kernel: Any) -> frozenset[Any]:
-    """Return a kernel and all kernels that it calls."""
-    found = {kernel}
-    for name in names_used(kernel.py_func.__code__):
-        other = kernel.py_func.__globals__.get(name)
-        other = getattr(other, "dispatcher", other)  # a `Kernel` has one
-        if isinstance(other, TieredDispatcher) and other not in found:
-            found |= _called(other)
-    return frozenset(found)
 
 
 @cache
