@@ -10,7 +10,7 @@ TESTERS = $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 .PHONY: demo test accept docs wheel wheel-installed pythons tables lint bench js clean
 .DELETE_ON_ERROR:
 
-# --no-compile: byte-compiling modules that nobody imports takes half of pip's time
+# --no-compile: half of pip's time goes into bytecode, most of it for modules that are never imported
 $(VENV)/.core: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -e .

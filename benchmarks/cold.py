@@ -1,12 +1,12 @@
-"""Measure the CPU seconds of first uses: all processes of a command, with an empty cache.
+"""Measure the CPU seconds of first uses: all processes of a command, without compiled code.
 
     python benchmarks/cold.py [--runs 3] [--worlds 5] [WORDS …]
 
-Only rows whose names contain one of the words are measured. Each run has a cache folder of its own
+Only rows whose names contain one of the words are measured. Each run has its own cache folder
 (`NUMBA_CACHE_DIR`), and the table shows medians. The background process, which compiles what the
 next command may need, is turned off. Bytecode of netsp exists, as after an installation by pip;
-only the demo on a fresh machine starts without it. `claims/first_use.py` measures the same rows in
-the gate.
+only the demo on a fresh machine starts without it. `claims/first_use.py` measures the same rows for
+`make accept`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ DEVELOPER_VARIABLES = ("PYTHONPATH", "PYTHONDONTWRITEBYTECODE", "NUMBA_CACHE_DIR
 
 @dataclass(frozen=True)
 class FirstUse:
-    """A command on a machine where nothing was compiled.
+    """A command on a machine where nothing is compiled yet.
 
     Parameters
     ----------
@@ -57,13 +57,13 @@ class FirstUse:
     measure: Callable[[Path, Path], float]
 
     def cpu_s(self) -> float:
-        """Return the CPU seconds of one run with a cache of its own."""
+        """Return the CPU seconds of one run with its own cache folder."""
         with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as cache:
             return self.measure(Path(folder), Path(cache))
 
 
 def spent_s(command: list[str], folder: Path, env: dict[str, str]) -> float:
-    """Return the CPU seconds of a command and of the processes that it waits for."""
+    """Return the CPU seconds of a command, including processes that it waits for."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(command, env=env, cwd=folder, capture_output=True, text=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -101,8 +101,8 @@ def solve_cpu_s(problem: Path, folder: Path, cache: Path) -> float:
 def demo_cpu_s(folder: Path, cache: Path) -> float:
     """Return the CPU seconds of `make demo` in a clean copy of the checkout.
 
-    The demo makes an environment and installs netsp. Packages that were installed before come from
-    pip's cache.
+    The demo creates an environment and installs netsp. Packages come from pip's cache where it has
+    them.
     """
     listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     names = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
@@ -119,7 +119,7 @@ def demo_cpu_s(folder: Path, cache: Path) -> float:
 def execute_cpu_s(folder: Path, cache: Path) -> float:
     """Return the CPU seconds of carrying out the tour of the wharf with the documented surprises.
 
-    The problem is solved before, with a cache of its own; that does not count.
+    Solving the problem beforehand, with another cache folder, does not count.
     """
     wharf = ROOT / "problems" / "wharf.json"
     with tempfile.TemporaryDirectory() as other:
@@ -158,7 +158,7 @@ def random_cpu_s(goals: int, seed: int, folder: Path, cache: Path) -> float:
 
 
 def first_uses(worlds: int) -> Iterator[FirstUse]:
-    """Yield the first uses of the gate, the longest first.
+    """Yield the first uses that `make accept` measures, the longest first.
 
     Parameters
     ----------

@@ -2,9 +2,9 @@
 
     python benchmarks/kernels_alike.py [WORDS …]
 
-Only steps whose names contain one of the words are run. Prints each kernel whose results, or the
-arrays that it writes to, differ in any bit, and how many kernels and calls were compared. Calls
-that take the interpreter too long are not compared, nor are calls that always run compiled.
+Only steps whose names contain one of the words are run. The script prints each kernel whose result,
+or an array that it writes to, differs in any bit, and the numbers of kernels and calls that were
+compared. It does not compare calls that take too long interpreted or that always run compiled.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Claims about first uses: CPU seconds of all processes, where nothing was compiled before."""
+"""Claims about first uses: CPU seconds of all processes when nothing is compiled yet."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from cold import FirstUse
 
 WORLDS_PER_GOAL_COUNT = 2
-"""Random worlds for each number of goals in the gate; `cold.py` measures five by default."""
+"""Random worlds for each number of goals in `make accept`; `cold.py` measures five by default."""
 
 
 def within(use: FirstUse) -> tuple[str, bool]:
-    """Measure one run, without an allowance: users were promised this limit."""
+    """Measure one run. Its limit has no allowance, because docs/install.md promises it to users."""
     spent = use.cpu_s()
     return f"{spent:.1f} s CPU", spent <= use.max_cpu_s
 
