@@ -2,4 +2,4 @@
 
 import os
 
-os.environ.setdefault("NETSP_BACKGROUND", "0")  # commands under test start no other process
+os.environ.setdefault("NETSP_BACKGROUND", "0")  # tests start no background process

@@ -1,4 +1,4 @@
-"""Tests of the process that compiles what is likely needed next."""
+"""Tests of the background process that compiles what is likely needed next."""
 
 import argparse
 import os
@@ -25,16 +25,16 @@ pytestmark = pytest.mark.skipif(not compiles(), reason="NUMBA_DISABLE_JIT is set
 
 @pytest.fixture
 def started(monkeypatch):
-    """The commands of processes that are noted instead of started."""
+    """Return a list of commands, to which each new process is added instead of being started."""
     commands = []
 
-    def note(words, **options):
+    def record(words, **options):
         assert options["start_new_session"]
         assert options["env"][background_warm_up.SWITCH_VARIABLE] == "0"
         commands.append(words)
         return SimpleNamespace()
 
-    monkeypatch.setattr(subprocess, "Popen", note)
+    monkeypatch.setattr(subprocess, "Popen", record)
     return commands
 
 
@@ -42,7 +42,7 @@ def started(monkeypatch):
     ("has_compiled", "is_disk_full", "variable", "count"),
     [(True, False, "1", 1), (True, False, "0", 0), (False, False, "1", 0), (True, True, "1", 0)],
 )
-def test_it_starts_after_a_command_that_compiled_unless_it_is_turned_off(
+def test_a_background_process_starts_after_a_command_that_compiled_unless_turned_off(
     has_compiled, is_disk_full, variable, count, started, monkeypatch
 ):
     monkeypatch.setattr(TieredDispatcher, "has_compiled", has_compiled)
@@ -52,7 +52,7 @@ def test_it_starts_after_a_command_that_compiled_unless_it_is_turned_off(
     assert len(started) == count
 
 
-def test_a_second_one_ends_at_once(monkeypatch):
+def test_a_second_background_process_ends_at_once(monkeypatch):
     niceness, ran = [], []
     monkeypatch.setattr("os.nice", niceness.append)
     monkeypatch.setattr(warm_up, "steps", lambda: [("solver auto", lambda: ran.append(1))])
@@ -95,7 +95,7 @@ print("done")
 """
 
 
-def _soon(condition):
+def _wait_for(condition):
     """Wait until a condition holds."""
     end = time.monotonic() + 120.0
     while not condition():
@@ -115,46 +115,46 @@ def test_one_process_at_the_lowest_priority_compiles_and_ends_after_the_command(
         "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}", background_warm_up.SWITCH_VARIABLE: "1",
     }  # fmt: skip
     done = subprocess.run(command, env=env, capture_output=True, text=True, cwd=tmp_path)
-    # standard output and standard error are closed, although the process goes on
+    # the background process, which still runs, has closed standard output and standard error
     assert (done.stdout, done.stderr) == ("done\n", "")
-    _soon(lambda: log.exists() and log.read_text().count("\n"))
+    _wait_for(lambda: log.exists() and log.read_text().count("\n"))
     pid, niceness = map(int, log.read_text().split())
     assert niceness == background_warm_up.LOWEST_PRIORITY
-    assert os.getsid(pid) == pid  # no terminal's Ctrl-C or hang-up reaches it
+    assert os.getsid(pid) == pid  # own session: no Ctrl-C or hang-up of a terminal
     (tmp_path / "go").touch()
-    _soon(lambda: "compiled" in log.read_text())
-    _soon(lambda: not list(cache.rglob("*.lock")))
-    _soon(lambda: not psutil.pid_exists(pid) or psutil.Process(pid).status() == "zombie")
-    # the other one ends at once, or finds nothing left to compile
+    _wait_for(lambda: "compiled" in log.read_text())
+    _wait_for(lambda: not list(cache.rglob("*.lock")))
+    _wait_for(lambda: not psutil.pid_exists(pid) or psutil.Process(pid).status() == "zombie")
+    # the other process ends at once, or finds nothing left to compile
     compiled = [line for line in log.read_text().splitlines() if line.startswith("compiled")]
     assert sum(int(line.split()[1]) for line in compiled) == 1
     assert len(list(cache.rglob("likely_next.double-*.nbc"))) == 1
 
 
-def test_one_that_is_killed_leaves_no_lock_that_keeps_others_from_compiling(tmp_path):
+def test_a_killed_process_leaves_no_lock_that_keeps_others_from_compiling(tmp_path):
     file = tmp_path / "background.lock"
-    hold = f"""
+    script = f"""
 import time
 from pathlib import Path
 from netsp.compiled.compile_lock import locked
 with locked(Path({str(file)!r})):
-    print("held", flush=True)
+    print("locked", flush=True)
     time.sleep(60)
 """
-    held = subprocess.Popen(
-        [sys.executable, "-c", hold], stdout=subprocess.PIPE, text=True, cwd=ROOT,
+    process = subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, cwd=ROOT,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )  # fmt: skip
-    assert held.stdout.readline() == "held\n"
+    assert process.stdout.readline() == "locked\n"
     with locked(file, max_wait_s=0.0) as is_held:
         assert not is_held
-    held.kill()
-    held.communicate()
+    process.kill()
+    process.communicate()
     with locked(file, max_wait_s=0.0) as is_held:
         assert is_held
 
 
-def test_it_ends_once_the_disk_is_full(monkeypatch):
+def test_the_background_process_ends_once_the_disk_is_full(monkeypatch):
     def fill():
         monkeypatch.setattr(TieredDispatcher, "is_disk_full", True)
 
@@ -166,7 +166,7 @@ def test_it_ends_once_the_disk_is_full(monkeypatch):
     assert ran == [1]
 
 
-def test_what_a_command_needs_is_compiled_first(monkeypatch):
+def test_steps_of_the_last_command_run_first(monkeypatch):
     ran = []
     steps = [(name, lambda name=name: ran.append(name)) for name in ("solver dp", "missions, x")]
     monkeypatch.setattr("os.nice", lambda _: 0)

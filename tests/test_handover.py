@@ -16,7 +16,7 @@ MIP = importlib.import_module("netsp.mip.solve")
 
 
 @given(st.integers(1, 200), st.integers(0, 10**6))
-def test_cuts_take_over_where_legs_are_few_or_labels_many(vertices, labels):
+def test_cuts_take_over_at_few_legs_or_many_labels(vertices, labels):
     handover = Handover(max_legs=600, max_legs_of_slow_walks=10_000, max_labels=40_000)
     legs = vertices * (vertices - 1) // 2
     assert handover.is_due(vertices, labels) == (
@@ -25,7 +25,7 @@ def test_cuts_take_over_where_legs_are_few_or_labels_many(vertices, labels):
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_tours_are_proven_alike_by_walks_and_by_cuts_that_take_over_at_once(seed, monkeypatch):
+def test_walks_and_cuts_that_take_over_at_once_prove_the_same_tour(seed, monkeypatch):
     graph = travel_graph(random_world(seed, circles=10, goals=13, tether=300.0))
     by_walks = solve_graph(graph, "auto")
     monkeypatch.setattr(MIP, "HANDOVER", Handover(max_legs_of_slow_walks=10**6))

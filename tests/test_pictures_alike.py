@@ -161,8 +161,8 @@ def test_a_change_that_an_eye_would_see_is_seen(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize("ending", style.FORMATS)
-def test_the_same_picture_drawn_twice_is_the_same_file(tmp_path, ending):
-    """Names of an SVG's parts are not random, and files hold no dates."""
+def test_a_picture_drawn_twice_gives_equal_files(tmp_path, ending):
+    """Element ids of an SVG are not random, and files hold no dates."""
     files = [tmp_path / f"{k}{ending}" for k in range(2)]
     for file in files:
         style.save(draw_tour(WHARF), file)

@@ -1,4 +1,4 @@
-"""Tests of what users read while kernels are compiled."""
+"""Tests of the messages that users read while kernels are compiled."""
 
 import io
 import os
@@ -31,29 +31,29 @@ class _Terminal(io.StringIO):
         return True
 
 
-def test_one_line_in_words_is_written_however_many_kernels_are_compiled():
+def test_one_line_is_written_however_many_kernels_are_compiled():
     stream = io.StringIO()
-    told = Preparation(stream)
+    preparation = Preparation(stream)
     outer, inner = _kernel("netsp.mip.flows"), _kernel("netsp.lns.links")
     for _ in range(40):
-        told.begin(outer)
-        told.begin(inner)
-        told.end(inner)
-        told.end(outer)
-    told.close()
+        preparation.begin(outer)
+        preparation.begin(inner)
+        preparation.end(inner)
+        preparation.end(outer)
+    preparation.close()
     (line,) = stream.getvalue().splitlines()
     assert re.fullmatch(r"preparing the solver, about \d+ s, once per installation", line)
 
 
-def test_where_there_is_no_terminal_long_work_is_told_of_again_after_half_a_minute(monkeypatch):
+def test_without_a_terminal_another_line_is_written_every_half_minute(monkeypatch):
     clock, stream = [100.0], io.StringIO()
     monkeypatch.setattr(compiling.time, "monotonic", lambda: clock[0])
-    told = Preparation(stream, policy=PreparationPolicy(every_s=30.0))
+    preparation = Preparation(stream, policy=PreparationPolicy(every_s=30.0))
     kernel = _kernel("netsp.space.walk")
     for _ in range(65):
-        told.begin(kernel)
+        preparation.begin(kernel)
         clock[0] += 1.0
-        told.end(kernel)
+        preparation.end(kernel)
     first, *more = stream.getvalue().splitlines()
     assert first.startswith("preparing planning in space, about ")
     assert len(more) == 2
@@ -65,12 +65,12 @@ def test_where_there_is_no_terminal_long_work_is_told_of_again_after_half_a_minu
 
 def test_a_terminal_shows_a_bar_that_fills():
     stream = _Terminal()
-    told = Preparation(stream, StatusLine(stream))
+    preparation = Preparation(stream, StatusLine(stream))
     kernel = _kernel("netsp.online.tether.pull")
-    told.begin(kernel)
-    told.end(kernel)
+    preparation.begin(kernel)
+    preparation.end(kernel)
     begin, end = stream.getvalue().strip("\r\n").split("\r")
-    told.close()
+    preparation.close()
     assert re.search(r"\[ +\]", begin)
     assert re.search(r"\[#+\]", end)
     assert "preparing the simulation" in begin
@@ -80,7 +80,7 @@ def test_a_terminal_shows_a_bar_that_fills():
 
 
 def _screen(written):
-    """Return the lines of a terminal after a text with carriage returns and erasures."""
+    """Return the lines that a terminal shows after text with carriage returns and erasures."""
     lines, column = [""], 0
     for part in filter(None, re.split(r"(\n|\r|\x1b\[K)", written)):
         if part == "\n":
@@ -95,7 +95,7 @@ def _screen(written):
     return lines
 
 
-def test_other_output_never_runs_into_the_line_of_a_terminal(monkeypatch):
+def test_other_output_never_runs_into_the_status_line(monkeypatch):
     stream = _Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(sys, "stdout", stream)
@@ -118,12 +118,12 @@ def test_a_policy_of_messages_has_positive_numbers(field):
         PreparationPolicy(**{field: 0.0})
 
 
-def test_kernels_of_other_packages_are_not_told():
+def test_kernels_of_other_packages_are_not_reported():
     stream = io.StringIO()
-    told = Preparation(stream)
-    told.begin(_kernel("elsewhere.fast"))
-    told.end(_kernel("elsewhere.fast"))
-    told.close()
+    preparation = Preparation(stream)
+    preparation.begin(_kernel("elsewhere.fast"))
+    preparation.end(_kernel("elsewhere.fast"))
+    preparation.close()
     assert stream.getvalue() == ""
 
 
@@ -134,7 +134,7 @@ from netsp.compiled.compile_policy import everything_compiled
 from netsp.compiled.kernel import kernel
 
 with compile_messages(sys.stderr):
-    pass  # over before Numba is loaded: it tells nothing later
+    pass  # ends before Numba is loaded, so it reports nothing later
 
 def minimum_violated_cut(x):
     return x + 1
@@ -145,13 +145,13 @@ with compile_messages(sys.stderr), everything_compiled():
 """
 
 
-def test_no_internal_name_is_told_while_a_kernel_is_compiled(tmp_path):
+def test_no_internal_name_is_shown_while_a_kernel_is_compiled(tmp_path):
     (tmp_path / "compiled.py").write_text(COMPILED)
     done = subprocess.run(
         [sys.executable, "compiled.py"], cwd=tmp_path, capture_output=True, text=True,
         env={**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
     )  # fmt: skip
     lines = done.stderr.splitlines()
-    told = re.compile(r"preparing the solver, about [1-9]\d* s, once per installation")
+    message = re.compile(r"preparing the solver, about [1-9]\d* s, once per installation")
     assert len(lines) == 1
-    assert told.fullmatch(lines[0])
+    assert message.fullmatch(lines[0])

@@ -1,4 +1,4 @@
-"""Kernels of scenes have forms in NumPy that return what their loops return, to the last bit."""
+"""Tests that vectorised forms of scene kernels return the same as their loops to the last bit."""
 
 import numpy as np
 import pytest
@@ -33,12 +33,12 @@ def field_of(names):
 
 ALL = {s["name"] for s in SOLIDS}
 FIELDS = st.sets(st.sampled_from(sorted(ALL)), min_size=1, max_size=5).map(field_of) | st.just(
-    field_of(ALL)  # so many that they are looked up
+    field_of(ALL)  # enough solids for a lookup by cell
 )
 
 
 def both(kernel, *args):
-    """Return the results of a kernel's loops and of its form in NumPy."""
+    """Return the results of a kernel's loops and of its vectorised form."""
     own = getattr(kernel, "py_func", kernel)
     numpy = CompilePolicy(min_numpy_items=0)
     with np.errstate(all="ignore"), pytest.MonkeyPatch.context() as patch, compiled_by(numpy):
@@ -55,7 +55,7 @@ def assert_alike(loops, numpy):
 
 
 def points(seed, n):
-    """Return random points, some of them on axes and faces of solids."""
+    """Return random points, a third of them with integer coordinates, as faces of solids have."""
     drawn = np.random.default_rng(seed).uniform(LOW, HIGH, (n, 3))
     drawn[::3] = np.round(drawn[::3])
     return drawn
@@ -63,8 +63,8 @@ def points(seed, n):
 
 @settings(max_examples=15, deadline=None)
 @given(field=FIELDS, seed=st.integers(0, 10**6))
-def test_points_and_segments_are_measured_alike(field, seed):
-    """Distances, gradients and sight are the same for solids of each kind, looked up or not."""
+def test_distances_and_sight_are_equal(field, seed):
+    """Distances, gradients and sight are equal for each kind of solid, with and without lookup."""
     p = points(seed, 40)
     assert_alike(*both(sampling.sample_many, field, p))
     assert_alike(*both(sees, field, p[:6], p[6:12], 0.05))
@@ -72,15 +72,15 @@ def test_points_and_segments_are_measured_alike(field, seed):
         assert_alike(*both(all_see, field, p[k : k + 2], p[k + 1 : k + 3], 0.1))
 
 
-def test_no_points_have_no_distances():
-    """No points have no distances."""
+def test_an_empty_array_of_points_has_no_distances():
+    """An array without points gives an array without distances."""
     assert_alike(*both(sampling.sample_many, field_of(ALL), np.zeros((0, 3))))
 
 
 @settings(max_examples=6, deadline=None)
 @given(field=FIELDS, seed=st.integers(0, 10**6))
-def test_cells_and_trees_are_alike(field, seed):
-    """Free cells, trees of shortest paths and the paths in them are the same."""
+def test_free_cells_and_trees_of_paths_are_equal(field, seed):
+    """Free cells, trees of shortest paths and paths to the root are equal in both forms."""
     rng = np.random.default_rng(seed)
     shape = (9, 8, 7)
     free, by_numpy = both(free_cells, field, LOW, 1.5, shape, 0.1, np.zeros(1, dtype=np.int64))
@@ -97,8 +97,8 @@ def test_cells_and_trees_are_alike(field, seed):
         assert_alike(*both(way, toward, start))
 
 
-def test_the_lookup_lists_the_same_solids():
-    """The solids that may be nearest in each cell of a look-up are the same."""
+def test_the_lookup_lists_the_same_solids_in_both_forms():
+    """Both forms list the same candidates for the nearest solid in each cell of the lookup."""
     data = field_of(ALL).data
     data = data[: int(data[packing.CELLS])].copy()
     data[packing.NEAR + 3] *= 8.0
@@ -108,8 +108,8 @@ def test_the_lookup_lists_the_same_solids():
 
 @settings(max_examples=10, deadline=None)
 @given(field=FIELDS, seed=st.integers(0, 10**6), yaw=st.floats(-3.0, 3.0))
-def test_the_same_patches_are_seen(field, seed, yaw):
-    """The same patches are seen, and the same shares are new."""
+def test_a_view_marks_the_same_patches_in_both_forms(field, seed, yaw):
+    """Both forms mark the same patches as seen and return the same shares of the surface as new."""
     centres = points(seed, 120)
     normals = points(seed + 1, 120)
     normals /= np.maximum(np.linalg.norm(normals, axis=1), 1.0)[:, None]

@@ -1,4 +1,4 @@
-"""Rounds of local search before a proof, by the size of the problem."""
+"""Tests of the number of rounds of local search before a proof."""
 
 from dataclasses import fields
 
@@ -13,12 +13,12 @@ EFFORT = SearchEffort()
 
 
 @given(st.integers(1, 600), st.integers(1, 30_000))
-def test_problems_that_are_soon_proven_are_searched_for_less(goals, vertices):
-    is_soon_proven = (
+def test_small_problems_get_fewer_search_rounds(goals, vertices):
+    is_small = (
         goals <= EFFORT.max_proven_goals and vertices <= EFFORT.max_proven_vertices
     )  # fmt: skip
     rounds = EFFORT.rounds(goals, vertices)
-    assert (rounds < EFFORT.min_rounds) == is_soon_proven
+    assert (rounds < EFFORT.min_rounds) == is_small
     assert rounds <= max(EFFORT.min_rounds, EFFORT.max_rounds_per_goal * goals)
 
 

@@ -591,7 +591,7 @@ def test_what_is_wrong_with_a_map_file_is_one_line(tmp_path, capsys, said, compl
             "--tether", "9"]  # fmt: skip
     assert main(argv) == 2
     err = capsys.readouterr().err
-    # a busy machine may tell that reading takes a while
+    # on a busy machine, a progress line about reading may come first
     lines = [line for line in err.splitlines() if not line.startswith("reading ")]
     assert len(lines) == 1
     assert complaint in lines[0]

@@ -1,4 +1,4 @@
-"""Tests of what a command loads before it works: time that every user waits for."""
+"""Tests of the start of a command: which modules it loads, and when its time limit begins."""
 
 import os
 import shutil
@@ -34,9 +34,9 @@ def test_a_problem_is_read_without_solvers_and_pictures():
     assert not loaded & {"numba", "scipy", "matplotlib", "highspy", "pulp"}
 
 
-def test_a_small_problem_is_solved_and_verified_without_what_only_others_need(tmp_path):
+def test_a_small_problem_is_solved_and_verified_without_numba_scipy_and_matplotlib(tmp_path):
     tour = str(tmp_path / "tour.json")
-    # as much as a slow machine may need
+    # a slow machine may run kernels interpreted for long before Numba is loaded
     patient = (
         "from netsp.compiled.compile_policy import CompilePolicy, compiled_by\n"
         "with compiled_by(CompilePolicy(numba_s=60.0)): "
@@ -95,8 +95,8 @@ assert kernels.fill.signatures and kernels.twice.signatures
 """
 
 
-def test_a_kernel_that_runs_long_loads_numba_and_begins_again_compiled(tmp_path):
-    """What the interpreted call has changed is restored; kernels call one another compiled."""
+def test_a_kernel_that_runs_long_loads_numba_and_starts_again_compiled(tmp_path):
+    """The compiled call starts from the original arguments, and calls another kernel compiled."""
     (tmp_path / "kernels.py").write_text(KERNELS)
     (tmp_path / "deferred.py").write_text(DEFERRED)
     done = subprocess.run(
@@ -123,7 +123,7 @@ assert is_kept or not kernels.fill.signatures
 """
 
 
-def test_numba_is_loaded_only_for_code_on_disk_or_to_compile(tmp_path):
+def test_numba_is_loaded_only_to_load_code_from_disk_or_to_compile(tmp_path):
     (tmp_path / "kernels.py").write_text(KERNELS)
     (tmp_path / "patient.py").write_text(PATIENT)
     cache = tmp_path / "cache" / "kernels"
@@ -150,7 +150,7 @@ LIMITED = {
 
 @pytest.mark.parametrize("command", LIMITED)
 def test_a_limit_counts_from_the_start_of_the_command(command, monkeypatch):
-    """A command that was begun a thousand seconds ago has no time left."""
+    """A command that started 1,000 seconds ago has no time left of a limit of 100 seconds."""
     ago = (time.monotonic() - 1000.0, time.process_time() - 1000.0)
     monkeypatch.setattr(main, "begin_command", lambda: command_clock._start.set(ago))
     monkeypatch.setattr(Clock, "policy", TimingPolicy(untimed_steps=0, grace_s=0.0))
@@ -168,6 +168,6 @@ assert "pyplot" not in " ".join(sys.modules)
 """
 
 
-def test_figures_are_loaded_without_pyplot_and_matplotlib_is_left_as_it_was():
+def test_figures_are_loaded_without_pyplot_and_matplotlib_stays_unchanged():
     done = subprocess.run([sys.executable, "-c", FIGURES], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -1,4 +1,4 @@
-"""Interpreted and compiled kernels: the same to the last bit, so it never matters which ran."""
+"""Tests of interpreted and compiled kernels, which return the same results to the last bit."""
 
 import contextlib
 import errno
@@ -47,7 +47,7 @@ pytestmark = pytest.mark.skipif(not compiles(), reason="NUMBA_DISABLE_JIT is set
 
 @contextlib.contextmanager
 def everything_interpreted():
-    """Replace all kernels by the interpreted ones, also those that are loaded."""
+    """Run all kernels interpreted, including those that are compiled already."""
     with pytest.MonkeyPatch.context() as patch, np.errstate(all="ignore"):
         patch.setattr(
             tiered.TieredDispatcher, "__call__", lambda self, *args: interpreted(self)(*args),
@@ -137,7 +137,7 @@ def caller(x):
 
 
 def _module(folder, text):
-    """Return a module of kernels that were never compiled before."""
+    """Return a module of kernels that were never compiled."""
     (folder / "fresh.py").write_text(text)
     spec = importlib.util.spec_from_file_location("fresh", folder / "fresh.py")
     module = importlib.util.module_from_spec(spec)
@@ -164,7 +164,7 @@ def test_a_kernel_is_compiled_once_it_has_run_interpreted_for_its_compile_time(k
     assert kernels.total(np.ones(1000), NO_STOP) == 1000.0
 
 
-def test_a_call_that_takes_too_long_begins_again_compiled_with_the_arguments_as_they_were(kernels):
+def test_a_call_that_takes_too_long_starts_again_compiled_with_its_original_arguments(kernels):
     x, pair = np.ones(1_000_000), np.ones(3)
     with compiled_by(CompilePolicy(compile_s=0.05, compile_s_per_byte=0.0)):
         assert kernels.total(pair, NO_STOP) == 3.0
@@ -174,7 +174,7 @@ def test_a_call_that_takes_too_long_begins_again_compiled_with_the_arguments_as_
     assert np.array_equal(x, np.arange(1.0, 1e6 + 1.0))
 
 
-def test_an_end_asked_for_during_an_interpreted_call_is_not_forgotten(kernels):
+def test_a_stop_during_an_interpreted_call_is_kept(kernels):
     stop, x = np.zeros(1, dtype=np.int64), np.ones(30_000_000)
     with compiled_by(CompilePolicy(compile_s=0.3, compile_s_per_byte=0.0, max_copied_bytes=10**9)):
         threading.Timer(0.1, lambda: stop.__setitem__(0, 1)).start()
@@ -183,17 +183,17 @@ def test_an_end_asked_for_during_an_interpreted_call_is_not_forgotten(kernels):
     assert x[-1] == 1.0
 
 
-def test_short_calls_do_not_look_for_compiled_code_each_time(kernels, monkeypatch):
-    looked, is_on_disk = [], disk_cache.is_on_disk
-    monkeypatch.setattr(disk_cache, "is_on_disk", lambda *a: looked.append(a) or is_on_disk(*a))
+def test_short_calls_do_not_search_for_compiled_code_each_time(kernels, monkeypatch):
+    searches, is_on_disk = [], disk_cache.is_on_disk
+    monkeypatch.setattr(disk_cache, "is_on_disk", lambda *a: searches.append(a) or is_on_disk(*a))
     with compiled_by(CompilePolicy(load_s=0.1)):
         for _ in range(50):
             kernels.ratio(7, 2)
     assert kernels.ratio.interpreted_s < 0.1
-    assert len(looked) == 1
+    assert len(searches) == 1
 
 
-def test_work_that_threads_share_is_never_begun_again(kernels):
+def test_calls_in_a_thread_pool_never_start_again(kernels):
     x = np.ones(200_000)
     with (
         compiled_by(CompilePolicy(compile_s=0.01, compile_s_per_byte=0.0)),
@@ -213,20 +213,20 @@ def test_large_arguments_are_never_copied(kernels):
     assert kernels.total.overloads
 
 
-def test_while_compiling_ahead_nothing_is_interpreted(kernels):
+def test_nothing_runs_interpreted_while_everything_is_compiled(kernels):
     with everything_compiled():
         kernels.ratio(7, 2)
     assert kernels.ratio.overloads
     assert not kernels.ratio.interpreted_s
 
 
-def test_what_an_interpreted_kernel_raises_reaches_its_caller(kernels):
+def test_an_exception_of_an_interpreted_kernel_reaches_its_caller(kernels):
     with pytest.raises(ZeroDivisionError):
         kernels.ratio(1, 0)
     assert not kernels.ratio.overloads
 
 
-def test_a_call_is_broken_off_in_time_or_not_at_all():
+def test_a_call_returns_within_its_budget_or_raises_overtime():
     def count(n):
         k = 0
         while k < n:
@@ -236,13 +236,13 @@ def test_a_call_is_broken_off_in_time_or_not_at_all():
     assert within(10.0, count, (10,)) == 10
     with pytest.raises(Overtime):
         within(0.02, count, (math.inf,))
-    for _ in range(20):  # the end of the call and of its budget at about the same time
+    for _ in range(20):  # the call and its budget end at about the same time
         with contextlib.suppress(Overtime):
             assert within(0.003, count, (60_000,)) == 60_000
     assert count(1000) == 1000
 
 
-def test_calls_are_still_broken_off_after_many_that_ended_just_then():
+def test_calls_still_raise_overtime_after_many_that_ended_at_their_deadline():
     def spin(seconds):
         end = time.thread_time() + seconds
         while time.thread_time() < end:
@@ -256,20 +256,20 @@ def test_calls_are_still_broken_off_after_many_that_ended_just_then():
 
 
 @pytest.mark.parametrize("is_python", [False, True])
-def test_a_signal_goes_before_the_end_of_a_budget(is_python):
+def test_a_signal_takes_precedence_over_overtime(is_python):
     def interrupt(number, frame):
         raise KeyboardInterrupt
 
     before = signal.signal(signal.SIGALRM, interrupt if is_python else signal.default_int_handler)
     try:
-        signal.setitimer(signal.ITIMER_REAL, 0.1)  # the budget is used up before
+        signal.setitimer(signal.ITIMER_REAL, 0.1)  # after the budget is used up
         with pytest.raises(KeyboardInterrupt):
             within(0.0, time.sleep, (5.0,))
     finally:
         signal.signal(signal.SIGALRM, before)
 
 
-def test_a_call_ends_although_a_finalizer_got_the_exception(monkeypatch):
+def test_a_call_returns_although_a_finalizer_swallowed_overtime(monkeypatch):
     class Slow:
         def __del__(self):
             end = time.monotonic() + 5.0
@@ -280,8 +280,8 @@ def test_a_call_ends_although_a_finalizer_got_the_exception(monkeypatch):
     assert within(0.01, lambda: Slow() and 1, ()) == 1
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here")
-def test_a_forked_process_watches_its_calls_whatever_the_other_did_just_then():
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork processes")
+def test_a_forked_process_watches_its_calls_even_if_its_parent_had_locked_the_watch():
     with overtime._watch._lock:
         child = os.fork()
         if child == 0:
@@ -308,16 +308,14 @@ def _forever():
         pass
 
 
-def test_without_what_numba_keeps_private_kernels_are_compiled_at_once(monkeypatch, tmp_path):
+def test_kernels_are_compiled_at_once_where_numba_lacks_private_parts(monkeypatch, tmp_path):
     monkeypatch.setattr(disk_cache, "is_supported", lambda: False)
     module = _module(tmp_path, MODULE)
     assert module.ratio(7, 2) == 3
     assert module.ratio.overloads
 
 
-def test_without_a_folder_that_takes_files_kernels_are_interpreted_and_compiled(
-    monkeypatch, tmp_path
-):
+def test_kernels_are_interpreted_and_compiled_without_a_writable_folder(monkeypatch, tmp_path):
     def refused(self, function):
         raise RuntimeError("cannot cache function: no locator available")
 
@@ -331,7 +329,7 @@ def test_without_a_folder_that_takes_files_kernels_are_interpreted_and_compiled(
         assert module.ratio(7, 2) == 3
     assert module.ratio.overloads
     assert not disk_cache.is_any_on_disk(module.ratio)
-    assert not tiered.TieredDispatcher.has_compiled  # nothing to keep: no process in the background
+    assert not tiered.TieredDispatcher.has_compiled  # so no background process starts
 
 
 PROFILED = """
@@ -364,7 +362,7 @@ def test_functions_can_be_profiled_after_a_budget_has_ended():
     assert done.stdout == "True\n"
 
 
-def test_a_full_disk_costs_the_next_command_time_and_nothing_else(monkeypatch, kernels):
+def test_kernels_are_compiled_although_the_disk_is_full(monkeypatch, kernels):
     def full(self, path):
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -379,7 +377,7 @@ def test_a_full_disk_costs_the_next_command_time_and_nothing_else(monkeypatch, k
 
 
 @pytest.mark.parametrize("pattern", ["*.nbi", "*.nbc"])
-def test_files_that_were_cut_off_are_compiled_anew(pattern, tmp_path):
+def test_truncated_files_are_compiled_again(pattern, tmp_path):
     (tmp_path / "cache").mkdir()
     for broken in (False, True):
         file = disk_cache.KernelFile(str(tmp_path / "cache"), "f", "stamp")
@@ -392,7 +390,7 @@ def test_files_that_were_cut_off_are_compiled_anew(pattern, tmp_path):
 
 
 @pytest.mark.parametrize("pattern", ["*.nbi", "*.nbc"])
-def test_files_whose_bytes_have_changed_are_compiled_anew(pattern, tmp_path):
+def test_damaged_files_are_compiled_again(pattern, tmp_path):
     file = disk_cache.KernelFile(str(tmp_path), "f", "stamp")
     kept = ("compiled" * 100, {"a": [1, 2.5]})
     file.save("of floats", kept)
@@ -477,7 +475,7 @@ def test_kernels_that_others_call_with_constants_are_compiled_once(tmp_path):
 
 
 def _loops(kernel):
-    """Return a kernel as it is written, and the kernels that it calls as well."""
+    """Return the loops of a kernel as a Python function, without vectorised forms."""
     names = kernel.py_func.__globals__
     called = {n: _loops(names[n]) for n in names_used(kernel.py_func.__code__)
               if hasattr(names.get(n), "py_func")}  # fmt: skip
@@ -490,7 +488,7 @@ def _loops(kernel):
     st.lists(st.booleans(), min_size=12, max_size=12),
 )
 @settings(deadline=None)
-def test_sides_of_parity_cuts_are_changed_alike_in_loops_and_at_once(pairs, flow, sides):
+def test_loops_and_vectorised_form_choose_the_same_sides_of_parity_cuts(pairs, flow, sides):
     ends = np.array(sorted(pairs))
     across = np.array(flow).reshape(-1, 2)[: len(ends)]
     row = np.searchsorted(np.sort(ends.ravel()), np.arange(13))
@@ -502,7 +500,7 @@ def test_sides_of_parity_cuts_are_changed_alike_in_loops_and_at_once(pairs, flow
 
 @given(st.data())
 @settings(deadline=None, max_examples=30)
-def test_labels_are_extended_and_joined_alike_in_loops_and_at_once(data):
+def test_loops_and_vectorised_form_extend_and_join_labels_alike(data):
     sizes = data.draw(st.lists(st.integers(1, 3), min_size=2, max_size=5))
     cluster = np.repeat(np.arange(len(sizes) + 1), [1, *sizes])
     costs = np.array(data.draw(st.lists(
@@ -530,7 +528,7 @@ def test_labels_are_extended_and_joined_alike_in_loops_and_at_once(data):
 
 
 @pytest.mark.parametrize("depth", [0.0, 7.5])
-def test_legs_that_cross_over_alike_are_noted_alike_in_loops_and_at_once(depth, monkeypatch):
+def test_loops_and_vectorised_form_fill_in_the_same_legs(depth, monkeypatch):
     problem = random_world(3, goals=4, tether_length=450.0)
     goals = [
         goal.model_copy(update={"position": (*goal.position[:2], -depth * k)})
@@ -571,7 +569,7 @@ def test_random_numbers_are_the_same_interpreted_and_compiled():
     assert state == other
 
 
-def test_a_kernel_that_another_process_compiles_is_waited_for_or_interpreted(kernels):
+def test_a_kernel_that_another_process_compiles_runs_interpreted_meanwhile(kernels):
     file = disk_cache.lock_file(kernels.ratio)
     kernels.ratio.interpreted_s = 60.0  # longer than its compile time
     with locked(file) as is_held:
@@ -586,14 +584,14 @@ def test_a_kernel_that_another_process_compiles_is_waited_for_or_interpreted(ker
     assert kernels.ratio.overloads
 
 
-def test_a_kernel_whose_other_compiling_process_was_stopped_is_compiled_all_the_same(kernels):
+def test_a_kernel_is_compiled_although_a_stopped_process_holds_its_lock(kernels):
     with locked(disk_cache.lock_file(kernels.ratio)):
         with compiled_by(CompilePolicy(is_eager=True, max_wait_ratio=0.1)):
             assert kernels.ratio(7, 2) == 3
         assert kernels.ratio.overloads
 
 
-def test_one_of_two_holds_a_lock_file(tmp_path):
+def test_only_one_thread_at_a_time_has_a_lock(tmp_path):
     file = tmp_path / "a.lock"
     inside, counts = [], []
 
