@@ -11,7 +11,7 @@ from netsp.errors import InputError
 
 
 def check_not_negative(policy: Any) -> None:
-    """Raise InputError, which names the field, unless no number of a policy is negative.
+    """Raise InputError, which names the field, if a number of a policy is negative or NaN.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def check_not_negative(policy: Any) -> None:
 
 
 def check_positive(policy: Any) -> None:
-    """Raise InputError, which names the field, unless all numbers of a policy are positive.
+    """Raise InputError, which names the field, if a number of a policy is not positive.
 
     Parameters
     ----------
@@ -36,6 +36,6 @@ def _check(policy: Any, least: float, expected: str) -> None:
     for field in fields(policy):
         if field.type in ("int", "float", int, float):
             value = getattr(policy, field.name)
-            # NaN is not at least anything
+            # also refuses NaN, for which every comparison is false
             if not (isinstance(value, Real) and float(value) >= least):
                 raise InputError(f"{field.name}: expected {expected}, got {value!r}")

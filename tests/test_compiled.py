@@ -42,7 +42,7 @@ with everything_compiled():
 
 
 def _imported_by(files, source):
-    """Return the modules of netsp's ground that files import, directly or through others."""
+    """Return the top-level modules of netsp that files import, directly or indirectly."""
     text = "".join(file.read_text() for file in files)
     names = re.findall(r"^from netsp\.(\w+) import", text, re.M)
     found = {source / f"{name}.py" for name in names if (source / f"{name}.py").is_file()}

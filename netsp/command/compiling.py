@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 PACKAGE_SUBJECTS = {
     "online": "the simulation", "space": "planning in space", "cover": "the choice of viewpoints",
 }  # fmt: skip
-"""Name of each package in messages; other packages are called the solver."""
+"""Name of each package in messages; all other packages are called `the solver`."""
 
 
 @contextmanager
@@ -43,7 +43,7 @@ def compile_messages(stream: TextIO, line: StatusLine | None = None) -> Iterator
 
         def listen() -> None:
             if not is_over:
-                listening.enter_context(_heard(preparation.begin, preparation.end))
+                listening.enter_context(_listening(preparation.begin, preparation.end))
 
         listening.callback(preparation.close)
         when_numba_is_loaded(listen)
@@ -54,7 +54,7 @@ def compile_messages(stream: TextIO, line: StatusLine | None = None) -> Iterator
 
 
 @contextmanager
-def _heard(on_begin: Callable[[Any], None], on_end: Callable[[Any], None]) -> Iterator[None]:
+def _listening(on_begin: Callable[[Any], None], on_end: Callable[[Any], None]) -> Iterator[None]:
     """Call functions with the dispatcher of each kernel whose compilation begins or ends while the
     body runs; loads Numba."""
     from numba.core import event
@@ -90,7 +90,7 @@ class CompileTimes:
     @contextmanager
     def measured(self) -> Iterator[None]:
         """Measure while the body runs."""
-        with _heard(self._begin, self._end):
+        with _listening(self._begin, self._end):
             yield
 
     def _begin(self, kernel: Any) -> None:

@@ -20,7 +20,7 @@ dtypes are never interpreted."""
 
 
 def arrays_in(value: Any) -> list[np.ndarray[Any, Any]]:
-    """Return all arrays in an argument, those in tuples included."""
+    """Return all arrays in an argument, including those in tuples."""
     if isinstance(value, np.ndarray):
         return [value]
     if isinstance(value, tuple | list):
@@ -50,11 +50,10 @@ def is_in_pool() -> bool:
 
 
 def call_within(budget_s: float, kernel: Any, args: tuple[Any, ...]) -> Any:
-    """Return the result of a kernel that runs interpreted, with the types of compiled code, or
-    end the call at its budget.
+    """Run a kernel interpreted within a budget; the result has the types of compiled code.
 
-    In a thread of a pool the call has no budget: arrays that other threads write to cannot be
-    restored.
+    In a thread of a pool the call has no budget, because arrays that other threads write to cannot
+    be restored.
 
     Parameters
     ----------

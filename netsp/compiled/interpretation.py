@@ -30,8 +30,8 @@ _in_numpy: dict[Any, Callable[..., Any]] = {}
 def interprets(kernel: Any) -> Callable[[F], F]:
     """Register the vectorised form of a kernel, which runs where the kernel is interpreted.
 
-    It must return the same result as the kernel to the last bit, and write the same values to the
-    same arrays.
+    The vectorised form must return the same result as the kernel to the last bit, and write the
+    same values to the same arrays.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def _interpreted(own: Any) -> Callable[..., Any]:
 
 
 def names_used(code: CodeType) -> Iterator[str]:
-    """Yield the global names in a function's code, those of its comprehensions included."""
+    """Yield the global names in a function's code, including those in comprehensions."""
     yield from code.co_names
     for inner in code.co_consts:
         if isinstance(inner, CodeType):
@@ -92,7 +92,7 @@ def names_used(code: CodeType) -> Iterator[str]:
 
 @cache
 def called_kernels(kernel: Any) -> frozenset[Any]:
-    """Return a kernel and all kernels that it calls, directly or through others.
+    """Return a kernel and all kernels that it calls, directly or indirectly.
 
     Parameters
     ----------
