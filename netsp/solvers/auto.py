@@ -149,7 +149,7 @@ def _beyond(graph: TravelGraph, limits: Limits) -> Result:
 
 def _rounds(graph: TravelGraph) -> int:
     """Return the number of rounds of one search."""
-    return SEARCH_EFFORT.rounds(graph.goal_count, len(graph))
+    return SEARCH_EFFORT.rounds(graph.goal_count)
 
 
 def _in_part_ordered(graph: TravelGraph, limits: Limits, backend: str) -> Result:

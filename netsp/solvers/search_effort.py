@@ -19,8 +19,6 @@ class SearchEffort:
     ----------
     max_proven_goals : int
         Maximum number of goals of a small problem, whose proof takes little time.
-    max_proven_vertices : int
-        Maximum number of vertices of the travel graph of a small problem.
     proven_rounds_per_goal : int
         Rounds for each goal of a small problem. With 8, a search of up to 20 goals nearly always
         finds the shortest tour; the proof corrects the others.
@@ -36,7 +34,6 @@ class SearchEffort:
     """
 
     max_proven_goals: int = 24
-    max_proven_vertices: int = 1200
     proven_rounds_per_goal: int = 8
     min_rounds: int = 500
     rounds_per_goal: int = 40
@@ -46,17 +43,15 @@ class SearchEffort:
     def __post_init__(self) -> None:
         check_not_negative(self)
 
-    def rounds(self, goals: int, vertices: int) -> int:
+    def rounds(self, goals: int) -> int:
         """Return the number of rounds of one search.
 
         Parameters
         ----------
         goals : int
             Number of goals.
-        vertices : int
-            Number of vertices of the travel graph.
         """
-        if goals <= self.max_proven_goals and vertices <= self.max_proven_vertices:
+        if goals <= self.max_proven_goals:
             return self.proven_rounds_per_goal * goals
         pairs = int(self.rounds_per_pair * goals * (goals - 1) / 2)
         return max(
