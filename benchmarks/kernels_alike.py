@@ -94,7 +94,7 @@ def _bits(value: Any) -> Any:
 
 
 def main(words: list[str]) -> int:
-    """Run the steps and print what differs."""
+    """Run the steps and print the differences."""
     comparison = Comparison()
     TieredDispatcher.__call__ = lambda self, *args: comparison.call(self, *args)
     with everything_compiled():
