@@ -1,18 +1,24 @@
 """Tests of the messages that users read while kernels are compiled."""
 
+import contextlib
+import functools
 import io
 import os
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from netsp.command import compiling
-from netsp.command.compiling import Preparation, PreparationPolicy
+from netsp.command import compiling, main, warm_up
+from netsp.command.compiling import CompileTimes, Preparation, PreparationPolicy
 from netsp.command.status_line import StatusLine, status_line
+from netsp.compiled import disk_cache, growing
+from netsp.compiled.compile_policy import compiles, current_policy
+from netsp.compiled.kernel import all_kernels
 from netsp.errors import InputError
 
 ROOT = Path(__file__).parent.parent
@@ -116,6 +122,64 @@ def test_other_output_never_runs_into_the_status_line(monkeypatch):
 def test_a_policy_of_messages_has_positive_numbers(field):
     with pytest.raises(InputError, match=f"{field}: expected a positive number"):
         PreparationPolicy(**{field: 0.0})
+
+
+def test_kernels_are_timed_without_those_that_they_call(monkeypatch):
+    clock, times = [0.0], CompileTimes()
+    monkeypatch.setattr(compiling.time, "thread_time", lambda: clock[0])
+    outer, inner = _kernel("netsp.mip.flows"), _kernel("netsp.lns.links")
+    for begin_or_end, kernel, spent in (
+        (times._begin, outer, 1.0), (times._begin, inner, 4.0), (times._end, inner, 2.0),
+        (times._end, outer, 0.0), (times._begin, inner, 8.0), (times._end, inner, 0.0),
+    ):  # fmt: skip
+        begin_or_end(kernel)
+        clock[0] += spent
+    assert times.seconds == {"mip.flows.body": 3.0, "lns.links.body": 12.0}
+
+
+@pytest.mark.skipif(not compiles(), reason="NUMBA_DISABLE_JIT is set")
+def test_kernels_of_a_folder_that_are_compiled_or_on_disk_need_no_time(monkeypatch, tmp_path):
+    monkeypatch.setattr(disk_cache, "lock_file", lambda _: tmp_path / "a.lock")
+    folder = Path(growing.__file__).parent
+    missing = [
+        kernel.py_func for kernel in all_kernels()
+        if Path(kernel.py_func.__code__.co_filename).parent == folder and not kernel.overloads
+    ]  # fmt: skip
+    expected = [current_policy().compile_time_s(len(f.__code__.co_code)) for f in missing]
+    kernel = getattr(growing.longer, "dispatcher", growing.longer)
+    assert missing
+    assert compiling._folder_compile_time_s(kernel) == pytest.approx(sum(expected))
+    kept = f"{Path(missing[0].__code__.co_filename).stem}.{missing[0].__qualname__}"
+    (tmp_path / f"{kept}-12.py311.nbi").touch()
+    assert compiling._folder_compile_time_s(kernel) == pytest.approx(sum(expected[1:]))
+
+
+@pytest.mark.parametrize(
+    ("command", "is_quiet", "count"),
+    [("solve", False, 1), ("solve", True, 0), ("warm-up", False, 0)],
+)
+def test_quiet_commands_write_no_compile_messages(command, is_quiet, count, monkeypatch):
+    told = []
+    monkeypatch.setattr(
+        compiling, "compile_messages", lambda *args: told.append(args) or contextlib.nullcontext()
+    )
+    with main._preparation_messages(command, is_quiet):
+        assert len(told) == count
+
+
+@pytest.mark.parametrize("is_watched", [False, True])
+def test_warm_up_shows_its_progress(is_watched, monkeypatch):
+    stream = _Terminal() if is_watched else io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    always = functools.partial(PreparationPolicy, every_s=1e-9)
+    monkeypatch.setattr(compiling, "PreparationPolicy", always)
+    warm_up._compile([("solvers", lambda: None), ("missions", lambda: time.sleep(0.01))], False)
+    shown = stream.getvalue()
+    assert "preparing netsp: solvers (1 of 2)" in shown
+    assert re.search(r"preparing netsp: missions \(2 of 2, about \d+:\d\d left\)", shown)
+    assert ("[" in shown) == is_watched
+    warm_up._compile([("solvers", lambda: None)], True)
+    assert stream.getvalue() == shown
 
 
 def test_kernels_of_other_packages_are_not_reported():

@@ -11,6 +11,7 @@ import pytest
 
 from netsp.clock import Clock, TimingPolicy
 from netsp.command import command_clock, main
+from netsp.compiled import kept_code
 
 ROOT = Path(__file__).parent.parent
 SMALL = "problems/pool.json"
@@ -136,6 +137,29 @@ def test_numba_is_loaded_only_to_load_code_from_disk_or_to_compile(tmp_path):
         assert done.returncode == 0, done.stderr
         cache.mkdir(parents=True, exist_ok=True)
         (cache / "other.nbi").touch()
+
+
+def test_compiled_code_is_looked_for_where_numba_keeps_it(tmp_path, monkeypatch):
+    places = {
+        "package": tmp_path / "netsp" / "dp" / "__pycache__",
+        "user": tmp_path / "numba" / "netsp_1",
+        "chosen": tmp_path / "chosen" / "netsp_1",
+    }
+    monkeypatch.setattr(kept_code, "_PACKAGE", tmp_path / "netsp")
+    monkeypatch.setattr(Path, "home", lambda: tmp_path / "nobody")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("LOCALAPPDATA", raising=False)
+    for place in places.values():
+        place.mkdir(parents=True)
+    for place in (None, *places):
+        if place is not None:
+            (places[place] / "labels.extend-12.py311.nbi").touch()
+        monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+        assert kept_code.may_be_kept.__wrapped__() == (place in ("package", "user"))
+        monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "chosen"))
+        assert kept_code.may_be_kept.__wrapped__() == (place == "chosen")
+        if place is not None:
+            (places[place] / "labels.extend-12.py311.nbi").unlink()
 
 
 LIMITED = {

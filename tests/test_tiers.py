@@ -3,6 +3,7 @@
 import contextlib
 import errno
 import functools
+import gc
 import importlib.util
 import math
 import os
@@ -11,10 +12,11 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple
 from pathlib import Path
-from types import FunctionType
+from types import FunctionType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,12 +25,15 @@ from hypothesis import strategies as st
 from numba.core.caching import FunctionCache
 
 from netsp.compiled import chance, disk_cache, growing, interpretation, overtime, tiered
+from netsp.compiled.arguments import call_within, can_be_interpreted
 from netsp.compiled.compile_lock import is_locked, locked
 from netsp.compiled.compile_policy import (
     CompilePolicy,
     compiled_by,
     compiles,
+    current_policy,
     everything_compiled,
+    long_work,
 )
 from netsp.compiled.interpretation import interpreted, names_used
 from netsp.compiled.overtime import Overtime, within
@@ -224,6 +229,48 @@ def test_an_exception_of_an_interpreted_kernel_reaches_its_caller(kernels):
     with pytest.raises(ZeroDivisionError):
         kernels.ratio(1, 0)
     assert not kernels.ratio.overloads
+
+
+def _interpretable(function):
+    """Return a function in the form of a kernel that is never compiled."""
+    return SimpleNamespace(py_func=function)
+
+
+def _pair(x):
+    return x[0] / x[1], (x[0] > 0.0, x.sum())
+
+
+@pytest.mark.parametrize("in_pool", [False, True])
+def test_interpreted_calls_return_numbers_of_python_and_do_not_warn(in_pool):
+    x = np.array([1.0, 0.0])
+    with warnings.catch_warnings(), ThreadPoolExecutor(1) as pool:
+        warnings.simplefilter("error")
+        call = pool.submit if in_pool else lambda f, *args: SimpleNamespace(result=lambda: f(*args))
+        ratio, (is_positive, total) = call(call_within, 10.0, _interpretable(_pair), (x,)).result()
+    assert (ratio, is_positive, total) == (math.inf, True, 1.0)
+    assert [type(v) for v in (ratio, is_positive, total)] == [float, bool, float]
+
+
+def test_arrays_that_a_kernel_cannot_write_to_are_not_restored():
+    def endless(x, out):
+        while True:
+            out[0] += x[0]
+
+    x, out = np.ones(3), np.zeros(1)
+    x.flags.writeable = False
+    with pytest.raises(Overtime):
+        call_within(0.02, _interpretable(endless), (x, out))
+    assert out[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("dtype", "is_alike"),
+    [("f8", True), ("i8", True), ("i4", True), ("?", True), ("f4", False), ("f2", False)],
+)
+def test_arrays_of_narrow_floats_are_left_to_the_compiler(dtype, is_alike):
+    for args in ((np.ones(2, dtype),), (1, (0.5, np.ones(2, dtype)))):
+        assert can_be_interpreted(args, 10**9) == is_alike
+    assert can_be_interpreted((np.ones(0, dtype),), 10**9)  # there is nothing to compute with
 
 
 def test_a_call_returns_within_its_budget_or_raises_overtime():
@@ -426,6 +473,27 @@ def test_numba_calls_compiled_code_at_once_for_narrow_integers(kernels, monkeypa
     assert len(kernels.ratio.overloads) == 1
 
 
+ROUNDED = """
+import math
+from netsp.compiled.kernel import kernel
+
+@kernel
+def rounded(x, y):
+    return x**2, x**3, (x + y) ** 5, x**7, math.hypot(x, y)
+"""
+
+
+def test_powers_and_hypotenuses_are_rounded_alike_interpreted_and_compiled(tmp_path):
+    kernel = _module(tmp_path, ROUNDED).rounded
+    drawn = np.random.default_rng(3).uniform(0.1, 10.0, (300, 2)).tolist()
+    alike = interpreted(kernel)
+    with everything_compiled():
+        assert [kernel(x, y) for x, y in drawn] == [alike(x, y) for x, y in drawn]
+    # Python rounds both differently
+    assert any(kernel(x, y)[3] != x**7 for x, y in drawn)
+    assert any(kernel(x, y)[4] != math.hypot(x, y) for x, y in drawn)
+
+
 def test_this_release_of_numba_is_supported():
     assert disk_cache.is_supported()
     assert tiered.is_supported()
@@ -469,7 +537,11 @@ def test_numbers_are_compiled_for_their_widest_type(kernels):
 
 def test_kernels_that_others_call_with_constants_are_compiled_once(tmp_path):
     module = _module(tmp_path, CALLERS)
+    own, called = (len(k.py_func.__code__.co_code) for k in (module.caller, module.scaled))
+    assert module.caller.bytecode() == own + called
     with everything_compiled():
+        assert module.scaled(5, 1, False) == 5
+        assert module.caller.bytecode() == own
         assert module.caller(5) == 5
     assert len(module.scaled.overloads) == 1
 
@@ -606,6 +678,26 @@ def test_only_one_thread_at_a_time_has_a_lock(tmp_path):
         list(pool.map(hold, range(4)))
     assert max(counts) == 1
     assert len(counts) == 80
+
+
+@pytest.mark.parametrize("is_collecting", [True, False])
+def test_garbage_is_collected_after_compiling_as_before(is_collecting):
+    before = gc.isenabled()
+    try:
+        (gc.enable if is_collecting else gc.disable)()
+        with tiered._collector_paused():
+            assert not gc.isenabled()
+        assert gc.isenabled() == is_collecting
+    finally:
+        (gc.enable if before else gc.disable)()
+
+
+def test_long_work_is_compiled_sooner():
+    before = current_policy()
+    with long_work():
+        assert current_policy().interpreted_share < before.interpreted_share
+        assert current_policy().numpy_share < before.numpy_share
+    assert current_policy() == before
 
 
 @pytest.mark.parametrize("field", ["load_s", "compile_s", "compile_s_per_byte", "max_copied_bytes"])
