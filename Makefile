@@ -16,10 +16,13 @@ $(VENV)/.core: pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -e .
 	touch $@
 
-# compile everything ahead: otherwise each of the parallel test processes compiles what it needs
 $(VENV)/.installed: $(VENV)/.core
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -e '.[dev]'
 	$(BIN)/python -m compileall -qq -j 0 $(VENV)/lib || true
+	touch $@
+
+# compile everything ahead: otherwise each of the parallel test processes compiles what it needs
+$(VENV)/.warm: $(VENV)/.installed
 	$(BIN)/netsp warm-up --quiet
 	touch $@
 
@@ -35,7 +38,7 @@ demo: $(VENV)/.core
 test: $(VENV)/.installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy & types=$$!; \
+	$(BIN)/mypy & types=$$!; $(MAKE) --no-print-directory $(VENV)/.warm && \
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(TESTERS) --dist worksteal --durations 20 && wait $$types
 
 # the linter and type checker for the page's scripts, where there is npm; `make test` runs them then
@@ -43,7 +46,7 @@ js:
 	npm ci --prefix tests/js --no-audit --no-fund --silent
 
 # every figure of README and docs, measured on this commit
-accept: $(VENV)/.installed
+accept: $(VENV)/.warm
 	$(BIN)/python benchmarks/accept.py
 
 # the pages as a site, in build/site; a warning is an error
