@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import psutil
 import pytest
 
-from netsp.command import background_warm_up, warm_up
+from netsp.command import background_warm_up, main, warm_up
 from netsp.compiled import growing
 from netsp.compiled.compile_lock import locked
 from netsp.compiled.compile_policy import compiles
@@ -36,6 +36,16 @@ def started(monkeypatch):
 
     monkeypatch.setattr(subprocess, "Popen", record)
     return commands
+
+
+@pytest.mark.parametrize(("argv", "count"), [(None, 1), (["world", "--seed", "1"], 0)])
+def test_main_starts_a_process_after_commands_of_a_shell_only(argv, count, monkeypatch, capsys):
+    begun = []
+    monkeypatch.setattr(background_warm_up, "begin", begun.append)
+    monkeypatch.setattr(sys, "argv", ["netsp", "world", "--seed", "1"])
+    assert main._main(argv) == 0
+    assert begun == count * ["world"]
+    assert capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -85,6 +85,20 @@ def test_a_terminal_shows_a_bar_that_fills():
     assert stream.getvalue().endswith("\r\x1b[K")
 
 
+def test_a_status_line_is_cut_to_the_width_of_the_terminal():
+    stream = _Terminal()
+    StatusLine(stream).show("preparing " + 100 * "x")
+    (shown,) = _screen(stream.getvalue())
+    assert shown == "preparing " + 69 * "x"
+
+
+def test_a_bar_has_at_least_and_at_most_the_columns_of_the_policy():
+    policy = PreparationPolicy(min_bar_columns=4, max_bar_columns=8)
+    assert policy.bar(0.5, -3) == "[##  ]"
+    assert policy.bar(0.5, 6) == "[###   ]"
+    assert policy.bar(1.0, 100) == "[########]"
+
+
 def _screen(written):
     """Return the lines that a terminal shows after text with carriage returns and erasures."""
     lines, column = [""], 0

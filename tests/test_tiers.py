@@ -24,7 +24,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba.core.caching import FunctionCache
 
-from netsp.compiled import chance, disk_cache, growing, interpretation, overtime, tiered
+from netsp.compiled import (
+    chance,
+    compile_lock,
+    disk_cache,
+    growing,
+    interpretation,
+    overtime,
+    tiered,
+)
+from netsp.compiled import kernel as kernel_module
 from netsp.compiled.arguments import call_within, can_be_interpreted
 from netsp.compiled.compile_lock import is_locked, locked
 from netsp.compiled.compile_policy import (
@@ -36,6 +45,7 @@ from netsp.compiled.compile_policy import (
     long_work,
 )
 from netsp.compiled.interpretation import interpreted, names_used
+from netsp.compiled.kernel import Kernel
 from netsp.compiled.overtime import Overtime, within
 from netsp.dp import labels, walks
 from netsp.errors import InputError
@@ -678,6 +688,48 @@ def test_only_one_thread_at_a_time_has_a_lock(tmp_path):
         list(pool.map(hold, range(4)))
     assert max(counts) == 1
     assert len(counts) == 80
+
+
+def test_a_lock_file_that_its_last_owner_has_just_removed_is_created_again(tmp_path, monkeypatch):
+    file, flock, calls = tmp_path / "a.lock", compile_lock.fcntl.flock, []
+
+    def removed_before(descriptor, how):
+        calls.append(how)
+        if len(calls) == 1:
+            file.unlink()
+        flock(descriptor, how)
+
+    monkeypatch.setattr(compile_lock.fcntl, "flock", removed_before)
+    with locked(file) as is_held:
+        assert is_held
+        assert is_locked(file)
+
+
+def test_kernels_with_a_form_in_numpy_have_a_share_of_their_own(kernels, monkeypatch):
+    total = kernels.total.py_func
+    monkeypatch.setitem(interpretation._in_numpy, total, lambda x, stop: x.sum())
+    with compiled_by(CompilePolicy(interpreted_share=0.0)):
+        assert kernels.total(np.ones(3), NO_STOP) == 3.0
+    assert not kernels.total.overloads
+    assert kernels.total.interpreted_s > 0.0
+
+
+def test_time_before_numba_is_loaded_counts_for_all_kernels_and_for_the_kernel(monkeypatch):
+    monkeypatch.setattr(Kernel, "_total_s", 0.25)
+    early = Kernel(_pair)
+    with monkeypatch.context() as patch, compiled_by(CompilePolicy(numba_s=60.0, compile_s=60.0)):
+        patch.delitem(sys.modules, "numba")
+        early(np.array([1.0, 2.0]))
+    assert early._early_s > 0.0
+    assert Kernel._total_s == 0.25 + early._early_s
+    policy = CompilePolicy(
+        numba_s=1.0, compile_s=2.0, compile_s_per_byte=0.0, interpreted_share=0.5
+    )
+    monkeypatch.setattr(kernel_module, "may_be_kept", lambda: True)
+    assert early._budget_s(policy) == 1.0 - Kernel._total_s
+    monkeypatch.setattr(kernel_module, "may_be_kept", lambda: False)
+    assert early._budget_s(policy) == 1.0 - early._early_s
+    assert early.dispatcher.interpreted_s == early._early_s
 
 
 @pytest.mark.parametrize("is_collecting", [True, False])
