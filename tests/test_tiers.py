@@ -18,6 +18,7 @@ from dataclasses import astuple
 from pathlib import Path
 from types import FunctionType, SimpleNamespace
 
+import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -165,7 +166,32 @@ def kernels(tmp_path):
     return _module(tmp_path, MODULE)
 
 
+LENGTHS = """
+import math
+from netsp.compiled.kernel import kernel
+
+@kernel
+def length(x, y):
+    return math.hypot(x, y)
+
+@kernel
+def longer(x, y):
+    return length(x, y) ** 3
+"""
+
+
 NO_STOP = np.zeros(1, dtype=np.int64)
+
+
+def test_kernels_round_the_same_where_compiling_is_turned_off(tmp_path, monkeypatch):
+    x, y = 5.1, 8.8  # Python and the C library round their hypotenuse differently on Linux
+    with everything_compiled():
+        compiled = _module(tmp_path, LENGTHS).longer(x, y)
+    monkeypatch.setattr(numba.config, "DISABLE_JIT", 1)
+    uncompiled = _module(tmp_path, LENGTHS).longer
+    assert uncompiled(x, y) == compiled
+    assert uncompiled(y=y, x=x) == compiled
+    assert type(uncompiled(x, y)) is float
 
 
 def test_a_kernel_is_compiled_once_it_has_run_interpreted_for_its_compile_time(kernels):

@@ -49,6 +49,20 @@ def is_in_pool() -> bool:
     return threading.current_thread().name.startswith("ThreadPoolExecutor")
 
 
+def call_interpreted(kernel: Any, args: tuple[Any, ...]) -> Any:
+    """Return the result of a kernel that runs interpreted, with the types of compiled code.
+
+    Parameters
+    ----------
+    kernel : callable
+        Function that `netsp.compiled.kernel.kernel` decorates.
+    args : tuple
+        Arguments of the call.
+    """
+    with np.errstate(all="ignore"):  # compiled code does not warn either
+        return _plain(interpreted(kernel)(*args))
+
+
 def call_within(budget_s: float, kernel: Any, args: tuple[Any, ...]) -> Any:
     """Run a kernel interpreted within a budget; the result has the types of compiled code.
 
@@ -69,10 +83,9 @@ def call_within(budget_s: float, kernel: Any, args: tuple[Any, ...]) -> Any:
     Overtime
         The budget is used up; the arguments are restored.
     """
-    function = interpreted(kernel)
     if is_in_pool():
-        with np.errstate(all="ignore"):  # compiled code does not warn either
-            return _plain(function(*args))
+        return call_interpreted(kernel, args)
+    function = interpreted(kernel)
     names = kernel.py_func.__code__.co_varnames
     own = [a for name, a in zip(names, args, strict=False) if name not in STOP_PARAMETERS]
     before = [(a, a.copy()) for a in arrays_in(own) if a.flags.writeable]

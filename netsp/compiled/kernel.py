@@ -8,6 +8,7 @@ compiled code is on disk, once a kernel has run interpreted for its compile time
 from __future__ import annotations
 
 import functools
+import inspect
 import operator
 import os
 import sys
@@ -17,7 +18,12 @@ from time import thread_time
 from typing import Any, TypeVar
 
 from netsp.compiled import numba_loading
-from netsp.compiled.arguments import call_within, can_be_interpreted, is_in_pool
+from netsp.compiled.arguments import (
+    call_interpreted,
+    call_within,
+    can_be_interpreted,
+    is_in_pool,
+)
 from netsp.compiled.compile_policy import CompilePolicy, current_policy
 from netsp.compiled.interpretation import called_kernels
 from netsp.compiled.kept_code import may_be_kept
@@ -168,13 +174,43 @@ class _LoadedKernel(Kernel):
     __call__ = property(operator.attrgetter("_dispatcher"))  # type: ignore[assignment]
 
 
+class UncompiledKernel:
+    """Kernel that always runs interpreted, because `NUMBA_DISABLE_JIT` turns compiling off.
+
+    It rounds as compiled code does, except for arrays of single precision; the bare function would
+    not (`netsp.compiled.interpretation`).
+
+    Parameters
+    ----------
+    function : callable
+        The function.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func = function
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Call the function as plain Python or NumPy."""
+        if kwargs:
+            args = inspect.signature(self.py_func).bind(*args, **kwargs).args
+        return call_interpreted(self, args)
+
+    def __reduce__(self) -> str:
+        """Pickle as the name of the function."""
+        return self.py_func.__qualname__
+
+
 def _dispatcher_of(function: Callable[..., Any]) -> Any:
-    """Return Numba's dispatcher of a function; where nothing is compiled, the function."""
-    _register()
-    from netsp.compiled import disk_cache, tiered
+    """Return Numba's dispatcher of a function, or its interpreted form if nothing is compiled."""
     from netsp.compiled.compile_policy import compiles
 
-    is_kept_on_disk = compiles() and disk_cache.is_supported()
+    if not compiles():
+        return UncompiledKernel(function)
+    _register()
+    from netsp.compiled import disk_cache, tiered
+
+    is_kept_on_disk = disk_cache.is_supported()
     is_tiered = is_kept_on_disk and tiered.is_supported()
     compiled = disk_cache.cached(function)
     if is_kept_on_disk:
