@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,8 @@ from netsp.execute import ExecutionOptions, Surprises, execute
 from netsp.execute.plan import HOME, legs_of
 from netsp.execute.repair import broken
 from netsp.online.vehicle import make_vehicle
+from netsp.solution import Status
+from netsp.travel.result import Result
 from netsp.worlds import random_world
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
@@ -346,6 +349,60 @@ def test_a_repair_in_the_same_order_starts_at_the_robot(world):
     assert np.allclose(made.legs[0].path[0], robot)
     assert sum(leg.length for leg in made.legs) == pytest.approx(made.length, rel=1e-3)
     assert made.length == pytest.approx(solution.length, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("bound", "words"), [(1.0, "no new order that saves enough was found"), (1e9, "would not save")]
+)
+def test_only_a_bound_shows_that_no_new_order_would_save_enough(world, monkeypatch, bound, words):
+    import netsp.execute.repair as module
+
+    problem, solution = world
+    robot = np.add(solution.path[0], (0.0, 0.5, 0.0))
+    found = Result(None, None, bound, Status.NO_SOLUTION_FOUND)
+    monkeypatch.setattr(module, "solve_graph", lambda *args, **options: found)
+    tether = np.array([problem.base, robot])
+    made = module.repair(problem, robot, tether, list(range(8)), 0.01, "a test", limit=60.0)
+    assert made.kind == "local"
+    assert words in made.reason
+
+
+def test_an_interrupt_while_a_new_order_is_searched_ends_the_run(monkeypatch):
+    import netsp.execute.repair as module
+
+    solve_graph = module.solve_graph
+
+    def interrupted_search(*args, **options):
+        def interrupt(_):
+            signal.raise_signal(signal.SIGINT)
+
+        return solve_graph(*args, on_progress=interrupt, **options)
+
+    monkeypatch.setattr(module, "solve_graph", interrupted_search)
+    monkeypatch.setattr(module, "_least", lambda *_: 0.0)
+    push = events({"time": 5.0, "push": [1.0, 1.0, 0.0]})
+    run = execute(CORNER, solve(CORNER), FAST, surprises=push)
+    assert run.interrupted
+    assert run.summary["defects"] == 0
+    assert run.summary["visited"] == 0
+
+
+def test_an_interrupt_after_the_end_of_a_run_loses_no_file(tmp_path, monkeypatch):
+    import netsp.execute.write as module
+
+    write_execution = module.write_execution
+
+    def interrupted_write(*args):
+        signal.raise_signal(signal.SIGINT)
+        write_execution(*args)
+
+    monkeypatch.setattr(module, "write_execution", interrupted_write)
+    monkeypatch.chdir(tmp_path)
+    Path("p.json").write_text(CORNER.to_json())
+    solve(CORNER).save(Path("s.json"))
+    assert main(["execute", "p.json", "s.json", "-o", "run", "--speed", "10", "--quiet"]) == 0
+    assert Path("run", "summary.json").exists()
+    assert Path("run", "run.png").exists()
 
 
 def test_a_defect_is_no_reason_it_is_counted_and_told_by_the_exit_code(

@@ -160,6 +160,7 @@ def test_sigterm_ends_a_command_as_ctrl_c_does(name, inputs, tmp_path, monkeypat
         for number in (signal.SIGINT, signal.SIGTERM)
     ]
     assert ends[0] == ends[1]
-    code, _, written = ends[0]
+    code, said, written = ends[0]
     assert code == expected
+    assert ("what was compiled is kept" in "".join(said)) == (name == "warm-up")
     assert not written or code != 130

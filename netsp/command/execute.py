@@ -134,6 +134,7 @@ def _mission(args: argparse.Namespace) -> int:
 
 def _problem(args: argparse.Namespace) -> int:
     """Of a problem in the plane."""
+    from netsp.clock import until_interrupt
     from netsp.execute.events import Surprises
     from netsp.execute.log import ExecutionOptions, describe_execution
     from netsp.execute.repair import REPLAN_S
@@ -167,13 +168,14 @@ def _problem(args: argparse.Namespace) -> int:
         done = execute(problem, solution, options, surprises=surprises, on_step=on_step)
     if show:
         print(file=sys.stderr)
-    if args.output is not None:
-        write_execution(done, args.output)
-        save_execution(done, Path(args.output) / "run.png")
-    if args.output is None or args.json:
-        told.tell(done.summary)
-    if not args.quiet:
-        print(describe_execution(done), file=sys.stderr)
+    with until_interrupt(None):  # the run is over; only a second Ctrl-C breaks off writing it
+        if args.output is not None:
+            write_execution(done, args.output)
+            save_execution(done, Path(args.output) / "run.png")
+        if args.output is None or args.json:
+            told.tell(done.summary)
+        if not args.quiet:
+            print(describe_execution(done), file=sys.stderr)
     s = done.summary
     if s["defects"]:
         return EXIT_DEFECT

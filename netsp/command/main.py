@@ -68,6 +68,7 @@ def _end_abandoned_work(code: int) -> None:
 def _main(argv: Sequence[str] | None) -> int:
     """Run the command line; return the exit code, whatever work goes on."""
     begin_command()
+    wanted: str | None = None
     # both are None when they were closed before we began
     sys.stdout, sys.stderr = sys.stdout or _Closed(), sys.stderr or io.StringIO()
     try:
@@ -102,7 +103,11 @@ def _main(argv: Sequence[str] | None) -> int:
     except (KeyboardInterrupt, SystemError) as error:
         if not interrupted(error):
             raise
-        messages.error("interrupted before there was anything to write")
+        messages.error(
+            "interrupted; what was compiled is kept, and `netsp warm-up` compiles the rest"
+            if wanted == "warm-up"
+            else "interrupted before there was anything to write"
+        )
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         _forget_stdout()  # the reader has gone (| head)

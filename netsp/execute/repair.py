@@ -16,7 +16,7 @@ import numpy.typing as npt
 import shapely
 
 from netsp.arrays import Floats
-from netsp.clock import Clock
+from netsp.clock import Clock, until_interrupt
 from netsp.errors import LimitReachedError, NetspError
 from netsp.execute.plan import HOME, Leg, legs_of
 from netsp.execute.tether_reserve import ReservedLimit
@@ -149,8 +149,29 @@ def repair(
     reserve
         Length of tether to keep in reserve. No goal is left out for it: where one needs more, less
         is kept.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Ctrl-C, which solvers take for the wish to have what there is.
     """
-    clock = Clock(limit)
+    with until_interrupt(limit) as clock:
+        try:
+            made = _repaired(problem, robot, tether, left, speed, why, seed, clock, reserve)
+        except NetspError:
+            if clock.stopped:
+                raise KeyboardInterrupt from None
+            raise
+        if clock.stopped:
+            raise KeyboardInterrupt
+        return made
+
+
+def _repaired(
+    problem: Problem, robot: Floats, tether: Floats, left: list[int], speed: float, why: str,
+    seed: int, clock: Clock, reserve: float,
+) -> Repair:  # fmt: skip
+    """Return a plan as `repair` does, with what the clock leaves time for."""
     word = signature(tether[:, :2], problem.representative_points)
     state = State(position=outside(problem, robot), signature=word)
     order, left_out = reachable(problem, left)
@@ -173,11 +194,17 @@ def repair(
     saving = (local.length - _least(graph, len(order), clock)) / speed
     if saving > replan_s > 0.0:
         found = solve_graph(graph, "auto", time_limit=clock, seed=seed, warm_start=local.tour)
-        if found.length is not None and found.length < local.length - speed * replan_s:
+        worthwhile = local.length - speed * replan_s
+        if found.length is not None and found.length < worthwhile:
             chosen, kind = found, "replan"
             reason += f", {found.length:.4g} {problem.units} in a new one"
-        else:
+        elif found.status is Status.OPTIMAL or (found.lower_bound or 0.0) >= worthwhile:
             reason += ", a new order would not save enough"
+        else:
+            reason += (
+                ", no new order that saves enough was found within the time limit of planning; a "
+                "longer limit (--planning-limit) may find one"
+            )
     elif hurried:
         reason += (
             ", as far as planning came within its time limit; no new order was tried, and a longer "

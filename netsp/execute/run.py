@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.errors import InputError
+from netsp.errors import InputError, interrupted
 from netsp.execute.aside import aside
 from netsp.execute.events import Event, Surprises, changed, index_of
 from netsp.execute.log import (
@@ -423,6 +423,8 @@ class _Run:
                 why, self.options.seed, self.options.planning_limit, self.reserve,
             )  # fmt: skip
         except Exception as error:
+            if interrupted(error):
+                raise KeyboardInterrupt from error
             # The robot must come home whatever is wrong with us; that something is, is logged and
             # counted, and the command says so by its exit code. What is always possible: back
             # along the tether.
