@@ -1,5 +1,6 @@
 """Legs in rows: those that may be in a better tour and no others, and as good as a matrix."""
 
+import functools
 import importlib
 
 import numpy as np
@@ -322,8 +323,9 @@ def test_a_proof_over_rows_finds_the_optimum_of_one_over_a_matrix(
     assert not graph.measured
 
 
-def kinds():
-    """Travel graphs whose legs are those of another one, changed."""
+@functools.cache
+def graphs_by_kind():
+    """Return travel graphs whose legs are those of another one, changed, by what changed them."""
     plain = small(3, goals=6, tether_length=150.0)
     goals = [g.model_dump() for g in plain.goals]
     for g in goals[:2]:
@@ -333,14 +335,19 @@ def kinds():
     here = whole.tour[2]
     state = State(position=plain.goals[here.goal].position, signature=here.signature)
     left = tuple(plain.goals[v.goal] for v in whole.tour[3:])
-    yield "plain", travel_graph(plain)
-    yield "with alternatives", travel_graph(choices)
-    yield "from a state", graph_from_state(plain.model_copy(update={"goals": left, "state": state}))
-    yield "without precedences", travel_graph(plain).unordered()
+    return {
+        "plain": travel_graph(plain),
+        "with alternatives": travel_graph(choices),
+        "from a state": graph_from_state(plain.model_copy(update={"goals": left, "state": state})),
+        "without precedences": travel_graph(plain).unordered(),
+    }
 
 
-@pytest.mark.parametrize(("kind", "graph"), list(kinds()), ids=[k for k, _ in kinds()])
-def test_legs_in_blocks_are_those_rounded_and_ways_no_longer(kind, graph, monkeypatch):
+@pytest.mark.parametrize(
+    "kind", ["plain", "with alternatives", "from a state", "without precedences"]
+)
+def test_legs_in_blocks_are_those_rounded_and_ways_no_longer(kind, monkeypatch):
+    graph = graphs_by_kind()[kind]
     monkeypatch.setattr("netsp.roadmap.legs.BLOCK", 5)
     monkeypatch.setattr("netsp.roadmap.legs.BLOCK_LEGS", 17 * len(graph))
     assert graph.legs_in_blocks

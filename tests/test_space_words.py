@@ -1,5 +1,6 @@
 """Words of paths among any solids: they tell classes of loops apart, and nothing else."""
 
+import functools
 import itertools
 
 import numpy as np
@@ -55,7 +56,13 @@ PRISMS = field_of(
     *({"prism": {"polygon": [[x, y - 0.2], [x + 0.1, y], [x, y + 0.1], [x - 0.2, y]], "grow": 0.2}}
       for x, y in POSTS)
 )  # fmt: skip
-IN_RINGS, IN_LINKED, IN_PRISMS = words_of(RINGS), words_of(LINKED), words_of(PRISMS)
+SCENES = {"rings": RINGS, "linked": LINKED, "prisms": PRISMS}
+
+
+@functools.cache
+def words_in(name):
+    """Return the words of paths in one of SCENES, built when a test first asks for them."""
+    return words_of(SCENES[name])
 
 
 @pytest.mark.parametrize(
@@ -111,7 +118,9 @@ def test_windings_around_rings_are_linking_numbers():
     found = {}
     for points in loops(300, 1, RINGS):
         linked = tuple(through_disc(points, z) for z in (-2.0, 2.0))
-        found.setdefault(linked, set()).add(IN_RINGS.windings(IN_RINGS.word(points, closed=True)))
+        found.setdefault(linked, set()).add(
+            words_in("rings").windings(words_in("rings").word(points, closed=True))
+        )
     assert len(found) > 6
     assert all(len(w) == 1 for w in found.values())
     assert len({next(iter(w)) for w in found.values()}) == len(found)
@@ -123,12 +132,12 @@ def test_among_prisms_words_tell_the_same_loops_apart_as_rays():
     for points in loops(300, 2, PRISMS):
         moored = np.vstack([ANCHOR, points, points[:1], ANCHOR])
         if all(PRISMS.grown(0.05).line_of_sight(a, b) for a, b in itertools.pairwise(moored)):
-            pairs.append((IN_PRISMS.word(moored), signature(moored, POSTS)))
+            pairs.append((words_in("prisms").word(moored), signature(moored, POSTS)))
     assert len(pairs) > 60
     for (a, x), (b, y) in itertools.pairwise(sorted(pairs, key=lambda p: p[1])):
         assert (a == b) == (x == y)
         # and so of loops one after the other
-        assert (IN_PRISMS.product(a, b) == ()) == (reduce(x + y) == ())
+        assert (words_in("prisms").product(a, b) == ()) == (reduce(x + y) == ())
     assert all((a == ()) == (x == ()) for a, x in pairs)
 
 
@@ -136,9 +145,11 @@ def test_words_do_not_depend_on_the_size_of_cells():
     finer = words_of(LINKED, 0.2)
     seen = {}
     for points in loops(150, 3, LINKED):
-        a, b = IN_LINKED.word(points, closed=True), finer.word(points, closed=True)
+        a, b = words_in("linked").word(points, closed=True), finer.word(points, closed=True)
         assert (a == ()) == (b == ())
-        assert seen.setdefault(IN_LINKED.windings(a), finer.windings(b)) == finer.windings(b)
+        assert seen.setdefault(words_in("linked").windings(a), finer.windings(b)) == finer.windings(
+            b
+        )
 
 
 def test_a_commutator_of_two_rings_winds_around_nothing_and_is_not_contractible():
@@ -147,24 +158,25 @@ def test_a_commutator_of_two_rings_winds_around_nothing_and_is_not_contractible(
 
     a, b = np.array(around(2, 1)), np.array(around(-2, 1))
     path = np.vstack([ANCHOR, a, ANCHOR, b, ANCHOR, a[::-1], ANCHOR, b[::-1], ANCHOR])
-    word = IN_RINGS.word(path)
+    word = words_in("rings").word(path)
     assert word != ()
-    assert IN_RINGS.windings(word) == (0, 0)
+    assert words_in("rings").windings(word) == (0, 0)
     # rings that are linked let it go
     c = np.array([[4.5, 2, 1], [1.5, 2, 1], [1, 0, 1], [1, 0, -1], [4.5, 2, -1]])
     d = np.array([[3, -1, 0], [3, 1, 0], [4.8, 1, 0], [4.8, -1, 0], [3, -1, 0]])
     for loop in (c, d):
-        assert IN_LINKED.windings(IN_LINKED.word(loop, closed=True)) != (0, 0)
+        assert words_in("linked").windings(words_in("linked").word(loop, closed=True)) != (0, 0)
     home = np.array([4.5, 2, 1])
     both = np.vstack([c, home, d, home, c[::-1], home, d[::-1], home])
-    assert IN_LINKED.word(both) == ()
+    assert words_in("linked").word(both) == ()
 
 
 @given(st.integers(0, 10_000), st.integers(1, 6))
 @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
 def test_what_can_be_deformed_keeps_its_word(seed, cuts):
     rng = np.random.default_rng(seed)
-    field, words = ((RINGS, IN_RINGS), (LINKED, IN_LINKED), (PRISMS, IN_PRISMS))[seed % 3]
+    name = ("rings", "linked", "prisms")[seed % 3]
+    field, words = SCENES[name], words_in(name)
     points = next(loops(1, seed, field))
     closed = np.vstack([points, points[:1]])
     finer = [closed[0]]
@@ -185,7 +197,7 @@ def test_what_can_be_deformed_keeps_its_word(seed, cuts):
 
 def test_a_path_through_a_solid_has_no_word_and_is_told_where():
     with pytest.raises(InputError, match=r"path: no word at \(-?2\.\d+, "):
-        IN_PRISMS.word([[-4, -1, 0], [4, -1, 0]])
+        words_in("prisms").word([[-4, -1, 0], [4, -1, 0]])
 
 
 def test_what_cannot_be_is_refused():

@@ -29,6 +29,9 @@ LONGEST_SIDE = 16
 MOST_PAIRS = 5_000
 """Overlaps that a completion looks at."""
 
+Endings = dict[int, list[tuple[int, Word, Word]]]
+"""Rules by the last letter of their left side: its length, the left side, the right side."""
+
 
 @dataclass(frozen=True)
 class Group:
@@ -96,7 +99,11 @@ class Group:
         Word
             Equal to it.
         """
-        return _rewritten(letters, self.rules)
+        return _rewritten(letters, self._endings)
+
+    @cached_property
+    def _endings(self) -> Endings:
+        return _by_last_letter(self.rules)
 
     @cached_property
     def functionals(self) -> tuple[tuple[int, ...], ...]:
@@ -228,7 +235,15 @@ def _order(word: Word) -> tuple[int, list[tuple[int, bool]]]:
     return len(word), [(abs(x), x < 0) for x in word]
 
 
-def _rewritten(letters: Iterable[int], rules: Sequence[tuple[Word, Word]]) -> Word:
+def _by_last_letter(rules: Iterable[tuple[Word, Word]]) -> Endings:
+    """Return rules by the last letter of their left sides, in the order of the rules."""
+    endings: Endings = {}
+    for a, b in rules:
+        endings.setdefault(a[-1], []).append((len(a), a, b))
+    return endings
+
+
+def _rewritten(letters: Iterable[int], endings: Endings) -> Word:
     """No rule applies to what is kept, so only its end need be looked at after a letter."""
     todo, kept = list(letters)[::-1], list[int]()
     while todo:
@@ -237,9 +252,9 @@ def _rewritten(letters: Iterable[int], rules: Sequence[tuple[Word, Word]]) -> Wo
             kept.pop()
             continue
         kept.append(x)
-        for a, b in rules:
-            if kept[-1] == a[-1] and len(kept) >= len(a) and tuple(kept[-len(a) :]) == a:
-                del kept[-len(a) :]
+        for n, a, b in endings.get(x, ()):
+            if len(kept) >= n and tuple(kept[-n:]) == a:
+                del kept[-n:]
                 todo.extend(reversed(b))
                 break
     return tuple(kept)
@@ -254,12 +269,13 @@ def _completed(rank: int, relators: Sequence[Word]) -> tuple[tuple[tuple[Word, W
         return len(word), [(place[abs(x)], x < 0) for x in word]
 
     rules: list[tuple[Word, Word]] = []
+    endings: Endings = {}
     equations: list[tuple[Word, Word]] = [(r, ()) for w in relators for r in (w, invert(w))]
     pairs, exact, done = 0, True, 0
     while True:
         while equations:
             end_if_abandoned()
-            a, b = (_rewritten(w, rules) for w in equations.pop())
+            a, b = (_rewritten(w, endings) for w in equations.pop())
             if a == b:
                 continue
             big, small = (a, b) if order(a) > order(b) else (b, a)
@@ -269,10 +285,11 @@ def _completed(rank: int, relators: Sequence[Word]) -> tuple[tuple[tuple[Word, W
             # what the new rule applies to is said again
             again = [r for r in rules if _within(big, r[0])]
             done -= sum(rules.index(r) < done for r in again)
-            every = [*rules, (big, small)]
+            every = _by_last_letter([*rules, (big, small)])
             rules = [(x, _rewritten(y, every)) for x, y in rules if not _within(big, x)]
             equations.extend(again)
             rules.append((big, small))
+            endings = _by_last_letter(rules)
         if done >= len(rules) or pairs > MOST_PAIRS:
             break
         new = rules[done]
