@@ -14,6 +14,7 @@ from netsp.pictures.film import Film, steps_of
 from netsp.pictures.interactive import (
     layout,
     line_trace,
+    marks_trace,
     mesh_trace,
     plotly_objects,
     point_trace,
@@ -46,7 +47,7 @@ def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
     InputError
         Plotly is not installed, the file cannot be written.
     """
-    go = plotly_objects()
+    plotly_objects()
     from plotly.subplots import make_subplots
 
     columns = len(films)
@@ -65,7 +66,7 @@ def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
     )  # fmt: skip
     figure.update_annotations(font={"size": 13}, yanchor="bottom")
     what, found = steps_of(films, FRAMES)
-    changing: list[list[Any]] = [[] for _ in found]
+    changing: list[list[dict[str, Any]]] = [[] for _ in found]
     numbers: list[int] = []
     for k, film in enumerate(films):
         assert film.scene is not None
@@ -78,13 +79,13 @@ def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
             moving = _moving(film, film.moments[step.moments[k]])
             if f == 0:
                 for trace in moving:
-                    trace.showlegend = k == 0
+                    trace["showlegend"] = k == 0
                     numbers.append(len(figure.data))
                     figure.add_trace(trace, row=1, col=k + 1)
             changing[f] += moving
     names = [step.name for step in found]
-    figure.frames = [
-        go.Frame(data=traces, traces=numbers, name=name)
+    frames = [
+        {"data": traces, "name": name, "traces": numbers}
         for name, traces in zip(names, changing, strict=True)
     ]
     now = {"frame": {"duration": 0, "redraw": True}, "mode": "immediate"}
@@ -104,17 +105,17 @@ def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
         }],
         updatemenus=[_play()], **scenes,
     )  # fmt: skip
-    write_figure(figure, title, file)
+    write_figure(figure, title, file, frames)
 
 
-def _moving(film: Film, moment: Moment) -> list[Any]:
+def _moving(film: Film, moment: Moment) -> list[dict[str, Any]]:
     """What changes from moment to moment."""
     visited, left = (list(moment.fates.get(fate, ())) for fate in (VISITED, LEFT_OUT))
     rest = sorted(set(range(len(film.places))) - {*visited, *left})
     return [
-        _marks(film, "waypoint", rest, size=4, color=style.PATH, symbol="circle-open"),
-        _marks(film, "waypoint visited", visited, size=4, color=style.VISITED),
-        _marks(film, "waypoint left out", left, size=4, color=style.LEFT_OUT, symbol="x"),
+        _marks(film, "waypoint", rest, color=style.PATH, size=4, symbol="circle-open"),
+        _marks(film, "waypoint visited", visited, color=style.VISITED, size=4),
+        _marks(film, "waypoint left out", left, color=style.LEFT_OUT, size=4, symbol="x"),
         line_trace("path", moment.path, style.PATH, 3),
         line_trace("taut tether", moment.nodes, style.TETHER, 6),
         point_trace("robot", moment.nodes[-1], style.ROBOT),
@@ -122,13 +123,11 @@ def _moving(film: Film, moment: Moment) -> list[Any]:
     ]
 
 
-def _marks(film: Film, name: str, which: list[int], **marker: Any) -> Any:
+def _marks(film: Film, name: str, which: list[int], **marker: Any) -> dict[str, Any]:
     """Waypoints of one kind; where there are none, one that is not drawn, so that the legend
     knows the kind."""
     x, y, z = film.places[which].T if which else ([None], [None], [None])
-    return plotly_objects().Scatter3d(
-        x=x, y=y, z=z, mode="markers", marker=marker, text=[f"#{k}" for k in which], name=name
-    )
+    return marks_trace(name, (x, y, z), marker, [f"#{k}" for k in which])
 
 
 def _play() -> dict[str, Any]:

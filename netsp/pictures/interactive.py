@@ -8,6 +8,7 @@ import gzip
 import html
 import json
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -62,13 +63,17 @@ async function unpack(text) {{
 """
 
 
-def write_figure(figure: Any, title: str, file: str | Path) -> None:
+def write_figure(
+    figure: Any, title: str, file: str | Path, frames: Sequence[dict[str, Any]] = ()
+) -> None:
     """Write a figure of plotly as a page.
 
     Parameters
     ----------
     figure : plotly.graph_objects.Figure
-        With its frames, if it has any.
+        Without frames.
+    frames : sequence of dict
+        Frames as plotly's JSON has them: checking as many objects takes plotly seconds.
     title : str
         Of the page.
     file : str or Path
@@ -79,14 +84,19 @@ def write_figure(figure: Any, title: str, file: str | Path) -> None:
     InputError
         The file cannot be written.
     """
-    from plotly.offline import get_plotlyjs
-
     told = {
-        "data": figure.data, "layout": figure.layout, "frames": figure.frames,
+        "data": figure.data, "layout": figure.layout, "frames": frames,
         "config": {"responsive": True, "displaylogo": False},
     }  # fmt: skip
-    packed = json.dumps([_packed(get_plotlyjs()), _packed(json.dumps(_plain(told)))])
+    packed = json.dumps([_packed_library(), _packed(json.dumps(_plain(told)))])
     write_text(file, PAGE.format(title=html.escape(title), packed=packed))
+
+
+@cache
+def _packed_library() -> str:
+    from plotly.offline import get_plotlyjs
+
+    return _packed(get_plotlyjs())
 
 
 def _packed(text: str) -> str:
@@ -140,22 +150,20 @@ def write_scene(
     write_figure(figure, title, file)
 
 
-def stop_traces(stops: Stops) -> list[Any]:
+def stop_traces(stops: Stops) -> list[dict[str, Any]]:
     """Waypoints on an interactive page: those that were visited, and those that were not."""
     out = []
     left = np.isin(np.arange(len(stops.places)), stops.left_out)
-    visited = {"size": 3, "color": style.VISITED}
-    to_visit = {"size": 4, "color": style.PATH, "symbol": "circle-open"}
+    visited = {"color": style.VISITED, "size": 3}
+    to_visit = {"color": style.PATH, "size": 4, "symbol": "circle-open"}
     for chosen, name, marker in (
         (~left, stops.name, visited if stops.visited else to_visit),
-        (left, "not visited", {"size": 4, "color": style.LEFT_OUT, "symbol": "x"}),
+        (left, "not visited", {"color": style.LEFT_OUT, "size": 4, "symbol": "x"}),
     ):
         if chosen.any():
             x, y, z = stops.places[chosen].T
             names = [f"#{k}" for k in np.flatnonzero(chosen)]
-            out.append(plotly_objects().Scatter3d(
-                x=x, y=y, z=z, mode="markers", marker=marker, text=names, name=name
-            ))  # fmt: skip
+            out.append(marks_trace(name, (x, y, z), marker, names))
     return out
 
 
@@ -184,20 +192,43 @@ def seen(points: Floats) -> Ints:
     return np.flatnonzero(polylines.telling(points, SEEN * size))
 
 
-def line_trace(name: str, points: Floats, colour: str, width: float) -> Any:
-    """A polyline on an interactive page."""
+def line_trace(name: str, points: Floats, colour: str, width: float) -> dict[str, Any]:
+    """Return a polyline on an interactive page, as plotly's JSON has it."""
     x, y, z = points[seen(points)].T
-    return plotly_objects().Scatter3d(
-        x=x, y=y, z=z, mode="lines", line={"color": colour, "width": width}, name=name
-    )
+    line = {"color": colour, "width": width}
+    return {
+        "line": line, "mode": "lines", "name": name, "x": x, "y": y, "z": z, "type": "scatter3d"
+    }  # fmt: skip
 
 
-def point_trace(name: str, point: Floats, colour: str) -> Any:
-    """A point on an interactive page."""
+def point_trace(name: str, point: Floats, colour: str) -> dict[str, Any]:
+    """Return a point on an interactive page, as plotly's JSON has it."""
     x, y, z = ([float(v)] for v in point)
-    return plotly_objects().Scatter3d(
-        x=x, y=y, z=z, mode="markers", marker={"size": 5, "color": colour}, name=name
-    )
+    return marks_trace(name, (x, y, z), {"color": colour, "size": 5})
+
+
+def marks_trace(
+    name: str, places: Sequence[Any], marker: dict[str, Any], texts: Sequence[str] | None = None
+) -> dict[str, Any]:
+    """Return points on an interactive page, as plotly's JSON has them.
+
+    Parameters
+    ----------
+    name : str
+        Name in the legend.
+    places : sequence
+        The x, the y and the z of all points.
+    marker : dict
+        Colour, size and symbol.
+    texts : sequence of str, optional
+        What is shown at each point under the cursor.
+    """
+    x, y, z = places
+    text = {} if texts is None else {"text": list(texts)}
+    return {
+        "marker": marker, "mode": "markers", "name": name, **text, "x": x, "y": y, "z": z,
+        "type": "scatter3d",
+    }  # fmt: skip
 
 
 def layout(title: str, units: str) -> dict[str, Any]:
