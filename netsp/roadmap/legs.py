@@ -343,6 +343,8 @@ class TautLegs:
     def _each(self, us: Ints, vs: Ints) -> Floats:
         """(k,) planar lengths of legs, negative where they could not be pulled."""
         paths, (ends, point) = self.paths, self._ends
+        # strided arrays are another type, for which the kernel would be compiled anew
+        us, vs = np.ascontiguousarray(us), np.ascontiguousarray(vs)
         out = np.empty(len(us))
 
         def some(first: int) -> None:
