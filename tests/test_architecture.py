@@ -1,6 +1,7 @@
 """docs/architecture.md says how the modules depend on one another; here it is checked."""
 
 import ast
+import functools
 import graphlib
 import re
 from pathlib import Path
@@ -15,6 +16,7 @@ MODULES = {
 }
 
 
+@functools.cache
 def layers():
     """Names in the layers of the page's first table, from the ground up."""
     table = PAGE.split("| layer | modules | job |")[1].split("\n\n")[0]
@@ -22,6 +24,7 @@ def layers():
     return [[n.strip("/") for n in re.findall(r"`([\w/]+)`", row)] for row in rows]
 
 
+@functools.cache
 def layer_of(module):
     """The layer that names a module, or its nearest package that is named."""
     place = module.removeprefix("netsp.").replace(".", "/")
@@ -34,6 +37,7 @@ def layer_of(module):
     return max(fits)[1] if fits else None
 
 
+@functools.cache
 def imports(path):
     """(module of netsp, whether it is imported when the file is loaded)."""
     found = []

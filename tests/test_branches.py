@@ -105,6 +105,23 @@ def test_rounded_legs_are_hardly_shorter_and_never_longer():
     assert np.allclose(rounded[finite], exact[finite], rtol=3e-7)
 
 
+def test_legs_between_strided_vertices_are_pulled_by_the_same_kernel(monkeypatch):
+    """Strided arrays are of another type, for which it would be compiled again."""
+    roadmap = TautRoadmap(TURNS, max_classes=20)
+    types, pull_each = set(), legs_of.pull_each
+
+    def note(us, vs, *more):
+        types.add((us.dtype, vs.dtype, us.flags.c_contiguous, vs.flags.c_contiguous))
+        pull_each(us, vs, *more)
+
+    monkeypatch.setattr(legs_of, "pull_each", note)
+    u, v = np.nonzero(roadmap.cluster[:, None] < roadmap.cluster[None])
+    assert not u.flags.c_contiguous
+    found = roadmap.legs.pairs(u, v)
+    assert types == {(np.dtype(np.int64), np.dtype(np.int64), True, True)}
+    assert (found == roadmap.legs.pairs(u.copy(), v.copy())).all()
+
+
 @pytest.fixture
 def searches(monkeypatch):
     """How often a leg was searched for by itself."""
