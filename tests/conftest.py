@@ -5,6 +5,7 @@ over what collection leaves behind: more than half a million objects, all of whi
 end, and a look at them takes half a second.
 """
 
+import functools
 import gc
 
 import pytest
@@ -28,3 +29,13 @@ def pytest_collection():
 def pytest_sessionfinish():
     """Let the collector look at everything again, as extension modules expect it at exit."""
     gc.unfreeze()
+
+
+@pytest.fixture
+def few_cells(monkeypatch):
+    """Have commands solve missions with `FEW_CELLS`: the bounds hold as well, and are coarser."""
+    from netsp.space import solve
+    from tests.worlds import FEW_CELLS
+
+    quick = functools.partial(solve.solve_mission, policy=FEW_CELLS)
+    monkeypatch.setattr(solve, "solve_mission", quick)

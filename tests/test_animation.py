@@ -27,6 +27,7 @@ from netsp.pictures.moments import moments_of_flight, moments_of_plan
 from netsp.report.opened import opened
 from netsp.space.solve import solve_mission
 from tests.pages import unpacked
+from tests.worlds import FEW_CELLS
 
 ROOT = Path(__file__).parent.parent
 SITE = Problem(
@@ -272,7 +273,7 @@ def test_a_planned_mission_is_a_film_and_a_page(flight, tmp_path, capsys):
     (tmp_path / "m.json").write_text(mission.model_dump_json(exclude_none=True))
     assert main(["animate", str(tmp_path / "m.json"), "-o", str(tmp_path / "x.gif")]) == 2
     assert "tour: the mission has none" in capsys.readouterr().err
-    found = solve_mission(mission, time_limit=60.0).mission
+    found = solve_mission(mission, time_limit=60.0, policy=FEW_CELLS).mission
     planned.write_text(found.model_dump_json(exclude_none=True))
     film = film_of_mission(Mission.load(planned), run.mission.load_scene(), 40)
     visited = [len(m.fates["visited"]) for m in film.moments]

@@ -21,6 +21,7 @@ from netsp.online.mission import Mission
 from netsp.online.scene.scene import Scene
 from netsp.online.simulate import simulate
 from netsp.space.solve import solve_mission
+from tests.worlds import FEW_CELLS
 
 EXACT = GuardOptions(noise=0.0, drift=0.0)
 
@@ -66,7 +67,7 @@ def site(mission):
 @pytest.fixture(scope="module")
 def solved(mission):
     """On a grid that is coarse enough for the whole of it to be gone through in time."""
-    return solve_mission(mission.model_copy(update={"cell": 0.4}), time_limit=8.0)
+    return solve_mission(mission.model_copy(update={"cell": 0.4}), time_limit=8.0, policy=FEW_CELLS)
 
 
 @pytest.fixture(scope="module")

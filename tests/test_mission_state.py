@@ -20,11 +20,11 @@ from netsp.space.bound import bound_of_all
 from netsp.space.flown import words_of_flight
 from netsp.space.judge import verify_mission
 from netsp.space.plan import plan
-from netsp.space.potential import PotentialParams
 from netsp.space.repair import RepairPlanner
 from netsp.space.solve import solve_mission
 from netsp.space.water import Water, has_room
 from tests.test_tour import written
+from tests.worlds import FEW_CELLS
 
 
 @pytest.fixture(scope="module")
@@ -60,11 +60,11 @@ def test_from_any_stop_of_a_shortest_tour_its_rest_is_found_again(planned, stops
     assert found.length <= length * (1 + 1e-6) + 0.02
     assert found.free
     assert found.stops[0].path[0] == pytest.approx(mission.waypoints[stops - 1].position, abs=1e-6)
-    few = PotentialParams(max_cells=120_000)
-    bound = bound_of_all(found.ways, sorted(found.order), None, params=few)
+    bound = bound_of_all(found.ways, sorted(found.order), None, params=FEW_CELLS.potential)
     assert 0.0 < bound <= found.length + 1e-6
 
 
+@pytest.mark.usefixtures("few_cells")
 def test_a_mission_from_the_middle_is_solved_judged_flown_and_reported(planned, tmp_path, capsys):
     mission, scene, _ = planned
     (tmp_path / "scene.json").write_text(scene.model_dump_json(exclude_none=True))

@@ -298,6 +298,7 @@ A_BAR = Scene(
 )
 
 
+@pytest.mark.usefixtures("few_cells")
 def test_a_tour_with_detours_is_told_as_one(tmp_path, capsys):
     (tmp_path / "scene.json").write_text(A_BAR.model_dump_json(exclude_none=True))
     file, out = tmp_path / "mission.json", tmp_path / "planned.json"

@@ -24,11 +24,8 @@ from netsp.space.bound import bound_of_all
 from netsp.space.flown import words_of_flight
 from netsp.space.judge import verify_mission
 from netsp.space.plan import plan
-from netsp.space.potential import PotentialParams
-from netsp.space.solve import MissionPolicy, seconds_until_home, solve_mission
-
-FEW_CELLS = MissionPolicy(potential=PotentialParams(max_cells=120_000))
-"""Bounds with fewer cells than by default take a tenth of the time."""
+from netsp.space.solve import seconds_until_home, solve_mission
+from tests.worlds import FEW_CELLS
 
 SCENE = {
     "schema_version": 1, "bounds": [-1, -4, -4, 9, 4, 1],
@@ -128,6 +125,7 @@ def test_the_same_seed_gives_the_same_mission(solved):
     assert again.mission.model_dump_json() == found.mission.model_dump_json()
 
 
+@pytest.mark.usefixtures("few_cells")
 def test_a_planned_mission_is_written_and_read_and_flies(tmp_path, capsys):
     file, out = written(tmp_path), tmp_path / "planned.json"
     assert main(["solve", str(file), "-o", str(out), "--plot", str(tmp_path / "p.png")]) == 0
