@@ -74,12 +74,13 @@ class BruteForce:
             for w, step, letters in self.near[v]:
                 if d + step > limit:
                     continue
-                onward = concatenate(word, letters)
-                if any(onward.count(a) > repeats for a in set(onward)):
+                onward = concatenate(word, letters) if letters else word
+                if d + step >= best.get((w, onward), math.inf) - 1e-12:
                     continue
-                if d + step < best.get((w, onward), math.inf) - 1e-12:
-                    best[w, onward] = d + step
-                    heapq.heappush(queue, (d + step, w, onward))
+                if any(onward.count(a) > repeats for a in set(letters)):
+                    continue
+                best[w, onward] = d + step
+                heapq.heappush(queue, (d + step, w, onward))
         return {k: d for k, d in best.items() if k[0] < goals}
 
     def optimum(self) -> float:

@@ -9,8 +9,15 @@ from hypothesis import strategies as st
 
 from netsp import Circle, Problem
 from netsp.command.main import main
-from netsp.hsignature import concatenate, cyclically_reduced, entangled, invert, reduce
-from netsp.hsignature.measures import measure, self_crossings, winding_numbers
+from netsp.hsignature import (
+    concatenate,
+    crossings,
+    cyclically_reduced,
+    entangled,
+    invert,
+    reduce,
+)
+from netsp.hsignature.measures import _cross_rays, measure, self_crossings, winding_numbers
 from netsp.online import Scene
 from netsp.space.measures import measure_path
 
@@ -140,6 +147,14 @@ def test_a_free_convex_hull_implies_the_other_definitions(path):
     assert set(m.linear_homotopy) <= set(m.convex_hull)
     if not m.convex_hull:
         assert m.local_visibility == ()
+
+
+@given(st.lists(st.tuples(*[st.integers(-3, 9)] * 4), min_size=1, max_size=30))
+def test_segments_are_known_to_have_letters_exactly_when_they_have(ends):
+    p, q = np.split(np.array(ends, dtype=float), 2, axis=1)
+    rays = np.array([[0.0, 0.0], [3.0, 1.0], [6.0, -2.0]])
+    expected = [bool(crossings(np.array(pair), rays)) for pair in zip(p, q, strict=True)]
+    assert _cross_rays(p, q, rays).tolist() == expected
 
 
 def test_the_command_prints_measures_of_any_path(tmp_path, capsys):

@@ -33,7 +33,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from netsp.arrays import Floats
+from netsp.arrays import Bools, Floats
 from netsp.hsignature.rays import crossings
 from netsp.hsignature.words import Word, entangled, reduce
 from netsp.problem import Problem
@@ -177,12 +177,24 @@ def against_local_visibility(
     steps = [crossings(line[k : k + 2], rays) for k in range(len(line) - 1)]
     begin = np.concatenate([[0], np.cumsum([len(s) for s in steps])])
     letters = [x for s in steps for x in s]
-    broken: set[int] = set()
-    for a, b in zip(first[free], second[free], strict=True):
-        between = letters[begin[a] : begin[b]]
-        direct = crossings(line[[a, b]], rays)
-        broken.update(entangled([*between, *(-x for x in reversed(direct))]))
+    first, second = first[free], second[free]
+    words: set[Word] = set()
+    for a, b, crosses in zip(
+        first, second, _cross_rays(line[first], line[second], rays), strict=True
+    ):
+        direct = crossings(line[[a, b]], rays) if crosses else ()
+        words.add((*letters[begin[a] : begin[b]], *(-x for x in reversed(direct))))
+    broken = {k for word in words for k in entangled(word)}
     return tuple(sorted(k - 1 for k in broken))
+
+
+def _cross_rays(p: Floats, q: Floats, rays: Floats) -> Bools:
+    """Return for segments from p to q, both (k, 2), whether they have letters (`crossings`)."""
+    sides = (p[:, :1] >= rays[:, 0]) != (q[:, :1] >= rays[:, 0])
+    (x, y), d = rays.T, q - p
+    with np.errstate(divide="ignore", invalid="ignore"):
+        height = p[:, 1:] + (x - p[:, :1]) / d[:, :1] * d[:, 1:]
+    return np.asarray((sides & (height > y)).any(axis=1))
 
 
 def _met(
