@@ -104,7 +104,7 @@ def towed(chord, length, tension, flow, nodes=20):
         "1 Coupled 0 0 -50 0 0 0 0", f"2 Coupled {chord} 0 -50 0 0 0 0",
         "--- LINES ---", "ID LineType AttachA AttachB UnstrLen NumSegs LineOutputs",
         "- - - - - - -", f"1 rope 1 2 {length / (1 + tension / stiff)} {nodes} -",
-        "--- OPTIONS ---", "0 writeLog", "5e-5 dtM", "100 WtrDpth", "1025 rho", "0.5 dtIC",
+        "--- OPTIONS ---", "0 writeLog", "2e-4 dtM", "100 WtrDpth", "1025 rho", "0.5 dtIC",
         "0.1 TmaxIC", "--- OUTPUTS ---", "--- END ---", "",
     ]  # fmt: skip
     return moordyn, "\n".join(lines), -np.array(flow)
