@@ -13,7 +13,6 @@ import pytest
 from matplotlib.text import Text
 from PIL import Image
 
-from netsp.online.simulate import simulate
 from netsp.pictures import style
 from netsp.pictures.animation import save_animation
 from netsp.pictures.film import film_of_flight, film_of_run
@@ -24,7 +23,7 @@ from netsp.pictures.sizing import draw_tether_curve
 from netsp.report import figures
 from netsp.report.stats import best_lengths, cells, methods
 from netsp.sizing.tether import tether_curve
-from tests.test_style import WHARF, mission, of, rows, run, tour
+from tests.test_style import WHARF, basin_flight, mission, of, rows, run, tour
 
 __all__ = ["mission", "rows", "run", "tour"]  # fixtures
 
@@ -55,9 +54,8 @@ def draw(what, file, request, monkeypatch):
     elif what == "roadmap":
         save_roadmap(WHARF, "taut", {}, file)
     elif what == "two runs":
-        found, scene = request.getfixturevalue("mission")
-        save_runs([simulate(found, scene=scene, planner=p) for p in ("predictive", "none")],
-                  scene, file)  # fmt: skip
+        _, scene = request.getfixturevalue("mission")
+        save_runs([basin_flight(), basin_flight("none")], scene, file)
     elif what.startswith("film"):
         save_animation([film_of(what, request)], file.with_suffix(".gif"), seconds=0.3, fps=10)
         with Image.open(file.with_suffix(".gif")) as film:
@@ -85,8 +83,8 @@ def film_of(what, request):
         since = {"visited": {a.goal: a.time for a in done.arrivals if a.goal >= 0},
                  "left out": {}, "cancelled": done.cancelled}  # fmt: skip
         return film_of_run(done.maps, rows, frames, since, 40)
-    found, scene = request.getfixturevalue("mission")
-    return film_of_flight(simulate(found, scene=scene), scene, 40)
+    _, scene = request.getfixturevalue("mission")
+    return film_of_flight(basin_flight(), scene, 40)
 
 
 def small(file):

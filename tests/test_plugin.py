@@ -85,7 +85,7 @@ def test_a_solver_of_another_package_works_in_a_study(installed, tmp_path):
 
 def test_a_tether_model_and_a_planner_of_another_package_fly(installed, tmp_path):
     data = json.loads((ROOT / "missions" / "basin.json").read_text())
-    data |= {"scene": str(ROOT / "scenes" / "basin.json"), "waypoints": data["waypoints"][::5]}
+    data |= {"scene": str(ROOT / "scenes" / "basin.json"), "waypoints": data["waypoints"][::12]}
     basin = tmp_path / "basin.json"
     basin.write_text(json.dumps(data))
     args = ("--planner", "cautious", "--tether-model", "straight", "-o", "run", "--quiet")

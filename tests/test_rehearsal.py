@@ -78,11 +78,11 @@ try:
 except KeyboardInterrupt:
     rng, time, words = np.random.default_rng(3), 0.0, set()
     corners = np.array(json.loads(sys.argv[2]), dtype=float)
-    track = np.concatenate([np.linspace(a, b, 40) for a, b in zip(corners[:-1], corners[1:])])
+    track = np.concatenate([np.linspace(a, b, 25) for a, b in zip(corners[:-1], corners[1:])])
     for k, place in enumerate(track):
-        time += 15.0 if k == 150 else 0.2
+        time += 15.0 if k == 100 else 0.2
         noise = 0.2 * rng.normal(size=3)
-        report = guard.take(Fix(time, tuple(map(float, place + noise)), estimate=k % 60 != 59))
+        report = guard.take(Fix(time, tuple(map(float, place + noise)), estimate=k % 40 != 39))
         words |= {c.word for c in report.classes}
     print(json.dumps([len(words), len(opened[0]), sorted(loaded() - opened[0])]))
 """

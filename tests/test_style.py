@@ -1,5 +1,6 @@
 """Every kind of picture against the list in docs/style.md."""
 
+import functools
 import itertools
 import json
 from pathlib import Path
@@ -41,37 +42,67 @@ ROLES = {
 NEUTRAL = {"#000000", "#ffffff", "#cccccc", "#b0b0b0", "#808080"}
 
 
-@pytest.fixture(scope="module")
-def tour():
+@functools.cache
+def wharf_tour():
+    """Return the tour of WHARF that pictures show, once for all modules."""
     return solve(WHARF)
 
 
-@pytest.fixture(scope="module")
-def run(tour):
+@functools.cache
+def wharf_run():
+    """Return a run of that tour with surprises, once for all modules."""
     barge = Circle(center=(12, 6.3), radius=0.8, name="barge")
     events = (
         Event(time=25, appear=barge), Event(time=60, cancel_goal="A3"),
         Event(time=70, vanish="barge"),
     )  # fmt: skip
-    return execute(WHARF, tour, surprises=Surprises(events=events))
+    return execute(WHARF, wharf_tour(), surprises=Surprises(events=events))
 
 
-@pytest.fixture(scope="module")
-def mission():
+@functools.cache
+def basin():
+    """Return a mission of eight waypoints and its scene, once for all modules."""
     found = Mission.load(ROOT / "missions" / "basin.json")
     found = found.model_copy(update={"waypoints": found.waypoints[:8]})
     return found, found.load_scene()
 
 
-@pytest.fixture(scope="module")
-def rows(tmp_path_factory):
-    file = tmp_path_factory.mktemp("style") / "rows.jsonl"
+@functools.cache
+def basin_flight(planner="predictive"):
+    """Return a flight of that mission, once for all modules."""
+    found, scene = basin()
+    return simulate(found, scene=scene, planner=planner)
+
+
+@functools.cache
+def small_study(file):
+    """Return the rows of a study of three solvers, once for all modules."""
     study = {
         "name": "style", "goals": [3, 4], "tether_lengths": [200], "time_limit": 5,
         "worlds": {"count": 2}, "solvers": [{"name": "auto"}, {"name": "mip"}, {"name": "greedy"}],
     }  # fmt: skip
     compare(Study.checked(study, "test"), file)
     return read_rows(file)
+
+
+@pytest.fixture(scope="module")
+def tour():
+    return wharf_tour()
+
+
+@pytest.fixture(scope="module")
+def run():
+    return wharf_run()
+
+
+@pytest.fixture(scope="module")
+def mission():
+    return basin()
+
+
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory):
+    return small_study(tmp_path_factory.getbasetemp() / "style-rows.jsonl")
 
 
 def of(what, request, monkeypatch):
@@ -94,10 +125,10 @@ def of(what, request, monkeypatch):
         save(Scene.load(ROOT / "scenes" / "oc4-jacket.json"), "x.png")
         return kept[0]
     if what == "mission":
-        found, scene = request.getfixturevalue("mission")
+        _, scene = request.getfixturevalue("mission")
         kept = []
         monkeypatch.setattr(style, "save", lambda figure, *_, **__: kept.append(figure))
-        save_runs([simulate(found, scene=scene)], scene, "x.png")
+        save_runs([basin_flight()], scene, "x.png")
         return kept[0]
     all_rows = request.getfixturevalue("rows")
     by_method, best = methods(all_rows), best_lengths(all_rows)
