@@ -32,7 +32,9 @@ from typing import Any
 from numba import njit
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-FORMAT_VERSION = 3
+from netsp.compiled.lazy_library import LINKABLE, is_for_kernel, is_linkable
+
+FORMAT_VERSION = 6
 """Version of the file format; kernels in files of another version are compiled again."""
 
 _PACKAGE = Path(__file__).resolve().parent.parent
@@ -46,6 +48,10 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
     def save(self, key: Any, data: Any) -> None:
         """Save a compiled kernel: first its file, then the index, so that no other process loads an
         older kernel under the same name."""
+        if is_linkable(data):
+            if not is_for_kernel():  # machine code for Python is saved in a moment
+                return
+            key = (LINKABLE, key)
         name = self._data_name(int(hashlib.sha256(self._dump(key)).hexdigest()[:15], 16))
         self._save_data(name, data)
         overloads = self._load_index()
@@ -56,14 +62,22 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
             self._tidy(set(overloads.values()))
 
     def contains(self, key: Any) -> bool:
-        """Return whether a compiled kernel is on disk, without loading it."""
-        name = self._load_index().get(key)
-        return name is not None and Path(self._data_path(name)).is_file()
+        """Return whether a kernel is on disk as Python, or the kernel that calls it, needs it."""
+        index, keys = self._load_index(), _keys(key) if is_for_kernel() else [key]
+        names = [index[one] for one in keys if one in index]
+        return any(Path(self._data_path(name)).is_file() for name in names)
+
+    def contains_any(self) -> bool:
+        """Return whether a kernel that Python can call is on disk, for any argument types."""
+        return any(key[0] != LINKABLE for key in self._load_index())
 
     def load(self, key: Any) -> Any:
         """Return a compiled kernel, or None if there is none or it cannot be read."""
-        with contextlib.suppress(Exception):  # pickle may raise anything on damaged bytes
-            return super().load(key)
+        for one in _keys(key):
+            with contextlib.suppress(Exception):  # pickle may raise anything on damaged bytes
+                data = super().load(one)
+                if data is not None:
+                    return data
         return None
 
     def _save_data(self, name: str, data: Any) -> None:
@@ -94,6 +108,12 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
             if isinstance(index, dict) and all(isinstance(name, str) for name in index.values()):
                 return index
         return {}
+
+
+def _keys(key: Any) -> list[Any]:
+    """Return the keys of a kernel without and with machine code, the preferred one first."""
+    keys = [(LINKABLE, key), key]
+    return keys if is_for_kernel() else keys[::-1]
 
 
 def keep_on_disk(dispatcher: Any, function: Callable[..., Any]) -> None:
@@ -135,7 +155,7 @@ def is_on_disk(dispatcher: Any, types: tuple[Any, ...]) -> bool:
 
 
 def is_any_on_disk(dispatcher: Any) -> bool:
-    """Return whether a kernel is on disk, compiled for any argument types.
+    """Return whether a kernel that Python can call is on disk, for any argument types.
 
     Parameters
     ----------
@@ -143,7 +163,7 @@ def is_any_on_disk(dispatcher: Any) -> bool:
         Dispatcher that `keep_on_disk` was called for.
     """
     file = _file_of(dispatcher)
-    return file is not None and bool(file._load_index())
+    return file is not None and file.contains_any()
 
 
 def lock_file(dispatcher: Any) -> Path | None:
@@ -164,7 +184,7 @@ def _file_of(dispatcher: Any) -> KernelFile | None:
     return file if isinstance(file, KernelFile) else None
 
 
-def cached(function: Callable[..., Any]) -> Any:
+def cached(function: Callable[..., Any], has_wrapper: bool = True) -> Any:
     """Return Numba's dispatcher of a function; it saves compiled code on disk where a folder is
     writable.
 
@@ -172,12 +192,16 @@ def cached(function: Callable[..., Any]) -> Any:
     ----------
     function : callable
         The function.
+    has_wrapper : bool
+        Whether the function is compiled with a wrapper for calls from Python; `LazyLibrary` adds
+        it later.
     """
-    # no wrappers for calls from C, because nothing calls kernels from C
+    # nothing calls kernels from C
+    options = {"no_cfunc_wrapper": True, "no_cpython_wrapper": not has_wrapper}
     try:
-        return njit(cache=True, nogil=True, no_cfunc_wrapper=True)(function)
+        return njit(cache=True, nogil=True, **options)(function)
     except RuntimeError:  # neither the package's nor the user's folder is writable
-        return njit(nogil=True, no_cfunc_wrapper=True)(function)
+        return njit(nogil=True, **options)(function)
 
 
 @cache

@@ -72,7 +72,10 @@ def runs_compiled(kernel: Any) -> bool:
     """
     from netsp.compiled.compile_policy import compiles
 
-    return compiles() and (current_policy().is_eager or bool(kernel.overloads) or is_kept(kernel))
+    if not compiles():
+        return False
+    compiled = getattr(kernel, "has_machine_code", bool(kernel.overloads))
+    return current_policy().is_eager or compiled or is_kept(kernel)
 
 
 def all_kernels() -> list[Any]:
@@ -208,11 +211,12 @@ def _dispatcher_of(function: Callable[..., Any]) -> Any:
     if not compiles():
         return UncompiledKernel(function)
     _register()
-    from netsp.compiled import disk_cache, tiered
+    from netsp.compiled import disk_cache, lazy_library, tiered
 
     is_kept_on_disk = disk_cache.is_supported()
     is_tiered = is_kept_on_disk and tiered.is_supported()
-    compiled = disk_cache.cached(function)
+    is_lazy = is_tiered and lazy_library.is_supported()
+    compiled = disk_cache.cached(function, has_wrapper=not is_lazy)
     if is_kept_on_disk:
         disk_cache.keep_on_disk(compiled, function)
     if is_tiered:

@@ -15,6 +15,7 @@ from time import thread_time
 from typing import Any
 
 from numba import int64, njit
+from numba.core import event
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.types import Boolean, Integer, unliteral  # type: ignore[attr-defined]
@@ -24,9 +25,15 @@ from netsp.compiled.arguments import call_within, can_be_interpreted, is_in_pool
 from netsp.compiled.compile_lock import is_locked, locked
 from netsp.compiled.compile_policy import compiles, current_policy
 from netsp.compiled.interpretation import called_kernels, is_in_numpy
+from netsp.compiled.lazy_library import (
+    compiled_for,
+    has_machine_code,
+    is_for_kernel,
+    lazy_libraries,
+)
 from netsp.compiled.overtime import Overtime
 
-OVERRIDDEN = ("compile", "get_call_template")
+OVERRIDDEN = ("compile", "get_call_template", "add_overload")
 """Methods of Numba's dispatcher that `TieredDispatcher` refines."""
 
 
@@ -66,7 +73,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
             return self._compiled(args, kwargs)
         if self.overloads:
             types = tuple(self.typeof_pyval(a) for a in args)
-            if _general(types) in self.overloads:
+            if self._is_ready(_general(types)):
                 return self._entry_for_narrow(types)
         on_disk = self._is_on_disk(args, policy.load_s)
         budget_s = policy.load_s
@@ -105,30 +112,70 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         """Compile for argument types, or load what another process has compiled for them.
 
         Numbers are compiled for their widest type: a kernel that is called with 0, 1 and a number
-        of 32 bits is compiled once.
+        of 32 bits is compiled once. Machine code is generated for calls from Python only.
         """
         types = _general(sig) if isinstance(sig, tuple) else sig
-        if types in self.overloads or disk_cache.is_on_disk(self, types):
-            return super().compile(types)
+        if self._is_ready(types):
+            return self.overloads[types].entry_point
+        with global_compiler_lock, lazy_libraries():
+            if not self._is_ready(types):  # no other thread has compiled it meanwhile
+                self._load_or_compile(types)
+        return self.overloads[types].entry_point
+
+    def _is_ready(self, types: tuple[Any, ...]) -> bool:
+        """Return whether what calls the kernel, Python or a kernel, needs no compiling for it."""
+        result = self.overloads.get(types)
+        return result is not None and (is_for_kernel() or has_machine_code(result))
+
+    def _load_or_compile(self, types: tuple[Any, ...]) -> None:
+        if disk_cache.is_on_disk(self, types):
+            self._obtain(types)
+            return
         file = disk_cache.lock_file(self)
         policy = current_policy()
         max_wait_s = policy.max_wait_ratio * policy.compile_time_s(self.bytecode())
-        with global_compiler_lock, locked(file, max_wait_s), _collector_paused():
+        with locked(file, max_wait_s), _collector_paused():
             try:
-                entry = super().compile(types)
+                self._obtain(types)
             except OSError:  # the folder takes no more files; the kernel is compiled all the same
-                if types not in self.overloads:
+                if not self._is_ready(types):
                     raise
                 TieredDispatcher.is_disk_full = True
-                return self.overloads[types].entry_point
-            TieredDispatcher.has_compiled |= file is not None
-            return entry
+            else:
+                TieredDispatcher.has_compiled |= file is not None
+
+    def _obtain(self, types: tuple[Any, ...]) -> None:
+        """Load what is on disk, or else compile, and generate machine code if Python calls it."""
+        if disk_cache.is_on_disk(self, types):
+            self.overloads.pop(types, None)  # what is in memory has no machine code
+        super().compile(types)
+        if self._is_ready(types):
+            return
+        details = {"dispatcher": self, "args": types, "return_type": None}
+        with event.trigger_event("numba:compile", data=details):
+            # after an interrupt, a half-made library is not used again
+            linked = self.overloads.pop(types)
+            self.add_overload(linked.library.wrapped(linked))
+        self._cache.save_overload(types, self.overloads[types])
+
+    def add_overload(self, cres: Any) -> None:
+        """Add a result of compiling; without machine code, Python does not call it."""
+        if has_machine_code(cres):
+            super().add_overload(cres)
+        else:
+            self.overloads[tuple(cres.signature.args)] = cres
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Return the template with which Numba compiles a call of this kernel by another one."""
-        return super().get_call_template(
-            _general(args), dict(zip(kws, _general(kws.values()), strict=True))
-        )
+        with compiled_for(is_kernel=True):
+            return super().get_call_template(
+                _general(args), dict(zip(kws, _general(kws.values()), strict=True))
+            )
+
+    @property
+    def has_machine_code(self) -> bool:
+        """Whether the kernel can be called compiled, for any argument types."""
+        return any(map(has_machine_code, list(self.overloads.values())))
 
     def _compiled(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Callable[..., Any]:
         return super()._compile_for_args(*args, **kwargs)  # type: ignore[no-any-return]
