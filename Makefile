@@ -23,7 +23,7 @@ $(VENV)/.installed: $(VENV)/.core
 
 # compile everything ahead: otherwise each of the parallel test processes compiles what it needs
 $(VENV)/.warm: $(VENV)/.installed
-	$(BIN)/netsp warm-up --quiet
+	$(BIN)/netsp warm-up --quiet --jobs 2
 	touch $@
 
 # write bytecode for later commands, even where the shell sets PYTHONDONTWRITEBYTECODE

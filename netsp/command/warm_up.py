@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
+
+from netsp.command.types import positive
 
 EXAMPLE = "netsp warm-up"
 
@@ -29,6 +32,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="print all functions and the CPU seconds of compiling each, without the functions "
         "that it calls; - if it was on disk already",
     )  # fmt: skip
+    p.add_argument(
+        "--jobs", type=positive, default=1, metavar="N",
+        help="processes that compile at the same time (default: 1)",
+    )  # fmt: skip
+    p.add_argument("--part", type=int, default=0, help=argparse.SUPPRESS)
     p.add_argument("--after", default=None, metavar="COMMAND", help=argparse.SUPPRESS)
 
 
@@ -41,7 +49,8 @@ def run(args: argparse.Namespace) -> int:
     times = CompileTimes()
     with everything_compiled(), times.measured():
         if args.after is None:
-            _compile(list(steps()), args.quiet)
+            with _other_processes(args.jobs) if not args.part else contextlib.nullcontext():
+                _compile(_own_first(list(steps()), args.part, args.jobs), args.quiet)
         else:
             with alone() as is_alone:
                 if is_alone:
@@ -49,6 +58,28 @@ def run(args: argparse.Namespace) -> int:
     if args.list:
         _print(times.seconds)
     return 0
+
+
+@contextlib.contextmanager
+def _other_processes(jobs: int) -> Iterator[None]:
+    """Have further processes compile while the body runs, and wait for them."""
+    command = [sys.executable, "-m", "netsp", "warm-up", "--quiet", "--jobs", str(jobs), "--part"]
+    others = [subprocess.Popen([*command, str(part)]) for part in range(1, jobs)]
+    try:
+        yield
+        for other in others:
+            other.wait()
+    finally:
+        for other in others:
+            other.terminate()
+
+
+def _own_first(every: list[Step], part: int, jobs: int) -> list[Step]:
+    """Return all steps, first those of one of several processes.
+
+    No kernel is compiled twice: a process waits for a kernel that another one is compiling.
+    """
+    return every[part::jobs] + [step for k, step in enumerate(every) if k % jobs != part]
 
 
 def _compile(every: list[Step], quiet: bool) -> None:
@@ -140,7 +171,7 @@ def steps() -> Iterator[Step]:
         # with a time limit alone, a busy machine would not call all kernels
         yield (
             f"solver {solver}",
-            partial(solve, world, solver, iteration_limit=20_000, time_limit=60.0),
+            partial(solve, world, solver, iteration_limit=2_000, time_limit=60.0),
         )
     for solver in ("dp", "mip"):
         yield f"solver {solver}, measured legs", partial(solve, fewer, solver, iteration_limit=4)
