@@ -381,7 +381,12 @@ def test_an_interrupt_while_a_new_order_is_searched_ends_the_run(monkeypatch):
     monkeypatch.setattr(module, "solve_graph", interrupted_search)
     monkeypatch.setattr(module, "_least", lambda *_: 0.0)
     push = events({"time": 5.0, "push": [1.0, 1.0, 0.0]})
-    run = execute(CORNER, solve(CORNER), FAST, surprises=push)
+    # what a shell starts in the background ignores Ctrl-C, and so would the run
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        run = execute(CORNER, solve(CORNER), FAST, surprises=push)
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert run.interrupted
     assert run.summary["defects"] == 0
     assert run.summary["visited"] == 0
