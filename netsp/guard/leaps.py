@@ -52,7 +52,7 @@ def _straight(field: DistanceField, here: Floats, places: Floats) -> int:
     """How many places are on one free line from here, as far as halving finds out."""
     step, count = places[0] - here, len(places)
     even = here + np.arange(1, count + 1)[:, None] * step
-    if not np.allclose(even, places, rtol=0.0, atol=1e-9 * (1.0 + float(np.abs(step).max()))):
+    if not (np.abs(even - places) <= 1e-9 * (1.0 + float(np.abs(step).max()))).all():
         return 0
     while count and not field.line_of_sight(here, places[count - 1]):
         count //= 2
