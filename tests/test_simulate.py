@@ -413,7 +413,8 @@ def test_lengths_in_a_grid_are_those_of_dijkstra_over_all_neighbours(shape, shar
     free = rng.random(shape) >= share
     root = tuple(int(rng.integers(n)) for n in shape)
     free[root] = True
-    cells = np.argwhere(free)
+    # in C order, as planners have them: kernels would be compiled anew for any other
+    cells = np.ascontiguousarray(np.argwhere(free))
     number = np.full(np.array(shape) + 2, -1)
     number[1:-1, 1:-1, 1:-1][free] = np.arange(len(cells))
     graph = lil_array((len(cells), len(cells)))
