@@ -1,10 +1,12 @@
 """Tests of the background process that compiles what is likely needed next."""
 
 import argparse
+import contextlib
 import os
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -145,6 +147,7 @@ def test_a_killed_process_leaves_no_lock_that_keeps_others_from_compiling(tmp_pa
     file = tmp_path / "background.lock"
     script = f"""
 import time
+from functools import partial
 from pathlib import Path
 from netsp.compiled.compile_lock import locked
 with locked(Path({str(file)!r})):
@@ -191,6 +194,54 @@ def test_warm_up_lists_all_functions(monkeypatch, capsys):
     *rows, last = capsys.readouterr().out.splitlines()
     assert "      -  compiled.growing.longer" in rows
     assert last.endswith(f"total, {len(rows)} functions")
+
+
+@pytest.mark.parametrize("jobs", [1, 2, 5])
+def test_each_process_runs_all_steps_and_first_those_of_no_other(jobs):
+    runs, begins = [], []
+    steps = [(str(k), partial(runs.append, k)) for k in range(7)]
+    for part in range(jobs):
+        runs.clear()
+        warm_up._compile(warm_up._own_first(steps, part, jobs), True)
+        assert sorted(runs) == list(range(7))
+        begins += runs[: len(range(part, 7, jobs))]
+    assert sorted(begins) == list(range(7))
+
+
+class _Process:
+    def __init__(self, command, **_):
+        self.command, self.calls = command, []
+
+    def wait(self):
+        self.calls.append("wait")
+
+    def terminate(self):
+        self.calls.append("terminate")
+
+
+@pytest.mark.parametrize("is_interrupted", [False, True])
+def test_the_other_processes_of_warm_up_are_waited_for_or_ended(is_interrupted, monkeypatch):
+    started = []
+
+    def start(command, **options):
+        started.append(_Process(command, **options))
+        return started[-1]
+
+    def step():
+        if is_interrupted:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(warm_up.subprocess, "Popen", start)
+    monkeypatch.setattr(warm_up, "steps", lambda: [("solver", step)])
+    with pytest.raises(KeyboardInterrupt) if is_interrupted else contextlib.nullcontext():
+        warm_up.run(warm_up_arguments("--jobs", "3", "--quiet"))
+    assert [process.command[-1] for process in started] == ["1", "2"]
+    expected = ["terminate"] if is_interrupted else ["wait", "terminate"]
+    assert [process.calls for process in started] == [expected] * 2
+    started.clear()
+    with contextlib.suppress(KeyboardInterrupt):
+        warm_up.run(warm_up_arguments("--jobs", "3", "--part", "1", "--quiet"))
+    assert not started
 
 
 def warm_up_arguments(*words):

@@ -62,9 +62,15 @@ def run(args: argparse.Namespace) -> int:
 
 @contextlib.contextmanager
 def _other_processes(jobs: int) -> Iterator[None]:
-    """Have further processes compile while the body runs, and wait for them."""
+    """Have further processes compile while the body runs, and wait for them.
+
+    They are silent: the body runs all steps too, and so reports what goes wrong.
+    """
     command = [sys.executable, "-m", "netsp", "warm-up", "--quiet", "--jobs", str(jobs), "--part"]
-    others = [subprocess.Popen([*command, str(part)]) for part in range(1, jobs)]
+    others = [
+        subprocess.Popen([*command, str(part)], stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        for part in range(1, jobs)
+    ]
     try:
         yield
         for other in others:
