@@ -6,12 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp.compiled import interpretation
-from netsp.compiled.compile_policy import CompilePolicy, compiled_by
+from netsp.compiled.compile_policy import CompilePolicy, compiled_by, everything_compiled
 from netsp.online import Scene
 from netsp.online.coverage import Surface, View, mark, nearest
 from netsp.online.paths.beside import sees
 from netsp.online.paths.tree import all_see, free_cells, grow, states_of, way
 from netsp.online.scene import packing, sampling
+from netsp.online.scene.sites import point_sites
 
 SOLIDS = (
     {"name": "ball", "sphere": {"center": [0, 0, 0], "radius": 1.0}},
@@ -126,3 +127,15 @@ def test_a_view_marks_the_same_patches_in_both_forms(field, seed, yaw):
         )
         assert_alike(loops(field, surface, *seen[2:], view), new)
     assert_alike(tuple(seen[2:]), tuple(seen[:2]))
+
+
+def test_arrays_in_any_memory_order_use_the_same_compiled_code():
+    rows = np.random.default_rng(0).uniform(-3, 3, (50, 3))
+    field = Scene(solids=SOLIDS[:2]).field()
+    with everything_compiled():
+        distances = field.distance(rows)
+        count = len(sampling.sample_many.overloads)
+        assert np.array_equal(field.distance(np.asfortranarray(rows)), distances)
+        assert np.array_equal(field.distance(np.repeat(rows, 2, axis=0)[::2]), distances)
+    assert len(sampling.sample_many.overloads) == count
+    assert point_sites(np.asfortranarray(rows)).flags.c_contiguous

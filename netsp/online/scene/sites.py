@@ -22,7 +22,7 @@ POINT, TRIANGLE = 4, 20
 
 def point_sites(points: Floats, radii: npt.ArrayLike = 0.0) -> Floats:
     """Rows of points (n, 3) with radii (n,) or one."""
-    return np.column_stack([points, np.broadcast_to(radii, len(points))]).astype(float)
+    return np.column_stack([points, np.broadcast_to(radii, len(points))]).astype(float, order="C")
 
 
 def triangle_sites(triangles: Floats) -> Floats:
