@@ -132,7 +132,7 @@ def test_an_interrupted_kernel_is_compiled_again(kernels, monkeypatch):
     with everything_compiled():
         kernels.total(A, 3)
         with monkeypatch.context() as patch:
-            patch.setattr(lazy_library.LazyLibrary, "_optimize_final_module", interrupted)
+            patch.setattr(lazy_library.LazyLibrary, "_finalize_final_module", interrupted)
             with pytest.raises(KeyboardInterrupt):
                 kernels.cells(A, 3)
         assert np.array_equal(kernels.cells(A, 3), interpreted(kernels.cells)(A, 3))

@@ -34,7 +34,7 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 from netsp.compiled.lazy_library import LINKABLE, is_for_kernel, is_linkable
 
-FORMAT_VERSION = 6
+FORMAT_VERSION = 7
 """Version of the file format; kernels in files of another version are compiled again."""
 
 _PACKAGE = Path(__file__).resolve().parent.parent
