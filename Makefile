@@ -22,7 +22,8 @@ $(VENV)/.installed: $(VENV)/.core
 	touch $@
 
 # compile everything ahead: otherwise each of the parallel test processes compiles what it needs
-$(VENV)/.warm: $(VENV)/.installed
+KERNELS = $(shell grep -rl --include='*.py' 'compiled.kernel import' netsp) $(wildcard netsp/compiled/*.py)
+$(VENV)/.warm: $(VENV)/.installed $(KERNELS)
 	$(BIN)/netsp warm-up --quiet --jobs 2
 	touch $@
 

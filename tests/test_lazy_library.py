@@ -1,6 +1,5 @@
 """Tests of kernels that get machine code only when Python calls them."""
 
-import importlib.util
 import subprocess
 import sys
 import threading
@@ -11,6 +10,7 @@ import pytest
 from netsp.compiled import disk_cache, kernel, lazy_library
 from netsp.compiled.compile_policy import compiles, everything_compiled
 from netsp.compiled.interpretation import interpreted
+from tests.fresh_modules import fresh_module
 
 pytestmark = pytest.mark.skipif(
     not compiles() or not lazy_library.is_supported(), reason="nothing is compiled lazily"
@@ -38,12 +38,7 @@ A = np.array([1.0, 2.5])
 
 
 def _module(folder):
-    folder.mkdir(exist_ok=True)
-    (folder / "lazy.py").write_text(MODULE)
-    spec = importlib.util.spec_from_file_location("lazy", folder / "lazy.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return fresh_module(folder, "lazy", MODULE)
 
 
 @pytest.fixture

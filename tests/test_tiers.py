@@ -5,7 +5,6 @@ import copy
 import errno
 import functools
 import gc
-import importlib.util
 import math
 import os
 import signal
@@ -56,6 +55,7 @@ from netsp.problem import Problem
 from netsp.roadmap import branches, legs, outline, tangents
 from netsp.solvers.solve import solve, travel_graph
 from netsp.worlds import FAMILIES, random_world
+from tests.fresh_modules import fresh_module
 
 PROBLEMS = sorted((Path(__file__).parent.parent / "problems").glob("*.json"))
 
@@ -155,11 +155,7 @@ def caller(x):
 
 def _module(folder, text):
     """Return a module of kernels that were never compiled."""
-    (folder / "fresh.py").write_text(text)
-    spec = importlib.util.spec_from_file_location("fresh", folder / "fresh.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return fresh_module(folder, "fresh", text)
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--list", action="store_true",
         help="print all functions and the CPU seconds of compiling each, without the functions "
-        "that it calls; - if it was on disk already",
+        "that it calls; - if it was on disk already, or another process compiled it",
     )  # fmt: skip
     p.add_argument(
         "--jobs", type=positive, default=1, metavar="N",

@@ -62,7 +62,7 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
             self._tidy(set(overloads.values()))
 
     def contains(self, key: Any) -> bool:
-        """Return whether a kernel is on disk as Python, or the kernel that calls it, needs it."""
+        """Return whether the code that the caller needs, Python or a kernel, is on disk."""
         index, keys = self._load_index(), _keys(key) if is_for_kernel() else [key]
         names = [index[one] for one in keys if one in index]
         return any(Path(self._data_path(name)).is_file() for name in names)

@@ -30,7 +30,7 @@ _ENVIRONMENT = "_ZN08NumbaEnv"  # prefix of the variables that hold a function's
 
 
 class _Caller(threading.local):
-    """What this thread compiles a function for."""
+    """Caller of the function that this thread compiles or loads."""
 
     is_kernel = False
 
@@ -39,7 +39,7 @@ _caller = _Caller()
 
 
 class LazyLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """Code of one function, whose machine code is generated once Python calls the function.
+    """Code of one function, which gets machine code once Python calls the function.
 
     Attributes
     ----------
@@ -85,8 +85,7 @@ class LazyLibrary(JITCodeLibrary):  # type: ignore[misc]
         return super().get_pointer_to_function(name)  # type: ignore[no-any-return]
 
     def wrapped(self, result: Any) -> Any:
-        """Return the result of compiling a function that Python can call: generates a wrapper and
-        machine code.
+        """Generate a wrapper and machine code; return a result of compiling that Python can call.
 
         Parameters
         ----------
@@ -180,7 +179,7 @@ def lazy_libraries() -> Iterator[None]:
 
 @contextlib.contextmanager
 def compiled_for(is_kernel: bool) -> Iterator[None]:
-    """State whether a kernel or Python calls what this thread compiles or loads in the body."""
+    """State the caller, a kernel or Python, of the functions that the body compiles or loads."""
     before = _caller.is_kernel
     _caller.is_kernel = is_kernel
     try:
@@ -190,18 +189,30 @@ def compiled_for(is_kernel: bool) -> Iterator[None]:
 
 
 def is_for_kernel() -> bool:
-    """Return whether a kernel calls what this thread compiles or loads."""
+    """Return whether a kernel calls the function that this thread compiles or loads."""
     return _caller.is_kernel
 
 
 def is_linkable(reduced: Any) -> bool:
-    """Return whether what Numba saves of a function is code that can only be linked."""
+    """Return whether a function's saved code has no machine code and can only be linked.
+
+    Parameters
+    ----------
+    reduced : tuple
+        Content of the function's file, as Numba saves it.
+    """
     library = reduced[0]  # see `CompileResult._reduce`
     return isinstance(library, tuple) and library[1] == LINKABLE
 
 
 def has_machine_code(result: Any) -> bool:
-    """Return whether Numba's result of compiling a function can be called from Python."""
+    """Return whether Python can call a compiled function.
+
+    Parameters
+    ----------
+    result : numba CompileResult
+        Result of compiling or loading the function.
+    """
     return getattr(result.library, "has_machine_code", True)
 
 

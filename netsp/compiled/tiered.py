@@ -109,7 +109,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         return self.was_on_disk
 
     def compile(self, sig: Any) -> Any:
-        """Compile for argument types, or load what another process has compiled for them.
+        """Compile the kernel for argument types, or load code that another process has compiled.
 
         Numbers are compiled for their widest type: a kernel that is called with 0, 1 and a number
         of 32 bits is compiled once. Machine code is generated for calls from Python only.
@@ -123,7 +123,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         return self.overloads[types].entry_point
 
     def _is_ready(self, types: tuple[Any, ...]) -> bool:
-        """Return whether what calls the kernel, Python or a kernel, needs no compiling for it."""
+        """Return whether the code in memory is enough for the caller, Python or a kernel."""
         result = self.overloads.get(types)
         return result is not None and (is_for_kernel() or has_machine_code(result))
 
@@ -145,7 +145,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
                 TieredDispatcher.has_compiled |= file is not None
 
     def _obtain(self, types: tuple[Any, ...]) -> None:
-        """Load what is on disk, or else compile, and generate machine code if Python calls it."""
+        """Load the kernel from disk or compile it, and generate machine code if Python calls it."""
         if disk_cache.is_on_disk(self, types):
             self.overloads.pop(types, None)  # what is in memory has no machine code
         super().compile(types)
@@ -174,7 +174,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
 
     @property
     def has_machine_code(self) -> bool:
-        """Whether the kernel can be called compiled, for any argument types."""
+        """True if Python can call compiled code of the kernel, for any argument types."""
         return any(map(has_machine_code, list(self.overloads.values())))
 
     def _compiled(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Callable[..., Any]:
