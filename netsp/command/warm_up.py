@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
 def _other_processes(jobs: int) -> Iterator[None]:
     """Have further processes compile while the body runs, and wait for them.
 
-    They are silent: the body runs all steps too, and so reports what goes wrong.
+    These processes are silent, because the body runs all steps too and reports their errors.
     """
     command = [sys.executable, "-m", "netsp", "warm-up", "--quiet", "--jobs", str(jobs), "--part"]
     others = [
