@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError, Problem
@@ -204,11 +204,17 @@ def test_an_outline_in_pieces_is_the_outline_in_one(seed, pieces, gap):
 
 @given(points=st.lists(st.tuples(st.integers(-9, 9), st.integers(-9, 9)), min_size=2, max_size=6),
        width=st.floats(0.1, 3.0))  # fmt: skip
+@example([(-5, 2), (1, -3), (3, 0), (-5, 2), (1, -3)], 2.5)
+@example([(1, 2), (-2, -1), (-4, 0), (2, -3), (-2, -2)], 2.555165860166079)
+@example([(-2, -2), (0, -2), (-1, 2), (0, 2), (-2, -2)], 2.5593006508723932)
 def test_a_widened_line_holds_all_within_half_its_width(points, width):
     line = shapely.LineString(points)
     if line.length == 0.0:
         return
-    assert widened(line, width).buffer(1e-6).covers(line.buffer(0.5 * width * 0.999))
+    # GEOS may fill holes in the buffer of a line that runs over itself, not in those of its pieces
+    area = widened(line, width).buffer(1e-6)
+    for a, b in itertools.pairwise(points):
+        assert a == b or area.covers(shapely.LineString([a, b]).buffer(0.5 * width * 0.999))
 
 
 def test_a_cropped_problem_refuses_a_tether_that_leaves_its_part_of_the_map(tmp_path):

@@ -10,6 +10,7 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
+from netsp.geometry.polygons import union
 from netsp.site.chart_classes import (
     CONTOURS,
     DEPTH_AREAS,
@@ -149,7 +150,7 @@ def _share_beyond(areas: Sequence[shapely.Geometry], window: CropWindow) -> floa
 
     circle = window.polygon
     near = [shapely.make_valid(area) for area in areas if not window.is_beyond(area)]
-    return float(circle.difference(shapely.union_all(near)).area / circle.area)
+    return float(circle.difference(union(near)).area / circle.area)
 
 
 @dataclass

@@ -21,6 +21,7 @@ from netsp.arrays import Floats
 from netsp.axes import UNITS
 from netsp.errors import InputError, UnansweredError, counted
 from netsp.files import check_file, read_bytes
+from netsp.geometry.polygons import union
 from netsp.site.contract import WORDS, words_in
 from netsp.site.dxf_shapes import WITHOUT_WIDTH, shape_damage, simple_entities
 from netsp.site.dxf_tags import Drawing, Record, Tag, read_drawing, written
@@ -474,7 +475,6 @@ class _Reader:
 
     def features(self, entity: _Entity) -> list[Feature]:
         """Return the feature of an entity; of a block with several layers one for each."""
-        import shapely
 
         record, layer = entity.record, entity.layer
         if record.type == "INSERT" and entity.pieces:
@@ -507,7 +507,7 @@ class _Reader:
                     Change(where, layer, "points in its block, beside other shapes: left out")
                 )
             if record.type == "MLINE" and all(p.geom_type == "Polygon" for p in whole):
-                whole = [shapely.union_all(whole)]
+                whole = [union(whole)]
             shape = whole[0] if len(whole) == 1 else collected(whole)
             out.append(
                 Feature(

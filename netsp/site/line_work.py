@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from netsp.arrays import Floats, Ints
+from netsp.geometry.polygons import union
 
 if TYPE_CHECKING:
     import shapely
@@ -80,7 +81,7 @@ def outlines(
                    for k in members]  # fmt: skip
         kept = [(k, line) for k, line in zip(members, snapped, strict=True) if line is not None]
         faces = shapely.polygonize([line for _, line in kept])
-        whole = shapely.union_all(list(faces.geoms))
+        whole = union(list(faces.geoms))
         used: set[int] = set()
         for part in getattr(whole, "geoms", [whole]):
             if part.is_empty:
@@ -149,12 +150,28 @@ def widened(line: shapely.LineString, width: float) -> shapely.Geometry:
     # where a line turns back, buffers with mitred joins end flat: its parts overlap there instead
     back = 1 + np.flatnonzero((ahead[1:] * ahead[:-1]).sum(axis=1) < MAX_TURN_COSINE)
     stops = [0, *back.tolist(), len(points) - 1]
-    parts = [shapely.LineString(points[a : b + 1]) for a, b in itertools.pairwise(stops)]
-    return shapely.union_all(
+    parts = [
+        part for a, b in itertools.pairwise(stops) for part in _simple_parts(points[a : b + 1])
+    ]
+    return union(
         shapely.buffer(
             parts, 0.5 * width, cap_style="square", join_style="mitre", mitre_limit=MITRE_LIMIT
         )
     )
+
+
+def _simple_parts(points: Floats) -> list[shapely.LineString]:
+    """Return a polyline in parts that do not meet themselves.
+
+    GEOS may lose a piece of the buffer of a line that runs over itself.
+    """
+    import shapely
+
+    line = shapely.LineString(points)
+    if line.is_simple:
+        return [line]
+    middle = len(points) // 2
+    return _simple_parts(points[: middle + 1]) + _simple_parts(points[middle:])
 
 
 def _corners(ends: Floats, tolerance: float) -> tuple[Ints, Ints]:

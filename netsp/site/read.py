@@ -20,6 +20,7 @@ from netsp import steps
 from netsp.axes import UNITS, column
 from netsp.errors import InputError, UnansweredError, counted
 from netsp.fields import checked_number
+from netsp.geometry.polygons import union
 from netsp.import_record import KIND_COLUMNS, MAX_NAMED, CropCircle, Site, UsedAs
 from netsp.models import explain, shown
 from netsp.problem import Problem
@@ -849,7 +850,7 @@ class _Site:
         if not rims:
             return outline
         inner = shapely.Polygon(outline.coords) if "Line" in outline.geom_type else outline
-        return shapely.union_all([*shapely.get_parts(shapely.make_valid(inner)), *rims])
+        return union([*shapely.get_parts(shapely.make_valid(inner)), *rims])
 
     def _is_beyond(self, shape: shapely.Geometry, grown: float) -> bool:
         return self.window is not None and self.window.is_beyond(shape, grown)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.geometry.polygons import union
 
 if TYPE_CHECKING:
     import shapely
@@ -72,7 +73,7 @@ def simple_polygons(shape: shapely.Geometry, inner: Any) -> tuple[list[shapely.P
     flat = shapely.force_2d(shape)
     if "Line" in flat.geom_type:
         lines = getattr(flat, "geoms", [flat])
-        flat = shapely.union_all([shapely.Polygon(line.coords) for line in lines])
+        flat = union([shapely.Polygon(line.coords) for line in lines])
     if not flat.is_valid:
         notes.append("crosses or touches itself: repaired")
         flat = shapely.make_valid(flat, method="structure", keep_collapsed=False)
@@ -148,7 +149,7 @@ def spurs_of(
     ]  # fmt: skip
     if "Line" not in flat.geom_type and flat.is_valid:
         return []
-    inside = shapely.union_all(polygons)
+    inside = union(polygons)
     out = []
     for line in lines:
         rest = shapely.line_merge(shapely.difference(shapely.node(line), inside))

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.geometry.polygons import union
 
 if TYPE_CHECKING:
     import shapely
@@ -168,9 +169,9 @@ def outline_of_faces(faces: list[shapely.Geometry], changes: list[str]) -> shape
     changes.append(FROM_ABOVE)
     flat = [shapely.force_2d(f) for f in faces if not f.is_empty]
     solid = [f for f in flat if f.geom_type == "Polygon" and _has_area(f)]
-    whole = shapely.union_all([shapely.make_valid(f) for f in solid])
+    whole = union([shapely.make_valid(f) for f in solid])
     areas = [p for p in getattr(whole, "geoms", [whole]) if "Polygon" in p.geom_type]
-    whole = shapely.union_all(areas)
+    whole = union(areas)
     if not whole.is_empty:
         return whole
     lines = [shapely.LineString(shapely.get_coordinates(f)) for f in flat]
