@@ -1,0 +1,246 @@
+"""Measures of the code's structure and language, as a table.
+
+Run `python benchmarks/structure.py [FOLDER]`; with `--list NAME`, the places that a row counts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import re
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+MAX_LINES, MAX_PARAMETERS = 40, 7
+
+BAD_OPENINGS = {
+    "of", "what", "whether", "those", "that", "so", "the", "as", "where", "which", "with", "when",
+    "how", "it", "its", "they", "such", "in", "at", "from", "if", "for",
+}  # fmt: skip
+"""First words of docstrings that hang on another sentence, except `The` before a head noun."""
+
+PRONOUNS = re.compile(r"\b(so many|the first of these|that many|the others? of|those that)\b", re.I)
+
+Place = tuple[str, int, str]
+"""File, line and text."""
+
+
+class Tree:
+    """All modules of a package.
+
+    Parameters
+    ----------
+    root : Path
+        Folder of the package.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.files = sorted(root.rglob("*.py"))
+        self.texts = {file: file.read_text(encoding="utf-8") for file in self.files}
+        self.trees = {file: ast.parse(text) for file, text in self.texts.items()}
+
+    def place(self, file: Path, node: ast.AST, text: str) -> Place:
+        """Return where a node is."""
+        return str(file.relative_to(self.root.parent)), getattr(node, "lineno", 1), text
+
+    def functions(self) -> Iterator[tuple[Path, ast.FunctionDef | ast.AsyncFunctionDef]]:
+        """Yield all functions and methods."""
+        for file, tree in self.trees.items():
+            for node in ast.walk(tree):
+                if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                    yield file, node
+
+    def constants(self) -> Iterator[tuple[Path, ast.stmt, str, object]]:
+        """Yield the module-level names that are bound to numbers, with their values."""
+        for file, tree in self.trees.items():
+            for node in tree.body:
+                if isinstance(node, ast.Assign) and len(node.targets) == 1:
+                    targets, value = node.targets[0], node.value
+                elif isinstance(node, ast.AnnAssign) and node.value is not None:
+                    targets, value = node.target, node.value
+                else:
+                    continue
+                for name, bound in _pairs(targets, value):
+                    number = _number(bound)
+                    if number is not None:
+                        yield file, node, name, number
+
+
+def _pairs(target: ast.expr, value: ast.expr) -> Iterator[tuple[str, ast.expr]]:
+    if isinstance(target, ast.Name):
+        yield target.id, value
+    elif isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+        for one, bound in zip(target.elts, value.elts, strict=False):
+            yield from _pairs(one, bound)
+
+
+def _number(value: ast.expr) -> object:
+    """Return the value of an expression of numeric literals, or None."""
+    if any(not isinstance(n, _NUMERIC) for n in ast.walk(value)):
+        return None
+    literals = [n.value for n in ast.walk(value) if isinstance(n, ast.Constant)]
+    if not literals or any(isinstance(v, bool | str | bytes | None.__class__) for v in literals):
+        return None
+    return ast.unparse(value)
+
+
+_NUMERIC = (
+    ast.Constant, ast.UnaryOp, ast.BinOp, ast.USub, ast.UAdd, ast.Add, ast.Sub, ast.Mult, ast.Div,
+    ast.Pow, ast.FloorDiv, ast.Tuple, ast.List, ast.Load, ast.LShift,
+)  # fmt: skip
+
+
+def _lines(tree: Tree) -> list[Place]:
+    return [
+        (str(f.relative_to(tree.root.parent)), k, "")
+        for f, text in tree.texts.items()
+        for k, _ in enumerate(text.splitlines(), 1)
+    ]
+
+
+def _names_twice(tree: Tree) -> list[Place]:
+    by_name = defaultdict(list)
+    for file in tree.files:
+        if file.stem != "__init__":
+            by_name[file.stem].append(file)
+    return [
+        (str(file.relative_to(tree.root.parent)), 1, name)
+        for name, files in sorted(by_name.items())
+        if len(files) > 1
+        for file in files
+    ]
+
+
+def _rooms(tree: Tree) -> list[Place]:
+    return [
+        (path.name, 1, "")
+        for path in sorted(tree.root.iterdir())
+        if path.suffix == ".py" or (path / "__init__.py").exists()
+    ]
+
+
+def _long(tree: Tree) -> list[Place]:
+    return [
+        tree.place(file, node, f"{node.name}: {length} lines")
+        for file, node in tree.functions()
+        if (length := _body_lines(node)) > MAX_LINES
+    ]
+
+
+def _body_lines(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    """Return the lines of a function, without its docstring."""
+    first = node.body[0]
+    documented = ast.get_docstring(node, clean=False) is not None
+    docstring = (first.end_lineno or 0) - first.lineno + 1 if documented else 0
+    return (node.end_lineno or 0) - node.lineno + 1 - docstring
+
+
+def _many_parameters(tree: Tree) -> list[Place]:
+    found = []
+    for file, node in tree.functions():
+        a = node.args
+        names = [p.arg for p in (*a.posonlyargs, *a.args, *a.kwonlyargs)]
+        count = len([name for name in names if name not in ("self", "cls")])
+        if count > MAX_PARAMETERS:
+            found.append(tree.place(file, node, f"{node.name}: {count} parameters"))
+    return found
+
+
+def _constants(tree: Tree) -> list[Place]:
+    return [tree.place(f, node, f"{name} = {value}") for f, node, name, value in tree.constants()]
+
+
+def _ambiguous_constants(tree: Tree) -> list[Place]:
+    values: dict[str, set[object]] = defaultdict(set)
+    modules: dict[str, set[Path]] = defaultdict(set)
+    for file, _, name, value in tree.constants():
+        values[name].add(value)
+        modules[name].add(file)
+    return [
+        ("", 0, f"{name}: {len(modules[name])} modules, {len(values[name])} values")
+        for name in sorted(values)
+        if len(modules[name]) > 1 and len(values[name]) > 1
+    ]
+
+
+def _documented(tree: Tree) -> Iterator[tuple[Path, ast.AST, str]]:
+    for file, module in tree.trees.items():
+        for node in ast.walk(module):
+            body = getattr(node, "body", None)
+            for statement in body if isinstance(body, list) else ():
+                value = getattr(statement, "value", None)
+                if (
+                    isinstance(statement, ast.Expr)
+                    and isinstance(value, ast.Constant)
+                    and isinstance(value.value, str)
+                ):
+                    yield file, statement, value.value.strip()
+
+
+def _openings(tree: Tree) -> list[Place]:
+    found = []
+    for file, node, text in _documented(tree):
+        words = text.split()
+        first = words[0].rstrip(",.:").lower() if words else ""
+        if first in BAD_OPENINGS and not (first == "the" and len(words) > 2):
+            found.append(tree.place(file, node, text.splitlines()[0]))
+    return found
+
+
+def _pronouns(tree: Tree) -> list[Place]:
+    return [
+        tree.place(file, node, text.splitlines()[0])
+        for file, node, text in _documented(tree)
+        if PRONOUNS.search(text)
+    ]
+
+
+def _skips(tree: Tree) -> list[Place]:
+    return [
+        (str(file.relative_to(tree.root.parent)), k, line.strip())
+        for file, text in tree.texts.items()
+        for k, line in enumerate(text.splitlines(), 1)
+        if "fmt: skip" in line
+    ]
+
+
+ROWS: dict[str, tuple[str, Callable[[Tree], list[Place]]]] = {
+    "lines": ("lines", _lines),
+    "rooms": ("names at the root", _rooms),
+    "basenames": ("modules whose basename is not unique", _names_twice),
+    "constants": ("module-level names of numbers", _constants),
+    "ambiguous": ("names of numbers in several modules with different values", _ambiguous_constants),
+    "long": (f"functions of more than {MAX_LINES} lines", _long),
+    "parameters": (f"functions of more than {MAX_PARAMETERS} parameters", _many_parameters),
+    "openings": ("docstrings that open with a pronoun or preposition", _openings),
+    "pronouns": ("docstrings with a pronoun for a number", _pronouns),
+    "skips": ("`# fmt: skip`", _skips),
+}
+
+
+def main() -> None:
+    """Print all measures, or the places of one."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("netsp"))
+    parser.add_argument("--list", choices=ROWS, help="print the places that a row counts")
+    args = parser.parse_args()
+    tree = Tree(args.folder.resolve())
+    if args.list:
+        for file, line, text in ROWS[args.list][1](tree):
+            print(f"{file}:{line}: {text}")
+        return
+    for text, measure in ROWS.values():
+        print(f"| {text} | {len(measure(tree))} |")
+    for room, count in Counter(_room(file) for file, _, _ in _lines(tree)).most_common():
+        print(f"| lines in {room} | {count} |")
+
+
+def _room(file: str) -> str:
+    parts = Path(file).parts
+    return parts[1] + "/" if len(parts) > 2 else "modules at the root"
+
+
+if __name__ == "__main__":
+    main()
