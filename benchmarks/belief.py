@@ -17,8 +17,8 @@ import numpy as np
 from guard_tracks import DRIFT, DT, NOISE, SPEED, drifted, track_of
 from table import head, heading, row
 
-from netsp.guard.fix import Fix
-from netsp.guard.guard import Guard, GuardOptions
+from netsp.online.guard.telemetry import Fix
+from netsp.online.guard.tether_guard import Guard, GuardOptions
 
 NAMES = ("wharf", "pool", "oc4-jacket", "random-11", "harbour-31")
 LITTLE = 0.05

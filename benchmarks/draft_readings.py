@@ -14,16 +14,16 @@ from typing import Any
 import numpy as np
 from table import ROOT, head, row
 
-from netsp.arrays import Floats
-from netsp.geometry import polylines
+from netsp.base.arrays import Floats
+from netsp.base.geometry import polylines
 from netsp.online.mission import Mission
+from netsp.online.mission_run import simulate
 from netsp.online.paths.refine import RefineParams
 from netsp.online.planner import PlannerOptions
-from netsp.online.planner.base import Planner
 from netsp.online.planner.pivots import Pivots
+from netsp.online.planner.planner import Planner
 from netsp.online.planner.react_draft import ReactDraftPlanner
-from netsp.online.simulate import simulate
-from netsp.online.tether import Tether
+from netsp.world.tether import Tether
 
 
 @dataclass

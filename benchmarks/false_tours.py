@@ -15,8 +15,8 @@ from itertools import pairwise
 import numpy as np
 
 from netsp import Circle, Polygon, Problem, Solution, Status
-from netsp.errors import InputError
-from netsp.solution import ProblemReference
+from netsp.base.errors import InputError
+from netsp.model.solution import ProblemReference
 
 Pair = tuple[Problem, Solution]
 Kind = Callable[[Problem, Solution, np.random.Generator], Pair | None]

@@ -27,29 +27,29 @@ import numpy as np
 from table import ROOT, head, heading, row
 
 from netsp import Circle, Problem, solve
-from netsp.errors import InputError, NetspError
-from netsp.execute.events import Surprises
-from netsp.execute.log import Execution, ExecutionOptions, ExecutionRow
-from netsp.execute.plan import legs_of
-from netsp.execute.run_record import RunRecord
-from netsp.fly.flight import fly
-from netsp.fly.flight_time import predicted_flight
-from netsp.fly.rehearsal import rehearse
-from netsp.fly.resume import from_record, read_run
-from netsp.fly.standby import stand_by
-from netsp.fly.stopped import RefusedError
-from netsp.geometry import polylines
-from netsp.link.address import Address
-from netsp.link.dialect import dialect, parser
-from netsp.link.frame import Frame
-from netsp.link.messages import Listener
-from netsp.link.modes import mode_name
-from netsp.link.session import Session
-from netsp.link.udp import UdpLink, messages_in
-from netsp.online.scene.scene import scene_of
-from netsp.online.tether import GeodesicTether
-from netsp.solution import Solution
-from netsp.worlds import reachable_world
+from netsp.base.errors import InputError, NetspError
+from netsp.base.geometry import polylines
+from netsp.model.random_worlds import reachable_world
+from netsp.model.solution import Solution
+from netsp.online.execute.events import Surprises
+from netsp.online.execute.execution_log import Execution, ExecutionOptions, ExecutionRow
+from netsp.online.execute.run_record import RunRecord
+from netsp.online.execute.tour_plan import legs_of
+from netsp.online.fly.flight_rehearsal import rehearse
+from netsp.online.fly.flight_time import predicted_flight
+from netsp.online.fly.resume import from_record, read_run
+from netsp.online.fly.standby import stand_by
+from netsp.online.fly.stopped import RefusedError
+from netsp.online.fly.tour_flight import fly
+from netsp.online.link.address import Address
+from netsp.online.link.dialect import dialect, parser
+from netsp.online.link.geo_frame import Frame
+from netsp.online.link.mavlink_messages import Listener
+from netsp.online.link.modes import mode_name
+from netsp.online.link.session import Session
+from netsp.online.link.udp import UdpLink, messages_in
+from netsp.world.scene.scene import scene_of
+from netsp.world.tether import GeodesicTether
 from tests.ardusub import BINARY, HOME, ArduSub
 from tests.autopilot import Earth
 from tests.simulated_session import SimulatedSession

@@ -9,7 +9,7 @@
     python benchmarks/frontier.py --peers             other people's solvers on the same graphs
 
 Worlds: 500 x 500, 20 circles of radius 10 to 30 (`--many`: 50 of radius 10 to 20), seeds from 0
-(`netsp.worlds`). A time is that of `netsp.solve` with `auto`: roadmap, legs and proof.
+(`netsp.model.random_worlds`). A time is that of `netsp.solve` with `auto`: roadmap, legs and proof.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from resumed import outcomes
 from table import head, heading, row
 
 from netsp import Problem, Status, solve, solve_graph, travel_graph, verify
-from netsp.errors import NetspError
-from netsp.report.figures import performance
-from netsp.worlds import random_world
+from netsp.base.errors import NetspError
+from netsp.model.random_worlds import random_world
+from netsp.view.report.figures import performance
 
 CELLS = [
     *[(n, t) for n in (5, 10, 15, 20) for t in (200, 250, 300, 350, 500)],

@@ -24,7 +24,7 @@ import numpy as np
 from table import head, heading, row
 
 from netsp import Status, TravelGraph, solve_graph
-from netsp.gtsplib import load
+from netsp.gtsp.gtsplib import load
 
 SIZES = (10, 20, 30, 40, 60)
 

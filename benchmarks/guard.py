@@ -27,13 +27,13 @@ from guard_tracks import DRIFT, DT, NOISE, SPEED, told_of, track_of, tracks
 from resumed import outcomes
 from table import head, heading, row
 
-from netsp.guard.alarms import Level
-from netsp.guard.fix import Fix
-from netsp.guard.guard import Guard, GuardOptions
-from netsp.guard.loops import loops_in
-from netsp.guard.report import Report
-from netsp.guard.tethers import Strands
-from netsp.problem import Circle, Polygon, Problem
+from netsp.model.problem import Circle, Polygon, Problem
+from netsp.online.guard.alarms import Level
+from netsp.online.guard.guard_report import Report
+from netsp.online.guard.loops import loops_in
+from netsp.online.guard.telemetry import Fix
+from netsp.online.guard.tether_belief import Strands
+from netsp.online.guard.tether_guard import Guard, GuardOptions
 
 LEAD, LONGER = 10.0, 12.0
 MOST_S = 90.0

@@ -17,8 +17,8 @@ import numpy as np
 from guard_tracks import DRIFT, DT, NOISE, SHIPPED, SPEED, drifted, recorded
 from table import head, heading, row
 
-from netsp.guard.fix import Fix
-from netsp.guard.guard import Guard, GuardOptions
+from netsp.online.guard.telemetry import Fix
+from netsp.online.guard.tether_guard import Guard, GuardOptions
 
 
 def resident() -> float:

@@ -26,16 +26,16 @@ from pathlib import Path
 import numpy as np
 from table import ROOT, head, heading, row
 
-from netsp.guard.alarms import Level
-from netsp.guard.fix import Fix
-from netsp.guard.guard import Guard, GuardOptions
-from netsp.guard.replay import read_fixes
-from netsp.guard.report import Report
-from netsp.guard.stream import replayed
 from netsp.hsignature import Word, concatenate, crossings
-from netsp.link.frame import Frame
+from netsp.model.problem import Problem
+from netsp.online.guard.alarms import Level
+from netsp.online.guard.guard_report import Report
+from netsp.online.guard.replay import read_fixes
+from netsp.online.guard.stream import replayed
+from netsp.online.guard.telemetry import Fix
+from netsp.online.guard.tether_guard import Guard, GuardOptions
+from netsp.online.link.geo_frame import Frame
 from netsp.online.mission import Mission
-from netsp.problem import Problem
 
 WARNED_S = 60.0
 """Time before a loop closes in which a warning counts for it, s."""

@@ -14,14 +14,14 @@ from guard_tracks import DRIFT_S, DT, SPEED
 from sites import SITES, mission_of, shipped
 from table import head, heading, row
 
-from netsp.guard.fix import Fix
-from netsp.guard.guard import Guard, GuardOptions
-from netsp.guard.space import SpaceSite
 from netsp.online import Scene
-from netsp.online.log import LogRow
+from netsp.online.guard.space_site import SpaceSite
+from netsp.online.guard.telemetry import Fix
+from netsp.online.guard.tether_guard import Guard, GuardOptions
 from netsp.online.mission import Mission
-from netsp.online.simulate import simulate
-from netsp.space.solve import solve_mission
+from netsp.online.mission_run import simulate
+from netsp.online.run_log import LogRow
+from netsp.plan.space.mission_solver import solve_mission
 
 
 def beside_flight(

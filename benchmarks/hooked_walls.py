@@ -27,7 +27,7 @@ from table import head, heading, row
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from netsp import Circle, Polygon, Problem
-from netsp.errors import InfeasibleError, InputError, NetspError
+from netsp.base.errors import InfeasibleError, InputError, NetspError
 from netsp.hsignature import Word
 from netsp.roadmap.taut import TautRoadmap
 from tests.brute import BruteForce

@@ -22,8 +22,8 @@ from false_tours import KINDS, WORLDS
 from table import head, heading, row
 
 from netsp import Circle, Polygon, Problem, Solution, Status, solve, verify
-from netsp.errors import InputError, NetspError
-from netsp.solution import ProblemReference
+from netsp.base.errors import InputError, NetspError
+from netsp.model.solution import ProblemReference
 
 FEW = {"max_classes": 1000}
 """Specks of obstacles have tens of thousands of classes; the judge need not wait for them."""

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from numba.core.registry import CPUDispatcher
 
+from netsp.base.compiled.arguments import NARROW_DTYPES, arrays_in, is_in_pool
+from netsp.base.compiled.compile_policy import everything_compiled
+from netsp.base.compiled.interpretation import interpreted
+from netsp.base.compiled.overtime import Overtime, within
+from netsp.base.compiled.tiered import TieredDispatcher
 from netsp.command.warm_up import steps
-from netsp.compiled.arguments import NARROW_DTYPES, arrays_in, is_in_pool
-from netsp.compiled.compile_policy import everything_compiled
-from netsp.compiled.interpretation import interpreted
-from netsp.compiled.overtime import Overtime, within
-from netsp.compiled.tiered import TieredDispatcher
 
 MAX_CALL_S = 0.3  # CPU seconds of one interpreted call; longer calls are not compared
 MAX_KERNEL_S = 3.0  # CPU seconds of all interpreted calls of a kernel; then no more are compared

@@ -21,9 +21,9 @@ from peak import highest
 from table import head, heading, row
 
 from netsp.online import Scene
-from netsp.online.scene import lattice, voxels
-from netsp.online.scene.field import DistanceField
-from netsp.online.tether import TETHERS
+from netsp.world.scene import lattice, voxels
+from netsp.world.scene.field import DistanceField
+from netsp.world.tether import TETHERS
 
 VOXEL = 0.05
 

@@ -17,10 +17,10 @@ from table import ROOT, head, heading, row
 
 from netsp import Problem
 from netsp.hsignature import Word
+from netsp.model.random_worlds import random_world
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.pulled import NOT_PULLED
 from netsp.roadmap.taut import TautRoadmap
-from netsp.worlds import random_world
+from netsp.roadmap.taut_by_word import NOT_PULLED
 
 SHIPPED = ("wharf", "pool", "oc4-jacket", "wec-array", "lillgrund-part")
 FAMILIES = ("icra2017", "clustered", "array", "harbour")

@@ -15,9 +15,9 @@ from library_worlds import FOLDER
 from table import head, heading, row, source
 
 from netsp import Problem, Solution, solve
-from netsp.errors import NetspError
-from netsp.library import Library
-from netsp.library.rank import ranking, read_rows
+from netsp.base.errors import NetspError
+from netsp.study.library import Library
+from netsp.study.library.rank import ranking, read_rows
 
 
 def solved(job: tuple[str, float]) -> tuple[str, Solution | None, str]:

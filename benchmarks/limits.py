@@ -30,9 +30,9 @@ from library_worlds import FOLDER
 from table import head, heading, row
 
 from netsp import Circle, Problem, solve
-from netsp.errors import InputError, NetspError
-from netsp.solvers.table import SOLVERS
-from netsp.worlds import random_world
+from netsp.base.errors import InputError, NetspError
+from netsp.model.random_worlds import random_world
+from netsp.plan.solver_table import SOLVERS
 
 
 def turbines() -> Problem:
@@ -160,7 +160,7 @@ def sites(missions: list[str]) -> Iterator[tuple[str, int, float, str, str]]:
     sys.path.insert(0, str(Path(__file__).parents[1]))
     from netsp import verify
     from netsp.online.mission import Mission
-    from netsp.space.solve import solve_mission
+    from netsp.plan.space.mission_solver import solve_mission
     from tests.clock_sites import watched
 
     problem = random_world(3, goals=10, tether_length=300.0)

@@ -17,7 +17,7 @@ from peak import highest
 from resumed import outcomes
 from table import head, heading, row
 
-import netsp.mip.overgoals as overgoals
+import netsp.mip.goal_relaxation as overgoals
 from netsp import Problem, solve, travel_graph, verify
 
 WORLDS = ((20, 600.0, 1), (60, 500.0, 4), (100, 500.0, 4), (200, 500.0, 9))

@@ -7,7 +7,7 @@ import shapely
 
 from netsp import Circle, Problem, Solution
 from netsp.judge.stringpull import StringPuller, reduce_sleeve
-from netsp.problem import Polygon
+from netsp.model.problem import Polygon
 from netsp.roadmap.paths import TautPaths
 
 

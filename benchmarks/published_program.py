@@ -14,8 +14,8 @@ import os
 from table import head, heading, row
 
 from netsp import TravelGraph, solve_graph
-from netsp.solvers.solve import travel_graph
-from netsp.worlds import reachable_world
+from netsp.model.random_worlds import reachable_world
+from netsp.plan.solve_problem import travel_graph
 
 CELLS = ((5, 200.0), (5, 300.0), (10, 200.0), (10, 250.0), (10, 300.0), (20, 200.0), (20, 300.0))
 """Goals and tether."""

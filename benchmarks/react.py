@@ -20,9 +20,9 @@ from table import RESULTS, head, heading, row, source
 from netsp.online import Scene
 from netsp.online.equipment import Camera
 from netsp.online.mission import Mission
+from netsp.online.mission_run import simulate
 from netsp.online.paths.refine import RefineParams
 from netsp.online.planner import PlannerOptions
-from netsp.online.simulate import simulate
 
 HERE = Path(__file__).parent.parent / "missions"
 PLANNERS = ("none", "react", "react-draft", "react-thresholds", "predictive")

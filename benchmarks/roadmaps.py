@@ -108,7 +108,7 @@ def ratios(counts: list[int], worlds: int, seeds: int) -> tuple[Ratios, Ratios, 
     """PRM* optimum over the exact one by the number of samples: along the roadmap, with the legs
     pulled taut, and how often there was no tour."""
     from netsp import solve
-    from netsp.errors import LimitReachedError
+    from netsp.base.errors import LimitReachedError
     from tests.worlds import random_world
 
     along: Ratios = {n: [] for n in counts}
@@ -134,7 +134,7 @@ def convergence(worlds: int = 3, seeds: int = 3) -> None:
     """As a table and a picture."""
     from matplotlib.figure import Figure
 
-    from netsp.pictures.style import EDGE, PATH, TETHER
+    from netsp.view.pictures.style import EDGE, PATH, TETHER
 
     counts = [250, 500, 1000, 2000, 4000, 8000, 16000]
     along, shortcut, lost = ratios(counts, worlds, seeds)

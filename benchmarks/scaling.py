@@ -25,11 +25,11 @@ from peak import highest
 from table import head, heading, row
 
 from netsp import Status, solve_graph
-from netsp.pictures.style import SERIES, save
-from netsp.problem import Problem
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.model.problem import Problem
+from netsp.model.random_worlds import random_world
 from netsp.roadmap.taut import TautRoadmap
-from netsp.travel.graph import TravelGraph
-from netsp.worlds import random_world
+from netsp.view.pictures.style import SERIES, save
 
 GOALS = (10, 20, 40, 80, 160, 320)
 TETHERS = (200, 250, 300, 350, 400, 450, 500, 550)

@@ -17,12 +17,12 @@ from fly import KILOMETRES, PROBLEMS, places, vehicle
 from table import ROOT, head, heading, row
 
 from netsp import Problem, Solution, solve
-from netsp.execute import ExecutionOptions, Surprises, execute
-from netsp.execute.log import Execution
-from netsp.fly.flight import fly
-from netsp.fly.rehearsal import rehearse
-from netsp.online.scene.scene import scene_of
-from netsp.online.tether import GeodesicTether
+from netsp.online.execute import ExecutionOptions, Surprises, execute
+from netsp.online.execute.execution_log import Execution
+from netsp.online.fly.flight_rehearsal import rehearse
+from netsp.online.fly.tour_flight import fly
+from netsp.world.scene.scene import scene_of
+from netsp.world.tether import GeodesicTether
 
 RESOLUTION = 1e-4
 """Share of the tether to which its model is right."""

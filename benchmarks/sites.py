@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from table import ROOT, head, heading, row
 
-from netsp.geometry import polylines
+from netsp.base.geometry import polylines
 from netsp.online import Scene
 from netsp.online.mission import Mission
+from netsp.online.mission_run import grid_of, simulate
 from netsp.online.paths.tree import ShortestTree, taut
-from netsp.online.scene.field import pushed_out
-from netsp.online.simulate import grid_of, simulate
+from netsp.world.scene.field import pushed_out
 
 SHARE = 1.1
 """Tether over the longest of the shortest."""

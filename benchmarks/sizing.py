@@ -19,11 +19,11 @@ from perturbed import violations
 from table import head, heading, row
 
 from netsp import Problem, Status, solve, verify
-from netsp.site import Projection, read_site
-from netsp.site.options import Looking
-from netsp.sizing import best_base, margins, tether_curve
-from netsp.sizing.candidates import over_grid
-from netsp.worlds import reachable_world
+from netsp.exchange.maps import Projection, read_site
+from netsp.exchange.maps.options import Looking
+from netsp.model.random_worlds import reachable_world
+from netsp.plan.sizing import best_base, tether_curve, tether_margins
+from netsp.plan.sizing.candidates import over_grid
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
 FORMATS = (
@@ -150,7 +150,7 @@ def margined(worlds: int) -> None:
     for problem, margin in cases:
         solution = solve(problem, margin=margin)
         begin = time.perf_counter()
-        found = margins(problem, solution)
+        found = tether_margins(problem, solution)
         took = time.perf_counter() - begin
         bad = violations(problem, solution, found.obstacles, worlds, seed=0)
         row(problem.name, f"{margin:g}", f"{solution.length:.3f}", f"{found.obstacles:.4f}",

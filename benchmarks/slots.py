@@ -17,16 +17,16 @@ import math
 import numpy as np
 from table import head, row
 
-from netsp.arrays import Floats
-from netsp.clock import Clock
+from netsp.base.arrays import Floats
+from netsp.base.clock import Clock
 from netsp.online.mission import Mission
-from netsp.online.scene.scene import Scene
-from netsp.space.bound import bound_of_all
-from netsp.space.legs import Ways
-from netsp.space.places import Places
-from netsp.space.solve import solve_mission
-from netsp.space.states import Effort
-from netsp.space.water import Water
+from netsp.plan.space.mission_solver import solve_mission
+from netsp.plan.space.path_bound import bound_of_all
+from netsp.plan.space.places import Places
+from netsp.plan.space.planning_context import Water
+from netsp.plan.space.space_legs import Ways
+from netsp.plan.space.states import Effort
+from netsp.world.scene.scene import Scene
 
 BOUNDS = (-6.0, -7.0, -2.0, 6.0, 7.0, 2.0)
 CLEARANCE, THICK, END = 0.1, 0.2, 4.0

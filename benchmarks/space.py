@@ -31,27 +31,32 @@ from sites import SITES, mission_of, shipped
 from table import ROOT, head, heading, row
 
 from netsp import Problem, solve
-from netsp.clock import Clock
+from netsp.base.clock import Clock
+from netsp.gtsp.travel.graph import TravelGraph
 from netsp.hsignature.rays import signature
+from netsp.model.random_worlds import reachable_world
 from netsp.online import Scene
-from netsp.online.log import Run
 from netsp.online.mission import Mission
-from netsp.online.scene.field import DistanceField
-from netsp.online.scene.scene import scene_of
-from netsp.online.simulate import grid_of, simulate
-from netsp.roadmap.reach import shortest_tethers
-from netsp.solvers.solve import solve_graph
-from netsp.space.judge import verify_mission
-from netsp.space.order import order_by_going_on
-from netsp.space.places import Places
-from netsp.space.plan import AS_GIVEN, OUT_AND_BACK, PLANE, SHORT_ORDER, water_of
-from netsp.space.prisms import tours_of_plan
-from netsp.space.signature import SpaceSignature
-from netsp.space.solve import GOING_ON, SolvedMission, seconds_until_home, solve_mission
-from netsp.space.upright import bound_of_upright
-from netsp.space.water import SHARE, Water, along, straight
-from netsp.travel.graph import TravelGraph
-from netsp.worlds import reachable_world
+from netsp.online.mission_run import grid_of, simulate
+from netsp.online.run_log import Run
+from netsp.plan.solve_problem import solve_graph
+from netsp.plan.space.judge import verify_mission
+from netsp.plan.space.mission_solver import (
+    GOING_ON,
+    SolvedMission,
+    seconds_until_home,
+    solve_mission,
+)
+from netsp.plan.space.places import Places
+from netsp.plan.space.planning_context import SHARE, Water, along, straight
+from netsp.plan.space.prisms import tours_of_plan
+from netsp.plan.space.space_plan import AS_GIVEN, OUT_AND_BACK, PLANE, SHORT_ORDER, water_of
+from netsp.plan.space.space_signature import SpaceSignature
+from netsp.plan.space.upright import bound_of_upright
+from netsp.plan.space.visit_order import order_by_going_on
+from netsp.roadmap.explain_unreachable import shortest_tethers
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.scene import scene_of
 
 MISSIONS = ("basin", "pipes", "jacket")
 LONGER_PEN = "net pen, 24 m of tether"

@@ -26,13 +26,13 @@ import trimesh
 from table import head, heading, row
 from tether import wander
 
-from netsp.compiled.kernel import kernel
-from netsp.geometry import polylines
+from netsp.base.compiled.kernel import kernel
+from netsp.base.geometry import polylines
 from netsp.online import GeodesicTether
-from netsp.online.scene.field import DistanceField, pushed_out
-from netsp.online.scene.sampling import Field, sample
-from netsp.online.scene.voxels import of_triangles
-from netsp.online.tether import Tether
+from netsp.world.scene.field import DistanceField, pushed_out
+from netsp.world.scene.sampling import Field, sample
+from netsp.world.scene.voxels import of_triangles
+from netsp.world.tether import Tether
 
 DELTA, VOXEL, THINNEST = 0.1, 0.05, 0.25
 

@@ -211,7 +211,10 @@ ROWS: dict[str, tuple[str, Callable[[Tree], list[Place]]]] = {
     "rooms": ("names at the root", _rooms),
     "basenames": ("modules whose basename is not unique", _names_twice),
     "constants": ("module-level names of numbers", _constants),
-    "ambiguous": ("names of numbers in several modules with different values", _ambiguous_constants),
+    "ambiguous": (
+        "names of numbers in several modules with different values",
+        _ambiguous_constants,
+    ),
     "long": (f"functions of more than {MAX_LINES} lines", _long),
     "parameters": (f"functions of more than {MAX_PARAMETERS} parameters", _many_parameters),
     "openings": ("docstrings that open with a pronoun or preposition", _openings),

@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 from table import ROOT, head, row, source
 
-from netsp.compare.path_comparison import PathComparison, compare_paths
-from netsp.compare.path_study import PathStudy
-from netsp.problem import Problem
-from netsp.report.stats import is_proven
-from netsp.site.path_file import read_paths
+from netsp.exchange.maps.path_file import read_paths
+from netsp.model.problem import Problem
+from netsp.study.compare.path_comparison import PathComparison, compare_paths
+from netsp.study.compare.path_study import PathStudy
+from netsp.view.report.stats import is_proven
 
 KEPT = ROOT / "studies" / "results"
 POINTS = 12
@@ -109,8 +109,8 @@ CLOCKED = ("lns", "anneal")
 def again(worlds: int, most_goals: int) -> tuple[int, list[str]]:
     """Run the trials of the first worlds with so few goals once more, but for those that a clock
     ends: how many are as kept, and those that are not."""
-    from netsp.compare.study import Trial
-    from netsp.compare.trial import run
+    from netsp.study.compare.study import Trial
+    from netsp.study.compare.trial import run
 
     same, differs = 0, []
     for study in ("icra2017-table1", "icra2017-fig5", "rss2016-fig3", "rss2016-fig4"):

@@ -24,11 +24,11 @@ from scipy.sparse.csgraph import dijkstra
 from table import ROOT, head, heading, row
 
 from netsp import Circle, Problem, Solution, solve
-from netsp.errors import NetspError
-from netsp.execute import ExecutionOptions, Surprises, execute
-from netsp.execute.log import Execution
-from netsp.online.tether.resolution import suggested_delta
-from netsp.worlds import random_world
+from netsp.base.errors import NetspError
+from netsp.model.random_worlds import random_world
+from netsp.online.execute import ExecutionOptions, Surprises, execute
+from netsp.online.execute.execution_log import Execution
+from netsp.world.tether.resolution import suggested_delta
 
 KINDS = (
     "none", "appear_on_path", "appear_on_tether", "appear_on_robot", "several", "vanish", "move",

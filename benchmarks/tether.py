@@ -21,11 +21,11 @@ from table import ROOT, head, heading, row
 
 from netsp import Problem
 from netsp.hsignature import signature
+from netsp.model.random_worlds import random_world
 from netsp.online import GeodesicTether, ReactTether, Scene
-from netsp.online.scene.field import DistanceField
-from netsp.online.scene.voxels import of_cloud_file
 from netsp.roadmap.paths import TautPaths
-from netsp.worlds import random_world
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.voxels import of_cloud_file
 
 SCENES = ROOT / "scenes"
 

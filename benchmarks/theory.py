@@ -19,13 +19,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from netsp import Circle, Polygon, Problem, solve
-from netsp.geometry import polylines
+from netsp.base.geometry import polylines
 from netsp.hsignature.rays import crossings, signature
-from netsp.pictures import style
-from netsp.pictures.moments import moments_of_plan
-from netsp.pictures.problem import draw_obstacles
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.taut import TautRoadmap
+from netsp.view.pictures import style
+from netsp.view.pictures.moments import moments_of_plan
+from netsp.view.pictures.problem_picture import draw_obstacles
 
 RISE = 0.35
 """Of a letter above its crossing."""

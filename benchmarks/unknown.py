@@ -14,9 +14,9 @@ import numpy as np
 from table import head, heading, row
 
 from netsp.online import Scene
-from netsp.online.log import Run
 from netsp.online.mission import Mission
-from netsp.online.simulate import simulate
+from netsp.online.mission_run import simulate
+from netsp.online.run_log import Run
 from netsp.online.surprises import SceneSurprises
 
 PILES = Scene.model_validate({

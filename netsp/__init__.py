@@ -14,37 +14,37 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from netsp.errors import InfeasibleError, InputError, NetspError, VerificationError
+    from netsp.base.errors import InfeasibleError, InputError, NetspError, VerificationError
+    from netsp.gtsp.travel.graph import TravelGraph
+    from netsp.gtsp.travel.result import Progress, Result
     from netsp.judge import Verification, verify
-    from netsp.problem import Circle, Goal, Polygon, Problem, State
-    from netsp.roadmap.tethers import Tethers
-    from netsp.solution import Solution, Status
-    from netsp.solvers.solve import solve, solve_graph, travel_graph
-    from netsp.travel.graph import TravelGraph
-    from netsp.travel.result import Progress, Result
+    from netsp.model.problem import Circle, Goal, Polygon, Problem, State
+    from netsp.model.solution import Solution, Status
+    from netsp.plan.solve_problem import solve, solve_graph, travel_graph
+    from netsp.roadmap.tether_classes import Tethers
 
 __version__ = "0.1.0"
 
 _PUBLIC = {
-    "Circle": "problem",
-    "Goal": "problem",
-    "InfeasibleError": "errors",
-    "InputError": "errors",
-    "NetspError": "errors",
-    "Polygon": "problem",
-    "Problem": "problem",
-    "Progress": "travel.result",
-    "Result": "travel.result",
-    "Solution": "solution",
-    "State": "problem",
-    "Status": "solution",
-    "Tethers": "roadmap.tethers",
-    "TravelGraph": "travel.graph",
+    "Circle": "model.problem",
+    "Goal": "model.problem",
+    "InfeasibleError": "base.errors",
+    "InputError": "base.errors",
+    "NetspError": "base.errors",
+    "Polygon": "model.problem",
+    "Problem": "model.problem",
+    "Progress": "gtsp.travel.result",
+    "Result": "gtsp.travel.result",
+    "Solution": "model.solution",
+    "State": "model.problem",
+    "Status": "model.solution",
+    "Tethers": "roadmap.tether_classes",
+    "TravelGraph": "gtsp.travel.graph",
     "Verification": "judge",
-    "VerificationError": "errors",
-    "solve": "solvers.solve",
-    "solve_graph": "solvers.solve",
-    "travel_graph": "solvers.solve",
+    "VerificationError": "base.errors",
+    "solve": "plan.solve_problem",
+    "solve_graph": "plan.solve_problem",
+    "travel_graph": "plan.solve_problem",
     "verify": "judge",
 }
 

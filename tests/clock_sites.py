@@ -14,10 +14,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import netsp.clock
-from netsp.clock import Clock, Flag
+import netsp.base.clock
+from netsp.base.clock import Clock, Flag
 
-OWN = {netsp.clock.__file__, __file__}
+OWN = {netsp.base.clock.__file__, __file__}
 
 Site = tuple[str, int]
 """File, relative to the package, and line."""
@@ -53,7 +53,7 @@ class Sites:
         frame = sys._getframe(2)
         while frame.f_back is not None and frame.f_code.co_filename in OWN:
             frame = frame.f_back
-        package = Path(netsp.clock.__file__).parent
+        package = Path(netsp.base.clock.__file__).parent
         file = Path(frame.f_code.co_filename)
         name = str(file.relative_to(package)) if file.is_relative_to(package) else file.name
         site = (name, frame.f_lineno)

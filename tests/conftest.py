@@ -34,8 +34,8 @@ def pytest_sessionfinish():
 @pytest.fixture
 def few_cells(monkeypatch):
     """Have commands solve missions with `FEW_CELLS`: the bounds hold as well, and are coarser."""
-    from netsp.space import solve
+    from netsp.plan.space import mission_solver
     from tests.worlds import FEW_CELLS
 
-    quick = functools.partial(solve.solve_mission, policy=FEW_CELLS)
-    monkeypatch.setattr(solve, "solve_mission", quick)
+    quick = functools.partial(mission_solver.solve_mission, policy=FEW_CELLS)
+    monkeypatch.setattr(mission_solver, "solve_mission", quick)

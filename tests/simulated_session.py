@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from netsp.link.dialect import GROUND_STATION, ONBOARD_COMPUTER, parser
-from netsp.link.frame import Frame
-from netsp.link.session import HEARTBEAT_S, Session
+from netsp.online.link.dialect import GROUND_STATION, ONBOARD_COMPUTER, parser
+from netsp.online.link.geo_frame import Frame
+from netsp.online.link.session import HEARTBEAT_S, Session
 from tests.autopilot import STEP, Simulation
 
 VEHICLE = ("vehicle", 1)
@@ -67,7 +67,7 @@ class SimulatedSession(Session):
                     self._take(message, VEHICLE)
 
     def _pass_on_stations(self) -> None:
-        from netsp.link.dialect import dialect
+        from netsp.online.link.dialect import dialect
 
         for ids, begin in self.stations.items():
             if self.simulation.now >= begin:

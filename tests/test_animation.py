@@ -11,21 +11,21 @@ import pytest
 from PIL import Image
 
 from netsp import Circle, Problem, solve
+from netsp.base.errors import InputError
 from netsp.command.main import main
-from netsp.errors import InputError
-from netsp.execute.events import Event, Surprises
-from netsp.execute.log import ExecutionOptions
-from netsp.execute.run import execute
-from netsp.execute.write import write_execution
-from netsp.online.log import read_run, write_run
+from netsp.online.execute.events import Event, Surprises
+from netsp.online.execute.execution_files import write_execution
+from netsp.online.execute.execution_log import ExecutionOptions
+from netsp.online.execute.tour_execution import execute
 from netsp.online.mission import Mission
-from netsp.online.simulate import simulate
-from netsp.pictures import style
-from netsp.pictures.animation import save_animation
-from netsp.pictures.film import film_of_mission, film_of_plan, steps_of
-from netsp.pictures.moments import moments_of_flight, moments_of_plan
-from netsp.report.opened import opened
-from netsp.space.solve import solve_mission
+from netsp.online.mission_run import simulate
+from netsp.online.run_log import read_run, write_run
+from netsp.plan.space.mission_solver import solve_mission
+from netsp.view.pictures import style
+from netsp.view.pictures.animation import save_animation
+from netsp.view.pictures.film import film_of_mission, film_of_plan, steps_of
+from netsp.view.pictures.moments import moments_of_flight, moments_of_plan
+from netsp.view.report.opened import opened
 from tests.pages import unpacked
 from tests.worlds import FEW_CELLS
 

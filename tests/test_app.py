@@ -19,26 +19,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, InfeasibleError, InputError, Problem, Solution, Tethers, solve, verify
+from netsp.app.dragged_tethers import Cursor
 from netsp.app.facts import facts, plain, shortest_sufficient
-from netsp.app.files import EXPORTS, bare_name
-from netsp.app.frame import Frame
+from netsp.app.served_files import EXPORTS, bare_name
 from netsp.app.shown import read_shown
 from netsp.app.solving import Worker
 from netsp.app.state import Document
-from netsp.app.tethers import Cursor
-from netsp.execute.events import Event, Surprises
-from netsp.execute.run import execute
-from netsp.execute.write import write_execution
-from netsp.export.write import export
-from netsp.geometry import polylines
-from netsp.online.log import write_run
+from netsp.app.view_box import Frame
+from netsp.base.geometry import polylines
+from netsp.exchange.maps.path_file import read_paths
+from netsp.exchange.maps.read_map import read_site
+from netsp.exchange.missions.mission_files import export
+from netsp.model.problem import Origin
+from netsp.online.execute.events import Event, Surprises
+from netsp.online.execute.execution_files import write_execution
+from netsp.online.execute.tour_execution import execute
 from netsp.online.mission import Mission
-from netsp.online.simulate import simulate
-from netsp.pathmeasures import measure_path
-from netsp.problem import Origin
-from netsp.site.path_file import read_paths
-from netsp.site.read import read_site
-from netsp.sizing.margins import margins
+from netsp.online.mission_run import simulate
+from netsp.online.run_log import write_run
+from netsp.plan.sizing.tether_margins import margins
+from netsp.study.paths import measure_path
 
 testclient = pytest.importorskip("starlette.testclient")
 

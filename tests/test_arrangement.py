@@ -19,8 +19,8 @@ from netsp import (
     travel_graph,
     verify,
 )
-from netsp.arrangement import closure
 from netsp.command.main import main
+from netsp.model.arrangement import closure
 from tests.worlds import random_world
 
 ORDERED = ("auto", "dp", "lns")

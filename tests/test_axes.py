@@ -7,8 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from netsp.axes import UNITS, column, height_axis, map_unit, metres_per_unit, read_table
-from netsp.errors import InputError
+from netsp.base.axes import UNITS, column, height_axis, map_unit, metres_per_unit, read_table
+from netsp.base.errors import InputError
 
 XYZ = ("x", "y", "z")
 

@@ -13,12 +13,12 @@ from types import SimpleNamespace
 import psutil
 import pytest
 
+from netsp.base.compiled import dynamic_array
+from netsp.base.compiled.compile_lock import locked
+from netsp.base.compiled.compile_policy import compiles
+from netsp.base.compiled.disk_cache import lock_file
+from netsp.base.compiled.tiered import TieredDispatcher
 from netsp.command import background_warm_up, main, warm_up
-from netsp.compiled import growing
-from netsp.compiled.compile_lock import locked
-from netsp.compiled.compile_policy import compiles
-from netsp.compiled.disk_cache import lock_file
-from netsp.compiled.tiered import TieredDispatcher
 
 ROOT = Path(__file__).parent.parent
 
@@ -69,7 +69,7 @@ def test_a_second_background_process_ends_at_once(monkeypatch):
     monkeypatch.setattr("os.nice", niceness.append)
     monkeypatch.setattr(warm_up, "steps", lambda: [("solver auto", lambda: ran.append(1))])
     args = warm_up_arguments("--after", "solve")
-    with locked(lock_file(growing.longer).with_name("background.lock")):
+    with locked(lock_file(dynamic_array.longer).with_name("background.lock")):
         assert warm_up.run(args) == 0
     assert ran == []
     assert warm_up.run(args) == 0
@@ -98,7 +98,7 @@ warm_up.steps = lambda: [("solver", compiled)]
 
 COMMAND = """
 from netsp.command import background_warm_up
-from netsp.compiled.tiered import TieredDispatcher
+from netsp.base.compiled.tiered import TieredDispatcher
 
 TieredDispatcher.has_compiled = True
 for _ in range(2):
@@ -118,7 +118,8 @@ def _wait_for(condition):
 def test_one_process_at_the_lowest_priority_compiles_and_ends_after_the_command(tmp_path):
     (tmp_path / "sitecustomize.py").write_text(SITE)
     (tmp_path / "likely_next.py").write_text(
-        "from netsp.compiled.kernel import kernel\n\n@kernel\ndef double(x):\n    return 2 * x\n"
+        "from netsp.base.compiled.kernel import kernel\n\n"
+        "@kernel\ndef double(x):\n    return 2 * x\n"
     )
     log, cache = tmp_path / "log", tmp_path / "cache"
     command = [sys.executable, "-c", COMMAND]
@@ -149,7 +150,7 @@ def test_a_killed_process_leaves_no_lock_that_keeps_others_from_compiling(tmp_pa
 import time
 from functools import partial
 from pathlib import Path
-from netsp.compiled.compile_lock import locked
+from netsp.base.compiled.compile_lock import locked
 with locked(Path({str(file)!r})):
     print("locked", flush=True)
     time.sleep(60)
@@ -192,7 +193,7 @@ def test_warm_up_lists_all_functions(monkeypatch, capsys):
     monkeypatch.setattr(warm_up, "steps", lambda: [("nothing", lambda: None)])
     assert warm_up.run(warm_up_arguments("--list", "--quiet")) == 0
     *rows, last = capsys.readouterr().out.splitlines()
-    assert "      -  compiled.growing.longer" in rows
+    assert "      -  base.compiled.dynamic_array.longer" in rows
     assert last.endswith(f"total, {len(rows)} functions")
 
 

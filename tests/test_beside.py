@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from netsp import solve, travel_graph
-from netsp.mip.solve import MipRun
-from netsp.solving import searching
-from netsp.solving.beside import beside_tour
-from netsp.solving.limits import Limits
-from netsp.travel.graph import least_tethers
-from netsp.worlds import random_world
+from netsp.gtsp import searching
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.neighbourhood import beside_tour
+from netsp.gtsp.travel.graph import least_tethers
+from netsp.mip.mip_solver import MipRun
+from netsp.model.random_worlds import random_world
 from tests.test_contract import random_graph
 
 

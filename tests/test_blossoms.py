@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp.mip.blossoms import best_teeth, blossom_cuts, shrunk
-from netsp.mip.bound import exact_bound
 from netsp.mip.cbc_program import CbcInteger, CbcRelaxation
 from netsp.mip.cuts import Cut, cut_coefficients
 from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.highs_integer import HighsInteger
+from netsp.mip.lagrangian_bound import exact_bound
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
 from tests.brute import brute_tour

@@ -9,14 +9,14 @@ from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, Polygon, Problem
-from netsp.clock import NEVER, Clock
-from netsp.errors import InfeasibleError, LimitReachedError
-from netsp.roadmap import legs as legs_of
+from netsp.base.clock import NEVER, Clock
+from netsp.base.errors import InfeasibleError, LimitReachedError
+from netsp.model.random_worlds import FAMILIES, random_world
+from netsp.roadmap import taut_legs as legs_of
 from netsp.roadmap.branches import OPEN
-from netsp.roadmap.legs import TautLegs
 from netsp.roadmap.taut import TautRoadmap
+from netsp.roadmap.taut_legs import TautLegs
 from netsp.roadmap.tethertree import GrowingTree
-from netsp.worlds import FAMILIES, random_world
 
 BAY = Polygon(polygon=[(2, -3), (8, -3), (8, 3), (2, 3), (2, 2), (7, 2), (7, -2), (2, -2)])
 

@@ -10,21 +10,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from netsp.gtsp.cost_matrix import LegCosts
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.solver_run import Stop
+from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip.branching import Tree
 from netsp.mip.combs import comb_cuts
 from netsp.mip.cuts import Cut, cut_coefficients
 from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.legprices import LegPrices
+from netsp.mip.mip_solver import MipRun
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
 from netsp.mip.root import Root
-from netsp.mip.solve import MipRun
 from netsp.mip.subtours import component_cuts
-from netsp.solving.legcosts import LegCosts
-from netsp.solving.limits import Limits
-from netsp.solving.run import Stop
-from netsp.travel.graph import TravelGraph
 from tests.brute import brute_tour
 from tests.test_blossoms import all_legs, some_cut, tours_as_points
 from tests.test_contract import random_graph
@@ -42,7 +42,7 @@ def test_the_first_legs_of_every_vertex_are_found_in_little_memory(monkeypatch):
     """Of ten rows at a time, and nothing of these is kept but a few legs."""
     graph = random_graph(0, 60, most=12)
     root = root_of(graph, tour=[0, *(graph.members(g)[0] for g in range(1, 61))])
-    monkeypatch.setattr("netsp.solving.legcosts.ROWS", 10)
+    monkeypatch.setattr("netsp.gtsp.cost_matrix.ROWS", 10)
     tracemalloc.start()
     legs = root._first_legs()
     peak = tracemalloc.get_traced_memory()[1]

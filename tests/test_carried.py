@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from netsp import Circle, Problem, Solution, solve, travel_graph, verify
-from netsp.clock import Clock
-from netsp.errors import LimitReachedError
+from netsp.base.clock import Clock
+from netsp.base.errors import LimitReachedError
+from netsp.plan import solve_problem as by_name
+from netsp.plan import tether_carry_columns
+from netsp.plan.tether_carry_columns import Carried, with_carried
 from netsp.roadmap import taut
-from netsp.solvers import carried
-from netsp.solvers import solve as by_name
-from netsp.solvers.carried import Carried, with_carried
 
 
 def windfarm(side=4, share=1.3, seed=0, radius=1.0):
@@ -108,14 +108,14 @@ def test_a_tether_is_carried_along_and_no_farther_than_it_reaches():
     problem = windfarm(4, 1.05)
     graph = few(problem)
     words = {}
-    chain = carried._along_straight_lines(graph, np.random.default_rng(0), Clock())
+    chain = tether_carry_columns._along_straight_lines(graph, np.random.default_rng(0), Clock())
     assert sorted(goal for goal, _ in chain) == list(range(1, 17))
-    again = carried._put_back(graph, chain, words, Clock())
+    again = tether_carry_columns._put_back(graph, chain, words, Clock())
     assert list(words) == chain
     assert again.tethers.max() <= problem.tether_length * (1.0 + 1e-9)
     ended = Clock()
     ended.end()
-    assert carried._along_straight_lines(graph, np.random.default_rng(0), ended) == []
+    assert tether_carry_columns._along_straight_lines(graph, np.random.default_rng(0), ended) == []
 
 
 def test_goals_over_one_place_are_carried_to():
@@ -191,7 +191,7 @@ def test_ctrl_c_while_a_roadmap_is_made_that_is_nothing_until_it_is_whole(presse
 
 def test_searches_in_vain_end_although_there_is_no_end_of_classes(monkeypatch):
     # so few may be looked at that each search begins anew with those of least tether
-    monkeypatch.setattr(carried, "MOST_PER_GOAL", 4)
+    monkeypatch.setattr(tether_carry_columns, "MOST_PER_GOAL", 4)
     graph = few(windfarm())
     found = with_carried(graph, Clock(), np.random.default_rng(1))
     assert found.graph.is_tour(found.tour)

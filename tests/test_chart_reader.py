@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError
-from netsp.site.options import Looking, SiteOptions
-from netsp.site.projection import Projection
-from netsp.site.read import import_site, read_map
-from netsp.site.sea_floor import Danger, DepthArea, sea_floor
-from netsp.site.selection import Selection
+from netsp.exchange.maps.options import Looking, SiteOptions
+from netsp.exchange.maps.projection import Projection
+from netsp.exchange.maps.read_map import import_site, read_map
+from netsp.exchange.maps.sea_floor import Danger, DepthArea, sea_floor
+from netsp.exchange.maps.selection import Selection
 from tests.chart_writer import write_cell
 
 pytest.importorskip("pyogrio")

@@ -10,18 +10,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError, Problem
+from netsp.base.errors import UnansweredError
 from netsp.command.main import main
-from netsp.errors import UnansweredError
-from netsp.site import chart_classes, read
-from netsp.site.chart_classes import REASONS, chart_kind, chart_radius, chart_width
-from netsp.site.crop import CropWindow, cropped
-from netsp.site.feature import Feature, Map
-from netsp.site.options import Looking, SiteOptions
-from netsp.site.projection import Projection
-from netsp.site.read import import_site
-from netsp.site.sea_floor import DepthArea, sea_floor
-from netsp.site.selection import Selection
-from netsp.sizing.base import best_base
+from netsp.exchange.maps import chart_classes
+from netsp.exchange.maps import read_map as read
+from netsp.exchange.maps.chart_classes import REASONS, chart_kind, chart_radius, chart_width
+from netsp.exchange.maps.crop import CropWindow, cropped
+from netsp.exchange.maps.feature import Feature, Map
+from netsp.exchange.maps.options import Looking, SiteOptions
+from netsp.exchange.maps.projection import Projection
+from netsp.exchange.maps.read_map import import_site
+from netsp.exchange.maps.sea_floor import DepthArea, sea_floor
+from netsp.exchange.maps.selection import Selection
+from netsp.plan.sizing.base_placement import best_base
 
 pyogrio = pytest.importorskip("pyogrio")
 shapely = pytest.importorskip("shapely")
@@ -176,7 +177,7 @@ def test_a_sea_floor_lies_within_the_depths_of_its_areas(seed):
 @pytest.mark.parametrize("name", ["floor.asc", "floor.tif"])
 def test_a_written_sea_floor_is_read_by_scenes(name, tmp_path):
     pytest.importorskip("rasterio")
-    from netsp.online.scene.floor import floor_mesh
+    from netsp.world.scene.floor import floor_mesh
 
     area = DepthArea(shapely.box(-4, -2, 4, 6), 3.0, 9.0)
     points = np.array([(-4, -2, 4.0), (4, -2, 8.0), (4, 6, 8.0), (-4, 6, 4.0)])
@@ -301,7 +302,7 @@ def test_what_is_missing_is_asked_for_without_options_of_the_command_line(monkey
 
 
 def test_the_report_says_what_became_of_each_layer(monkeypatch):
-    from netsp.report.briefing import imported
+    from netsp.view.report.briefing import imported
 
     file = chart(
         monkeypatch, feature(0, "PILPNT", shapely.Point(5, 0)),

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, InputError, Problem, solve
-from netsp.axes import metres_per_unit
+from netsp.base.axes import metres_per_unit
 from netsp.command.main import main
-from netsp.sizing.clearance_advice import ClearancePolicy, clearance_advice, clearance_room
+from netsp.plan.sizing.clearance_advice import ClearancePolicy, clearance_advice, clearance_room
 
 FLIGHTS = Path(__file__).parent / "data" / "ardusub47"
 PROBLEMS = Path(__file__).parent.parent / "problems"

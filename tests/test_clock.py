@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from netsp import Problem, Status, solve, solve_graph, travel_graph, verify
-from netsp.clock import (
+from netsp.base.clock import (
     BOUNDED,
     NEVER,
     Clock,
@@ -15,15 +15,15 @@ from netsp.clock import (
     abandoned_work_goes_on,
     end_if_abandoned,
 )
-from netsp.compiled.compile_policy import everything_compiled
-from netsp.errors import InputError, LimitReachedError, MemoryLimitError
-from netsp.memory import ask, available
+from netsp.base.compiled.compile_policy import everything_compiled
+from netsp.base.errors import InputError, LimitReachedError, MemoryLimitError
+from netsp.base.ram import ask, available
 from netsp.mip.cutpool import IDLE, CutPool
 from netsp.mip.cuts import Cut
+from netsp.model.random_worlds import random_world, reachable_world
 from netsp.online.mission import Mission
-from netsp.online.scene.scene import Scene
-from netsp.space.solve import MissionPolicy, solve_mission
-from netsp.worlds import random_world, reachable_world
+from netsp.plan.space.mission_solver import MissionPolicy, solve_mission
+from netsp.world.scene.scene import Scene
 from tests.clock_sites import watched
 
 
@@ -109,7 +109,7 @@ def test_a_cut_pool_never_gives_one_cut_the_count_of_another():
 
 def test_the_same_iterations_give_the_same_tour_whatever_the_machine_does(monkeypatch):
     """The temperature of ruin and recreate falls by rounds, not by how many fit into a moment."""
-    import netsp.lns.search as search
+    import netsp.gtsp.search.local_search as search
 
     problem = random_world(2, goals=25, tether_length=300.0)
     found = set()

@@ -16,12 +16,12 @@ from hypothesis import strategies as st
 
 from netsp import InputError, solve
 from netsp.command.main import main
-from netsp.compare import pool
-from netsp.compare.rows import RowsFile, combine, read_rows
-from netsp.compare.run import compare
-from netsp.compare.study import Study, shard
-from netsp.compare.trial import MOST_POINTS, run, thinned, world_of
-from netsp.solvers.table import SOLVERS, Solver
+from netsp.plan.solver_table import SOLVERS, Solver
+from netsp.study.compare import pool
+from netsp.study.compare.rows import RowsFile, combine, read_rows
+from netsp.study.compare.study import Study, shard
+from netsp.study.compare.study_run import compare
+from netsp.study.compare.trial import MOST_POINTS, run, thinned, world_of
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -193,7 +193,7 @@ def test_solvers_that_crash_hang_or_eat_cost_one_row_each(tmp_path, monkeypatch)
     patch = f"""
         import sys
         sys.path.insert(0, {str(ROOT)!r})
-        from netsp.solvers.table import SOLVERS, Solver
+        from netsp.plan.solver_table import SOLVERS, Solver
         for name in {sorted(names)}:
             SOLVERS[name] = Solver(name, f"badsolvers:{{name}}")
     """
@@ -345,7 +345,7 @@ def _with_netsp():
 
 
 def test_a_dask_cluster_gives_the_same_rows_though_a_worker_is_killed(dask_cluster, tmp_path):
-    from netsp.compare.cluster import dask_executor
+    from netsp.study.compare.cluster import dask_executor
 
     address, workers = dask_cluster
     (tmp_path / "study.toml").write_text(TOML.replace("count = 2", "count = 3"))
@@ -364,7 +364,7 @@ def test_a_dask_cluster_gives_the_same_rows_though_a_worker_is_killed(dask_clust
 
 
 def test_a_scheduler_that_is_not_there_is_told_in_one_line(tmp_path, capsys, monkeypatch):
-    from netsp.compare import cluster
+    from netsp.study.compare import cluster
 
     monkeypatch.setattr(cluster, "CONNECT", 1.0)
     (tmp_path / "s.toml").write_text(TOML)

@@ -1,7 +1,6 @@
 """What is kept of compiled functions must never outlive its sources."""
 
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -10,11 +9,11 @@ from pathlib import Path
 import pytest
 
 import netsp
-from netsp.compiled.disk_cache import KernelFile
+from netsp.base.compiled.disk_cache import KernelFile
 
 CALLEE = """
 from typing import NamedTuple
-from netsp.compiled.kernel import kernel
+from netsp.base.compiled.kernel import kernel
 
 class {name}(NamedTuple):
     x: float
@@ -26,7 +25,7 @@ def times(pair: {name}) -> float:
 
 CALLER = """
 from netsp.callee import {name}, times
-from netsp.compiled.kernel import kernel
+from netsp.base.compiled.kernel import kernel
 
 @kernel
 def twice(pair: {name}) -> float:
@@ -35,18 +34,10 @@ def twice(pair: {name}) -> float:
 
 SCRIPT = """
 from netsp.caller import *
-from netsp.compiled.compile_policy import everything_compiled
+from netsp.base.compiled.compile_policy import everything_compiled
 with everything_compiled():
     print(twice({name}(1.0)))
 """
-
-
-def _imported_by(files, source):
-    """Return the top-level modules of netsp that files import, directly or indirectly."""
-    text = "".join(file.read_text() for file in files)
-    names = re.findall(r"^from netsp\.(\w+) import", text, re.M)
-    found = {source / f"{name}.py" for name in names if (source / f"{name}.py").is_file()}
-    return found | (_imported_by(found, source) if found else set())
 
 
 @pytest.fixture
@@ -55,9 +46,7 @@ def package(tmp_path):
     source = Path(netsp.__file__).parent
     (tmp_path / "netsp").mkdir()
     (tmp_path / "netsp" / "__init__.py").touch()
-    shutil.copytree(source / "compiled", tmp_path / "netsp" / "compiled")
-    for needed in _imported_by((source / "compiled").glob("*.py"), source):
-        shutil.copy(needed, tmp_path / "netsp" / needed.name)
+    shutil.copytree(source / "base", tmp_path / "netsp" / "base")
 
     def run(name: str, factor: float) -> float:
         for module, text in (("callee", CALLEE), ("caller", CALLER)):

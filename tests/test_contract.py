@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError, Problem, Status, TravelGraph, solve, solve_graph, verify
-from netsp.solvers.solve import travel_graph
-from netsp.solvers.table import ROADMAPS, SOLVERS
+from netsp.plan.solve_problem import travel_graph
+from netsp.plan.solver_table import ROADMAPS, SOLVERS
 from tests.brute import brute_tour
 from tests.worlds import random_world
 

@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp.clock import Clock
+from netsp.base.clock import Clock
+from netsp.model.problem import Circle
 from netsp.online import Scene
 from netsp.online.mission import Mission
-from netsp.problem import Circle
-from netsp.space.cross_sections import Depths, cross_sections
-from netsp.space.places import Places
-from netsp.space.plan import water_of
-from netsp.space.upright import bound_of_upright, upright_obstacles
+from netsp.plan.space.cross_sections import Depths, cross_sections
+from netsp.plan.space.places import Places
+from netsp.plan.space.space_plan import water_of
+from netsp.plan.space.upright import bound_of_upright, upright_obstacles
 
 DIP = 0.02
 ANCHOR = np.array([4.0, 0.0, -1.0])

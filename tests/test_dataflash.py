@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from netsp import Circle, Problem
-from netsp.errors import InputError
-from netsp.guard.guard import Guard, GuardOptions
-from netsp.guard.replay import read_fixes
-from netsp.guard.stream import replayed
-from netsp.link.frame import Frame
+from netsp.base.errors import InputError
+from netsp.online.guard.replay import read_fixes
+from netsp.online.guard.stream import replayed
+from netsp.online.guard.tether_guard import Guard, GuardOptions
+from netsp.online.link.geo_frame import Frame
 
 SITE = Problem(
     base=(0, 0), goals=[(9, 0, -1)], tether_length=30,

@@ -117,7 +117,7 @@ def test_the_site_has_every_page_every_public_name_and_every_field():
     site = (ROOT / "mkdocs.yml").read_text()
     assert all(f": {page.name}\n" in site for page in (ROOT / "docs").glob("*.md"))
     reference = (ROOT / "docs" / "reference.md").read_text()
-    errors = vars(importlib.import_module("netsp.errors"))
+    errors = vars(importlib.import_module("netsp.base.errors"))
     for name in netsp.__all__:
         assert re.search(rf"^::: netsp[\w.]*\.{name}$", reference, re.M) or name in errors, name
     pages = runpy.run_path(str(ROOT / "docs" / "hooks" / "pages.py"))

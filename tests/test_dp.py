@@ -10,19 +10,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError, Status, TravelGraph, solve_graph, travel_graph
-from netsp.dp import walks as walks_module
-from netsp.dp.labels import translate
-from netsp.dp.memory import MOST, Memory
-from netsp.dp.walks import Walks
+from netsp.gtsp.dp import walks as walks_module
+from netsp.gtsp.dp.label_kernels import translate
+from netsp.gtsp.dp.ng_sets import MOST, Memory
+from netsp.gtsp.dp.walks import Walks
+from netsp.gtsp.solver_run import Stop
 from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.prices import Prices
 from netsp.mip.program import Duals
-from netsp.solving.run import Stop
 from tests.brute import brute_tour
 from tests.test_contract import random_graph
 from tests.worlds import costs_of, random_world
 
-SOLVE = importlib.import_module("netsp.dp.solve")
+SOLVE = importlib.import_module("netsp.gtsp.dp.dp_solver")
 
 
 def tours(graph):
@@ -102,7 +102,7 @@ def test_a_matrix_is_taken_over_block_by_block_until_the_flag_is_set(shuffled, m
     order = np.random.default_rng(0).permutation(len(graph)) if shuffled else np.arange(len(graph))
     cluster, costs = graph.cluster[order], graph.costs[np.ix_(order, order)].astype(np.float32)
     whole = Walks(cluster, costs)
-    monkeypatch.setattr("netsp.dp.walks.ROWS", 3)
+    monkeypatch.setattr("netsp.gtsp.dp.walks.ROWS", 3)
     blocks = Walks(cluster, costs)
     assert (whole.values == blocks.values).all()
     assert whole.values.dtype == np.float64
@@ -172,7 +172,7 @@ def test_dp_proves_the_same_optimum_as_mip_whether_legs_are_measured_or_bounded(
 ):
     problem = random_world(seed, circles=12, goals=7, tether=330.0)
     expected = solve_graph(travel_graph(problem), "mip").length
-    monkeypatch.setattr("netsp.solving.legcosts.MEASURE_AT_ONCE", 20)
+    monkeypatch.setattr("netsp.gtsp.cost_matrix.MEASURE_AT_ONCE", 20)
     monkeypatch.setattr(SOLVE, "MEASURE_AT_ONCE", 20)
     monkeypatch.setattr(TravelGraph, "legs_at_once", at_once)
     result = solve_graph(travel_graph(problem), "dp", params={"search_rounds": 0})

@@ -13,27 +13,27 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, Problem, Status, solve_graph, travel_graph
-from netsp.clock import Clock
-from netsp.errors import LimitReachedError
+from netsp.base.clock import Clock
+from netsp.base.errors import LimitReachedError
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.solver_run import Stop
+from netsp.gtsp.travel.costs import CostTable
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.parity_distances import WaysByParity
 from netsp.mip import root
-from netsp.mip.bound import exact_bound
+from netsp.mip.cover_costs import OverClasses, OverWays
 from netsp.mip.covers import climb
 from netsp.mip.cuts import Cut, cut_coefficients
 from netsp.mip.deadlegs import DeadLegs
+from netsp.mip.goal_relaxation import bound_over_goals
 from netsp.mip.highs import HighsRelaxation
+from netsp.mip.lagrangian_bound import exact_bound
 from netsp.mip.legprices import LegPrices
-from netsp.mip.overgoals import bound_over_goals
-from netsp.mip.parities import odd_letters, parity_cuts
+from netsp.mip.mip_solver import solve
+from netsp.mip.parity_cuts import odd_letters, parity_cuts
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
-from netsp.mip.solve import solve
-from netsp.mip.towers import OverClasses, OverWays
-from netsp.solving.limits import Limits
-from netsp.solving.run import Stop
-from netsp.travel.costs import CostTable
-from netsp.travel.graph import TravelGraph
-from netsp.travel.ways import WaysByParity
-from netsp.worlds import random_world
+from netsp.model.random_worlds import random_world
 from tests.brute import brute_tour
 from tests.test_blossoms import all_legs, tours_as_points
 from tests.test_contract import random_graph
@@ -238,11 +238,11 @@ def test_covers_in_between_prove_the_same(seed, most, monkeypatch):
         seen.append(climb(*args, **more))
         return seen[-1]
 
-    monkeypatch.setattr("netsp.mip.overgoals.climb", climbed)
+    monkeypatch.setattr("netsp.mip.goal_relaxation.climb", climbed)
     monkeypatch.setattr("netsp.mip.covers.MOST_CELLS", most)
-    monkeypatch.setattr(sys.modules["netsp.mip.solve"], "MANY_GOALS", 5)
-    monkeypatch.setattr("netsp.solving.searching.MEASURE_AT_ONCE", 50)
-    for module in ("netsp.mip.solve", "netsp.mip.overgoals"):
+    monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "MANY_GOALS", 5)
+    monkeypatch.setattr("netsp.gtsp.searching.MEASURE_AT_ONCE", 50)
+    for module in ("netsp.mip.mip_solver", "netsp.mip.goal_relaxation"):
         monkeypatch.setattr(sys.modules[module], "MANY_CLASSES", 50)
     fewer = solve(travel_graph(problem))
     assert len(seen) == 1
@@ -257,11 +257,11 @@ def test_beyond_reach_of_the_program_over_all_classes_the_time_left_is_for_the_s
     problem = random_world(0, goals=14, tether_length=320.0)
     whole = solve(travel_graph(problem))
     monkeypatch.setattr("netsp.mip.covers.MOST_CELLS", 16)
-    monkeypatch.setattr("netsp.solving.searching.MEASURE_AT_ONCE", 50)
-    monkeypatch.setattr(sys.modules["netsp.mip.solve"], "MANY_GOALS", 5)
-    monkeypatch.setattr(sys.modules["netsp.mip.solve"], "OUT_OF_REACH", 0.0)
-    monkeypatch.setattr(sys.modules["netsp.mip.solve"], "LARGE", 5)
-    for module in ("netsp.mip.solve", "netsp.mip.overgoals"):
+    monkeypatch.setattr("netsp.gtsp.searching.MEASURE_AT_ONCE", 50)
+    monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "MANY_GOALS", 5)
+    monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "OUT_OF_REACH", 0.0)
+    monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "LARGE", 5)
+    for module in ("netsp.mip.mip_solver", "netsp.mip.goal_relaxation"):
         monkeypatch.setattr(sys.modules[module], "MANY_CLASSES", 50)
     graph = travel_graph(problem)
     found = solve_graph(graph, "mip", **limits)
@@ -276,7 +276,7 @@ def test_beyond_reach_of_the_program_over_all_classes_the_time_left_is_for_the_s
 
 
 def test_however_long_covers_take_the_core_has_its_share_of_what_is_left(monkeypatch):
-    module = sys.modules["netsp.mip.solve"]
+    module = sys.modules["netsp.mip.mip_solver"]
     began, proven = [], []
 
     def slowly(run, backend):
@@ -292,8 +292,8 @@ def test_however_long_covers_take_the_core_has_its_share_of_what_is_left(monkeyp
     monkeypatch.setattr(module.MipRun, "bound_by_goals", slowly)
     monkeypatch.setattr(module.MipRun, "program", program)
     monkeypatch.setattr(module, "CORE_FIRST", 50)
-    monkeypatch.setattr("netsp.solving.searching.MEASURE_AT_ONCE", 50)
-    monkeypatch.setattr("netsp.solving.searching.LARGER", 1)
+    monkeypatch.setattr("netsp.gtsp.searching.MEASURE_AT_ONCE", 50)
+    monkeypatch.setattr("netsp.gtsp.searching.LARGER", 1)
     graph = travel_graph(random_world(0, goals=14, tether_length=320.0))
     found = solve_graph(graph, "mip", time_limit=10.0)
     assert began
@@ -305,12 +305,12 @@ def share_of_covers(goals, classes):
     cluster = np.sort(np.append(np.arange(goals + 1), np.ones(classes - goals - 1, dtype=int)))
     costs = CostTable(np.broadcast_to(1.0, (classes, classes)), cluster)
     graph = TravelGraph(cluster, [()] * classes, np.ones(classes), costs)
-    return sys.modules["netsp.mip.solve"].MipRun(graph)._cells_share
+    return sys.modules["netsp.mip.mip_solver"].MipRun(graph)._cells_share
 
 
 def test_covers_have_more_of_the_time_the_more_classes_there_are():
     shares = [share_of_covers(100, n) for n in (500, 3000, 9000, 13_000, 20_000)]
-    module = sys.modules["netsp.mip.solve"]
+    module = sys.modules["netsp.mip.mip_solver"]
     assert shares[0] == module.GOALS_SHARE
     assert shares[-1] == module.CELLS_SHARE
     assert shares == sorted(shares)
@@ -318,7 +318,7 @@ def test_covers_have_more_of_the_time_the_more_classes_there_are():
 
 
 def test_with_hundreds_of_goals_covers_have_all_the_time_that_they_may():
-    module = sys.modules["netsp.mip.solve"]
+    module = sys.modules["netsp.mip.mip_solver"]
     assert share_of_covers(module.LARGE + 1, 500) == module.CELLS_SHARE
 
 
@@ -327,8 +327,8 @@ def test_with_too_many_classes_for_a_matrix_covers_bound_the_tour(seed, monkeypa
     problem = random_world(seed, goals=26, tether_length=300.0)
     best = solve_graph(travel_graph(problem), "auto")
     goals = bound_over_goals(travel_graph(problem), proven_goals, Limits()).bound
-    monkeypatch.setattr("netsp.solvers.auto.PROVABLE", 30)
-    monkeypatch.setattr("netsp.mip.overgoals.MANY_CLASSES", 30)
+    monkeypatch.setattr("netsp.plan.auto.PROVABLE", 30)
+    monkeypatch.setattr("netsp.mip.goal_relaxation.MANY_CLASSES", 30)
     found = solve_graph(travel_graph(problem), "auto", time_limit=3.0)
     assert found.lower_bound <= best.length * (1.0 + 1e-6)
     assert found.length >= best.length * (1.0 - 1e-6)
@@ -370,7 +370,7 @@ def test_the_legs_of_a_matrix_that_takes_too_long_leave_the_bound_over_goals(mon
     def too_long():
         raise LimitReachedError("the time is up")
 
-    monkeypatch.setattr("netsp.mip.overgoals.MANY_CLASSES", 10)
+    monkeypatch.setattr("netsp.mip.goal_relaxation.MANY_CLASSES", 10)
     with pytest.raises(LimitReachedError):
         bound_over_goals(graph, proven_goals, Limits(), [0], too_long)
     assert 0.5 * best < graph.bound_in_any_class <= best

@@ -11,13 +11,13 @@ import pytest
 
 from netsp import Circle, InputError, Problem, Solution, solve
 from netsp.command.main import main
-from netsp.execute import ExecutionOptions, Surprises, execute
-from netsp.execute.plan import HOME, legs_of
-from netsp.execute.repair import broken
+from netsp.gtsp.travel.result import Result
+from netsp.model.random_worlds import random_world
+from netsp.model.solution import Status
+from netsp.online.execute import ExecutionOptions, Surprises, execute
+from netsp.online.execute.tour_plan import HOME, legs_of
+from netsp.online.execute.tour_repair import broken
 from netsp.online.vehicle import make_vehicle
-from netsp.solution import Status
-from netsp.travel.result import Result
-from netsp.worlds import random_world
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
 FAST = ExecutionOptions(speed=1.0)
@@ -338,7 +338,7 @@ def test_a_resolution_that_obstacles_slip_through_is_refused():
 
 def test_a_repair_in_the_same_order_starts_at_the_robot(world):
     """The tether that is out is no part of the path to come: it is behind the robot."""
-    from netsp.execute.repair import repair
+    from netsp.online.execute.tour_repair import repair
 
     problem, solution = world
     robot = np.add(solution.path[0], (0.0, 0.5, 0.0))
@@ -355,7 +355,7 @@ def test_a_repair_in_the_same_order_starts_at_the_robot(world):
     ("bound", "words"), [(1.0, "no new order that saves enough was found"), (1e9, "would not save")]
 )
 def test_only_a_bound_shows_that_no_new_order_would_save_enough(world, monkeypatch, bound, words):
-    import netsp.execute.repair as module
+    import netsp.online.execute.tour_repair as module
 
     problem, solution = world
     robot = np.add(solution.path[0], (0.0, 0.5, 0.0))
@@ -368,7 +368,7 @@ def test_only_a_bound_shows_that_no_new_order_would_save_enough(world, monkeypat
 
 
 def test_an_interrupt_while_a_new_order_is_searched_ends_the_run(monkeypatch):
-    import netsp.execute.repair as module
+    import netsp.online.execute.tour_repair as module
 
     solve_graph = module.solve_graph
 
@@ -393,7 +393,7 @@ def test_an_interrupt_while_a_new_order_is_searched_ends_the_run(monkeypatch):
 
 
 def test_an_interrupt_after_the_end_of_a_run_loses_no_file(tmp_path, monkeypatch):
-    import netsp.execute.write as module
+    import netsp.online.execute.execution_files as module
 
     write_execution = module.write_execution
 
@@ -413,12 +413,12 @@ def test_an_interrupt_after_the_end_of_a_run_loses_no_file(tmp_path, monkeypatch
 def test_a_defect_is_no_reason_it_is_counted_and_told_by_the_exit_code(
     world, tmp_path, monkeypatch
 ):
-    import netsp.execute.run
+    import netsp.online.execute.tour_execution
 
     def broken_repair(*_):
         raise RuntimeError("something that nobody foresaw")
 
-    monkeypatch.setattr(netsp.execute.run, "repair", broken_repair)
+    monkeypatch.setattr(netsp.online.execute.tour_execution, "repair", broken_repair)
     problem, solution = world
     (tmp_path / "p.json").write_text(problem.to_json())
     solution.save(tmp_path / "s.json")

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from netsp import Circle, InputError, Polygon, Problem, Solution, solve
 from netsp.command.main import main
-from netsp.export import Projection, export, waypoints_of
+from netsp.exchange.maps.read_map import read_site
+from netsp.exchange.missions import Projection, export, waypoints_of
 from netsp.hsignature import reduce, signature
-from netsp.site.read import read_site
-from netsp.solution import ProblemReference, Status, Visit
+from netsp.model.solution import ProblemReference, Status, Visit
 
 pytest.importorskip("pyproj")
 

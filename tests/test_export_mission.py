@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from netsp.base.errors import InputError
 from netsp.command.main import main
-from netsp.errors import InputError
-from netsp.export import Projection
-from netsp.export.mission import export_mission
-from netsp.export.write import Settings
+from netsp.exchange.missions import Projection
+from netsp.exchange.missions.mission_export import export_mission
+from netsp.exchange.missions.mission_files import Settings
 from netsp.online.mission import Mission
-from netsp.space.plan import plan
+from netsp.plan.space.space_plan import plan
 
 SCENE = {
     "schema_version": 1, "bounds": [-1, -4, -4, 9, 4, 1],

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from netsp import Circle, InputError, Polygon, Problem, Solution, solve
 from netsp.command.main import main
-from netsp.export import Projection, export
-from netsp.export.export_notes import fence_warnings
-from netsp.export.fence import FencePolicy, fence_of
-from netsp.export.write import Settings
-from netsp.site.qgc_plan import read_plan
+from netsp.exchange.maps.qgc_plan import read_plan
+from netsp.exchange.missions import Projection, export
+from netsp.exchange.missions.export_notes import fence_warnings
+from netsp.exchange.missions.fence import FencePolicy, fence_of
+from netsp.exchange.missions.mission_files import Settings
 from tests.plan_loaders import RefusedError, load_cockpit, load_fence, load_plan, stored_bytes
 
 pytest.importorskip("pyproj")

@@ -8,9 +8,9 @@ import pytest
 from netsp import InputError
 from netsp.command.main import main
 from netsp.online import GeodesicTether, Scene
-from netsp.online.scene.floor import floor_mesh
-from netsp.online.scene.readers import read_cloud
-from netsp.online.scene.voxels import of_mesh
+from netsp.world.scene.floor import floor_mesh
+from netsp.world.scene.readers import read_cloud
+from netsp.world.scene.voxels import of_mesh
 
 rasterio = pytest.importorskip("rasterio", reason="rasterio (extra geo) is not installed")
 

@@ -12,27 +12,27 @@ import numpy as np
 import pytest
 
 from netsp import Circle, Problem, solve
+from netsp.base.errors import InputError
 from netsp.command.main import main
-from netsp.errors import InputError
-from netsp.execute.events import Surprises
-from netsp.execute.log import ExecutionOptions
-from netsp.execute.run import StopsFlightError
-from netsp.fly.checks import ready
-from netsp.fly.flight import fly
-from netsp.fly.flight_policy import FlightPolicy
-from netsp.fly.flight_time import predicted_flight
-from netsp.fly.inputs import event_of
-from netsp.fly.rehearsal import rehearse
-from netsp.fly.stopped import RefusedError
-from netsp.fly.vehicle import LinkedVehicle
-from netsp.guard.fix import Fix
-from netsp.link.address import Address
-from netsp.link.dialect import dialect, parser
-from netsp.link.frame import Frame
-from netsp.link.messages import Listener
-from netsp.link.session import Session
-from netsp.link.udp import UdpLink, messages_in
-from netsp.link.vehicle_kind import VehicleKind
+from netsp.online.execute.events import Surprises
+from netsp.online.execute.execution_log import ExecutionOptions
+from netsp.online.execute.tour_execution import StopsFlightError
+from netsp.online.fly.flight_policy import FlightPolicy
+from netsp.online.fly.flight_rehearsal import rehearse
+from netsp.online.fly.flight_time import predicted_flight
+from netsp.online.fly.inputs import event_of
+from netsp.online.fly.preflight_checks import ready
+from netsp.online.fly.stopped import RefusedError
+from netsp.online.fly.tour_flight import fly
+from netsp.online.fly.vehicle import LinkedVehicle
+from netsp.online.guard.telemetry import Fix
+from netsp.online.link.address import Address
+from netsp.online.link.dialect import dialect, parser
+from netsp.online.link.geo_frame import Frame
+from netsp.online.link.mavlink_messages import Listener
+from netsp.online.link.session import Session
+from netsp.online.link.udp import UdpLink, messages_in
+from netsp.online.link.vehicle_kind import VehicleKind
 from tests.ardusub import BINARY, REASON, ArduSub
 from tests.autopilot import Autopilot
 
@@ -305,7 +305,7 @@ def test_a_command_that_waits_for_events_ends_with_its_own_exit_code(sent):
     """Standard input stays open, as that of a shell does."""
     program = (
         "import sys, time\n"
-        "from netsp.fly.inputs import events_of\n"
+        "from netsp.online.fly.inputs import events_of\n"
         "events, found = events_of(sys.stdin.buffer, print), []\n"
         "time.sleep(0.2)  # so that it waits for a line when the program ends\n"
         "while len(found) < int(sys.argv[1]):\n"

@@ -7,14 +7,14 @@ import pytest
 
 from netsp import Circle, Problem, solve
 from netsp.command.main import main
-from netsp.execute import log
-from netsp.execute.log import ExecutionOptions
-from netsp.execute.run import _Run
-from netsp.execute.run_record import RunState
-from netsp.fly import flight
-from netsp.fly.flight import fly
-from netsp.fly.resume import read_run
-from netsp.fly.standby import stand_by
+from netsp.online.execute import execution_log
+from netsp.online.execute.execution_log import ExecutionOptions
+from netsp.online.execute.run_record import RunState
+from netsp.online.execute.tour_execution import _Run
+from netsp.online.fly import tour_flight
+from netsp.online.fly.resume import read_run
+from netsp.online.fly.standby import stand_by
+from netsp.online.fly.tour_flight import fly
 from tests.simulated_session import SimulatedSession
 
 SITE = Problem(
@@ -34,7 +34,7 @@ def tour():
 @pytest.fixture(autouse=True)
 def rehearsed(monkeypatch):
     """Nothing is in a hurry on a clock that waits."""
-    monkeypatch.setattr(flight, "rehearse", lambda: None)
+    monkeypatch.setattr(tour_flight, "rehearse", lambda: None)
 
 
 def after(session, seconds, do):
@@ -150,9 +150,9 @@ def commanded(monkeypatch, tmp_path, tour, session, *more):
     problem, solution, run = tmp_path / "p.json", tmp_path / "s.json", tmp_path / "run"
     problem.write_text(SITE.to_json())
     solution.write_text(tour.to_json())
-    monkeypatch.setattr("netsp.link.session.Session", lambda *_: session)
-    monkeypatch.setattr("netsp.link.udp.UdpLink", lambda *_: None)
-    monkeypatch.setattr("netsp.fly.rehearsal.rehearse", lambda: None)
+    monkeypatch.setattr("netsp.online.link.session.Session", lambda *_: session)
+    monkeypatch.setattr("netsp.online.link.udp.UdpLink", lambda *_: None)
+    monkeypatch.setattr("netsp.online.fly.flight_rehearsal.rehearse", lambda: None)
     return ["fly", str(problem), str(solution), "--link", "udpin:14550", "-o", str(run), *more]
 
 
@@ -171,9 +171,9 @@ def broken(error, when):
 @pytest.mark.parametrize(
     ("error", "where"),
     [
-        (RuntimeError("no such thing"), "netsp.execute.run._Run.go"),
-        (OSError(28, "No space left on device"), "netsp.execute.run._Run.go"),
-        (RuntimeError("no such thing"), "netsp.pictures.execution.save_execution"),
+        (RuntimeError("no such thing"), "netsp.online.execute.tour_execution._Run.go"),
+        (OSError(28, "No space left on device"), "netsp.online.execute.tour_execution._Run.go"),
+        (RuntimeError("no such thing"), "netsp.view.pictures.execution.save_execution"),
     ],
 )
 def test_whatever_breaks_in_netsp_the_vehicle_is_held_and_the_error_told_in_the_end(
@@ -215,7 +215,7 @@ def test_ctrl_c_while_the_files_are_written_does_not_break_them_off(
     """The command prints what the vehicle will do, and then ends."""
     session, pressed = SimulatedSession(SITE).arm(), []
     words = commanded(monkeypatch, tmp_path, tour, session)
-    sleep, write = session.sleep, log.Execution.summary.fget
+    sleep, write = session.sleep, execution_log.Execution.summary.fget
 
     def press(seconds):
         sleep(seconds)
@@ -230,7 +230,7 @@ def test_ctrl_c_while_the_files_are_written_does_not_break_them_off(
         return write(done)
 
     monkeypatch.setattr(session, "sleep", press)
-    monkeypatch.setattr(log.Execution, "summary", property(summary))
+    monkeypatch.setattr(execution_log.Execution, "summary", property(summary))
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         assert main(words) == 4

@@ -9,18 +9,25 @@ import numpy as np
 import pytest
 
 from netsp import Circle, Problem, solve
+from netsp.base.errors import InputError
 from netsp.command.main import main
-from netsp.errors import InputError
-from netsp.execute import run_record
-from netsp.execute.events import Event, Surprises
-from netsp.execute.log import ExecutionOptions, describe_execution
-from netsp.execute.run_record import RunRecord, RunState
-from netsp.fly import flight
-from netsp.fly.flight import fly
-from netsp.fly.resume import from_guard, from_record, from_word, parse_class, read_run, whole_tour
-from netsp.fly.stopped import RefusedError
-from netsp.guard.plane import PlaneSite
 from netsp.hsignature import signature
+from netsp.online.execute import run_record
+from netsp.online.execute.events import Event, Surprises
+from netsp.online.execute.execution_log import ExecutionOptions, describe_execution
+from netsp.online.execute.run_record import RunRecord, RunState
+from netsp.online.fly import tour_flight
+from netsp.online.fly.resume import (
+    from_guard,
+    from_record,
+    from_word,
+    parse_class,
+    read_run,
+    whole_tour,
+)
+from netsp.online.fly.stopped import RefusedError
+from netsp.online.fly.tour_flight import fly
+from netsp.online.guard.plane import PlaneSite
 from tests.simulated_session import SimulatedSession
 
 SITE = Problem(
@@ -41,7 +48,7 @@ def tour():
 
 @pytest.fixture(autouse=True)
 def rehearsed(monkeypatch):
-    monkeypatch.setattr(flight, "rehearse", lambda: None)
+    monkeypatch.setattr(tour_flight, "rehearse", lambda: None)
 
 
 def killed(tour, folder, when, seconds=10.0, **how):
@@ -213,9 +220,9 @@ def test_the_command_resumes_a_run_and_writes_another(tour, tmp_path, monkeypatc
     log = (run / "log.csv").read_text()
     again = after_kill(session)
     again.stations = {(255, 190): 0.0}
-    monkeypatch.setattr("netsp.link.session.Session", lambda *_: again)
-    monkeypatch.setattr("netsp.link.udp.UdpLink", lambda *_: None)
-    monkeypatch.setattr("netsp.fly.rehearsal.rehearse", lambda: None)
+    monkeypatch.setattr("netsp.online.link.session.Session", lambda *_: again)
+    monkeypatch.setattr("netsp.online.link.udp.UdpLink", lambda *_: None)
+    monkeypatch.setattr("netsp.online.fly.flight_rehearsal.rehearse", lambda: None)
     given = ["fly", "--resume", str(run), "--link", "udpin:14550", "--quiet"]
     assert main([*given, "-o", str(run)]) == 2
     assert main([*given, "--dry-run"]) == 2

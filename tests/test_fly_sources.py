@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from netsp import Problem, solve
-from netsp.execute.log import ExecutionOptions
-from netsp.execute.run import StopsFlightError
-from netsp.fly import flight
-from netsp.fly.flight import fly
-from netsp.fly.standby import stand_by
-from netsp.fly.vehicle import LinkedVehicle
-from netsp.link.position_source import PositionSources
+from netsp.online.execute.execution_log import ExecutionOptions
+from netsp.online.execute.tour_execution import StopsFlightError
+from netsp.online.fly import tour_flight
+from netsp.online.fly.standby import stand_by
+from netsp.online.fly.tour_flight import fly
+from netsp.online.fly.vehicle import LinkedVehicle
+from netsp.online.link.position_source import PositionSources
 from tests.simulated_session import SimulatedSession
 from tests.test_fly_vehicle import Scripted, driven
 
@@ -27,7 +27,7 @@ def tour():
 
 @pytest.fixture(autouse=True)
 def rehearsed(monkeypatch):
-    monkeypatch.setattr(flight, "rehearse", lambda: None)
+    monkeypatch.setattr(tour_flight, "rehearse", lambda: None)
 
 
 @pytest.mark.parametrize(

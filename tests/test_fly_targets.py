@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from netsp import Problem, solve
-from netsp.execute.log import ExecutionOptions
-from netsp.fly import flight
-from netsp.fly.flight import fly
+from netsp.online.execute.execution_log import ExecutionOptions
+from netsp.online.fly import tour_flight
+from netsp.online.fly.tour_flight import fly
 from tests.simulated_session import SimulatedSession
 
 DEEP = Problem(base=(0, 0), goals=[(30, 0, -11)], tether_length=40)
@@ -15,7 +15,7 @@ OPTIONS = ExecutionOptions(speed=0.5, reach=0.3)
 
 @pytest.fixture(autouse=True)
 def rehearsed(monkeypatch):
-    monkeypatch.setattr(flight, "rehearse", lambda: None)
+    monkeypatch.setattr(tour_flight, "rehearse", lambda: None)
 
 
 def targets(session):

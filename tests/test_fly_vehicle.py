@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from netsp import Problem
-from netsp.execute.run import StopsFlightError
-from netsp.fly.checks import ready
-from netsp.fly.stopped import RefusedError
-from netsp.fly.vehicle import LinkedVehicle
-from netsp.guard.fix import Fix
-from netsp.link.dialect import dialect, parser
-from netsp.link.frame import Frame
-from netsp.link.messages import Listener
-from netsp.link.target_echo import TargetEcho
-from netsp.link.udp import messages_in
-from netsp.link.vehicle_kind import VehicleKind
+from netsp.online.execute.tour_execution import StopsFlightError
+from netsp.online.fly.preflight_checks import ready
+from netsp.online.fly.stopped import RefusedError
+from netsp.online.fly.vehicle import LinkedVehicle
+from netsp.online.guard.telemetry import Fix
+from netsp.online.link.dialect import dialect, parser
+from netsp.online.link.geo_frame import Frame
+from netsp.online.link.mavlink_messages import Listener
+from netsp.online.link.target_echo import TargetEcho
+from netsp.online.link.udp import messages_in
+from netsp.online.link.vehicle_kind import VehicleKind
 
 SITE = Problem(base=(0, 0), goals=[(6, 2, -1)], tether_length=40)
 

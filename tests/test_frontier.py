@@ -20,15 +20,15 @@ from netsp import (
     travel_graph,
     verify,
 )
-from netsp.clock import Clock
-from netsp.errors import MemoryLimitError
-from netsp.lns import Instance, Search
+from netsp.base.clock import Clock
+from netsp.base.errors import MemoryLimitError
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.search import Instance, Search
 from netsp.mip.flows import min_cuts
-from netsp.mip.solve import MipRun
+from netsp.mip.mip_solver import MipRun
 from netsp.mip.subtours import branches
 from netsp.roadmap.slits import _taut, build_slits, slit_lengths
 from netsp.roadmap.taut import TautRoadmap
-from netsp.solving.limits import Limits
 from tests.brute import brute_tour
 from tests.test_contract import random_graph
 from tests.worlds import random_world, small_worlds
@@ -228,13 +228,13 @@ def test_auto_proves_what_it_can():
 
 
 def test_auto_gives_a_tour_and_a_true_bound_where_mip_would_not_fit(monkeypatch):
-    import netsp.solvers.auto
+    import netsp.plan.auto
 
     problem = random_world(1, goals=8, tether=300.0)
     best = solve(problem, "mip")
-    monkeypatch.setattr(netsp.solvers.auto, "PROVABLE", 10)
-    monkeypatch.setattr(netsp.solvers.auto.exact, "MOST_SUMS", 0.0)
-    monkeypatch.setattr(netsp.solvers.auto, "FEW_GOALS", 4)
+    monkeypatch.setattr(netsp.plan.auto, "PROVABLE", 10)
+    monkeypatch.setattr(netsp.plan.auto.exact, "MOST_SUMS", 0.0)
+    monkeypatch.setattr(netsp.plan.auto, "FEW_GOALS", 4)
     solution = solve(problem, "auto", iteration_limit=2_000)
     assert verify(problem, solution)
     assert solution.lower_bound is not None
@@ -243,7 +243,7 @@ def test_auto_gives_a_tour_and_a_true_bound_where_mip_would_not_fit(monkeypatch)
 
 
 def test_auto_gives_a_tour_and_a_true_bound_where_there_is_no_room_for_the_legs(monkeypatch):
-    import netsp.solvers.auto
+    import netsp.plan.auto
 
     problem = random_world(1, goals=8, tether=300.0)
     best = solve(problem, "mip")
@@ -252,9 +252,9 @@ def test_auto_gives_a_tour_and_a_true_bound_where_there_is_no_room_for_the_legs(
         if size > 24.0 * 9**2:  # there is for the legs between the goals
             raise MemoryLimitError(f"{what} would take {size} bytes; {advice}")
 
-    monkeypatch.setattr(netsp.solvers.auto.exact, "MOST_SUMS", 0.0)
-    monkeypatch.setattr("netsp.solving.legcosts.MEASURE_AT_ONCE", 0)
-    monkeypatch.setattr("netsp.solving.legcosts.ask", none_left)
+    monkeypatch.setattr(netsp.plan.auto.exact, "MOST_SUMS", 0.0)
+    monkeypatch.setattr("netsp.gtsp.cost_matrix.MEASURE_AT_ONCE", 0)
+    monkeypatch.setattr("netsp.gtsp.cost_matrix.ask", none_left)
     with pytest.raises(MemoryLimitError, match="bounding every tour over"):
         solve(problem, "mip")
     solution = solve(problem, "auto")
@@ -266,13 +266,13 @@ def test_auto_gives_a_tour_and_a_true_bound_where_there_is_no_room_for_the_legs(
 @pytest.mark.parametrize("kept", [16, 40, 4000])
 def test_few_goals_are_proven_over_the_shortest_classes(monkeypatch, kept):
     """The status claims no more than was looked at, the bound holds for all."""
-    import netsp.solvers.auto
+    import netsp.plan.auto
 
     problem = random_world(1, goals=8, tether=300.0)
     best = solve(problem, "mip")
-    monkeypatch.setattr(netsp.solvers.auto, "PROVABLE", 10)
-    monkeypatch.setattr(netsp.solvers.auto.exact, "MOST_SUMS", 0.0)
-    monkeypatch.setattr(netsp.solvers.auto, "MOST_KEPT", kept)
+    monkeypatch.setattr(netsp.plan.auto, "PROVABLE", 10)
+    monkeypatch.setattr(netsp.plan.auto.exact, "MOST_SUMS", 0.0)
+    monkeypatch.setattr(netsp.plan.auto, "MOST_KEPT", kept)
     solution = solve(problem, "auto")
     assert verify(problem, solution)
     assert solution.lower_bound is not None
@@ -287,7 +287,7 @@ def test_few_goals_are_proven_over_the_shortest_classes(monkeypatch, kept):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_sets_of_goals_and_cutting_planes_agree(seed):
-    from netsp.solvers import exact
+    from netsp.plan import exact
 
     graph = travel_graph(random_world(seed, goals=7, tether=280.0))
     assert exact.fits(graph)
@@ -319,12 +319,12 @@ def test_a_limit_that_ends_in_the_root_leaves_a_true_bound(solver):
 
 
 def test_auto_bounds_large_graphs_without_geometry_too(monkeypatch):
-    import netsp.solvers.auto
+    import netsp.plan.auto
 
     graph = random_graph(4, goals=6)
     best = brute_tour(graph)
-    monkeypatch.setattr(netsp.solvers.auto, "PROVABLE", 5)
-    monkeypatch.setattr(netsp.solvers.auto.exact, "MOST_SUMS", 0.0)
+    monkeypatch.setattr(netsp.plan.auto, "PROVABLE", 5)
+    monkeypatch.setattr(netsp.plan.auto.exact, "MOST_SUMS", 0.0)
     result = solve_graph(graph, "auto", iteration_limit=500)
     assert 0.0 < result.lower_bound <= best * (1 + 1e-9)
     assert result.length >= best * (1 - 1e-9)
@@ -333,10 +333,10 @@ def test_auto_bounds_large_graphs_without_geometry_too(monkeypatch):
 def core_first(monkeypatch, problem, share=0.4, **limits):
     """A proof over the core, then over all, of a world so small that the core would not be worth
     it."""
-    import netsp.solving.legcosts
-    import netsp.solving.searching as searching
+    import netsp.gtsp.cost_matrix
+    import netsp.gtsp.searching as searching
 
-    for module in (searching, netsp.solving.legcosts):
+    for module in (searching, netsp.gtsp.cost_matrix):
         monkeypatch.setattr(module, "MEASURE_AT_ONCE", 0)
     monkeypatch.setattr(searching, "LARGER", 1)
     monkeypatch.setattr(searching, "MOST_CLASSES", 3)

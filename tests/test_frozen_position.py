@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, InputError, Problem
-from netsp.guard.fix import Fix
-from netsp.guard.frozen_position import FreezePolicy
-from netsp.guard.guard import Guard, GuardOptions
-from netsp.guard.stream import replayed
-from netsp.guard.track import Track
-from netsp.link.frame import Frame
-from netsp.link.messages import Listener
+from netsp.online.guard.frozen_position import FreezePolicy
+from netsp.online.guard.position_track import Track
+from netsp.online.guard.stream import replayed
+from netsp.online.guard.telemetry import Fix
+from netsp.online.guard.tether_guard import Guard, GuardOptions
+from netsp.online.link.geo_frame import Frame
+from netsp.online.link.mavlink_messages import Listener
 
 pytest.importorskip("pymavlink")
 

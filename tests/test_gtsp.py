@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from netsp import TravelGraph, solve_graph
-from netsp.clock import Clock
+from netsp.base.clock import Clock
+from netsp.base.errors import InputError
 from netsp.command.main import main
-from netsp.errors import InputError
-from netsp.gtsplib import load
-from netsp.lns.solve import solve as lns
-from netsp.mip.overgoals import bound_at_once
-from netsp.pictures.gtsp import draw_gtsp
-from netsp.solution import Status
+from netsp.gtsp.gtsplib import load
+from netsp.gtsp.search.lns_solver import solve as lns
+from netsp.mip.goal_relaxation import bound_at_once
+from netsp.model.solution import Status
+from netsp.view.pictures.gtsp_picture import draw_gtsp
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 from gtsp import OPTIMA, clustered

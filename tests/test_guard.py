@@ -22,30 +22,30 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, Polygon, Problem
+from netsp.base.errors import InputError
 from netsp.command.main import main
-from netsp.errors import InputError
-from netsp.guard.ahead import Ahead, Look
-from netsp.guard.alarms import Alarm, Alarms, Level
-from netsp.guard.belief import Belief
-from netsp.guard.correct import agrees
-from netsp.guard.fix import Fix
-from netsp.guard.gaps import ways_between
-from netsp.guard.guard import Guard, GuardOptions
-from netsp.guard.live import watch
-from netsp.guard.loops import closed_by, loops_in
-from netsp.guard.memory import restore, save
-from netsp.guard.page import Page
-from netsp.guard.plane import PlaneSite, RayLetters
-from netsp.guard.reasons import OF_VELOCITIES, soon_looped
-from netsp.guard.replay import read_fixes
-from netsp.guard.site import Loop
-from netsp.guard.stream import replayed
-from netsp.guard.tethers import Strands
-from netsp.guard.track import RESTART_S, Motion, Track
 from netsp.hsignature import concatenate, crossings, signature
-from netsp.link.frame import Frame
-from netsp.link.modes import GUIDED
-from netsp.solution import Solution
+from netsp.model.solution import Solution
+from netsp.online.guard.alarms import Alarm, Alarms, Level
+from netsp.online.guard.belief import Belief
+from netsp.online.guard.correct import agrees
+from netsp.online.guard.dropout import ways_between
+from netsp.online.guard.guard_page import Page
+from netsp.online.guard.live import watch
+from netsp.online.guard.lookahead import Ahead, Look
+from netsp.online.guard.loops import closed_by, loops_in
+from netsp.online.guard.plane import PlaneSite, RayLetters
+from netsp.online.guard.position_track import RESTART_S, Motion, Track
+from netsp.online.guard.reasons import OF_VELOCITIES, soon_looped
+from netsp.online.guard.replay import read_fixes
+from netsp.online.guard.site import Loop
+from netsp.online.guard.state_file import restore, save
+from netsp.online.guard.stream import replayed
+from netsp.online.guard.telemetry import Fix
+from netsp.online.guard.tether_belief import Strands
+from netsp.online.guard.tether_guard import Guard, GuardOptions
+from netsp.online.link.geo_frame import Frame
+from netsp.online.link.modes import GUIDED
 from tests.autopilot import Autopilot
 
 RECORDED = Path(__file__).parent / "data" / "ardusub"
@@ -531,7 +531,7 @@ def test_a_recording_that_is_none_is_told_in_a_line(tmp_path, capsys, name, text
 def test_a_telemetry_log_is_read_as_it_was_heard(tmp_path):
     import struct
 
-    from netsp.link.dialect import dialect, parser
+    from netsp.online.link.dialect import dialect, parser
 
     m, packs = dialect(), parser(1, 1)
     data = b"\x00rest of something"
@@ -630,7 +630,7 @@ def test_a_guard_asks_for_a_link_or_a_recording(capsys):
 
 def test_a_class_that_is_too_long_takes_no_other_with_it(monkeypatch):
     """Classes beyond those that have a tether of their own once went, too."""
-    monkeypatch.setattr("netsp.guard.guard.MOST_TETHERS", 2)
+    monkeypatch.setattr("netsp.online.guard.tether_guard.MOST_TETHERS", 2)
     guard = Guard(SITE, GuardOptions(noise=0.1, drift=0.1))
     for fix in along((0, 0, 0), (3, 1, 0), (9, 0.5, 0)):
         report = guard.take(fix)

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from netsp import Problem
-from netsp.guard.alarms import Level
-from netsp.guard.fix import Fix
-from netsp.guard.guard import Guard
-from netsp.guard.stream import replayed
 from netsp.hsignature import concatenate, crossings
+from netsp.online.guard.alarms import Level
+from netsp.online.guard.stream import replayed
+from netsp.online.guard.telemetry import Fix
+from netsp.online.guard.tether_guard import Guard
 
 ROOT = Path(__file__).parent
 FLIGHT = ROOT / "data" / "ardusub47" / "guard-loops-wharf-true.csv.gz"

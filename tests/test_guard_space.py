@@ -8,19 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from netsp.base.errors import InputError
 from netsp.command.main import main
-from netsp.errors import InputError
-from netsp.guard.fix import Fix
-from netsp.guard.guard import Guard, GuardOptions
-from netsp.guard.memory import restore, save
-from netsp.guard.page import Page
-from netsp.guard.silhouettes import silhouette
-from netsp.guard.space import SpaceSite
-from netsp.guard.winding import closing, loops_of
+from netsp.online.guard.guard_page import Page
+from netsp.online.guard.silhouettes import silhouette
+from netsp.online.guard.space_site import SpaceSite
+from netsp.online.guard.state_file import restore, save
+from netsp.online.guard.telemetry import Fix
+from netsp.online.guard.tether_guard import Guard, GuardOptions
+from netsp.online.guard.winding import closing, loops_of
 from netsp.online.mission import Mission
-from netsp.online.scene.scene import Scene
-from netsp.online.simulate import simulate
-from netsp.space.solve import solve_mission
+from netsp.online.mission_run import simulate
+from netsp.plan.space.mission_solver import solve_mission
+from netsp.world.scene.scene import Scene
 from tests.worlds import FEW_CELLS
 
 EXACT = GuardOptions(noise=0.0, drift=0.0)

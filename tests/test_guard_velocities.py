@@ -8,16 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, Problem
-from netsp.guard.fix import Fix
-from netsp.guard.guard import Guard
-from netsp.guard.replay import read_fixes
-from netsp.guard.track import Track
-from netsp.guard.velocities import Velocities
-from netsp.link.dialect import dialect, parser
-from netsp.link.frame import Frame
-from netsp.link.messages import Listener
-from netsp.link.udp import messages_in
-from netsp.problem import Origin
+from netsp.model.problem import Origin
+from netsp.online.guard.position_track import Track
+from netsp.online.guard.replay import read_fixes
+from netsp.online.guard.telemetry import Fix
+from netsp.online.guard.tether_guard import Guard
+from netsp.online.guard.velocities import Velocities
+from netsp.online.link.dialect import dialect, parser
+from netsp.online.link.geo_frame import Frame
+from netsp.online.link.mavlink_messages import Listener
+from netsp.online.link.udp import messages_in
 
 SITE = Problem(
     base=(0, 0), goals=[(9, 0, -1)], tether_length=30,

@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from netsp import solve_graph, travel_graph
-from netsp.dp.handover import Handover
-from netsp.errors import InputError
+from netsp.base.errors import InputError
+from netsp.gtsp.dp.handover import Handover
 from tests.worlds import random_world
 
-MIP = importlib.import_module("netsp.mip.solve")
+MIP = importlib.import_module("netsp.mip.mip_solver")
 
 
 @given(st.integers(1, 200), st.integers(0, 10**6))

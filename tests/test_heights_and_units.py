@@ -8,15 +8,15 @@ import struct
 import numpy as np
 import pytest
 
+from netsp.base.errors import InputError
 from netsp.command.main import main
-from netsp.errors import InputError
-from netsp.online.scene.readers import Placement, load_cloud, load_mesh
-from netsp.problem import Problem
-from netsp.site import read_site
-from netsp.site.goal_depths import surface_warning, with_depth
-from netsp.site.path_file import read_paths
-from netsp.site.projection import Projection
-from netsp.site.table import from_table
+from netsp.exchange.maps import read_site
+from netsp.exchange.maps.csv_table import from_table
+from netsp.exchange.maps.goal_depths import surface_warning, with_depth
+from netsp.exchange.maps.path_file import read_paths
+from netsp.exchange.maps.projection import Projection
+from netsp.model.problem import Problem
+from netsp.world.scene.readers import Placement, load_cloud, load_mesh
 
 PILE = np.array([(4.0, -1.0, -10.0), (6.0, 1.0, 0.0), (5.0, 0.5, -3.25), (5.5, -0.25, -7.0)])
 """Points of a pile that fit no other order or sign of their coordinates."""
@@ -234,7 +234,7 @@ def grid(file, z, crs="EPSG:25832", cell=1.0, **tags):
 
 
 def floor_of(file, **options):
-    from netsp.online.scene.floor import load_floor
+    from netsp.world.scene.floor import load_floor
 
     vertices, _, notes = load_floor(file, **options)
     return vertices[: len(vertices) // 2], notes
@@ -336,7 +336,7 @@ def test_a_path_is_read_by_the_names_of_its_columns(tmp_path):
 def test_transparency_means_what_map_server_takes_it_for(tmp_path, form, mode, pixel, kinds):
     from PIL import Image
 
-    from netsp.site.occupancy import MapFile, _kinds, _values
+    from netsp.exchange.maps.occupancy import MapFile, _kinds, _values
 
     image = Image.new(form, (2, 2), pixel if form == "LA" else (*(pixel[:1] * 3), pixel[1]))
     image.save(tmp_path / "m.png")
@@ -399,7 +399,7 @@ def test_a_cloud_stands_beside_a_mesh_and_a_floor(tmp_path, capsys):
 
 @pytest.mark.parametrize(("units", "plain"), [(None, -4.0), ("ft", -4.0 * 0.3048)])
 def test_a_depth_of_a_map_is_in_the_unit_that_its_property_names(tmp_path, units, plain):
-    from netsp.site import read_site
+    from netsp.exchange.maps import read_site
 
     features = [({"kind": "base"}, 0.0), ({"Depth (ft)": 10}, 1.0), ({"depth_m": 4}, 2.0),
                 ({"DEPTH": 4}, 3.0)]  # fmt: skip
@@ -419,7 +419,7 @@ def test_a_depth_of_a_map_is_in_the_unit_that_its_property_names(tmp_path, units
 def test_heights_of_a_map_are_those_of_its_vertical_system(tmp_path, crs, z):
     pyogrio = pytest.importorskip("pyogrio")
     shapely = pytest.importorskip("shapely")
-    from netsp.site import read_site
+    from netsp.exchange.maps import read_site
 
     for layer, point in (("base", (500000, 6400000, 0)), ("goals", (500020, 6400000, 3))):
         pyogrio.raw.write(

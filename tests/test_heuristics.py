@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from netsp import Circle, NetspError, Polygon, Problem, solve_graph
 from netsp.anneal import icra2017, rss2016
-from netsp.compiled.chance import seeded, uniform
+from netsp.base.compiled.rng import seeded, uniform
+from netsp.gtsp.cost_matrix import MEASURE_AT_ONCE
+from netsp.gtsp.search import Instance
 from netsp.hsignature import concatenate, entangled, signature
-from netsp.lns import Instance
-from netsp.solvers.solve import travel_graph
-from netsp.solvers.table import ROADMAPS
-from netsp.solving.legcosts import MEASURE_AT_ONCE
-from netsp.worlds import random_world as papers_world
+from netsp.model.random_worlds import random_world as papers_world
+from netsp.plan.solve_problem import travel_graph
+from netsp.plan.solver_table import ROADMAPS
 from tests.brute import brute_tour
 from tests.test_contract import random_graph
 from tests.worlds import random_world, small_worlds

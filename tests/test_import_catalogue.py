@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from netsp import InputError, Problem
 from netsp.command.main import main
-from netsp.import_record import LayerRecord, OmittedFeatures, Site
-from netsp.site.feature import Unread
-from netsp.site.ledger import Ledger
-from netsp.site.line_work import outlines, widened
-from netsp.site.options import SiteOptions
-from netsp.site.projection import Projection
-from netsp.site.read import import_site
+from netsp.exchange.maps.feature import Unread
+from netsp.exchange.maps.ledger import Ledger
+from netsp.exchange.maps.line_work import outlines, widened
+from netsp.exchange.maps.options import SiteOptions
+from netsp.exchange.maps.projection import Projection
+from netsp.exchange.maps.read_map import import_site
+from netsp.model.import_record import LayerRecord, OmittedFeatures, Site
 
 pytest.importorskip("pyogrio")
 shapely = pytest.importorskip("shapely")
@@ -349,7 +349,7 @@ def test_a_system_that_outweighs_the_files_own_is_told(tmp_path):
         file, geometry=places, field_data=[np.array(["base"], dtype=object)], fields=["kind"],
         crs="EPSG:32632", geometry_type="Point", layer="a",
     )  # fmt: skip
-    from netsp.site.read import read_map
+    from netsp.exchange.maps.read_map import read_map
 
     assert any("EPSG:32632 is not used" in note for note in read_map(file, "EPSG:32633").notes)
     assert not any("is not used" in note for note in read_map(file, "epsg:32632").notes)

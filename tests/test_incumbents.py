@@ -8,22 +8,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import netsp.space.plan
-import netsp.space.solve
+import netsp.plan.space.mission_solver
+import netsp.plan.space.space_plan
 from netsp import Problem, solve
-from netsp.clock import Clock
-from netsp.errors import LimitReachedError
+from netsp.base.clock import Clock
+from netsp.base.errors import LimitReachedError
 from netsp.judge import Check, Verification
 from netsp.online import Scene
 from netsp.online.mission import Mission
-from netsp.space.board import Board
-from netsp.space.judge import verify_mission
-from netsp.space.places import Places
-from netsp.space.plan import AS_GIVEN, OUT_AND_BACK, PLANE, given_plan, plan, plans
-from netsp.space.prisms import PlaneParams, floor_plan, tours_of_plan
-from netsp.space.solve import seconds_until_home, solve_mission
-from netsp.space.states import Effort, first_states
-from netsp.space.water import Water, along
+from netsp.plan.space.board import Board
+from netsp.plan.space.judge import verify_mission
+from netsp.plan.space.mission_solver import seconds_until_home, solve_mission
+from netsp.plan.space.places import Places
+from netsp.plan.space.planning_context import Water, along
+from netsp.plan.space.prisms import PlaneParams, floor_plan, tours_of_plan
+from netsp.plan.space.space_plan import AS_GIVEN, OUT_AND_BACK, PLANE, given_plan, plan, plans
+from netsp.plan.space.states import Effort, first_states
 from tests.worlds import FEW_CELLS
 
 BOX = [-4, -4, -4, 4, 4, 4]
@@ -60,7 +60,7 @@ def square_board(square_water) -> Board:
     places = Places.of(square_water.mission, square_water.field)
     states = first_states(square_water, places, 8.9, Effort.of(3), Clock())
     board = Board(square_water, states)
-    board.take(netsp.space.plan.Growth(states, None).legs, Clock())
+    board.take(netsp.plan.space.space_plan.Growth(states, None).legs, Clock())
     return board
 
 
@@ -105,7 +105,7 @@ def test_where_all_other_tours_are_refused_the_one_out_and_back_is_given(monkeyp
             return Verification((Check("no", False, "refused"),))
         return verify_mission(mission, **how)
 
-    monkeypatch.setattr(netsp.space.plan, "verify_mission", judge)
+    monkeypatch.setattr(netsp.plan.space.space_plan, "verify_mission", judge)
     found = plan(mission_about(BESIDE), scene=SQUARE, time_limit=4.0)
     assert found.kind == OUT_AND_BACK
     assert verify_mission(found.planned(), scene=SQUARE)
@@ -115,7 +115,7 @@ def test_where_all_other_tours_are_refused_the_one_out_and_back_is_given(monkeyp
 @pytest.mark.parametrize("seconds", [1e-3, 6.0])
 def test_what_the_judge_refuses_is_never_given(seconds, monkeypatch):
     refuse = Verification((Check("no", False, "refused"),))
-    for module in (netsp.space.plan, netsp.space.solve):
+    for module in (netsp.plan.space.space_plan, netsp.plan.space.mission_solver):
         monkeypatch.setattr(module, "verify_mission", lambda *_, **__: refuse)
     with pytest.raises(LimitReachedError):
         solve_mission(mission_about(BESIDE[:2]), scene=SQUARE, time_limit=seconds)

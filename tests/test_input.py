@@ -14,17 +14,17 @@ import pytest
 from matplotlib.figure import Figure
 
 from netsp import Circle, InputError, Problem, Solution, solve, verify
+from netsp.base.errors import brief
+from netsp.base.files import cell, read_gzip, write_text
 from netsp.command.main import main
-from netsp.errors import brief
-from netsp.execute import ExecutionOptions, Surprises, execute
-from netsp.execute.events import changed
-from netsp.export import Projection, export
-from netsp.export.write import Settings
-from netsp.files import cell, read_gzip, write_text
+from netsp.exchange.maps.read_map import read_site
+from netsp.exchange.missions import Projection, export
+from netsp.exchange.missions.mission_files import Settings
+from netsp.online.execute import ExecutionOptions, Surprises, execute
+from netsp.online.execute.events import changed
 from netsp.online.mission import Mission
-from netsp.pictures import style
-from netsp.pictures.style import literal
-from netsp.site.read import read_site
+from netsp.view.pictures import style
+from netsp.view.pictures.style import literal
 
 ROOT = Path(__file__).parent.parent
 SMALL = str(ROOT / "problems" / "known" / "triangle.json")
@@ -560,7 +560,7 @@ def test_names_in_any_script_and_of_any_length_leave_no_remark(name, tmp_path, r
         g.model_copy(update={"name": f"{k}{name}"[:200]}) for k, g in enumerate(problem.goals)
     )
     problem = problem.model_copy(update={"goals": goals})
-    from netsp.pictures.problem import save
+    from netsp.view.pictures.problem_picture import save
 
     save(problem, solve(problem), tmp_path / "p.png")
     assert not [str(w.message) for w in recwarn]
@@ -678,7 +678,7 @@ def test_an_obstacle_of_neither_form_is_told_both(tmp_path, capsys):
 
 
 def test_an_obstacle_that_appears_in_degrees_is_refused(tmp_path, capsys):
-    from netsp.execute.events import Surprises
+    from netsp.online.execute.events import Surprises
 
     origin = {"latitude": 57.7, "longitude": 11.95}
     problem = Problem(base=(0, 0), goals=[(9, 0)], tether_length=60, origin=origin)

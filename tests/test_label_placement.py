@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from netsp import Problem
-from netsp.pictures.label_placement import HEIGHT_PER_LINE, WIDTH_PER_LETTER, place_labels
-from netsp.pictures.problem import draw_map
+from netsp.view.pictures.label_placement import HEIGHT_PER_LINE, WIDTH_PER_LETTER, place_labels
+from netsp.view.pictures.problem_picture import draw_map
 
 
 @given(seed=st.integers(0, 10**6), n=st.integers(1, 30), span=st.floats(1.0, 400.0))

@@ -7,11 +7,11 @@ import pytest
 import trimesh
 
 from netsp import InputError
-from netsp.online.scene import lattice, voxels
-from netsp.online.scene.field import DistanceField
-from netsp.online.scene.grid import SIDE
-from netsp.online.scene.sites import site_distance, triangle_sites
-from netsp.online.tether import TETHERS
+from netsp.world.scene import lattice, voxels
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.grid import SIDE
+from netsp.world.scene.sites import site_distance, triangle_sites
+from netsp.world.tether import TETHERS
 
 VOXEL = 0.07
 

@@ -7,9 +7,9 @@ import threading
 import numpy as np
 import pytest
 
-from netsp.compiled import disk_cache, kernel, lazy_library
-from netsp.compiled.compile_policy import compiles, everything_compiled
-from netsp.compiled.interpretation import interpreted
+from netsp.base.compiled import disk_cache, kernel, lazy_library
+from netsp.base.compiled.compile_policy import compiles, everything_compiled
+from netsp.base.compiled.interpretation import interpreted
 from tests.fresh_modules import fresh_module
 
 pytestmark = pytest.mark.skipif(
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(
 
 MODULE = """
 import numpy as np
-from netsp.compiled.kernel import kernel
+from netsp.base.compiled.kernel import kernel
 
 @kernel
 def cells(a, n):
@@ -70,7 +70,7 @@ def test_a_kernel_without_machine_code_runs_interpreted_until_that_pays(kernels)
 PROCESS = """
 import importlib, sys
 import numpy as np
-from netsp.compiled.compile_policy import everything_compiled
+from netsp.base.compiled.compile_policy import everything_compiled
 import numba.core.compiler as compiler
 
 translated = []

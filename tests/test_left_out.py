@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from netsp import Circle, Problem, solve
+from netsp.base.errors import InputError, LeftOutWarning, LimitReachedError
 from netsp.command.main import main
 from netsp.command.measures import describe_tethers
-from netsp.errors import InputError, LeftOutWarning, LimitReachedError
-from netsp.execute.repair import repair
-from netsp.pictures.problem import draw_map
-from netsp.report.briefing import tethers
+from netsp.online.execute.tour_repair import repair
+from netsp.plan.solve_problem import travel_graph
 from netsp.roadmap.paths import TautPaths, UnknownPathError
 from netsp.roadmap.turning import turnings, within_turning
-from netsp.solvers.solve import travel_graph
+from netsp.view.pictures.problem_picture import draw_map
+from netsp.view.report.briefing import tethers
 
 matplotlib.use("Agg")
 

@@ -6,13 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from netsp import Problem, solve
-from netsp.execute.log import ExecutionOptions
-from netsp.execute.run import StopsFlightError
-from netsp.fly import flight
-from netsp.fly.flight import fly
-from netsp.fly.flight_policy import FlightPolicy
-from netsp.fly.leg_corridor import LegCorridor
-from netsp.geometry import polylines
+from netsp.base.geometry import polylines
+from netsp.online.execute.execution_log import ExecutionOptions
+from netsp.online.execute.tour_execution import StopsFlightError
+from netsp.online.fly import tour_flight
+from netsp.online.fly.flight_policy import FlightPolicy
+from netsp.online.fly.leg_corridor import LegCorridor
+from netsp.online.fly.tour_flight import fly
 from tests.simulated_session import SimulatedSession
 from tests.test_fly_vehicle import driven
 
@@ -30,7 +30,7 @@ velocities = st.tuples(*[st.integers(-10, 10)] * 3).map(lambda p: np.array(p) / 
 )  # fmt: skip
 def test_bends_at_full_speed_end_no_flight(monkeypatch, speed, current):
     """Goals are only seen in passing: the vehicle turns at full speed."""
-    monkeypatch.setattr(flight, "rehearse", lambda: None)
+    monkeypatch.setattr(tour_flight, "rehearse", lambda: None)
     session = SimulatedSession(SQUARE, speed=speed, current=current, noise=0.02, smooth=1.0).arm()
     done = fly(SQUARE, solve(SQUARE), session, ExecutionOptions(speed=speed, reach=3.0))
     assert (done.summary["status"], done.summary["home"]) == ("done", True), done.stopped

@@ -12,13 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Problem, Solution
-from netsp.errors import InputError
-from netsp.execute.log import ExecutionRow
-from netsp.execute.plan import HOME, legs_of
-from netsp.export.leg_times import SmoothMove, VehicleMotion, leg_times, target_times
-from netsp.export.waypoints import Waypoint, waypoints_of
-from netsp.export.write import Settings, altitude, predicted_s, start_of
-from netsp.fly.flight_time import FlightClock, FlightTime, predicted_flight
+from netsp.base.errors import InputError
+from netsp.exchange.missions.leg_times import SmoothMove, VehicleMotion, leg_times, target_times
+from netsp.exchange.missions.mission_files import Settings, altitude, predicted_s, start_of
+from netsp.exchange.missions.waypoints import Waypoint, waypoints_of
+from netsp.online.execute.execution_log import ExecutionRow
+from netsp.online.execute.tour_plan import HOME, legs_of
+from netsp.online.fly.flight_time import FlightClock, FlightTime, predicted_flight
 from tests.autopilot import Earth
 from tests.test_autopilot_recordings import log, track
 

@@ -8,28 +8,28 @@ import pytest
 
 from netsp import Problem, Status, solve_graph, travel_graph
 from netsp import solve as solve_problem
-from netsp.clock import Clock
-from netsp.mip import overgoals
+from netsp.base.clock import Clock
+from netsp.gtsp import cost_matrix
+from netsp.gtsp.cost_matrix import LegCosts
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.nearest_index import NearRows
+from netsp.gtsp.sparse_costs import LegRows
+from netsp.mip import goal_relaxation
+from netsp.mip.cost_fixing import longest_legs, survivors
+from netsp.mip.cover_costs import OverClasses, OverWays
 from netsp.mip.covers import climb
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs
-from netsp.mip.parities import odd_letters
+from netsp.mip.parity_cuts import odd_letters
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
-from netsp.mip.survivors import longest_legs, survivors
-from netsp.mip.towers import OverClasses, OverWays
-from netsp.problem import State
+from netsp.model.problem import State
+from netsp.model.random_worlds import random_world
 from netsp.roadmap.from_state import graph_from_state
-from netsp.solving import legcosts
-from netsp.solving.legcosts import LegCosts
-from netsp.solving.legrows import LegRows
-from netsp.solving.limits import Limits
-from netsp.solving.nearrows import NearRows
-from netsp.worlds import random_world
 from tests.test_contract import random_graph
 from tests.test_even_crossings import small
 
-SOLVE = importlib.import_module("netsp.mip.solve")  # the package has a function of that name
+SOLVE = importlib.import_module("netsp.mip.mip_solver")  # the package has a function of that name
 NO_TOUR = np.zeros(0, dtype=np.int64)
 
 
@@ -86,7 +86,7 @@ def test_rows_ask_for_room_before_they_grow(monkeypatch):
     costs = some_costs(rng)
     asked = []
     monkeypatch.setattr(
-        "netsp.solving.legrows.ask", lambda size, what, advice: asked.append((size, len(what)))
+        "netsp.gtsp.sparse_costs.ask", lambda size, what, advice: asked.append((size, len(what)))
     )
     rows_of(costs, rng)
     assert sum(size for size, _ in asked) == 8.0 * np.isfinite(costs).sum()
@@ -136,7 +136,7 @@ def test_prices_over_rows_are_those_over_a_matrix_and_rule_out_the_same(seed):
     duals = duals_of_relaxation(rng.normal(size=7), rng.random(12), cuts, graph.cluster)
     marks, rows = DeadLegs.of(costs), rows_of(costs, rng)
     with_marks = Prices(costs, marks, graph.cluster, cuts, duals)
-    in_rows = Prices(legcosts.NO_VALUES, rows, graph.cluster, cuts, duals)
+    in_rows = Prices(cost_matrix.NO_VALUES, rows, graph.cluster, cuts, duals)
     assert in_rows.bound == with_marks.bound
     cutoff = with_marks.bound + 3.0
     legs = marks.legs_left()
@@ -153,7 +153,7 @@ def test_prices_over_rows_are_those_over_a_matrix_and_rule_out_the_same(seed):
 
 
 def test_what_lies_nearest_is_so_along_legs_that_were_let_go_too(monkeypatch):
-    monkeypatch.setattr(legcosts, "ROUNDED_FROM", 0)  # never a matrix again
+    monkeypatch.setattr(cost_matrix, "ROUNDED_FROM", 0)  # never a matrix again
     graph, rng = travel_graph(small(3, tether_length=150.0)), np.random.default_rng(0)
     costs, asked, find = graph.costs_rounded(np.arange(len(graph))), [], graph.costs_in_blocks
 
@@ -281,14 +281,14 @@ def test_what_a_leg_may_cost_is_no_less_than_it_costs_in_tours_as_short(seed):
 def rows_from_the_start(monkeypatch):
     """Legs of small graphs are held in rows, until few classes are left."""
     monkeypatch.setattr(SOLVE, "ROUNDED_FROM", 20)
-    monkeypatch.setattr(legcosts, "ROUNDED_FROM", 20)
+    monkeypatch.setattr(cost_matrix, "ROUNDED_FROM", 20)
     monkeypatch.setattr(SOLVE, "MANY_CLASSES", 20)
-    monkeypatch.setattr(overgoals, "MANY_CLASSES", 20)
+    monkeypatch.setattr(goal_relaxation, "MANY_CLASSES", 20)
     monkeypatch.setattr(SOLVE, "MANY_GOALS", 5)
     monkeypatch.setattr("netsp.mip.covers.COARSE", 1)
-    monkeypatch.setattr("netsp.solving.searching.CORE", 30)
-    monkeypatch.setattr("netsp.solving.searching.MEASURE_AT_ONCE", 10)
-    monkeypatch.setattr(legcosts, "MEASURE_AT_ONCE", 10)
+    monkeypatch.setattr("netsp.gtsp.searching.CORE", 30)
+    monkeypatch.setattr("netsp.gtsp.searching.MEASURE_AT_ONCE", 10)
+    monkeypatch.setattr(cost_matrix, "MEASURE_AT_ONCE", 10)
     # covers prove little, so that the program over the classes has something to do
     monkeypatch.setattr("netsp.mip.covers.MOST_CELLS", 25)
     monkeypatch.setattr("netsp.mip.covers.PATIENCE", 0)
@@ -358,8 +358,8 @@ def graphs_by_kind():
 )
 def test_legs_in_blocks_are_those_rounded_and_ways_no_longer(kind, monkeypatch):
     graph = graphs_by_kind()[kind]
-    monkeypatch.setattr("netsp.roadmap.legs.BLOCK", 5)
-    monkeypatch.setattr("netsp.roadmap.legs.BLOCK_LEGS", 17 * len(graph))
+    monkeypatch.setattr("netsp.roadmap.taut_legs.BLOCK", 5)
+    monkeypatch.setattr("netsp.roadmap.taut_legs.BLOCK_LEGS", 17 * len(graph))
     assert graph.legs_in_blocks
     expected = graph.costs_rounded(np.arange(len(graph)))
     for asked in None, np.random.default_rng(0).permutation(len(graph))[:23]:

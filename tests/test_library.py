@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from netsp import Problem, Solution, solve, verify
+from netsp.base.errors import InputError, VerificationError
 from netsp.command.main import main
-from netsp.errors import InputError, VerificationError
-from netsp.library import Library, Record, rank
-from netsp.library.rank import Row, append_row, ranking, read_rows
-from netsp.lower_bound import LowerBound, Scope
+from netsp.model.bound_scope import LowerBound, Scope
+from netsp.study.library import Library, Record, rank
+from netsp.study.library.rank import Row, append_row, ranking, read_rows
 
 FOLDER = Path(__file__).parent.parent / "problems" / "library"
 SMALL = "jacket-6-0"

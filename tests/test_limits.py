@@ -14,9 +14,9 @@ from netsp import InfeasibleError, InputError, Problem, Status, solve, travel_gr
 from netsp.command.main import main
 from netsp.hsignature import reduce
 from netsp.hsignature.rays import crossings
+from netsp.model.solution import max_turning
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.turning import turnings
-from netsp.solution import max_turning
 from tests.brute import brute_tour
 from tests.worlds import random_world
 

@@ -5,15 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp.clock import Clock
-from netsp.compiled.chance import seeded
-from netsp.lns.descent import descend, two_opt
-from netsp.lns.layers import Instance, best_classes
-from netsp.lns.links import Tables, best_place, link, no_links, put, take_out, write_order
-from netsp.lns.ruin import ruin_and_recreate
-from netsp.lns.search import Search
-from netsp.lns.solve import Params, solve
-from netsp.solving.limits import Limits
+from netsp.base.clock import Clock
+from netsp.base.compiled.rng import seeded
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.search.descent import descend, two_opt
+from netsp.gtsp.search.layers import Instance, best_classes
+from netsp.gtsp.search.links import Tables, best_place, link, no_links, put, take_out, write_order
+from netsp.gtsp.search.lns_solver import Params, solve
+from netsp.gtsp.search.local_search import Search
+from netsp.gtsp.search.ruin import ruin_and_recreate
 from tests.test_contract import random_graph
 
 

@@ -11,8 +11,8 @@ from netsp import InputError
 from netsp.online import GeodesicTether
 from netsp.online.equipment import TetherPhysics
 from netsp.online.mission import Mission
-from netsp.online.simulate import simulate
-from netsp.online.tether.load import payout, payout_along, pull_on_robot, turning
+from netsp.online.mission_run import simulate
+from netsp.world.tether.load import payout, payout_along, pull_on_robot, turning
 from tests.test_simulate import POST, ring
 
 DIAMETER, DRAG = 0.0076, 1.2

@@ -16,22 +16,22 @@ from hypothesis import strategies as st
 
 from netsp import Problem, Solution, TravelGraph, solve, solve_graph, travel_graph, verify
 from netsp.app import solving
+from netsp.base.errors import InputError
 from netsp.command import gtsp as gtsp_command
-from netsp.command import told
-from netsp.command.progress import ProgressTable, summary
-from netsp.errors import InputError
-from netsp.gtsplib.tour import tour_text
-from netsp.library.records import Record
-from netsp.lower_bound import LowerBound, Scope, above_shortest, gap_of, strongest
-from netsp.pictures.problem import _title, save_trace
-from netsp.report.page import _cells_table, _rows_link
-from netsp.report.stats import bound_of, cells, is_proven
-from netsp.report.tour import _summary
-from netsp.solution import Status, proof, scope_of
-from netsp.solvers import auto, exact
-from netsp.solvers import solve as by_name
-from netsp.travel.result import Progress, Result, of_part
-from netsp.worlds import reachable_world
+from netsp.command import json_output
+from netsp.command.progress_table import ProgressTable, summary
+from netsp.gtsp.gtsplib.tour_file import tour_text
+from netsp.gtsp.travel.result import Progress, Result, of_part
+from netsp.model.bound_scope import LowerBound, Scope, above_shortest, gap_of, strongest
+from netsp.model.random_worlds import reachable_world
+from netsp.model.solution import Status, proof, scope_of
+from netsp.plan import auto, exact
+from netsp.plan import solve_problem as by_name
+from netsp.study.library.records import Record
+from netsp.view.pictures.problem_picture import _title, save_trace
+from netsp.view.report.page import _cells_table, _rows_link
+from netsp.view.report.stats import bound_of, cells, is_proven
+from netsp.view.report.tour_page import _summary
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -157,7 +157,7 @@ PLACES = {
         Result((0, 1), 10.0, b.length, Status.FEASIBLE, lower_bound_of=b.scope)
     ),
     "summary of solve": lambda p, s, b: summary(p, s),
-    "summary of solve as JSON": lambda p, s, b: told.of_solution(p, s)["lower_bound_of"],
+    "summary of solve as JSON": lambda p, s, b: json_output.of_solution(p, s)["lower_bound_of"],
     "solution file": lambda p, s, b: json.loads(s.to_json())["lower_bound_of"],
     "title of a picture": lambda p, s, b: _title(p, s),
     "report of a tour": lambda p, s, b: _summary(p, s, NOT_FLOWN),
@@ -222,9 +222,9 @@ def test_records_take_bounds_on_all_tours_only(solved):
 
 SHOWN = {"lower_bound", "gap", "bound_of_all", "gap_to_all"}
 ELSEWHERE = {
-    "netsp/lower_bound.py": "the type itself",
-    "netsp/space/judge.py": "quotes what a file states wrongly",
-    "netsp/library/records.py": "a record is updated; it holds bounds on all tours only",
+    "netsp/model/bound_scope.py": "the type itself",
+    "netsp/plan/space/judge.py": "quotes what a file states wrongly",
+    "netsp/study/library/records.py": "a record is updated; it holds bounds on all tours only",
 }
 
 
@@ -449,7 +449,7 @@ def test_the_page_keeps_classes_of_the_tour_before_an_edit(restricted):
 
 
 def test_a_record_refuses_a_bound_on_other_tours(tmp_path, small, solved):
-    from netsp.library import Library
+    from netsp.study.library import Library
 
     (tmp_path / "records.json").write_text('{"schema_version": 1, "records": []}')
     (tmp_path / "pier.json").write_text(small.to_json())

@@ -17,9 +17,14 @@ from netsp.hsignature import (
     invert,
     reduce,
 )
-from netsp.hsignature.measures import _cross_rays, measure, self_crossings, winding_numbers
+from netsp.hsignature.signature_measures import (
+    _cross_rays,
+    measure,
+    self_crossings,
+    winding_numbers,
+)
 from netsp.online import Scene
-from netsp.space.measures import measure_path
+from netsp.plan.space.mission_measures import measure_path
 
 PILE = Circle(center=(0, 0), radius=1)
 FAR = Circle(center=(10, 0), radius=1)
@@ -187,7 +192,7 @@ def test_a_tour_out_and_home_past_the_same_side_does_not_cross_itself():
 
 
 def test_a_byte_order_mark_does_not_cost_a_point(tmp_path):
-    from netsp.axes import read_path
+    from netsp.base.axes import read_path
 
     (tmp_path / "a.csv").write_text("\ufeff0,0\n1,1\n", encoding="utf-8")
     assert len(read_path(tmp_path / "a.csv")) == 2

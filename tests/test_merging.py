@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import travel_graph
-from netsp.clock import Clock
+from netsp.base.clock import Clock
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.searching import SearchingRun
 from netsp.mip.merging import classes_of, merge, merged
-from netsp.mip.solve import solve_merged
-from netsp.solving.limits import Limits
-from netsp.solving.searching import SearchingRun
-from netsp.worlds import random_world
+from netsp.mip.mip_solver import solve_merged
+from netsp.model.random_worlds import random_world
 from tests.brute import brute_tour
 from tests.test_contract import random_graph
 
@@ -59,8 +59,8 @@ def test_searches_from_the_start_give_different_tours_and_the_merged_is_no_longe
 
 def test_tours_of_very_many_classes_are_merged_by_a_program_that_merges_nothing(monkeypatch):
     graph = random_graph(0, 5, most=3)
-    monkeypatch.setattr(sys.modules["netsp.mip.solve"], "MANY_CLASSES", 2)
-    monkeypatch.setattr(sys.modules["netsp.mip.solve"], "MANY_GOALS", 2)
+    monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "MANY_CLASSES", 2)
+    monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "MANY_GOALS", 2)
     tours = some_tours(graph, random.Random(0), 4)
     found = merged(graph, tours, solve_merged, Limits(Clock(60.0)))
     assert graph.is_tour(found)
@@ -68,7 +68,7 @@ def test_tours_of_very_many_classes_are_merged_by_a_program_that_merges_nothing(
 
 def ends_of(monkeypatch, least, limits):
     """Tours from which those of a run with so many goals are made, and the run."""
-    module = sys.modules["netsp.mip.solve"]
+    module = sys.modules["netsp.mip.mip_solver"]
     given = []
 
     def merge(run, tours, prove, clock, known=module.merge):

@@ -16,19 +16,25 @@ from hypothesis import strategies as st
 from scipy.sparse import csc_array, csr_array
 
 from netsp import solve_graph, travel_graph
+from netsp.gtsp import cost_matrix, searching
+from netsp.gtsp.cost_matrix import MEASURE_AT_ONCE, LegCosts
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.solver_run import Stop
+from netsp.gtsp.travel.costs import rounded_down
+from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip import highs, root
 from netsp.mip import solve as mip
-from netsp.mip.bound import exact_bound
 from netsp.mip.cbc_program import CbcRelaxation
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs, not_dead
 from netsp.mip.flows import joined
+from netsp.mip.goal_relaxation import best_tree
 from netsp.mip.highs import HighsRelaxation
-from netsp.mip.overgoals import best_tree
+from netsp.mip.lagrangian_bound import exact_bound
+from netsp.mip.mip_solver import Params
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
 from netsp.mip.reducedcosts import reduced_row
-from netsp.mip.solve import Params
 from netsp.mip.subtours import (
     VIOLATION,
     components,
@@ -36,15 +42,9 @@ from netsp.mip.subtours import (
     goal_cuts,
     strongest_cut,
 )
+from netsp.model.random_worlds import random_world as far_world
+from netsp.model.solution import Status
 from netsp.roadmap.taut import TautRoadmap
-from netsp.solution import Status
-from netsp.solving import legcosts, searching
-from netsp.solving.legcosts import MEASURE_AT_ONCE, LegCosts
-from netsp.solving.limits import Limits
-from netsp.solving.run import Stop
-from netsp.travel.costs import rounded_down
-from netsp.travel.graph import TravelGraph
-from netsp.worlds import random_world as far_world
 from tests.brute import brute_tour as brute
 from tests.test_contract import random_graph
 from tests.worlds import costs_of, random_world
@@ -516,10 +516,10 @@ def test_rounded_costs_prove_the_same(monkeypatch, rounded_from, at_once):
     problem = far_world(0, goals=7, tether_length=450.0)
     plain = solve(travel_graph(problem))
     monkeypatch.setattr(TravelGraph, "legs_at_once", at_once)
-    monkeypatch.setattr(legcosts, "ROUNDED_FROM", rounded_from)
-    monkeypatch.setattr(legcosts, "ROWS", 100)
-    monkeypatch.setattr(legcosts, "LEGS", 70)
-    monkeypatch.setattr(legcosts, "MEASURE_AT_ONCE", 5)
+    monkeypatch.setattr(cost_matrix, "ROUNDED_FROM", rounded_from)
+    monkeypatch.setattr(cost_matrix, "ROWS", 100)
+    monkeypatch.setattr(cost_matrix, "LEGS", 70)
+    monkeypatch.setattr(cost_matrix, "MEASURE_AT_ONCE", 5)
     monkeypatch.setattr(searching, "MEASURE_AT_ONCE", 5)
     graph = travel_graph(problem)
     costs = LegCosts(graph)
@@ -536,10 +536,10 @@ def test_rounded_costs_prove_the_same(monkeypatch, rounded_from, at_once):
 
 
 def test_what_is_measured_of_rounded_costs_is_as_long_as_it_is(monkeypatch):
-    monkeypatch.setattr(legcosts, "ROUNDED_FROM", 10)
-    monkeypatch.setattr(legcosts, "ROWS", 50)
-    monkeypatch.setattr(legcosts, "LEGS", 30)
-    monkeypatch.setattr(legcosts, "MEASURE_AT_ONCE", 5)
+    monkeypatch.setattr(cost_matrix, "ROUNDED_FROM", 10)
+    monkeypatch.setattr(cost_matrix, "ROWS", 50)
+    monkeypatch.setattr(cost_matrix, "LEGS", 30)
+    monkeypatch.setattr(cost_matrix, "MEASURE_AT_ONCE", 5)
     monkeypatch.setattr(TravelGraph, "legs_at_once", False)
     graph = travel_graph(far_world(0, goals=5, tether_length=400.0))
     costs, rng = LegCosts(graph), np.random.default_rng(0)
@@ -575,7 +575,7 @@ def test_rounding_is_down_and_squeezing_keeps_what_is_kept(numbers, keep):
     assert (rounded >= matrix * (1 - 2e-7) - 1e-40).all()
     kept = np.array(keep)
     np.testing.assert_array_equal(
-        legcosts.squeezed(matrix.copy(), kept), matrix[np.ix_(kept, kept)]
+        cost_matrix.squeezed(matrix.copy(), kept), matrix[np.ix_(kept, kept)]
     )
 
 
@@ -590,7 +590,7 @@ def test_with_many_classes_of_few_goals_a_bound_comes_before_all_legs_are_bounde
             held.append(len(part))
             super().__init__(part)
 
-    module = sys.modules["netsp.mip.solve"]  # the function of that name hides it
+    module = sys.modules["netsp.mip.mip_solver"]  # the function of that name hides it
     monkeypatch.setattr(module, "LegCosts", OfSome)
     monkeypatch.setattr(module, "CORE_FIRST", 10)
     monkeypatch.setattr(searching, "LARGER", 2)
@@ -605,7 +605,7 @@ def test_with_many_goals_their_bound_comes_first_and_the_proof_is_the_same(monke
     graph = travel_graph(far_world(1, goals=12, tether_length=200.0))
     plain = solve(graph)
     assert "goals" not in {row.stage for row in plain.trace}
-    monkeypatch.setattr(sys.modules["netsp.mip.solve"], "MANY_GOALS", 12)
+    monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "MANY_GOALS", 12)
     first = solve(graph)
     begun = [row for row in first.trace if row.stage == "goals"]
     assert 0.0 < begun[0].bound.length <= plain.length * (1 + 1e-9)
@@ -615,7 +615,7 @@ def test_with_many_goals_their_bound_comes_first_and_the_proof_is_the_same(monke
 
 def test_the_matrices_of_a_proof_go_when_it_ends(monkeypatch):
     made = []
-    module = sys.modules["netsp.mip.solve"]  # the function of that name hides it
+    module = sys.modules["netsp.mip.mip_solver"]  # the function of that name hides it
 
     class Noted(LegCosts):
         def __init__(self, graph):
@@ -728,7 +728,7 @@ def test_what_is_done_with_thousands_of_classes_only_proves_the_same_with_hundre
 
 
 def test_cuts_of_the_proof_over_goals_stay_in_the_program(monkeypatch):
-    monkeypatch.setattr(sys.modules["netsp.mip.solve"], "MANY_GOALS", 5)
+    monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "MANY_GOALS", 5)
     monkeypatch.setattr("netsp.mip.cutpool.IDLE", 1)
     ends = []
     proven = root.Root.solve

@@ -9,13 +9,19 @@ from hypothesis import strategies as st
 
 from netsp import Circle, InputError, Polygon, Problem, solve
 from netsp.command.main import main
-from netsp.export import export
-from netsp.export.write import Settings
-from netsp.problem import Goal
-from netsp.site.mission_commands import CIRCLES, NOT_VISITED, POLYGONS, VISITED, WITHOUT_PLACE
-from netsp.site.options import SiteOptions
-from netsp.site.projection import Projection
-from netsp.site.read import import_site
+from netsp.exchange.maps.mission_commands import (
+    CIRCLES,
+    NOT_VISITED,
+    POLYGONS,
+    VISITED,
+    WITHOUT_PLACE,
+)
+from netsp.exchange.maps.options import SiteOptions
+from netsp.exchange.maps.projection import Projection
+from netsp.exchange.maps.read_map import import_site
+from netsp.exchange.missions import export
+from netsp.exchange.missions.mission_files import Settings
+from netsp.model.problem import Goal
 
 pytest.importorskip("pyproj")
 shapely = pytest.importorskip("shapely")

@@ -6,23 +6,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from netsp.base.errors import InputError, LimitReachedError
+from netsp.base.geometry import polylines
 from netsp.command.main import main
-from netsp.cover import cover
-from netsp.errors import InputError, LimitReachedError
-from netsp.geometry import polylines
 from netsp.online import Scene
 from netsp.online.equipment import Camera
 from netsp.online.mission import Mission, MissionState, MissionWaypoint, Viewpoint
+from netsp.online.mission_run import simulate
 from netsp.online.planner import PlannerOptions
-from netsp.online.simulate import simulate
 from netsp.online.surprises import SceneSurprises
-from netsp.space.bound import bound_of_all
-from netsp.space.flown import words_of_flight
-from netsp.space.judge import verify_mission
-from netsp.space.plan import plan
-from netsp.space.repair import RepairPlanner
-from netsp.space.solve import solve_mission
-from netsp.space.water import Water, has_room
+from netsp.plan.cover import cover
+from netsp.plan.space.flown import words_of_flight
+from netsp.plan.space.judge import verify_mission
+from netsp.plan.space.mission_repair import RepairPlanner
+from netsp.plan.space.mission_solver import solve_mission
+from netsp.plan.space.path_bound import bound_of_all
+from netsp.plan.space.planning_context import Water, has_room
+from netsp.plan.space.space_plan import plan
 from tests.test_tour import written
 from tests.worlds import FEW_CELLS
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from netsp.errors import InputError
-from netsp.number_ranges import check_not_negative, check_positive
+from netsp.base.errors import InputError
+from netsp.base.number_ranges import check_not_negative, check_positive
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,13 @@ import math
 import numpy as np
 import pytest
 
-from netsp.clock import Clock
+from netsp.base.clock import Clock
 from netsp.command.main import main
 from netsp.online import Scene
 from netsp.online.mission import Mission
-from netsp.online.simulate import grid_of, simulate
-from netsp.space.order import order_by_going_on, waypoint_graph
-from netsp.space.solve import seconds_until_home, solve_mission, tour_of_flight
+from netsp.online.mission_run import grid_of, simulate
+from netsp.plan.space.mission_solver import seconds_until_home, solve_mission, tour_of_flight
+from netsp.plan.space.visit_order import order_by_going_on, waypoint_graph
 from tests.worlds import FEW_CELLS
 
 

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 from netsp import Circle, InputError, Problem, Tethers, solve
 from netsp.command.main import main
+from netsp.exchange.maps.gpx import read_gpx
+from netsp.exchange.maps.path_file import path_to_geojson, read_paths
+from netsp.exchange.maps.projection import Projection
 from netsp.hsignature import crossings, invert, reduce
-from netsp.pathmeasures import PathPolicy, measure_path
-from netsp.problem import Origin
-from netsp.site.gpx import read_gpx
-from netsp.site.path_file import path_to_geojson, read_paths
-from netsp.site.projection import Projection
+from netsp.model.problem import Origin
+from netsp.study.paths import PathPolicy, measure_path
 
 ROOT = Path(__file__).parent.parent
 WHARF = ROOT / "problems" / "wharf.json"
@@ -410,7 +410,7 @@ def test_a_path_that_misses_goals_is_compared_with_a_tour_of_those_it_visits(tmp
 
 
 def test_a_recorded_flight_is_measured_by_its_time_stamps(tmp_path):
-    from netsp.guard.recorded_path import read_any_paths
+    from netsp.online.guard.recorded_path import read_any_paths
 
     problem = Problem.load(WHARF)
     (flight,) = read_any_paths(ROOT / "examples" / "wharf-flight.csv.gz", problem, noise=0.1)

@@ -6,14 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from netsp import Circle, Problem, steps
+from netsp import Circle, Problem
+from netsp.base import progress
 from netsp.command import patience
 from netsp.command.main import main
 from netsp.command.patience import Patience, span
 from netsp.command.stages import Stages
-from netsp.roadmap import reach
-from netsp.roadmap.reach import shortest_tethers
-from netsp.worlds import random_world
+from netsp.model.random_worlds import random_world
+from netsp.roadmap import explain_unreachable
+from netsp.roadmap.explain_unreachable import shortest_tethers
 
 ROOT = Path(__file__).parent.parent
 
@@ -27,19 +28,19 @@ def at_once(monkeypatch):
 def test_what_is_quickly_done_says_nothing():
     out = io.StringIO()
     with Patience(out, "counting"):
-        list(steps.each(range(10)))
+        list(progress.each(range(10)))
     assert out.getvalue() == ""
 
 
 def test_the_time_left_is_that_of_the_steps_left(at_once):
     out = io.StringIO()
     with Patience(out, "counting") as told:
-        for k in steps.each(range(4)):
+        for k in progress.each(range(4)):
             if k == 3:
                 time.sleep(0.1)
                 told._since = time.monotonic() - 60.0
                 assert told.line == "counting: 3 of 4, about 0:20 left"
-        for _ in steps.each(range(100)):  # other steps: their pace is their own
+        for _ in progress.each(range(100)):  # other steps: their pace is their own
             assert "about 1:" not in told.line
     assert "counting: " in out.getvalue()
     assert "3 of 4" in out.getvalue()
@@ -80,10 +81,10 @@ def test_obstacles_that_no_path_touches_change_no_tether(monkeypatch, seed):
     far = [Circle(center=(5000.0 + 50.0 * k, 9000.0), radius=20.0) for k in range(10)]
     more = problem.model_copy(update={"obstacles": (*problem.obstacles, *far), "bounds": None})
     whole = shortest_tethers(more)
-    monkeypatch.setattr(reach, "MANY_OBSTACLES", 0)
+    monkeypatch.setattr(explain_unreachable, "MANY_OBSTACLES", 0)
     assert shortest_tethers(more) == pytest.approx(whole, rel=1e-8)
     # and where the first guess is too near
-    monkeypatch.setattr(reach, "FARTHER", 0.3)
+    monkeypatch.setattr(explain_unreachable, "FARTHER", 0.3)
     assert shortest_tethers(more) == pytest.approx(whole, rel=1e-8)
 
 
@@ -91,6 +92,6 @@ def test_a_goal_behind_a_wall_that_is_far_around_needs_the_whole_way(monkeypatch
     wall = [Circle(center=(10.0, y), radius=3.0) for y in range(-60, 61, 4)]
     problem = Problem(base=(0, 0), goals=[(20, 0)], tether_length=10, obstacles=wall)
     whole = shortest_tethers(problem)
-    monkeypatch.setattr(reach, "MANY_OBSTACLES", 0)
+    monkeypatch.setattr(explain_unreachable, "MANY_OBSTACLES", 0)
     assert whole[0] > 120.0
     assert shortest_tethers(problem) == pytest.approx(whole, rel=1e-8)

@@ -176,8 +176,8 @@ def hidden_legs(monkeypatch):
 
     monkeypatch.setattr(TautPaths, "_sought", sought)
     monkeypatch.setattr(TautPaths, "_pulled", lambda *_: (-1.0, None, None))
-    monkeypatch.setattr("netsp.roadmap.legs.fill", _pulls_nothing)
-    monkeypatch.setattr("netsp.roadmap.legs.pull_each", lambda *args: args[-1].fill(-1.0))
+    monkeypatch.setattr("netsp.roadmap.taut_legs.fill", _pulls_nothing)
+    monkeypatch.setattr("netsp.roadmap.taut_legs.pull_each", lambda *args: args[-1].fill(-1.0))
     return length
 
 

@@ -9,12 +9,12 @@ from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 
 from netsp import Problem, TravelGraph, solve, travel_graph
-from netsp.execute import execute
-from netsp.lower_bound import LowerBound, Scope, above_shortest
+from netsp.model.bound_scope import LowerBound, Scope, above_shortest
 from netsp.online import Scene
+from netsp.online.execute import execute
 from netsp.online.mission import Mission
-from netsp.online.simulate import simulate
-from netsp.pictures import style
+from netsp.online.mission_run import simulate
+from netsp.view.pictures import style
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -13,16 +13,16 @@ import pytest
 from matplotlib.text import Text
 from PIL import Image
 
-from netsp.pictures import style
-from netsp.pictures.animation import save_animation
-from netsp.pictures.film import film_of_flight, film_of_run
-from netsp.pictures.mission import save_runs
-from netsp.pictures.problem import draw as draw_tour
-from netsp.pictures.problem import save_classes, save_roadmap
-from netsp.pictures.sizing import draw_tether_curve
-from netsp.report import figures
-from netsp.report.stats import best_lengths, cells, methods
-from netsp.sizing.tether import tether_curve
+from netsp.plan.sizing.tether_sizing import tether_curve
+from netsp.view.pictures import style
+from netsp.view.pictures.animation import save_animation
+from netsp.view.pictures.film import film_of_flight, film_of_run
+from netsp.view.pictures.mission_picture import save_runs
+from netsp.view.pictures.problem_picture import draw as draw_tour
+from netsp.view.pictures.problem_picture import save_classes, save_roadmap
+from netsp.view.pictures.sizing import draw_tether_curve
+from netsp.view.report import figures
+from netsp.view.report.stats import best_lengths, cells, methods
 from tests.test_style import WHARF, basin_flight, mission, of, rows, run, tour
 
 __all__ = ["mission", "rows", "run", "tour"]  # fixtures

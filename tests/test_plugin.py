@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 
 from netsp import InputError, Problem, Solution, Status, TravelGraph, solve, solve_graph, verify
+from netsp.base.registry import Registry
 from netsp.command.main import main
-from netsp.compare.rows import read_rows
-from netsp.compare.run import compare
-from netsp.compare.study import Study
+from netsp.gtsp.travel.result import Result
 from netsp.online import GeodesicTether, Scene
 from netsp.online.mission import Mission
+from netsp.online.mission_run import simulate
 from netsp.online.planner import Planner
-from netsp.online.simulate import simulate
-from netsp.registry import Registry
-from netsp.travel.result import Result
+from netsp.study.compare.rows import read_rows
+from netsp.study.compare.study import Study
+from netsp.study.compare.study_run import compare
 
 ROOT = Path(__file__).resolve().parent.parent
 WHARF = ROOT / "problems" / "wharf.json"
@@ -215,7 +215,7 @@ def test_what_other_packages_raise_is_told_in_one_line(tmp_path):
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1\n")
     (info / "entry_points.txt").write_text(
-        "[netsp.solvers]\nfails = broken:fails\nleaves = broken:leaves\n"
+        "[netsp.plan]\nfails = broken:fails\nleaves = broken:leaves\n"
         "unloadable = unloadable:solve\n[netsp.roadmaps]\nplain = broken:Plain\n"
     )
     env = {**os.environ, "PYTHONPATH": str(tmp_path)}
@@ -261,7 +261,7 @@ def test_a_name_of_ours_cannot_be_taken_and_a_broken_package_costs_one_line(monk
         metadata.EntryPoint("gone", "not_installed_at_all:solve", "netsp.solvers"),
     ]
     monkeypatch.setattr(metadata, "entry_points", lambda group: offers)
-    from netsp.registry import load
+    from netsp.base.registry import load
 
     registry = Registry("solver", "netsp.solvers", {"auto": "ours"}, lambda name, where: where)
     assert registry["auto"] == "ours"

@@ -11,20 +11,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, InputError, Problem
-from netsp.guard import live
-from netsp.guard.alarms import Level
-from netsp.guard.dead_reckoning import DeadReckoning
-from netsp.guard.fix import Fix
-from netsp.guard.guard import Guard, GuardOptions
-from netsp.guard.message_rates import MessageRates, RatePolicy
-from netsp.guard.replay import read_fixes
-from netsp.link.frame import Frame
-from netsp.link.messages import Listener
-from netsp.link.position_aiding import AidingPolicy
+from netsp.online.guard import live
+from netsp.online.guard.alarms import Level
+from netsp.online.guard.dead_reckoning import DeadReckoning
+from netsp.online.guard.message_rates import MessageRates, RatePolicy
+from netsp.online.guard.replay import read_fixes
+from netsp.online.guard.telemetry import Fix
+from netsp.online.guard.tether_guard import Guard, GuardOptions
+from netsp.online.link.geo_frame import Frame
+from netsp.online.link.mavlink_messages import Listener
+from netsp.online.link.position_aiding import AidingPolicy
 
 pytest.importorskip("pymavlink")
 
-from netsp.link.dialect import dialect, parser
+from netsp.online.link.dialect import dialect, parser
 from tests.autopilot import Simulation
 
 FLIGHTS = Path(__file__).parent / "data" / "ardusub47"

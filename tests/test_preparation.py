@@ -13,13 +13,13 @@ from types import SimpleNamespace
 
 import pytest
 
+from netsp.base.compiled import disk_cache, dynamic_array
+from netsp.base.compiled.compile_policy import compiles, current_policy
+from netsp.base.compiled.kernel import all_kernels
+from netsp.base.errors import InputError
 from netsp.command import compiling, main, warm_up
 from netsp.command.compiling import CompileTimes, Preparation, PreparationPolicy
 from netsp.command.status_line import StatusLine, status_line
-from netsp.compiled import disk_cache, growing
-from netsp.compiled.compile_policy import compiles, current_policy
-from netsp.compiled.kernel import all_kernels
-from netsp.errors import InputError
 
 ROOT = Path(__file__).parent.parent
 
@@ -40,7 +40,7 @@ class _Terminal(io.StringIO):
 def test_one_line_is_written_however_many_kernels_are_compiled():
     stream = io.StringIO()
     preparation = Preparation(stream)
-    outer, inner = _kernel("netsp.mip.flows"), _kernel("netsp.lns.links")
+    outer, inner = _kernel("netsp.mip.flows"), _kernel("netsp.gtsp.search.links")
     for _ in range(40):
         preparation.begin(outer)
         preparation.begin(inner)
@@ -55,7 +55,7 @@ def test_without_a_terminal_another_line_is_written_every_half_minute(monkeypatc
     clock, stream = [100.0], io.StringIO()
     monkeypatch.setattr(compiling.time, "monotonic", lambda: clock[0])
     preparation = Preparation(stream, policy=PreparationPolicy(every_s=30.0))
-    kernel = _kernel("netsp.space.walk")
+    kernel = _kernel("netsp.plan.space.walk")
     for _ in range(65):
         preparation.begin(kernel)
         clock[0] += 1.0
@@ -72,7 +72,7 @@ def test_without_a_terminal_another_line_is_written_every_half_minute(monkeypatc
 def test_a_terminal_shows_a_bar_that_fills():
     stream = _Terminal()
     preparation = Preparation(stream, StatusLine(stream))
-    kernel = _kernel("netsp.online.tether.pull")
+    kernel = _kernel("netsp.world.tether.pull")
     preparation.begin(kernel)
     preparation.end(kernel)
     begin, end = stream.getvalue().strip("\r\n").split("\r")
@@ -141,26 +141,26 @@ def test_a_policy_of_messages_has_positive_numbers(field):
 def test_kernels_are_timed_without_those_that_they_call(monkeypatch):
     clock, times = [0.0], CompileTimes()
     monkeypatch.setattr(compiling.time, "thread_time", lambda: clock[0])
-    outer, inner = _kernel("netsp.mip.flows"), _kernel("netsp.lns.links")
+    outer, inner = _kernel("netsp.mip.flows"), _kernel("netsp.gtsp.search.links")
     for begin_or_end, kernel, spent in (
         (times._begin, outer, 1.0), (times._begin, inner, 4.0), (times._end, inner, 2.0),
         (times._end, outer, 0.0), (times._begin, inner, 8.0), (times._end, inner, 0.0),
     ):  # fmt: skip
         begin_or_end(kernel)
         clock[0] += spent
-    assert times.seconds == {"mip.flows.body": 3.0, "lns.links.body": 12.0}
+    assert times.seconds == {"mip.flows.body": 3.0, "gtsp.search.links.body": 12.0}
 
 
 @pytest.mark.skipif(not compiles(), reason="NUMBA_DISABLE_JIT is set")
 def test_kernels_of_a_folder_that_are_compiled_or_on_disk_need_no_time(monkeypatch, tmp_path):
     monkeypatch.setattr(disk_cache, "lock_file", lambda _: tmp_path / "a.lock")
-    folder = Path(growing.__file__).parent
+    folder = Path(dynamic_array.__file__).parent
     missing = [
         kernel.py_func for kernel in all_kernels()
         if Path(kernel.py_func.__code__.co_filename).parent == folder and not kernel.overloads
     ]  # fmt: skip
     expected = [current_policy().compile_time_s(len(f.__code__.co_code)) for f in missing]
-    kernel = getattr(growing.longer, "dispatcher", growing.longer)
+    kernel = getattr(dynamic_array.longer, "dispatcher", dynamic_array.longer)
     assert missing
     assert compiling._folder_compile_time_s(kernel) == pytest.approx(sum(expected))
     kept = f"{Path(missing[0].__code__.co_filename).stem}.{missing[0].__qualname__}"
@@ -208,8 +208,8 @@ def test_kernels_of_other_packages_are_not_reported():
 COMPILED = """
 import sys
 from netsp.command.compiling import compile_messages
-from netsp.compiled.compile_policy import everything_compiled
-from netsp.compiled.kernel import kernel
+from netsp.base.compiled.compile_policy import everything_compiled
+from netsp.base.compiled.kernel import kernel
 
 with compile_messages(sys.stderr):
     pass  # ends before Numba is loaded, so it reports nothing later

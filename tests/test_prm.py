@@ -7,9 +7,9 @@ import pytest
 import shapely
 
 from netsp import Circle, InfeasibleError, InputError, Problem, Status, solve, verify
-from netsp.errors import LimitReachedError
+from netsp.base.errors import LimitReachedError
 from netsp.hsignature import concatenate, crossings, is_looping, signature
-from netsp.lower_bound import Scope
+from netsp.model.bound_scope import Scope
 from netsp.roadmap.prm import PrmRoadmap
 from netsp.roadmap.taut import TautRoadmap
 from tests.worlds import random_world

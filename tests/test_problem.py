@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from netsp import Circle, InputError, Polygon, Problem, Solution
-from netsp.geometry.polygons import (
+from netsp.base.geometry.polygons import (
     counterclockwise,
     polygon_interior_point,
     polygon_signed_distance,

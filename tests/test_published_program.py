@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from netsp import InputError, solve_graph
+from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip.cbc_program import CbcInteger
-from netsp.solution import Status
-from netsp.travel.graph import TravelGraph
+from netsp.model.solution import Status
 from tests.brute import brute_tour
 from tests.test_contract import random_graph
 

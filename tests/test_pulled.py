@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, Polygon, Problem
-from netsp.errors import NetspError
+from netsp.base.errors import NetspError
 from netsp.hsignature import signature
+from netsp.model.random_worlds import FAMILIES, random_world
 from netsp.roadmap.outline import is_free
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.pulled import NOT_PULLED
 from netsp.roadmap.taut import TautRoadmap
-from netsp.worlds import FAMILIES, random_world
+from netsp.roadmap.taut_by_word import NOT_PULLED
 
 
 def some_legs(roadmap, rng, most):

@@ -10,17 +10,17 @@ from hypothesis import strategies as st
 
 from netsp import Circle, InputError, Problem
 from netsp.command.main import main
-from netsp.guard.alarms import Level
-from netsp.guard.fix import Fix
-from netsp.guard.guard import Guard, GuardOptions
-from netsp.guard.message_tally import MessageTally
-from netsp.guard.recorded_path import read_any_paths
-from netsp.guard.recording_checks import RecordingPolicy
-from netsp.guard.replay import read_fixes
-from netsp.guard.stream import Stream, replayed
-from netsp.link.frame import Frame
-from netsp.link.vehicle_clock import ClockPolicy, VehicleClock
-from netsp.problem import Origin
+from netsp.model.problem import Origin
+from netsp.online.guard.alarms import Level
+from netsp.online.guard.message_tally import MessageTally
+from netsp.online.guard.recorded_path import read_any_paths
+from netsp.online.guard.recording_checks import RecordingPolicy
+from netsp.online.guard.replay import read_fixes
+from netsp.online.guard.stream import Stream, replayed
+from netsp.online.guard.telemetry import Fix
+from netsp.online.guard.tether_guard import Guard, GuardOptions
+from netsp.online.link.geo_frame import Frame
+from netsp.online.link.vehicle_clock import ClockPolicy, VehicleClock
 
 SITE = Problem(
     base=(0, 0), goals=[(9, 0, -1)], tether_length=30,
@@ -47,7 +47,7 @@ WAY = [(0.1 * k, 0.3 * k, 0.2 * k, -1.0) for k in range(20)]
 
 
 def degrees(x, y):
-    from netsp.site.projection import Projection
+    from netsp.exchange.maps.projection import Projection
 
     ((lat, lon),) = Projection.of(ON_EARTH).to_earth([(x, y)])
     return f"{lat:.10f}", f"{lon:.10f}"
@@ -244,7 +244,7 @@ def test_columns_that_are_not_understood_are_named(tmp_path):
 
 def tlog(file, *rows):
     """Rows of (system, component, message)."""
-    from netsp.link.dialect import parser
+    from netsp.online.link.dialect import parser
 
     data = b"".join(
         struct.pack(">Q", 10**15 + k) + message.pack(parser(system, component))
@@ -276,7 +276,7 @@ def vehicle(m, system=1, *, local=True, degrees=None, flags=GOOD, n=30, begin=0)
 @pytest.fixture(scope="module")
 def m():
     pytest.importorskip("pymavlink")
-    from netsp.link.dialect import dialect
+    from netsp.online.link.dialect import dialect
 
     return dialect()
 
@@ -546,9 +546,9 @@ def test_paths_of_tables_have_the_same_times_and_gaps(tmp_path, text, n, says, c
 
 
 def test_beside_the_vehicle_it_is_said_once_which_option_would_help(m):
-    from netsp.guard.live import _Hints
-    from netsp.link.dialect import parser
-    from netsp.link.messages import Listener
+    from netsp.online.guard.live import _Hints
+    from netsp.online.link.dialect import parser
+    from netsp.online.link.mavlink_messages import Listener
 
     listener, hints = Listener(Frame(ON_EARTH)), _Hints()
     said = []
@@ -565,8 +565,8 @@ def test_beside_the_vehicle_it_is_said_once_which_option_would_help(m):
 def test_damaged_messages_of_a_log_are_told_by_the_checksum_as_pymavlink_tells_them(m, wire):
     import random
 
-    from netsp.guard.telemetry_log import STAMP_BYTES, messages_of
-    from netsp.link.dialect import parser
+    from netsp.online.guard.telemetry_log import STAMP_BYTES, messages_of
+    from netsp.online.link.dialect import parser
 
     chance, stamp = random.Random(wire), (10**15).to_bytes(STAMP_BYTES, "big")
     packets = [bytes(packet.pack(parser(1, 1), force_mavlink1=wire == 1))

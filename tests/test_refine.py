@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError
-from netsp.geometry import polylines
+from netsp.base.geometry import polylines
 from netsp.online import Scene
 from netsp.online.paths.refine import (
     REFINEMENTS,

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from netsp import Circle, Problem, solve
-from netsp.compiled.compile_policy import compiles
-from netsp.execute import execute, ready
-from netsp.fly import rehearsal
-from netsp.fly.rehearsal import rehearse
-from netsp.guard.rehearsal import rehearse as watched
+from netsp.base.compiled.compile_policy import compiles
+from netsp.online.execute import execute, repair_warm_up
+from netsp.online.fly import flight_rehearsal
+from netsp.online.fly.flight_rehearsal import rehearse
+from netsp.online.guard.guard_rehearsal import rehearse as watched
 from tests.autopilot import Autopilot
 
 pytestmark = pytest.mark.skipif(not compiles(), reason="NUMBA_DISABLE_JIT is set")
@@ -41,7 +41,7 @@ def loaded():
 
 FLOWN = """
 from netsp.command.main import main
-from netsp.link import session
+from netsp.online.link import session
 
 opened, begin = [], session.Session.__init__
 
@@ -56,12 +56,12 @@ print(json.dumps([code, len(opened[0]), sorted(loaded() - opened[0])]))
 
 WATCHED = """
 import numpy as np
-from netsp.guard import live
-from netsp.guard.fix import Fix
-from netsp.guard.guard import Guard
-from netsp.link.frame import Frame
+from netsp.online.guard import live
+from netsp.online.guard.telemetry import Fix
+from netsp.online.guard.tether_guard import Guard
+from netsp.online.link.geo_frame import Frame
 from netsp.online.mission import Mission
-from netsp.problem import Problem
+from netsp.model.problem import Problem
 
 opened = []
 
@@ -127,15 +127,17 @@ def test_before_a_tour_is_flown_all_is_loaded_that_it_and_its_repairs_need(tmp_p
 
 @pytest.mark.parametrize(
     ("module", "stage", "told"),
-    [(rehearsal, "solve", "on_progress"), (rehearsal, "execute", "on_step"),
-     (ready, "solve_graph", "on_progress")],
+    [(flight_rehearsal, "solve", "on_progress"), (flight_rehearsal, "execute", "on_step"),
+     (repair_warm_up, "solve_graph", "on_progress")],
 )  # fmt: skip
 def test_ctrl_c_before_the_flight_ends_it(module, stage, told, monkeypatch):
     """Planning and flying take Ctrl-C for the wish to have what there is."""
     real = getattr(module, stage)
     press = {told: lambda _: signal.raise_signal(signal.SIGINT)}
     monkeypatch.setattr(module, stage, lambda *args, **more: real(*args, **{**more, **press}))
-    monkeypatch.setattr("netsp.execute.run.make_ready", ready.make_ready.__wrapped__)
+    monkeypatch.setattr(
+        "netsp.online.execute.tour_execution.make_ready", repair_warm_up.make_ready.__wrapped__
+    )
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
@@ -149,7 +151,7 @@ def test_a_rehearsal_meets_no_defect(monkeypatch):
     """It would hide there: a flight goes home with it."""
     flown = []
     monkeypatch.setattr(
-        rehearsal, "execute", lambda *args, **more: flown.append(execute(*args, **more))
+        flight_rehearsal, "execute", lambda *args, **more: flown.append(execute(*args, **more))
     )
     rehearse.__wrapped__()
     (done,) = flown

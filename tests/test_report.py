@@ -14,13 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom
 
+from netsp.base.errors import InputError
 from netsp.command.main import main
-from netsp.compare.rows import SCHEMA, read_rows
-from netsp.compare.run import compare
-from netsp.compare.study import Study
-from netsp.errors import InputError
-from netsp.report import stats
-from netsp.report.page import write_report
+from netsp.study.compare.rows import SCHEMA, read_rows
+from netsp.study.compare.study import Study
+from netsp.study.compare.study_run import compare
+from netsp.view.report import stats
+from netsp.view.report.page import write_report
 
 STUDIES = Path(__file__).parent.parent / "studies"
 

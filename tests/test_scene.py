@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from netsp import InputError, Problem
 from netsp.command.main import main
 from netsp.online import DistanceField, Scene
-from netsp.online.scene.packing import CELLS
-from netsp.online.scene.surfaces import surface_of
-from netsp.online.scene.voxels import of_cloud, of_cloud_file, of_mesh, of_triangles
+from netsp.world.scene.packing import CELLS
+from netsp.world.scene.surfaces import surface_of
+from netsp.world.scene.voxels import of_cloud, of_cloud_file, of_mesh, of_triangles
 
 trimesh = pytest.importorskip("trimesh")
 

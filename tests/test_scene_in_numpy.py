@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp.compiled import interpretation
-from netsp.compiled.compile_policy import CompilePolicy, compiled_by, everything_compiled
+from netsp.base.compiled import interpretation
+from netsp.base.compiled.compile_policy import CompilePolicy, compiled_by, everything_compiled
 from netsp.online import Scene
 from netsp.online.coverage import Surface, View, mark, nearest
-from netsp.online.paths.beside import sees
+from netsp.online.paths.standoff import sees
 from netsp.online.paths.tree import all_see, free_cells, grow, states_of, way
-from netsp.online.scene import packing, sampling
-from netsp.online.scene.sites import point_sites
+from netsp.world.scene import packing, sampling
+from netsp.world.scene.sites import point_sites
 
 SOLIDS = (
     {"name": "ball", "sphere": {"center": [0, 0, 0], "radius": 1.0}},

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp.online import GeodesicTether, Scene
-from netsp.online.scene.field import DistanceField
-from netsp.online.scene.scene import encode
-from netsp.online.scene.seams import seam_boxes
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.scene import encode
+from netsp.world.scene.seams import seam_boxes
 
 lengths = st.floats(0.4, 3.0)
 angles = st.floats(-180.0, 180.0)

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from netsp.errors import InputError
-from netsp.solvers.search_effort import SearchEffort
+from netsp.base.errors import InputError
+from netsp.plan.search_effort import SearchEffort
 
 EFFORT = SearchEffort()
 

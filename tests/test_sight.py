@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError, Problem
-from netsp.compiled.compile_policy import everything_compiled
-from netsp.geometry.box_tree import build_box_tree
-from netsp.geometry.kernels import (
+from netsp.base.compiled.compile_policy import everything_compiled
+from netsp.base.geometry.box_tree import build_box_tree
+from netsp.base.geometry.kernels import (
     depth_in_obstacle,
     point_in_polygon,
     point_segment_distance,

@@ -12,9 +12,9 @@ import pytest
 
 from netsp import Problem, solve
 from netsp.command.main import COMMANDS, main
-from netsp.fly.rehearsal import rehearse
+from netsp.online.fly.flight_rehearsal import rehearse
 from netsp.online.mission import Mission
-from netsp.space.plan import plan
+from netsp.plan.space.space_plan import plan
 from tests.test_tour import written
 
 ROOT = Path(__file__).parent.parent
@@ -79,46 +79,48 @@ def inputs(tmp_path_factory):
 
 RUNS = {
     "solve": ("solve p.json -o out.json", "roadmap/taut.py", 0),
-    "solve, late": ("solve p.json -o out.json --solver lns", "lns/search.py", 0),
-    "solve mission": ("solve mission.json -o out.json", "space/signature.py", 0),
-    "solve mission, late": ("solve mission.json -o out.json", "space/legs.py", 0),
-    "order": ("order mission.json -o out.json", "online/scene/seams.py", 130),
+    "solve, late": ("solve p.json -o out.json --solver lns", "gtsp/search/local_search.py", 0),
+    "solve mission": ("solve mission.json -o out.json", "plan/space/space_signature.py", 0),
+    "solve mission, late": ("solve mission.json -o out.json", "plan/space/space_legs.py", 0),
+    "order": ("order mission.json -o out.json", "world/scene/seams.py", 130),
     "app": ("app p.json --no-browser --port 0", "app/server.py", 130),
     "cover": ("cover scene.json --anchor 0,0,0 -o out.json", "online/coverage.py", 0),
-    "verify": ("verify p.json s.json", "judge/checks.py", 130),
-    "verify mission": ("verify planned.json", "space/judge.py", 0),
-    "margins": ("margins p.json s.json -o out.json", "sizing/margins.py", 130),
-    "plot": ("plot p.json s.json -o out.svg", "pictures/problem.py", 130),
-    "animate": ("animate s.json --problem p.json -o out.gif", "pictures/animation.py", 130),
-    "base": ("base p.json --grid 4,4 -o out.csv", "sizing/base.py", 130),
-    "tether": ("tether p.json -o out.csv", "sizing/tether.py", 130),
-    "gtsp": (f"gtsp {ROOT}/examples/7ring28.gtsp -o out.tour", "lns/search.py", 0),
+    "verify": ("verify p.json s.json", "judge/tour_checks.py", 130),
+    "verify mission": ("verify planned.json", "plan/space/judge.py", 0),
+    "margins": ("margins p.json s.json -o out.json", "plan/sizing/tether_margins.py", 130),
+    "plot": ("plot p.json s.json -o out.svg", "view/pictures/problem_picture.py", 130),
+    "animate": ("animate s.json --problem p.json -o out.gif", "view/pictures/animation.py", 130),
+    "base": ("base p.json --grid 4,4 -o out.csv", "plan/sizing/base_placement.py", 130),
+    "tether": ("tether p.json -o out.csv", "plan/sizing/tether_sizing.py", 130),
+    "gtsp": (f"gtsp {ROOT}/examples/7ring28.gtsp -o out.tour", "gtsp/search/local_search.py", 0),
     "world": ("world --goals 9 -o out.json", "worlds.py", 130),
     "simulate": ("simulate mission.json --quiet", "online/simulation.py", 4),
-    "execute": ("execute p.json s.json -o out", "execute/run.py", 130),
-    "execute mission": ("execute planned.json -o out", "space/judge.py", 130),
-    "fly": ("fly p.json s.json --link udpin:{port} -o out", "fly/rehearsal.py", 130),
-    "guard": ("guard p.json --link udpin:{port} -o out.jsonl", "guard/live.py", 4),
-    "export": ("export planned.json -o out.csv", "export/mission.py", 0),
-    "import": (f"import {ROOT}/examples/site.geojson -o out.json", "site/read.py", 130),
+    "execute": ("execute p.json s.json -o out", "online/execute/tour_execution.py", 130),
+    "execute mission": ("execute planned.json -o out", "plan/space/judge.py", 130),
+    "fly": ("fly p.json s.json --link udpin:{port} -o out", "online/fly/flight_rehearsal.py", 130),
+    "guard": ("guard p.json --link udpin:{port} -o out.jsonl", "online/guard/live.py", 4),
+    "export": ("export planned.json -o out.csv", "exchange/missions/mission_export.py", 0),
+    "import": (
+        f"import {ROOT}/examples/site.geojson -o out.json", "exchange/maps/read_map.py", 130,
+    ),
     "compare": (
         "compare --goals 4 --tethers 300 --solvers lns --worlds 1 --time-limit 1 -o out.jsonl",
-        "compare/rows.py", 130,
+        "study/compare/rows.py", 130,
     ),
     "compare-path": (
         f"compare-path {ROOT}/problems/wharf.json {ROOT}/examples/paths/wharf-systematic-1.csv "
-        "-o out.csv", "pathmeasures/path_measures.py", 130,
+        "-o out.csv", "study/paths/path_measures.py", 130,
     ),
     "library": (
         f"library rank --folder {ROOT}/problems/library --only clustered-10-0 --solver lns "
-        "--time-limit 1 -o out.jsonl", "library/rank.py", 130,
+        "--time-limit 1 -o out.jsonl", "study/library/rank.py", 130,
     ),
-    "combine": ("combine rows.jsonl -o out.jsonl", "compare/rows.py", 130),
-    "report": ("report s.json --problem p.json -o out.html", "report/briefing.py", 130),
+    "combine": ("combine rows.jsonl -o out.jsonl", "study/compare/rows.py", 130),
+    "report": ("report s.json --problem p.json -o out.html", "view/report/briefing.py", 130),
     "warm-up": ("warm-up", "problem.py", 130),
 }  # fmt: skip
 """Commands by name: arguments, the module where the signal comes, the exit code. Short work that
-is broken off within the grace of `netsp.clock.TimingPolicy` ends as if nobody had pressed."""
+is broken off within the grace of `netsp.base.clock.TimingPolicy` ends as if nobody had pressed."""
 
 
 def test_every_command_that_takes_time_is_here():

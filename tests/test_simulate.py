@@ -14,19 +14,19 @@ from scipy.sparse import lil_array
 from scipy.sparse.csgraph import dijkstra
 
 from netsp import InputError
+from netsp.base.geometry import polylines
 from netsp.command.main import main
-from netsp.geometry import polylines
 from netsp.online import Scene
 from netsp.online.equipment import PositionSensor
-from netsp.online.log import describe_run
 from netsp.online.mission import Mission
+from netsp.online.mission_run import simulate
 from netsp.online.paths.tree import STEPS, Grid, ShortestTree, grow, states_of, taut, way
 from netsp.online.planner import PLANNERS, PlannerOptions
 from netsp.online.planner.predictive import WORTH, PredictivePlanner
-from netsp.online.scene.field import pushed_out
+from netsp.online.run_log import describe_run
 from netsp.online.sensing import Positions
-from netsp.online.simulate import simulate
 from netsp.online.vehicle.kinematic import advance
+from netsp.world.scene.field import pushed_out
 from tests.pages import unpacked
 
 MISSIONS = Path(__file__).parent.parent / "missions"

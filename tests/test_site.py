@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError, Problem, Solution, solve, verify
+from netsp.base.errors import SeveralErrors
 from netsp.command.main import main
-from netsp.errors import SeveralErrors
-from netsp.site import Projection, read_site
-from netsp.site.shapes import circle_of
+from netsp.exchange.maps import Projection, read_site
+from netsp.exchange.maps.drawn_shapes import circle_of
 
 pyogrio = pytest.importorskip("pyogrio")
 shapely = pytest.importorskip("shapely")
@@ -469,7 +469,7 @@ def test_whole_wind_farms_are_read(name):
     if not file.is_file():
         pytest.skip(f"{file} is not here")
     base = None if name == "dudgeon" else Projection(55.486, 7.84)
-    from netsp.site.options import Looking
+    from netsp.exchange.maps.options import Looking
 
     found = read_site(file, base, tether=9000.0, radius=4.0, looking=Looking(1, 3.0, (-10.0,)))
     assert len(found.goals) == len(found.obstacles) == (67 if name == "dudgeon" else 80)
@@ -518,7 +518,7 @@ def basin(rng, rows=30, columns=40):
 def test_polygons_hold_every_occupied_cell_and_little_more(
     tmp_path_factory, seed, suffix, turn, share
 ):
-    from netsp.site.occupancy import read_occupancy
+    from netsp.exchange.maps.occupancy import read_occupancy
 
     tmp = tmp_path_factory.mktemp("map")
     cells = basin(np.random.default_rng(seed))
@@ -598,7 +598,7 @@ def test_what_is_wrong_with_a_map_file_is_one_line(tmp_path, capsys, said, compl
 
 
 def test_fields_that_matter_to_nobody_and_numbers_of_any_style_are_read(tmp_path):
-    from netsp.site.occupancy import read_occupancy
+    from netsp.exchange.maps.occupancy import read_occupancy
 
     file = image(tmp_path, np.zeros((9, 9), dtype=int), resolution="5e-1", negate="false",
                  date="2024-13-01", odd="0x_")  # fmt: skip

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 
 from netsp import Circle, InfeasibleError, InputError, Problem, Status, solve, travel_graph, verify
 from netsp.command.main import main
+from netsp.plan.sizing import best_base, margins, tether_curve
+from netsp.plan.sizing.tether_margins import _complaint
+from netsp.roadmap.explain_unreachable import shortest_tethers
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.reach import shortest_tethers
-from netsp.sizing import best_base, margins, tether_curve
-from netsp.sizing.margins import _complaint
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
@@ -74,7 +74,7 @@ def test_a_curve_that_ran_out_of_time_is_not_whole(monkeypatch):
     whole = tether_curve(problem)
     assert len(whole.steps) > 1
     clock = iter([False])
-    monkeypatch.setattr("netsp.clock.Clock.up", property(lambda self: next(clock, True)))
+    monkeypatch.setattr("netsp.base.clock.Clock.up", property(lambda self: next(clock, True)))
     part = tether_curve(problem)
     assert not part.whole
     assert not part.proven

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 
 from netsp import Circle, InputError, Problem, TravelGraph, solve, solve_graph, travel_graph
-from netsp.arrays import ComparesArrays
-from netsp.axes import read_path
+from netsp.base.arrays import ComparesArrays
+from netsp.base.axes import read_path
+from netsp.base.files import csv_rows
 from netsp.command.main import main
-from netsp.files import csv_rows
-from netsp.guard.memory import MAX_LETTERS, GuardState
-from netsp.guard.plane import PlaneSite
+from netsp.exchange.maps.read_map import read_site
+from netsp.model.problem import State
+from netsp.model.solution import LARGEST, tension_ratio
+from netsp.online.guard.plane import PlaneSite
+from netsp.online.guard.state_file import MAX_LETTERS, GuardState
 from netsp.online.mission import Mission
-from netsp.online.tether.tether import Tether, strand_of
-from netsp.problem import State
-from netsp.site.read import read_site
-from netsp.sizing.margins import margins
-from netsp.solution import LARGEST, tension_ratio
+from netsp.plan.sizing.tether_margins import margins
+from netsp.world.tether.taut_tether import Tether, strand_of
 
 LONG_NUMBER = "1" * 5001
 

@@ -19,16 +19,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, InputError, Polygon, Problem, solve, verify
-from netsp.clock import Clock
-from netsp.cover.choose import greedy, pruned, simple_bound
-from netsp.errors import LimitReachedError
-from netsp.execute.passing import lasting, passing
-from netsp.execute.plan import HOME, Leg
-from netsp.execute.repair import broken, outside, reachable
-from netsp.export.leg_times import SmoothMove, VehicleMotion, leg_times
-from netsp.export.margins import warnings
-from netsp.export.mission import pursued
-from netsp.export.waypoints import (
+from netsp.base.clock import Clock
+from netsp.base.errors import LimitReachedError
+from netsp.exchange.maps.contract import kind_of, words_of
+from netsp.exchange.maps.drawn_shapes import circle_of, simple_polygons
+from netsp.exchange.maps.feature import Feature
+from netsp.exchange.maps.projection import Projection
+from netsp.exchange.missions.export_margins import warnings
+from netsp.exchange.missions.leg_times import SmoothMove, VehicleMotion, leg_times
+from netsp.exchange.missions.mission_export import pursued
+from netsp.exchange.missions.mission_files import (
+    Settings,
+    _counter_clockwise,
+    _hold,
+    altitude,
+    format_of,
+    predicted_s,
+)
+from netsp.exchange.missions.waypoints import (
     Waypoint,
     _check_class,
     _cuts,
@@ -37,21 +45,24 @@ from netsp.export.waypoints import (
     clearance_of,
     turn,
 )
-from netsp.export.write import (
-    Settings,
-    _counter_clockwise,
-    _hold,
-    altitude,
-    format_of,
-    predicted_s,
-)
-from netsp.fly.checks import ready
-from netsp.fly.stopped import RefusedError
-from netsp.fly.vehicle import POSITION_ONLY, LinkedVehicle, _wrong
-from netsp.guard.ahead import Ahead
-from netsp.guard.alarms import Alarm, Alarms, Level
-from netsp.guard.fix import Fix
-from netsp.guard.reasons import (
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.solver_run import SolverRun
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.kept import with_bound, with_classes_left_out
+from netsp.gtsp.travel.result import Result, proven, relative_gap
+from netsp.hsignature.words import concatenate, cyclically_reduced, entangled, invert, reduce
+from netsp.model.bound_scope import LowerBound, Scope
+from netsp.model.solution import Status
+from netsp.online.execute.temporary_obstacles import lasting, passing
+from netsp.online.execute.tour_plan import HOME, Leg
+from netsp.online.execute.tour_repair import broken, outside, reachable
+from netsp.online.fly.preflight_checks import ready
+from netsp.online.fly.stopped import RefusedError
+from netsp.online.fly.vehicle import POSITION_ONLY, LinkedVehicle, _wrong
+from netsp.online.guard.alarms import Alarm, Alarms, Level
+from netsp.online.guard.lookahead import Ahead
+from netsp.online.guard.position_track import Track
+from netsp.online.guard.reasons import (
     in_doubt,
     little_left,
     looped,
@@ -60,21 +71,10 @@ from netsp.guard.reasons import (
     soon_looped,
     soon_short,
 )
-from netsp.guard.site import Loop
-from netsp.guard.track import Track
-from netsp.hsignature.words import concatenate, cyclically_reduced, entangled, invert, reduce
-from netsp.link.vehicle_kind import VehicleKind
-from netsp.lower_bound import LowerBound, Scope
-from netsp.site.contract import kind_of, words_of
-from netsp.site.feature import Feature
-from netsp.site.projection import Projection
-from netsp.site.shapes import circle_of, simple_polygons
-from netsp.solution import Status
-from netsp.solving.limits import Limits
-from netsp.solving.run import SolverRun
-from netsp.travel.graph import TravelGraph
-from netsp.travel.kept import with_bound, with_classes_left_out
-from netsp.travel.result import Result, proven, relative_gap
+from netsp.online.guard.site import Loop
+from netsp.online.guard.telemetry import Fix
+from netsp.online.link.vehicle_kind import VehicleKind
+from netsp.plan.cover.choose import greedy, pruned, simple_bound
 
 # words
 
@@ -129,7 +129,7 @@ def test_a_clock_within_another_never_outlasts_it():
 
 def test_a_clock_is_up_from_its_deadline_on(monkeypatch):
     now = [1000.0]
-    monkeypatch.setattr("netsp.clock.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("netsp.base.clock.time.monotonic", lambda: now[0])
     clock = Clock(5.0)
     now[0] = 1004.999
     assert not clock.up
@@ -883,7 +883,7 @@ def test_holes_are_filled_unless_something_must_stay_free_in_them():
 def test_a_plan_file_is_json_with_every_obstacle_fenced_out(posts, tmp_path):
     """Circles and polygons are exclusion fences, at their true radius."""
     pytest.importorskip("pyproj")
-    from netsp.export.write import FORMATS
+    from netsp.exchange.missions.mission_files import FORMATS
 
     square = Polygon(polygon=[(9, 9), (10, 9), (10, 10)])
     problem = posts.model_copy(update={"obstacles": (*posts.obstacles, square)})

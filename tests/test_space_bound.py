@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp.clock import NEVER, Clock
-from netsp.errors import InputError
+from netsp.base.clock import NEVER, Clock
+from netsp.base.errors import InputError
 from netsp.online import Scene
 from netsp.online.mission import Mission
-from netsp.solvers.solve import solve
-from netsp.space.bound import LegBounds, bound_of_all
-from netsp.space.legs import Ways
-from netsp.space.places import Places
-from netsp.space.potential import (
+from netsp.plan.solve_problem import solve
+from netsp.plan.space.path_bound import LegBounds, bound_of_all
+from netsp.plan.space.places import Places
+from netsp.plan.space.planning_context import Water
+from netsp.plan.space.potential import (
     PotentialParams,
     Region,
     edges_of,
@@ -25,9 +25,9 @@ from netsp.space.potential import (
     path_bound,
     steepest,
 )  # fmt: skip
-from netsp.space.states import Effort
-from netsp.space.upright import bound_of_upright
-from netsp.space.water import Water
+from netsp.plan.space.space_legs import Ways
+from netsp.plan.space.states import Effort
+from netsp.plan.space.upright import bound_of_upright
 
 BOUNDS = [-3, -4, -1.5, 3, 4, 1.5]
 EVERYWHERE = np.array([[-math.inf] * 3, [math.inf] * 3])
@@ -204,7 +204,7 @@ def test_the_bound_among_upright_solids_ends_with_the_clock_of_the_run(monkeypat
         heard.append(time_limit.up and bool(time_limit.flag[0]))
         return solve(problem, time_limit=time_limit)
 
-    monkeypatch.setattr("netsp.space.upright.solve", solve_until_stopped)
+    monkeypatch.setattr("netsp.plan.space.upright.solve", solve_until_stopped)
     bound_of_upright(mission, water, [0, 1], places, clock.part(0.5))
     assert heard == [True]
 

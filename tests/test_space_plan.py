@@ -9,23 +9,23 @@ import numpy as np
 import pytest
 
 from netsp import Circle, Problem, solve
-from netsp.clock import Clock
+from netsp.base.clock import Clock
+from netsp.base.errors import InputError
 from netsp.command.main import main
-from netsp.errors import InputError
 from netsp.hsignature.wordtable import times, times_inverse
 from netsp.online import Scene
 from netsp.online.mission import Mission
-from netsp.online.scene.scene import scene_of
 from netsp.online.surprises import SceneSurprises
-from netsp.space.board import Board
-from netsp.space.bound import bound_of_all
-from netsp.space.judge import verify_mission
-from netsp.space.labels import LENGTHS, STEPS, axes_of, lower_end, nth_axis, staircase
-from netsp.space.legs import Legs, Ways
-from netsp.space.places import Places
-from netsp.space.plan import _best_driven, plan
-from netsp.space.states import Effort, first_states
-from netsp.space.water import Water, has_room
+from netsp.plan.space.board import Board
+from netsp.plan.space.judge import verify_mission
+from netsp.plan.space.path_bound import bound_of_all
+from netsp.plan.space.places import Places
+from netsp.plan.space.planning_context import Water, has_room
+from netsp.plan.space.space_legs import Legs, Ways
+from netsp.plan.space.space_plan import _best_driven, plan
+from netsp.plan.space.states import Effort, first_states
+from netsp.plan.space.triangle_labels import LENGTHS, STEPS, axes_of, lower_end, nth_axis, staircase
+from netsp.world.scene.scene import scene_of
 
 POSTS = [
     Circle(center=(3.0, 0.4), radius=0.5),
@@ -315,7 +315,7 @@ def test_a_detour_past_the_free_end_of_a_bar_saves_the_way_back_around_it(monkey
     scene, mission = A_BAR, Mission.model_validate(BESIDE_A_BAR)
     found = plan(mission, scene=scene)
     assert verify_mission(found.planned(), scene=scene)
-    monkeypatch.setattr("netsp.space.plan.Detours.shortened", lambda *_: None)
+    monkeypatch.setattr("netsp.plan.space.space_plan.Detours.shortened", lambda *_: None)
     taut = plan(mission, scene=scene)
     assert taut.result.status.value == "optimal_of_states"
     assert found.length < taut.length - 0.1

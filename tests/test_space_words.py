@@ -8,11 +8,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from netsp.errors import InputError
+from netsp.base.errors import InputError
 from netsp.hsignature.rays import signature
 from netsp.hsignature.words import reduce
 from netsp.online import Scene
-from netsp.space.signature import SpaceSignature
+from netsp.plan.space.space_signature import SpaceSignature
 
 LOW, HIGH, ANCHOR = [-5.0] * 3, [5.0] * 3, [4.0, 0.3, 3.0]
 

@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import solve_graph
-from netsp.clock import Clock
+from netsp.base.clock import Clock
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.solver_run import Stop
 from netsp.mip import covers
-from netsp.mip.overcells import Cells
+from netsp.mip.cover_bounds import Cells
+from netsp.mip.cover_refinement import Splits, frustration
 from netsp.mip.root import Root
-from netsp.mip.splits import Splits, frustration
-from netsp.solving.limits import Limits
-from netsp.solving.run import Stop
 from tests.test_even_crossings import towers
 
 

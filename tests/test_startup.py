@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from netsp.clock import Clock, TimingPolicy
+from netsp.base.clock import Clock, TimingPolicy
+from netsp.base.compiled import kept_code
 from netsp.command import command_clock, main
-from netsp.compiled import kept_code
 
 ROOT = Path(__file__).parent.parent
 SMALL = "problems/pool.json"
@@ -39,7 +39,7 @@ def test_a_small_problem_is_solved_and_verified_without_numba_scipy_and_matplotl
     tour = str(tmp_path / "tour.json")
     # a slow machine may run kernels interpreted for long before Numba is loaded
     patient = (
-        "from netsp.compiled.compile_policy import CompilePolicy, compiled_by\n"
+        "from netsp.base.compiled.compile_policy import CompilePolicy, compiled_by\n"
         "with compiled_by(CompilePolicy(numba_s=60.0)): "
     )
     run = "from netsp.command.main import main\n" + patient + "main({!r})"
@@ -62,7 +62,7 @@ def test_the_demo_installs_no_extras_and_compiles_nothing_ahead(tmp_path):
 
 KERNELS = """
 import numpy as np
-from netsp.compiled.kernel import kernel
+from netsp.base.compiled.kernel import kernel
 
 @kernel
 def twice(x: float) -> float:
@@ -83,7 +83,7 @@ DEFERRED = """
 import pickle, sys
 import numpy as np
 import kernels
-from netsp.compiled.compile_policy import CompilePolicy, compiled_by
+from netsp.base.compiled.compile_policy import CompilePolicy, compiled_by
 
 stop = np.zeros(1, dtype=np.int64)
 assert kernels.fill(np.zeros(3), stop) == 6.0
@@ -113,7 +113,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import kernels
-from netsp.compiled.compile_policy import CompilePolicy, compiled_by
+from netsp.base.compiled.compile_policy import CompilePolicy, compiled_by
 
 stop, is_kept = np.zeros(1, dtype=np.int64), sys.argv[1] == "kept"
 with compiled_by(CompilePolicy(numba_s=0.0, compile_s=60.0)):
@@ -185,7 +185,7 @@ def test_a_limit_counts_from_the_start_of_the_command(command, monkeypatch):
 
 FIGURES = """
 import sys
-from netsp.pictures.style import load_matplotlib
+from netsp.view.pictures.style import load_matplotlib
 load_matplotlib()
 from matplotlib import artist, figure
 assert figure.Figure().subplots().plot([0], [1]) and "alpha" in artist.kwdoc(artist.Artist)

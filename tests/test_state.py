@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, InfeasibleError, InputError, Problem, solve, solve_graph, verify
-from netsp.clock import Clock
-from netsp.problem import State
+from netsp.base.clock import Clock
+from netsp.model.problem import State
+from netsp.model.random_worlds import random_world
+from netsp.plan.solver_table import SOLVERS
 from netsp.roadmap.from_state import graph_from_state
-from netsp.solvers.table import SOLVERS
-from netsp.worlds import random_world
 
 GEOMETRIC = {s.name for s in SOLVERS.values() if s.geometric}
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from netsp.link.statustext import CHUNK, MOST, ascii_of, status_texts
+from netsp.online.link.statustext import CHUNK, MOST, ascii_of, status_texts
 
 PLAIN = st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=300)
 

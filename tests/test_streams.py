@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from netsp import Problem, Solution, files, solve
+from netsp import Problem, Solution, solve
+from netsp.base import files
 from netsp.command.main import main
 
 ROOT = Path(__file__).parent.parent

@@ -13,24 +13,24 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from netsp import Circle, Problem, solve
-from netsp.compare.rows import read_rows
-from netsp.compare.run import compare
-from netsp.compare.study import Study
-from netsp.execute.events import Event, Surprises
-from netsp.execute.run import execute
+from netsp.online.execute.events import Event, Surprises
+from netsp.online.execute.tour_execution import execute
 from netsp.online.mission import Mission
-from netsp.online.scene.scene import Scene
-from netsp.online.simulate import simulate
-from netsp.pictures import style
-from netsp.pictures.execution import draw_map, draw_tether
-from netsp.pictures.film import film_of_flight
-from netsp.pictures.film_page import FRAMES, save_page
-from netsp.pictures.interactive import seen
-from netsp.pictures.mission import save_runs
-from netsp.pictures.problem import draw
-from netsp.pictures.scene import Stops, figure_of, save
-from netsp.report import figures
-from netsp.report.stats import best_lengths, cells, methods
+from netsp.online.mission_run import simulate
+from netsp.study.compare.rows import read_rows
+from netsp.study.compare.study import Study
+from netsp.study.compare.study_run import compare
+from netsp.view.pictures import style
+from netsp.view.pictures.execution import draw_map, draw_tether
+from netsp.view.pictures.film import film_of_flight
+from netsp.view.pictures.film_page import FRAMES, save_page
+from netsp.view.pictures.interactive import seen
+from netsp.view.pictures.mission_picture import save_runs
+from netsp.view.pictures.problem_picture import draw
+from netsp.view.pictures.scene_picture import Stops, figure_of, save
+from netsp.view.report import figures
+from netsp.view.report.stats import best_lengths, cells, methods
+from netsp.world.scene.scene import Scene
 from tests.pages import unpacked
 
 ROOT = Path(__file__).parent.parent

@@ -9,11 +9,11 @@ import struct
 import numpy as np
 import pytest
 
-from netsp.axes import height_meaning, marks_of_no_height
-from netsp.errors import InputError
-from netsp.online.scene.floor import read_floor
-from netsp.online.scene.pcd import unpack_lzf
-from netsp.online.scene.readers import read_cloud_file, read_mesh_file
+from netsp.base.axes import height_meaning, marks_of_no_height
+from netsp.base.errors import InputError
+from netsp.world.scene.floor import read_floor
+from netsp.world.scene.pcd import unpack_lzf
+from netsp.world.scene.readers import read_cloud_file, read_mesh_file
 
 PILE = np.array([(4.0, -1.0, -10.0), (6.0, 1.0, 0.0), (5.0, 0.5, -3.25), (5.5, -0.25, -7.0)])
 X, Y, Z = PILE.T
@@ -415,7 +415,7 @@ def test_a_mesh_that_would_stand_elsewhere_is_refused_in_one_line(tmp_path, name
 
 
 def test_the_scene_says_how_much_of_a_file_is_used(tmp_path):
-    from netsp.online.scene.scene import Scene
+    from netsp.world.scene.scene import Scene
 
     (tmp_path / "c.csv").write_text("x,y,z,class\n" + table(X, Y, Z, [7, 1, 1, 1], separator=","))
     (tmp_path / "s.json").write_text('{"schema_version": 1, "cloud": {"file": "c.csv"}}')

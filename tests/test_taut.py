@@ -20,11 +20,11 @@ from netsp import (
     travel_graph,
     verify,
 )
-from netsp.clock import Clock
-from netsp.errors import LimitReachedError
+from netsp.base.clock import Clock
+from netsp.base.errors import LimitReachedError
 from netsp.hsignature import crossings, is_looping, reduce, signature
+from netsp.model.random_worlds import random_world as papers_world
 from netsp.roadmap.taut import TautRoadmap
-from netsp.worlds import random_world as papers_world
 from tests.brute import BruteForce
 from tests.worlds import random_world, small_worlds
 

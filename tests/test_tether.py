@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from netsp import InputError, Problem
 from netsp.hsignature import signature
+from netsp.model.random_worlds import random_world
 from netsp.online import GeodesicTether, ReactTether, Scene
-from netsp.online.scene.field import DistanceField
-from netsp.online.scene.voxels import of_triangles
 from netsp.roadmap.paths import TautPaths
-from netsp.worlds import random_world
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.voxels import of_triangles
 
 
 def model(*solids, delta=0.05, kind=GeodesicTether, **more):

@@ -10,16 +10,16 @@ from hypothesis import strategies as st
 
 from netsp import Circle, InputError, Problem, solve
 from netsp.command.main import main
-from netsp.execute import ExecutionOptions, Surprises, execute
-from netsp.execute.log import describe_execution
-from netsp.execute.plan import HOME
-from netsp.execute.repair import repair, reserved_limit
-from netsp.execute.tether_limits import RESOLUTION, describe_limits, limit_periods, overruns
-from netsp.execute.tether_reserve import ReservePolicy
-from netsp.fly import flight
-from netsp.fly.flight import fly
-from netsp.online.scene.scene import scene_of
-from netsp.online.tether import GeodesicTether
+from netsp.online.execute import ExecutionOptions, Surprises, execute
+from netsp.online.execute.execution_log import describe_execution
+from netsp.online.execute.tether_limits import RESOLUTION, describe_limits, limit_periods, overruns
+from netsp.online.execute.tether_reserve import ReservePolicy
+from netsp.online.execute.tour_plan import HOME
+from netsp.online.execute.tour_repair import repair, reserved_limit
+from netsp.online.fly import tour_flight
+from netsp.online.fly.tour_flight import fly
+from netsp.world.scene.scene import scene_of
+from netsp.world.tether import GeodesicTether
 from tests.simulated_session import SimulatedSession
 
 SITE = Problem(
@@ -189,7 +189,7 @@ def true_lengths(session, begin):
 
 @pytest.mark.parametrize(("when", "limit"), [(13.0, 4.0), (30.0, 9.9)])
 def test_a_vehicle_stays_within_a_limit_that_is_lowered_under_way(tour, monkeypatch, when, limit):
-    monkeypatch.setattr(flight, "rehearse", lambda: None)
+    monkeypatch.setattr(tour_flight, "rehearse", lambda: None)
     session = SimulatedSession(SITE, speed=0.5).arm()
     begin = session.simulation.now
     done = fly(

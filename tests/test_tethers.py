@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, InfeasibleError, InputError, Polygon, Problem, Tethers, travel_graph
-from netsp.geometry import polylines
+from netsp.base.geometry import polylines
 from netsp.hsignature import signature
 from tests.worlds import random_world
 

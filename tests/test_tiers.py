@@ -25,19 +25,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba.core.caching import FunctionCache
 
-from netsp.compiled import (
-    chance,
+from netsp.base.compiled import (
     compile_lock,
     disk_cache,
-    growing,
+    dynamic_array,
     interpretation,
     overtime,
     tiered,
 )
-from netsp.compiled import kernel as kernel_module
-from netsp.compiled.arguments import call_within, can_be_interpreted
-from netsp.compiled.compile_lock import is_locked, locked
-from netsp.compiled.compile_policy import (
+from netsp.base.compiled import kernel as kernel_module
+from netsp.base.compiled import rng as chance
+from netsp.base.compiled.arguments import call_within, can_be_interpreted
+from netsp.base.compiled.compile_lock import is_locked, locked
+from netsp.base.compiled.compile_policy import (
     CompilePolicy,
     compiled_by,
     compiles,
@@ -45,16 +45,16 @@ from netsp.compiled.compile_policy import (
     everything_compiled,
     long_work,
 )
-from netsp.compiled.interpretation import interpreted, names_used
-from netsp.compiled.kernel import Kernel
-from netsp.compiled.overtime import Overtime, within
-from netsp.dp import labels, walks
-from netsp.errors import InputError
-from netsp.mip import parities
-from netsp.problem import Problem
-from netsp.roadmap import branches, legs, outline, tangents
-from netsp.solvers.solve import solve, travel_graph
-from netsp.worlds import FAMILIES, random_world
+from netsp.base.compiled.interpretation import interpreted, names_used
+from netsp.base.compiled.kernel import Kernel
+from netsp.base.compiled.overtime import Overtime, within
+from netsp.base.errors import InputError
+from netsp.gtsp.dp import label_kernels, walks
+from netsp.mip import parity_cuts
+from netsp.model.problem import Problem
+from netsp.model.random_worlds import FAMILIES, random_world
+from netsp.plan.solve_problem import solve, travel_graph
+from netsp.roadmap import branches, outline, tangents, taut_legs
 from tests.fresh_modules import fresh_module
 
 PROBLEMS = sorted((Path(__file__).parent.parent / "problems").glob("*.json"))
@@ -124,7 +124,7 @@ def test_solvers_find_the_same_tour_interpreted_and_compiled(solver):
 
 
 MODULE = """
-from netsp.compiled.kernel import kernel
+from netsp.base.compiled.kernel import kernel
 
 @kernel
 def total(x, stop):
@@ -141,7 +141,7 @@ def ratio(a, b):
 
 
 CALLERS = """
-from netsp.compiled.kernel import kernel
+from netsp.base.compiled.kernel import kernel
 
 @kernel
 def scaled(x, by, negative):
@@ -165,7 +165,7 @@ def kernels(tmp_path):
 
 LENGTHS = """
 import math
-from netsp.compiled.kernel import kernel
+from netsp.base.compiled.kernel import kernel
 
 @kernel
 def length(x, y):
@@ -414,7 +414,7 @@ def test_kernels_are_interpreted_and_compiled_without_a_writable_folder(monkeypa
 
 PROFILED = """
 import sys
-from netsp.compiled.overtime import Overtime, within
+from netsp.base.compiled.overtime import Overtime, within
 
 def spin(seconds):
     import time
@@ -508,7 +508,7 @@ def test_numba_calls_compiled_code_at_once_for_narrow_integers(kernels, monkeypa
 
 ROUNDED = """
 import math
-from netsp.compiled.kernel import kernel
+from netsp.base.compiled.kernel import kernel
 
 @kernel
 def rounded(x, y):
@@ -533,11 +533,11 @@ def test_this_release_of_numba_is_supported():
 
 
 SIGNATURES = """
-from netsp.compiled.compile_policy import everything_compiled
-from netsp.compiled.kernel import all_kernels
-from netsp.problem import Problem
-from netsp.solvers.solve import solve
-from netsp.worlds import random_world
+from netsp.base.compiled.compile_policy import everything_compiled
+from netsp.base.compiled.kernel import all_kernels
+from netsp.model.problem import Problem
+from netsp.plan.solve_problem import solve
+from netsp.model.random_worlds import random_world
 
 with everything_compiled():
     solve(Problem.load("problems/wharf.json"))
@@ -598,8 +598,8 @@ def test_loops_and_vectorised_form_choose_the_same_sides_of_parity_cuts(pairs, f
     across = np.array(flow).reshape(-1, 2)[: len(ends)]
     row = np.searchsorted(np.sort(ends.ravel()), np.arange(13))
     by_loops, at_once = np.array(sides), np.array(sides)
-    cost, teeth = _loops(parities._cheapest)(ends, across, row, row, by_loops)
-    other, same = interpreted(parities._cheapest)(ends, across, row, row, at_once)
+    cost, teeth = _loops(parity_cuts._cheapest)(ends, across, row, row, by_loops)
+    other, same = interpreted(parity_cuts._cheapest)(ends, across, row, row, at_once)
     assert (cost, teeth.tolist(), by_loops.tolist()) == (other, same.tolist(), at_once.tolist())
 
 
@@ -634,7 +634,7 @@ def test_loops_and_vectorised_form_extend_and_join_labels_alike(data):
 
     with pytest.MonkeyPatch.context() as patch:
         for name in ("completions", "extend", "join", "step_back"):
-            patch.setattr(walks, name, functools.partial(both, getattr(labels, name)))
+            patch.setattr(walks, name, functools.partial(both, getattr(label_kernels, name)))
         walk.solve(prices, cutoff, lambda: None)
 
 
@@ -655,7 +655,7 @@ def test_loops_and_vectorised_form_fill_in_the_same_legs(depth, monkeypatch):
 
     monkeypatch.setitem(interpretation._in_numpy, branches.spread.py_func, both)
     interpretation._interpreted.cache_clear()
-    monkeypatch.setattr(legs, "spread", both)
+    monkeypatch.setattr(taut_legs, "spread", both)
     with everything_interpreted():
         travel_graph(problem.model_copy(update={"goals": tuple(goals)})).costs  # noqa: B018
     interpretation._interpreted.cache_clear()
@@ -668,7 +668,7 @@ def test_compiled_sorting_keeps_the_order_of_equal_numbers(n):
     values = np.random.default_rng(n).integers(0, 9, n).astype(float)
     values[::7] = np.inf
     with everything_compiled():
-        order = growing.order_of(values)
+        order = dynamic_array.order_of(values)
     assert np.array_equal(order, np.argsort(values, kind="stable"))
 
 

@@ -10,21 +10,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from netsp.clock import Clock, until_interrupt, whole_or_interrupted
+from netsp.base.clock import Clock, until_interrupt, whole_or_interrupted
+from netsp.base.geometry import polylines
 from netsp.command.main import main
-from netsp.geometry import polylines
+from netsp.model.solution import Status
 from netsp.online.laid import present_tether
 from netsp.online.mission import Mission
+from netsp.online.mission_run import grid_of, simulate
+from netsp.online.planned_tour import in_file
 from netsp.online.planner.predictive import PredictivePlanner
-from netsp.online.simulate import grid_of, simulate
-from netsp.online.tether import GeodesicTether
-from netsp.online.tour import in_file
-from netsp.solution import Status
-from netsp.space.bound import bound_of_all
-from netsp.space.flown import words_of_flight
-from netsp.space.judge import verify_mission
-from netsp.space.plan import plan
-from netsp.space.solve import seconds_until_home, solve_mission
+from netsp.plan.space.flown import words_of_flight
+from netsp.plan.space.judge import verify_mission
+from netsp.plan.space.mission_solver import seconds_until_home, solve_mission
+from netsp.plan.space.path_bound import bound_of_all
+from netsp.plan.space.space_plan import plan
+from netsp.world.tether import GeodesicTether
 from tests.worlds import FEW_CELLS
 
 SCENE = {

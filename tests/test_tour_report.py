@@ -10,8 +10,8 @@ import pytest
 
 from netsp import Problem, Solution
 from netsp.command.main import main
-from netsp.report.wording import Passage, back_from, listed, passages
 from netsp.roadmap.paths import TautPaths
+from netsp.view.report.wording import Passage, back_from, listed, passages
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")

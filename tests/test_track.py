@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 
 from netsp import InputError
 from netsp.online import Scene
-from netsp.online.log import describe_run
+from netsp.online.anchor_track import Track
 from netsp.online.mission import Mission
-from netsp.online.simulate import simulate
-from netsp.online.track import Track
-from netsp.pictures.mission import save_runs, tethers_along
-from netsp.space.solve import solve_mission
+from netsp.online.mission_run import simulate
+from netsp.online.run_log import describe_run
+from netsp.plan.space.mission_solver import solve_mission
+from netsp.view.pictures.mission_picture import save_runs, tethers_along
 
 PILES = Scene(
     solids=[

@@ -10,16 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError
+from netsp.base.errors import interrupted
 from netsp.command.main import main
-from netsp.errors import interrupted
 from netsp.online import Scene
-from netsp.online.log import describe_run
 from netsp.online.mission import Mission
+from netsp.online.mission_run import simulate
 from netsp.online.ranging import Ranging, cast, fan
-from netsp.online.scene.scene import Solid
-from netsp.online.simulate import simulate
+from netsp.online.run_log import describe_run
 from netsp.online.surprises import SceneSurprises, changed, moved
 from netsp.online.surroundings import Surroundings
+from netsp.world.scene.scene import Solid
 
 ROOT = Path(__file__).parent.parent
 PILES = Scene(

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from netsp import InputError
-from netsp.app.files import ImportAnswers
-from netsp.app.files import imported as read_upload
-from netsp.errors import UnansweredError
-from netsp.site.contract import words_in
-from netsp.site.options import Looking, SiteOptions
-from netsp.site.read import import_site
-from netsp.site.selection import Selection
+from netsp.app.served_files import ImportAnswers
+from netsp.app.served_files import imported as read_upload
+from netsp.base.errors import UnansweredError
+from netsp.exchange.maps.contract import words_in
+from netsp.exchange.maps.options import Looking, SiteOptions
+from netsp.exchange.maps.read_map import import_site
+from netsp.exchange.maps.selection import Selection
 
 pyogrio = pytest.importorskip("pyogrio")
 shapely = pytest.importorskip("shapely")

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError
+from netsp.online.current import Water
 from netsp.online.vehicle import VEHICLES, make_vehicle
 from netsp.online.vehicle.control import HORIZON, PredictiveControl, solve_positive, within
 from netsp.online.vehicle.dynamics import (
@@ -19,7 +20,6 @@ from netsp.online.vehicle.dynamics import (
     step,
 )
 from netsp.online.vehicle.kinematic import KinematicVehicle, turned
-from netsp.online.water import Water
 
 STILL = np.zeros(3)
 

@@ -22,15 +22,15 @@ from netsp import (
     travel_graph,
     verify,
 )
+from netsp.base.errors import EXIT_NOT_VERIFIED, VerificationError
 from netsp.command.main import main
-from netsp.errors import EXIT_NOT_VERIFIED, VerificationError
 from netsp.hsignature import signature
 from netsp.judge import checked
 from netsp.judge.orientation import orientation, orientations
-from netsp.judge.solids import room
+from netsp.judge.solid_distances import room
 from netsp.judge.stringpull import StringPuller, reduce_sleeve
+from netsp.model.solution import ProblemReference, Status, Visit
 from netsp.roadmap.taut import TautRoadmap
-from netsp.solution import ProblemReference, Status, Visit
 from tests.worlds import random_world, small_worlds
 
 
@@ -398,7 +398,7 @@ def test_a_tour_that_fails_its_check_is_not_written(pair, tmp_path, monkeypatch,
     with pytest.raises(VerificationError, match="length is right"):
         checked(problem, wrong)
     assert checked(problem, solution) is solution
-    monkeypatch.setattr("netsp.solvers.solve.solve", lambda *_, **__: wrong)
+    monkeypatch.setattr("netsp.plan.solve_problem.solve", lambda *_, **__: wrong)
     file, output = tmp_path / "problem.json", tmp_path / "tour.json"
     problem.save(file)
     assert main(["solve", str(file), "--quiet", "-o", str(output)]) == EXIT_NOT_VERIFIED

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from netsp import InfeasibleError, InputError, Problem, Solution, solve, travel_graph, verify
 from netsp.command.main import main
-from netsp.solvers.warm import old_tour, tour_from
+from netsp.plan.warm_start import old_tour, tour_from
 from tests.worlds import random_world
 
 PROBLEMS = Path(__file__).parent.parent / "problems"

@@ -10,20 +10,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import TravelGraph, travel_graph
+from netsp.gtsp.cost_matrix import LegCosts
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.solver_run import Stop
 from netsp.mip import root
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs
+from netsp.mip.lp_warm_start import Warm
+from netsp.mip.mip_solver import MipRun
+from netsp.mip.parity_paths import beyond, ways_from_base
 from netsp.mip.prices import Prices
 from netsp.mip.program import Duals, duals_of_relaxation
 from netsp.mip.reducedcosts import reduced_costs
-from netsp.mip.solve import MipRun
-from netsp.mip.warm import Warm
-from netsp.mip.ways import beyond, ways_from_base
-from netsp.solution import Status
-from netsp.solving.legcosts import LegCosts
-from netsp.solving.limits import Limits
-from netsp.solving.run import Stop
-from netsp.worlds import random_world
+from netsp.model.random_worlds import random_world
+from netsp.model.solution import Status
 from tests.test_blossoms import some_cut
 from tests.test_contract import random_graph
 from tests.worlds import costs_of
@@ -103,7 +103,7 @@ def test_the_search_for_ways_can_be_stopped(monkeypatch):
             raise Stop
 
     prices = Prices(costs, DeadLegs.of(costs), cluster, [], duals, stop)
-    monkeypatch.setattr("netsp.mip.ways.AT_ONCE", 1)
+    monkeypatch.setattr("netsp.mip.parity_paths.AT_ONCE", 1)
     with pytest.raises(Stop):
         prices.rule_out(prices.bound + 100.0)
 
@@ -129,7 +129,7 @@ def test_once_few_legs_are_left_all_of_them_are_measured(seed, monkeypatch):
         return longer
 
     monkeypatch.setattr(root.Root, "_measure_left", note)
-    monkeypatch.setattr("netsp.solving.legcosts.MEASURE_AT_ONCE", 20)
+    monkeypatch.setattr("netsp.gtsp.cost_matrix.MEASURE_AT_ONCE", 20)
     monkeypatch.setattr(TravelGraph, "legs_at_once", False)
     found = MipRun(travel_graph(problem), Limits()).solve("highs", None)
     assert after

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from netsp import Polygon, Problem
-from netsp.errors import InputError
+from netsp.base.errors import InputError
 from netsp.hsignature import Word, concatenate, invert
 
 UNIT = 2_000_000_000

@@ -17,10 +17,10 @@ def recordings() -> tuple[str, bool]:
     import guard_tracks as bench
     import numpy as np
 
-    from netsp.guard.fix import Fix
-    from netsp.guard.guard import Guard, GuardOptions
     from netsp.hsignature import concatenate, crossings
-    from netsp.solution import Solution
+    from netsp.model.solution import Solution
+    from netsp.online.guard.telemetry import Fix
+    from netsp.online.guard.tether_guard import Guard, GuardOptions
 
     right = goals = loops = 0
     for name in (*bench.SHIPPED, "r1", "r4"):
@@ -60,14 +60,14 @@ def believed() -> tuple[str, bool]:
 def flown() -> tuple[str, bool]:
     """The pool's tour on the fake autopilot."""
     from netsp import solve
-    from netsp.execute.log import ExecutionOptions
-    from netsp.fly.flight import fly
-    from netsp.fly.rehearsal import rehearse
-    from netsp.link.address import Address
-    from netsp.link.frame import Frame
-    from netsp.link.session import Session
-    from netsp.link.udp import UdpLink
-    from netsp.problem import Problem
+    from netsp.model.problem import Problem
+    from netsp.online.execute.execution_log import ExecutionOptions
+    from netsp.online.fly.flight_rehearsal import rehearse
+    from netsp.online.fly.tour_flight import fly
+    from netsp.online.link.address import Address
+    from netsp.online.link.geo_frame import Frame
+    from netsp.online.link.session import Session
+    from netsp.online.link.udp import UdpLink
     from tests.autopilot import Autopilot
 
     problem = Problem.load(ROOT / "problems" / "pool.json")
@@ -95,8 +95,8 @@ def in_space() -> tuple[str, bool]:
     from guard_space import beside_flight
     from sites import shipped
 
-    from netsp.online.simulate import simulate
-    from netsp.space.solve import solve_mission
+    from netsp.online.mission_run import simulate
+    from netsp.plan.space.mission_solver import solve_mission
 
     mission, scene = shipped("basin")
     found = solve_mission(mission, scene=scene)

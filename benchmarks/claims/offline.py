@@ -32,7 +32,7 @@ def proofs(
 def bounds() -> tuple[str, bool]:
     """Runs stopped early, whose bound must not exceed the optimum."""
     from netsp import solve_graph, travel_graph
-    from netsp.worlds import random_world
+    from netsp.model.random_worlds import random_world
 
     worst, runs = -np.inf, 0
     for seed in range(10):
@@ -49,8 +49,8 @@ def restricted_bounds() -> tuple[str, bool]:
     """Check that bounds on all tours in progress rows of runs over few classes do not exceed the
     optimum over all classes, although the optimum over the classes kept does."""
     from netsp import solve, solve_graph, travel_graph
-    from netsp.lower_bound import LowerBound, Scope
-    from netsp.worlds import reachable_world
+    from netsp.model.bound_scope import LowerBound, Scope
+    from netsp.model.random_worlds import reachable_world
 
     above = rows = longer = 0
     for seed in range(8):
@@ -208,8 +208,8 @@ def reduced_as_published() -> tuple[str, bool]:
 def published_program() -> tuple[str, bool]:
     """`mip-2017` beside `mip` on a world of ten goals at tether 200."""
     from netsp import solve_graph
-    from netsp.solvers.solve import travel_graph
-    from netsp.worlds import reachable_world
+    from netsp.model.random_worlds import reachable_world
+    from netsp.plan.solve_problem import travel_graph
 
     world, _ = reachable_world(0, goals=10, tether_length=200.0, obstacles=(1, 20))
     graph = travel_graph(world)
@@ -298,7 +298,7 @@ def proposals() -> tuple[str, bool]:
 def records() -> tuple[str, bool]:
     """Proven tours of the library found and proven again, and judged."""
     from netsp import Status, solve
-    from netsp.library import Library
+    from netsp.study.library import Library
 
     library = Library(ROOT / "problems" / "library")
     names = ("jacket-8-0", "maze-15-2", "harbour-50-1", "clustered-20-3", "jetty-8-1",
@@ -379,9 +379,9 @@ def covers() -> tuple[str, bool]:
 
     import netsp.mip.covers as module
     from netsp import travel_graph
-    from netsp.mip.overgoals import bound_over_goals
-    from netsp.mip.solve import MipRun
-    from netsp.solving.limits import Limits
+    from netsp.gtsp.limits import Limits
+    from netsp.mip.goal_relaxation import bound_over_goals
+    from netsp.mip.mip_solver import MipRun
 
     graph = travel_graph(frontier.world(4, 100, 500.0, many=False))
     run = MipRun(graph, Limits(rng=np.random.default_rng(0)), search_rounds=1000)

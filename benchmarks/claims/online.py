@@ -160,7 +160,7 @@ def mission(name: str, replan_s: float) -> Iterator[Claim]:
 def from_a_ship() -> tuple[str, bool]:
     """The shipped mission whose anchor moves, by both vehicles."""
     from netsp.online.mission import Mission
-    from netsp.online.simulate import simulate
+    from netsp.online.mission_run import simulate
 
     there = Mission.load(ROOT / "missions" / "ship.json")
     shown, good = [], True

@@ -42,9 +42,9 @@ def small() -> tuple[str, bool]:
 
     from sites import shipped
 
-    from netsp.online.simulate import simulate
-    from netsp.pictures.film import film_of_flight
-    from netsp.pictures.film_page import FRAMES, save_page
+    from netsp.online.mission_run import simulate
+    from netsp.view.pictures.film import film_of_flight
+    from netsp.view.pictures.film_page import FRAMES, save_page
 
     mission, scene = shipped("basin")
     with tempfile.TemporaryDirectory() as folder:

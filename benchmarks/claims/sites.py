@@ -17,8 +17,8 @@ from claims.claim import ABSENT, ALLOWANCE, DATA, Claim
 def examples() -> tuple[str, bool]:
     """Both example sites: proven, verified, and back from the map that an export writes."""
     from netsp import Status, solve, verify
-    from netsp.export import export
-    from netsp.site import read_site
+    from netsp.exchange.maps import read_site
+    from netsp.exchange.missions import export
 
     harbour = read_site(ROOT / "examples" / "harbour.kml")
     tank = read_site(
@@ -44,7 +44,7 @@ def curve() -> tuple[str, bool]:
     from sizing import world
 
     from netsp import InfeasibleError, Problem, solve
-    from netsp.sizing import tether_curve
+    from netsp.plan.sizing import tether_curve
 
     agree = count = 0
     for problem in (Problem.load(ROOT / "problems" / "wharf.json"), world(8, 4, 330.0)):
@@ -71,8 +71,8 @@ def base(most: float) -> Callable[[], tuple[str, bool]]:
         from sizing import PROBLEMS, world
 
         from netsp import Problem
-        from netsp.sizing import best_base
-        from netsp.sizing.candidates import over_grid
+        from netsp.plan.sizing import best_base
+        from netsp.plan.sizing.candidates import over_grid
 
         shown, good = [], True
         for problem in (Problem.load(PROBLEMS / "wharf.json"), world(20, 1, 300.0)):
@@ -92,14 +92,14 @@ def margined() -> tuple[str, bool]:
     from sizing import world
 
     from netsp import Problem, solve
-    from netsp.sizing import margins
+    from netsp.plan.sizing import tether_margins
 
     bad = count = 0
     for problem, margin in (
         (Problem.load(ROOT / "problems" / "wharf.json"), 0.3), (world(10, 1, 330.0), 0.0),
     ):  # fmt: skip
         solution = solve(problem, margin=margin)
-        found = margins(problem, solution).obstacles
+        found = tether_margins(problem, solution).obstacles
         assert found >= margin * (1.0 - 1e-9)
         bad += violations(problem, solution, found, 200, seed=1)
         count += 200
@@ -142,8 +142,8 @@ def arranged() -> tuple[str, bool]:
 def formats() -> tuple[str, bool]:
     """An occupancy image and maps of other formats: the example basin, proven."""
     from netsp import Status, solve, verify
-    from netsp.site.occupancy import read_occupancy
-    from netsp.site.table import from_table
+    from netsp.exchange.maps.csv_table import from_table
+    from netsp.exchange.maps.occupancy import read_occupancy
 
     places, names = from_table(ROOT / "examples" / "basin-goals.csv")
     goals = [{"position": p, "name": n} for p, n in zip(places.tolist(), names, strict=True)]
@@ -157,7 +157,7 @@ def formats() -> tuple[str, bool]:
 
 def spellings() -> tuple[str, bool]:
     """One cloud in every order of columns, with each separator, decimal sign and encoding."""
-    from netsp.online.scene.readers import read_cloud
+    from netsp.world.scene.readers import read_cloud
 
     points = np.random.default_rng(60).uniform(-9.0, 9.0, (40, 3)).round(3) - (0.0, 0.0, 10.0)
     columns = {
@@ -184,11 +184,11 @@ def spellings() -> tuple[str, bool]:
 def chart() -> tuple[str, bool]:
     """Import of the chart of docs/sites.md, and a proven tour of its piers."""
     from netsp import Status, solve, verify
-    from netsp.roadmap.within_reach import within_reach
-    from netsp.site.options import Looking, SiteOptions
-    from netsp.site.projection import Projection
-    from netsp.site.read import import_site
-    from netsp.site.selection import Selection
+    from netsp.exchange.maps.options import Looking, SiteOptions
+    from netsp.exchange.maps.projection import Projection
+    from netsp.exchange.maps.read_map import import_site
+    from netsp.exchange.maps.selection import Selection
+    from netsp.roadmap.reachable_goals import within_reach
 
     file = DATA / "charts" / "US5MIACB.000"
     if not file.is_file():

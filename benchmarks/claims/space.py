@@ -12,7 +12,7 @@ def groups() -> tuple[str, bool]:
     from space import ANCHOR, HIGH, LOW, shapes
 
     from netsp.online import Scene
-    from netsp.space.signature import SpaceSignature
+    from netsp.plan.space.space_signature import SpaceSignature
 
     found = []
     for name, solids in shapes().items():
@@ -53,11 +53,11 @@ def uprights() -> tuple[str, bool]:
     from space import posts_world, prism_world
 
     from netsp import solve
-    from netsp.clock import Clock
-    from netsp.space.judge import verify_mission
-    from netsp.space.places import Places
-    from netsp.space.plan import plans
-    from netsp.space.upright import bound_of_upright
+    from netsp.base.clock import Clock
+    from netsp.plan.space.judge import verify_mission
+    from netsp.plan.space.places import Places
+    from netsp.plan.space.space_plan import plans
+    from netsp.plan.space.upright import bound_of_upright
 
     worst, gap = 0.0, 0.0
     worlds = [posts_world(seed) for seed in (2, 3)]
@@ -81,9 +81,9 @@ def no_worse() -> tuple[str, bool]:
     """A mission in its planned order, solved again in two seconds."""
     from sites import shipped
 
-    from netsp.online.simulate import simulate
-    from netsp.space.judge import verify_mission
-    from netsp.space.solve import seconds_until_home, solve_mission
+    from netsp.online.mission_run import simulate
+    from netsp.plan.space.judge import verify_mission
+    from netsp.plan.space.mission_solver import seconds_until_home, solve_mission
 
     mission, scene = shipped("basin")
     ordered = solve_mission(mission, scene=scene, time_limit=10.0).mission
@@ -100,8 +100,8 @@ def solved(name: str, longest: float, saved: float) -> Claim:
     def measure() -> tuple[str, bool]:
         from sites import SITES, mission_of, shipped
 
-        from netsp.online.simulate import simulate
-        from netsp.space.solve import seconds_until_home, solve_mission
+        from netsp.online.mission_run import simulate
+        from netsp.plan.space.mission_solver import seconds_until_home, solve_mission
 
         mission, scene = mission_of(name) if name in SITES else shipped(name)
         found = solve_mission(mission, scene=scene)
@@ -124,8 +124,8 @@ def seen(name: str) -> Claim:
         import cover as bench
         from sites import mission_of
 
-        from netsp.cover import cover
-        from netsp.online.simulate import simulate
+        from netsp.online.mission_run import simulate
+        from netsp.plan.cover import cover
 
         mission, scene = mission_of(name)
         found = cover(scene, anchor=mission.anchor, start=mission.start, **bench.CAMERA)
@@ -144,10 +144,10 @@ def mended() -> tuple[str, bool]:
     import numpy as np
     from sites import mission_of
 
-    from netsp.geometry import polylines
-    from netsp.online.simulate import simulate
+    from netsp.base.geometry import polylines
+    from netsp.online.mission_run import simulate
     from netsp.online.surprises import SceneSurprises
-    from netsp.space.plan import plan
+    from netsp.plan.space.space_plan import plan
 
     mission, scene = mission_of("ring")
     planned = plan(mission, scene=scene).planned()
@@ -175,7 +175,7 @@ def near_the_bound() -> tuple[str, bool]:
     a detour."""
     from space import random_frame
 
-    from netsp.space.solve import solve_mission
+    from netsp.plan.space.mission_solver import solve_mission
 
     mission, scene = random_frame(1)
     found = solve_mission(mission, scene=scene)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from netsp.solving.run import SolverRun
+from netsp.gtsp.solver_run import SolverRun
 
 
 @dataclass(frozen=True)

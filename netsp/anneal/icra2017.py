@@ -17,15 +17,15 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.anneal.cooling import Cooling, Schedule
-from netsp.arrays import Floats, Ints
-from netsp.compiled.chance import below, metropolis, seeded
-from netsp.compiled.kernel import kernel
-from netsp.lns.layers import Instance
-from netsp.lns.solve import core_of
-from netsp.solving.limits import Limits
-from netsp.solving.run import SolverRun
-from netsp.travel.graph import TravelGraph
-from netsp.travel.result import Result
+from netsp.base.arrays import Floats, Ints
+from netsp.base.compiled.kernel import kernel
+from netsp.base.compiled.rng import below, metropolis, seeded
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.search.layers import Instance
+from netsp.gtsp.search.lns_solver import core_of
+from netsp.gtsp.solver_run import SolverRun
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.result import Result
 
 PROPOSALS_PER_GOAL = 1_000_000
 """Default number of proposals, times the number of goals, when nothing is limited."""

@@ -26,13 +26,13 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.anneal.cooling import Cooling, Schedule
-from netsp.arrays import Floats, Ints
-from netsp.compiled.chance import below, metropolis, seeded
-from netsp.compiled.kernel import kernel
-from netsp.solving.limits import Limits
-from netsp.solving.run import SolverRun
-from netsp.travel.graph import TravelGraph
-from netsp.travel.result import Result
+from netsp.base.arrays import Floats, Ints
+from netsp.base.compiled.kernel import kernel
+from netsp.base.compiled.rng import below, metropolis, seeded
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.solver_run import SolverRun
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.result import Result
 
 PROPOSALS_PER_GOAL = 20_000
 """Default number of proposals, times the number of goals, when nothing is limited."""
@@ -68,8 +68,8 @@ class Params(Cooling):
 
 
 class Table(NamedTuple):
-    """What does not change: `netsp.travel.detours.Detours` (planar, height, letters, row, far,
-    near), and `_admissible` words (trie, vertex)."""
+    """What does not change: `netsp.gtsp.travel.tether_blind_legs.Detours` (planar, height, letters,
+    row, far, near), and `_admissible` words (trie, vertex)."""
 
     planar: Floats
     height: Floats

@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from netsp.arrays import Floats
-from netsp.compare.path_comparison import order_length
-from netsp.errors import InputError
-from netsp.fields import checked_argument, is_index
-from netsp.models import shown
-from netsp.pathmeasures import PathMeasures, measure_path
-from netsp.problem import Problem
-from netsp.roadmap.tethers import Tethers
-from netsp.site.path_file import path_to_geojson
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.exchange.maps.path_file import path_to_geojson
+from netsp.model.field_types import checked_argument, is_index
+from netsp.model.problem import Problem
+from netsp.model.validated import shown
+from netsp.roadmap.tether_classes import Tethers
+from netsp.study.compare.path_comparison import order_length
+from netsp.study.paths import PathMeasures, measure_path
 
 MAX_POINTS = 5000
 """Largest number of points of a drawn path; a message with 5000 points has 0.2 MB."""

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from netsp.app.tethers import Cursor
-from netsp.arrays import Floats
-from netsp.errors import InputError
-from netsp.problem import Problem
-from netsp.sizing.base import shortest_paths
-from netsp.sizing.margins import margins
-from netsp.solution import Solution
+from netsp.app.dragged_tethers import Cursor
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.model.problem import Problem
+from netsp.model.solution import Solution
+from netsp.plan.sizing.base_placement import shortest_paths
+from netsp.plan.sizing.tether_margins import margins
 
 SAMPLES = 120
 """Places along the tour at which the tether is told, its visits besides."""

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlsplit
 
+from netsp.app.dragged_tethers import Cursor
 from netsp.app.drawn_path import (
     drawn_figures,
     drawn_file,
@@ -24,7 +25,7 @@ from netsp.app.drawn_path import (
     worth_of_order,
 )
 from netsp.app.facts import facts
-from netsp.app.files import (
+from netsp.app.served_files import (
     EXPORTS,
     ImportAnswers,
     bare_name,
@@ -33,16 +34,15 @@ from netsp.app.files import (
     imported,
     without_options,
 )
-from netsp.app.files import MOST_BYTES as MOST_FILE
+from netsp.app.served_files import MOST_BYTES as MOST_FILE
 from netsp.app.shown import Shown
 from netsp.app.solving import Worker
 from netsp.app.state import Document
-from netsp.app.tethers import Cursor
-from netsp.errors import InputError, NetspError, UnansweredError
-from netsp.fields import checked_argument, is_index
-from netsp.models import parse_json_object, shown
-from netsp.problem import Problem
-from netsp.solution import Solution
+from netsp.base.errors import InputError, NetspError, UnansweredError
+from netsp.model.field_types import checked_argument, is_index
+from netsp.model.problem import Problem
+from netsp.model.solution import Solution
+from netsp.model.validated import parse_json_object, shown
 
 STATIC = Path(__file__).parent / "static"
 
@@ -260,7 +260,7 @@ class Session:
 
     def _space(self, share: float) -> dict[str, Any]:
         """Solids, path and tether in space."""
-        from netsp.app.space import figure
+        from netsp.app.space_preview import figure
 
         told = self._along(share) or {}
         if self.shown is not None:
@@ -269,7 +269,7 @@ class Session:
                 self.shown.scene, self.shown.data, self.shown.answer["path"],
                 nodes if self.shown.frames else _in_space(told),
             )  # fmt: skip
-        from netsp.online.scene.scene import scene_of
+        from netsp.world.scene.scene import scene_of
 
         path = (self.answer or {}).get("path", [])
         problem = self.document.problem()
@@ -420,7 +420,7 @@ def application(session: Session, token: str, port: int) -> Any:
 
     def plotly(request: Request) -> Response:
         del request
-        from netsp.app.space import script
+        from netsp.app.space_preview import script
 
         try:
             return FileResponse(script(), media_type="text/javascript")
@@ -518,7 +518,7 @@ def _in_space(told: Mapping[str, Any]) -> list[list[float]]:
     """The taut tether of an answer about the plane, its height in proportion to its length."""
     import numpy as np
 
-    from netsp.geometry import polylines
+    from netsp.base.geometry import polylines
 
     flat = np.array(told.get("path") or [], dtype=float).reshape(-1, 2)
     if len(flat) < 2:
@@ -568,8 +568,8 @@ def _download(session: Session, name: str) -> Any:
         elif name == "solution.json":
             text, kind = session.solution, "application/json"
         elif name == "report.html":
-            from netsp.report.opened import Opened
-            from netsp.report.tour import page
+            from netsp.view.report.opened import Opened
+            from netsp.view.report.tour_page import page
 
             solution = Solution.from_json(session.solution)
             text, kind = page(Opened(problem, solution)), "text/html"

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from netsp.app.solving import told_bound
-from netsp.errors import InputError
-from netsp.files import csv_rows, read_text
-from netsp.geometry import polylines
-from netsp.models import parse_json_object
-from netsp.online.scene.scene import Scene, scene_of
-from netsp.problem import Problem
-from netsp.solution import Solution
+from netsp.base.errors import InputError
+from netsp.base.files import csv_rows, read_text
+from netsp.base.geometry import polylines
+from netsp.model.problem import Problem
+from netsp.model.solution import Solution
+from netsp.model.validated import parse_json_object
+from netsp.world.scene.scene import Scene, scene_of
 
 FRAMES = 240
 """Moments of a run that are shown."""
@@ -170,11 +170,11 @@ def _of_execution(place: Path, problem: Problem, solution: Solution) -> Shown:
 
 def _of_mission(place: Path) -> Shown:
     """A mission that was flown; the tether is worked out again along the way."""
+    from netsp.online.anchor_track import Track
     from netsp.online.laid import present_tether
     from netsp.online.mission import Mission
-    from netsp.online.simulate import grid_of
-    from netsp.online.tether import GeodesicTether
-    from netsp.online.track import Track
+    from netsp.online.mission_run import grid_of
+    from netsp.world.tether import GeodesicTether
 
     mission = Mission.load(place / "mission.json")
     scene = mission.load_scene()

@@ -16,9 +16,9 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from netsp.lower_bound import LowerBound
-    from netsp.problem import Problem
-    from netsp.solution import Solution, Status
+    from netsp.model.bound_scope import LowerBound
+    from netsp.model.problem import Problem
+    from netsp.model.solution import Solution, Status
 
 TELL = 0.15
 """Shortest time between two tours that are told, seconds."""
@@ -111,20 +111,21 @@ def _solve(
     connection: Connection, version: int, text: str, time_limit: float, before: Solution | None
 ) -> Solution | None:
     """Solve one version, and tell the tours found on the way: first what is left of the tour before
-    (`netsp.solvers.warm`), which an edit rarely changes much. Returns the solution if there is one.
+    (`netsp.plan.warm_start`), which an edit rarely changes much. Returns the solution if there is
+    one.
     """
     from netsp.app.facts import facts
-    from netsp.clock import Clock
-    from netsp.errors import InfeasibleError, InputError, NetspError
+    from netsp.base.clock import Clock
+    from netsp.base.errors import InfeasibleError, InputError, NetspError
+    from netsp.gtsp.travel.graph import TravelGraph
+    from netsp.gtsp.travel.result import Progress
     from netsp.judge import checked
-    from netsp.problem import Problem
-    from netsp.solution import Status
-    from netsp.solvers.answer import to_solution
-    from netsp.solvers.solve import DEFAULT_SOLVER as SOLVER
-    from netsp.solvers.solve import solve_over, travel_graph
-    from netsp.solvers.warm import old_tour
-    from netsp.travel.graph import TravelGraph
-    from netsp.travel.result import Progress
+    from netsp.model.problem import Problem
+    from netsp.model.solution import Status
+    from netsp.plan.answer import to_solution
+    from netsp.plan.solve_problem import DEFAULT_SOLVER as SOLVER
+    from netsp.plan.solve_problem import solve_over, travel_graph
+    from netsp.plan.warm_start import old_tour
 
     problem = Problem.from_json(text)
     told: list[Any] = [0.0, None]
@@ -201,7 +202,7 @@ def _solve(
 
 def told_bound(status: Status, length: float | None, bound: LowerBound | None) -> dict[str, Any]:
     """Return the fields of a tour's bound for the page: length, scope and the words shown."""
-    from netsp.solution import proof
+    from netsp.model.solution import proof
 
     return {
         "lower_bound": None if bound is None else bound.length,
@@ -214,7 +215,7 @@ def _out_of_reach(problem: Problem) -> dict[str, Any]:
     """Goals that the tether does not reach, with what each needs (None: nothing leads there), and
     the tether that would do for all."""
     from netsp.app.facts import needed, plain, shortest_sufficient
-    from netsp.errors import InputError
+    from netsp.base.errors import InputError
 
     if problem.state is not None:
         return {"unreached": [], "needed": None}

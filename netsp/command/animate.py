@@ -7,12 +7,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from netsp.base.errors import InputError
 from netsp.command.solve_mission import is_mission
 from netsp.command.types import check_writable, positive
-from netsp.errors import InputError
 
 if TYPE_CHECKING:
-    from netsp.pictures.film import Film
+    from netsp.view.pictures.film import Film
 
 EXAMPLE = "netsp animate tour.json --problem problems/wharf.json -o tour.gif"
 
@@ -48,7 +48,7 @@ MOST_SECONDS, MOST_FPS = 600, 60
 def run(args: argparse.Namespace) -> int:
     """Draw, and return the exit code."""
     check_writable(args.output, inputs=(*args.source, args.problem))
-    from netsp.pictures.animation import FORMATS, save_animation
+    from netsp.view.pictures.animation import FORMATS, save_animation
 
     kinds = (*FORMATS, PAGE)
     if Path(args.output).suffix.lower() not in kinds:
@@ -93,7 +93,7 @@ def _page(args: argparse.Namespace) -> int:
     """A page that plays."""
     in_space = [_in_space(source) for source in args.source]
     if all(in_space):
-        from netsp.pictures.film_page import FRAMES, save_page
+        from netsp.view.pictures.film_page import FRAMES, save_page
 
         films = [_film(source, args.problem, FRAMES) for source in args.source]
         names = dict.fromkeys(film.title.split("\n")[0] for film in films)
@@ -104,12 +104,12 @@ def _page(args: argparse.Namespace) -> int:
             f"{args.source[in_space.index(False)]} is not; expected a page of one kind"
         )
     elif len(args.source) > 1:
-        from netsp.report.beside import save_beside
-        from netsp.report.opened import opened
+        from netsp.view.report.opened import opened
+        from netsp.view.report.side_by_side_page import save_beside
 
         save_beside([opened(source, args.problem) for source in args.source], args.output)
     else:
-        from netsp.report.tour import report_tour
+        from netsp.view.report.tour_page import report_tour
 
         report_tour(args.source[0], args.problem, args.output)
     return _told(args)
@@ -117,17 +117,17 @@ def _page(args: argparse.Namespace) -> int:
 
 def _film(source: str, problem_file: str | None, count: int) -> Film:
     if not _in_space(source):
-        from netsp.report.opened import opened
+        from netsp.view.report.opened import opened
 
         return opened(source, problem_file).film(count)
     if not Path(source).is_dir():
         from netsp.online.mission import Mission
-        from netsp.pictures.film import film_of_mission
+        from netsp.view.pictures.film import film_of_mission
 
         mission = Mission.load(source)
         return film_of_mission(mission, mission.load_scene(), count)
-    from netsp.online.log import read_run
-    from netsp.pictures.film import film_of_flight
+    from netsp.online.run_log import read_run
+    from netsp.view.pictures.film import film_of_flight
 
     run = read_run(source)
     try:

@@ -11,9 +11,9 @@ import threading
 import webbrowser
 from typing import TYPE_CHECKING
 
+from netsp.base.errors import InputError
 from netsp.command import messages
 from netsp.command.types import positive
-from netsp.errors import InputError
 
 if TYPE_CHECKING:
     from netsp.app.state import Document
@@ -48,10 +48,10 @@ def _document(name: str | None) -> tuple[Document, list[str]]:
     """Return the document to open (a problem, or an import of a map) and notes on the import."""
     from pathlib import Path
 
-    from netsp.app.files import import_warnings, is_map, without_options
+    from netsp.app.served_files import import_warnings, is_map, without_options
     from netsp.app.state import Document
     from netsp.command.import_site import show_table
-    from netsp.site.read import import_site
+    from netsp.exchange.maps.read_map import import_site
 
     path = Path(name or "")
     is_problem = path.suffix.lower() == ".json" and not (

@@ -26,7 +26,7 @@ def begin(command: str) -> None:
     command : str
         Name of the command, which decides what is compiled first.
     """
-    tiered = sys.modules.get("netsp.compiled.tiered")
+    tiered = sys.modules.get("netsp.base.compiled.tiered")
     is_wanted = os.environ.get(SWITCH_VARIABLE, "1") != "0" and os.name == "posix"
     if tiered is None or not is_wanted:
         return
@@ -52,12 +52,12 @@ def alone() -> Iterator[bool]:
     It should not while another background process runs, nor where compiled code cannot be kept on
     disk.
     """
-    from netsp.compiled import growing
-    from netsp.compiled.compile_lock import locked
-    from netsp.compiled.disk_cache import lock_file
+    from netsp.base.compiled import dynamic_array
+    from netsp.base.compiled.compile_lock import locked
+    from netsp.base.compiled.disk_cache import lock_file
 
     os.nice(LOWEST_PRIORITY)
-    file = lock_file(growing.longer)
+    file = lock_file(dynamic_array.longer)
     if file is None:  # no folder is writable
         yield False
         return

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 
+from netsp.base.errors import EXIT_INFEASIBLE, EXIT_NOT_ALL
 from netsp.command import messages
 from netsp.command.command_clock import command_clock
 from netsp.command.types import check_writable, natural, positive, seconds
-from netsp.errors import EXIT_INFEASIBLE, EXIT_NOT_ALL
 
 EXAMPLE = "netsp base problems/wharf.json --grid 10,10 --plot base.png"
 
@@ -52,13 +52,13 @@ def run(args: argparse.Namespace) -> int:
     check_writable(
         args.output, args.plot, args.problem_output, inputs=(args.problem, args.candidates)
     )
-    from netsp.files import write_text
-    from netsp.pictures import style
-    from netsp.problem import Problem
-    from netsp.site.projection import Projection
-    from netsp.site.table import from_table
-    from netsp.sizing.base import Candidate, best_base
-    from netsp.sizing.candidates import along_line, over_grid
+    from netsp.base.files import write_text
+    from netsp.exchange.maps.csv_table import from_table
+    from netsp.exchange.maps.projection import Projection
+    from netsp.model.problem import Problem
+    from netsp.plan.sizing.base_placement import Candidate, best_base
+    from netsp.plan.sizing.candidates import along_line, over_grid
+    from netsp.view.pictures import style
 
     if args.plot:
         style.check_format(args.plot)

@@ -10,8 +10,8 @@ from netsp.command import messages
 from netsp.command.types import length
 
 if TYPE_CHECKING:
-    from netsp.problem import Problem
-    from netsp.sizing.clearance_advice import ClearanceRoom
+    from netsp.model.problem import Problem
+    from netsp.plan.sizing.clearance_advice import ClearanceRoom
 
 
 def clearance_flags(p: argparse.ArgumentParser) -> None:
@@ -38,7 +38,7 @@ def warn_of_problem(args: argparse.Namespace, problem: Problem, margin: float) -
     margin : float
         Margin that the tour was planned with, which counts as clearance.
     """
-    from netsp.sizing.clearance_advice import clearance_room
+    from netsp.plan.sizing.clearance_advice import clearance_room
 
     room = clearance_room(problem)
     if room is not None:
@@ -52,8 +52,8 @@ def warn_of_clearance(
     room: ClearanceRoom | None = None,
 ) -> None:  # fmt: skip
     """Warn if the clearance of a plan among obstacles is too small to be flown."""
-    from netsp.axes import metres_per_unit
-    from netsp.sizing.clearance_advice import ClearancePolicy, clearance_advice
+    from netsp.base.axes import metres_per_unit
+    from netsp.plan.sizing.clearance_advice import ClearancePolicy, clearance_advice
 
     policy = ClearancePolicy(position_error=position_error, current=current)
     text = clearance_advice(clearance, units, policy, margin=margin, room=room)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from netsp.command import told
+from netsp.command import json_output
 
 EXAMPLE = "netsp combine part-1.jsonl part-2.jsonl -o rows.jsonl"
 
@@ -14,17 +14,17 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument("results", metavar="RESULTS", nargs="+", help="results of netsp compare")
     p.add_argument("-o", "--output", required=True, metavar="FILE", help="file for all rows")
-    told.json_flag(p)
+    json_output.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the rows, and return the exit code."""
-    told.check_stdout(args)
-    from netsp.compare.rows import combine
+    json_output.check_stdout(args)
+    from netsp.study.compare.rows import combine
 
     count = combine(args.results, args.output)
     if args.json:
-        told.tell({"trials": count, "file": args.output})
+        json_output.tell({"trials": count, "file": args.output})
         return 0
     print(f"{count} trials in {args.output}", file=sys.stderr)
     return 0

@@ -7,7 +7,7 @@ from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from netsp.clock import Clock
+    from netsp.base.clock import Clock
 
 _start: ContextVar[tuple[float, float] | None] = ContextVar("start", default=None)
 """Monotonic time and CPU seconds of the process at the start of the command, s."""
@@ -27,6 +27,6 @@ def command_clock(limit: float | None) -> Clock:
     limit : float or None
         Seconds; None for no limit.
     """
-    from netsp.clock import Clock
+    from netsp.base.clock import Clock
 
     return Clock(limit, begun=_start.get())

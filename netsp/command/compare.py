@@ -7,7 +7,8 @@ import sys
 import time
 from typing import TYPE_CHECKING, Any, TextIO
 
-from netsp.command import messages, told
+from netsp.base.errors import EXIT_INTERRUPTED, InputError
+from netsp.command import json_output, messages
 from netsp.command.patience import span
 from netsp.command.types import (
     length,
@@ -16,12 +17,11 @@ from netsp.command.types import (
     seconds,
     shard,
 )
-from netsp.errors import EXIT_INTERRUPTED, InputError
 
 if TYPE_CHECKING:
-    from netsp.compare.rows import TrialRow
-    from netsp.compare.run import Tally
-    from netsp.compare.study import Study
+    from netsp.study.compare.rows import TrialRow
+    from netsp.study.compare.study import Study
+    from netsp.study.compare.study_run import Tally
 
 EXAMPLE = "netsp compare examples/study.toml -o rows.jsonl --jobs 2"
 
@@ -73,17 +73,17 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--scheduler", metavar="ADDRESS", help="run on the Dask cluster at tcp://host:port"
     )
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    told.json_flag(p)
+    json_output.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the trials that are not done yet, and return the exit code."""
-    from netsp.compare.run import compare
+    from netsp.study.compare.study_run import compare
 
     study = study_of(args)
     executor = None
     if args.scheduler:
-        from netsp.compare.cluster import dask_executor
+        from netsp.study.compare.cluster import dask_executor
 
         executor = dask_executor(args.scheduler)
     bar = Bar(sys.stderr, args.quiet)
@@ -103,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     if args.json:
-        told.tell({
+        json_output.tell({
             "trials": tally.total, "done": tally.done, "new": tally.done - tally.begun,
             "failed": tally.failed, "results": args.output,
         })  # fmt: skip
@@ -112,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
 
 def study_of(args: argparse.Namespace) -> Study:
     """The study file, or a study made from the flags."""
-    from netsp.compare.study import Study
+    from netsp.study.compare.study import Study
 
     flags = {
         "goals": args.goals,
@@ -151,7 +151,7 @@ class Bar:
 
     def show(self, row: TrialRow, tally: Tally) -> None:
         """After a trial."""
-        from netsp.compare.rows import FAILED
+        from netsp.study.compare.rows import FAILED
 
         if self.quiet:
             return

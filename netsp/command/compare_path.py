@@ -8,14 +8,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from netsp.command import messages, told
+from netsp.base.errors import EXIT_INFEASIBLE, EXIT_NOT_ALL, InputError
+from netsp.command import json_output, messages
 from netsp.command.types import check_writable, length, natural, seconds
-from netsp.errors import EXIT_INFEASIBLE, EXIT_NOT_ALL, InputError
 
 if TYPE_CHECKING:
-    from netsp.compare.path_comparison import PathComparison
-    from netsp.problem import Problem
-    from netsp.site.path_file import FoundPath
+    from netsp.exchange.maps.path_file import FoundPath
+    from netsp.model.problem import Problem
+    from netsp.study.compare.path_comparison import PathComparison
 
 EXAMPLE = (
     "netsp compare-path problems/wharf.json examples/paths/wharf-systematic-1.csv --html page.html"
@@ -77,12 +77,12 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compare the paths, print and write the results, and return the exit code."""
-    from netsp.compare.path_comparison import compare_paths
-    from netsp.files import STANDARD, write_text
-    from netsp.pathmeasures import PathPolicy
-    from netsp.pathmeasures.path_measures import SPEED
-    from netsp.pictures import style
-    from netsp.solution import Solution
+    from netsp.base.files import STANDARD, write_text
+    from netsp.model.solution import Solution
+    from netsp.study.compare.path_comparison import compare_paths
+    from netsp.study.paths import PathPolicy
+    from netsp.study.paths.path_measures import SPEED
+    from netsp.view.pictures import style
 
     if args.json and args.output == STANDARD:
         raise InputError("--json: standard output is taken by the table; expected -o FILE")
@@ -109,7 +109,7 @@ def run(args: argparse.Namespace) -> int:
             on_stage=stage or (lambda text: None),
         )  # fmt: skip
     if args.json:
-        told.tell(found.to_dict())
+        json_output.tell(found.to_dict())
     elif args.output == STANDARD:
         sys.stdout.write(found.to_csv())
     elif not args.quiet:
@@ -121,11 +121,11 @@ def run(args: argparse.Namespace) -> int:
         text = found.to_csv() if as_table else json.dumps(found.to_dict(), indent=1) + "\n"
         write_text(args.output, text)
     if args.plot is not None:
-        from netsp.pictures.path_picture import draw_comparison
+        from netsp.view.pictures.path_picture import draw_comparison
 
         style.save(draw_comparison(found), args.plot)
     if args.html is not None:
-        from netsp.report.path_page import page
+        from netsp.view.report.path_page import page
 
         write_text(args.html, page(found))
     if not args.quiet:
@@ -143,9 +143,9 @@ def _inputs(args: argparse.Namespace) -> tuple[Problem, list[FoundPath]]:
     arguments that are not given."""
     from dataclasses import replace
 
-    from netsp.compare.path_study import PathStudy
-    from netsp.guard.recorded_path import read_any_paths
-    from netsp.problem import Problem
+    from netsp.model.problem import Problem
+    from netsp.online.guard.recorded_path import read_any_paths
+    from netsp.study.compare.path_study import PathStudy
 
     files: list[tuple[str, str]] = [(file, "") for file in args.paths]
     problem_file = args.problem
@@ -184,7 +184,7 @@ def describe(found: PathComparison) -> str:
         A paragraph for the tour and each path, each with its visits.
     """
     from netsp.command.measures import aligned, visit_table
-    from netsp.report.path_wording import figures_of
+    from netsp.view.report.path_wording import figures_of
 
     problem, tour, u = found.problem, found.tour, found.problem.units
     parts = [f"{problem.name}: {problem.summary}"]

@@ -13,14 +13,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from netsp.number_ranges import check_positive
+from netsp.base.number_ranges import check_positive
 
 if TYPE_CHECKING:
     from netsp.command.status_line import StatusLine
 
 PACKAGE_SUBJECTS = {
-    "online": "the simulation", "space": "planning in space", "cover": "the choice of viewpoints",
-}  # fmt: skip
+    "online": "the simulation",
+    "world": "the simulation",
+    "plan.space": "planning in space",
+    "plan.cover": "the choice of viewpoints",
+}
 """Name of each package in messages; all other packages are called `the solver`."""
 
 
@@ -35,7 +38,7 @@ def compile_messages(stream: TextIO, line: StatusLine | None = None) -> Iterator
     line : StatusLine, optional
         Line of a terminal, in which a bar is drawn. Without it, lines are written to the stream.
     """
-    from netsp.compiled.numba_loading import when_numba_is_loaded
+    from netsp.base.compiled.numba_loading import when_numba_is_loaded
 
     preparation = Preparation(stream, line)
     is_over = False
@@ -189,8 +192,9 @@ class Preparation:
             return
         if not self._depth:
             if self._subject is None:
-                part = kernel.py_func.__module__.split(".")[1]
-                self._subject = PACKAGE_SUBJECTS.get(part, "the solver")
+                module = kernel.py_func.__module__.removeprefix("netsp.")
+                subjects = (v for k, v in PACKAGE_SUBJECTS.items() if module.startswith(k + "."))
+                self._subject = next(subjects, "the solver")
             package = kernel.py_func.__module__.rpartition(".")[0]
             if package not in self._packages:
                 self._packages.add(package)
@@ -246,10 +250,10 @@ def _folder_compile_time_s(kernel: Any) -> float:
 
     Kernels that are on disk do not count.
     """
-    from netsp.compiled.compile_policy import current_policy
-    from netsp.compiled.disk_cache import lock_file
-    from netsp.compiled.kernel import functions_to_compile
-    from netsp.compiled.tiered import TieredDispatcher
+    from netsp.base.compiled.compile_policy import current_policy
+    from netsp.base.compiled.disk_cache import lock_file
+    from netsp.base.compiled.kernel import functions_to_compile
+    from netsp.base.compiled.tiered import TieredDispatcher
 
     if not isinstance(kernel, TieredDispatcher):
         return 0.0
@@ -274,7 +278,7 @@ def compile_time_s(kernel: Any, with_called: bool = False) -> float:
     with_called : bool
         Whether to include the kernels that it calls, as far as they are not compiled.
     """
-    from netsp.compiled.compile_policy import current_policy
+    from netsp.base.compiled.compile_policy import current_policy
 
     own = len(kernel.py_func.__code__.co_code)
     whole = getattr(kernel, "bytecode", None) if with_called else None

@@ -10,14 +10,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from netsp.command import told
+from netsp.base.errors import InputError
+from netsp.command import json_output as told
 from netsp.command.command_clock import command_clock
 from netsp.command.types import check_writable, length, natural, seconds, vector
-from netsp.errors import InputError
 
 if TYPE_CHECKING:
-    from netsp.cover import Cover
     from netsp.online.equipment import Camera
+    from netsp.plan.cover import Cover
 
 EXAMPLE = "netsp cover scenes/jetty.json --anchor=-3,-3,-1 -o mission.json"
 
@@ -81,17 +81,17 @@ def run(args: argparse.Namespace) -> int:
     told.check_stdout(args)
     check_writable(args.output, args.plot, inputs=(args.scene,))
     if args.plot:
-        from netsp.pictures import style
+        from netsp.view.pictures import style
 
         style.check_format(args.plot)
     camera = _camera(args.camera, args.patch)
     anchor = vector(args.anchor, "--anchor")
     start = None if args.start is None else vector(args.start, "--start")
+    from netsp.base.files import write_text
     from netsp.command.plot_scene import note_scene
     from netsp.command.stages import Stages
-    from netsp.cover import cover
-    from netsp.files import write_text
-    from netsp.online.scene.scene import Scene
+    from netsp.plan.cover import cover
+    from netsp.world.scene.scene import Scene
 
     clock = command_clock(args.time_limit)
     scene = clock.bounded("reading the scene", lambda: Scene.load(args.scene))
@@ -117,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         write_text(args.output, text)
     if args.plot:
-        from netsp.pictures.cover import save
+        from netsp.view.pictures.cover_picture import save
 
         save(found, scene, args.plot)
     if not args.quiet:

@@ -9,18 +9,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from netsp.command import told
+from netsp.base.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
+from netsp.command import json_output
 from netsp.command.types import (
     length,
     natural,
     seconds,
     vector,
 )
-from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 
 if TYPE_CHECKING:
-    from netsp.execute.log import ExecutionRow
-    from netsp.problem import Problem
+    from netsp.model.problem import Problem
+    from netsp.online.execute.execution_log import ExecutionRow
 
 SPEED = 0.5
 """Of a robot in the plane, where none is given; missions have their own."""
@@ -80,7 +80,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("-o", "--output", metavar="RUN", help="folder for logs, summary and run.png")
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    told.json_flag(p)
+    json_output.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -95,8 +95,8 @@ def run(args: argparse.Namespace) -> int:
 def _mission(args: argparse.Namespace) -> int:
     """Of a planned mission in space."""
     from netsp.command.flight import fly
-    from netsp.online.limits import check_names
     from netsp.online.mission import Mission
+    from netsp.online.mission_limits import check_names
     from netsp.online.planner import PlannerOptions
     from netsp.online.surprises import SceneSurprises
 
@@ -134,17 +134,17 @@ def _mission(args: argparse.Namespace) -> int:
 
 def _problem(args: argparse.Namespace) -> int:
     """Of a problem in the plane."""
-    from netsp.clock import until_interrupt
-    from netsp.execute.events import Surprises
-    from netsp.execute.log import ExecutionOptions, describe_execution
-    from netsp.execute.repair import REPLAN_S
-    from netsp.execute.run import execute
-    from netsp.execute.tether_reserve import ReservePolicy
-    from netsp.execute.write import write_execution
-    from netsp.files import output_folder
-    from netsp.pictures.execution import save_execution
-    from netsp.problem import Problem
-    from netsp.solution import Solution
+    from netsp.base.clock import until_interrupt
+    from netsp.base.files import output_folder
+    from netsp.model.problem import Problem
+    from netsp.model.solution import Solution
+    from netsp.online.execute.events import Surprises
+    from netsp.online.execute.execution_files import write_execution
+    from netsp.online.execute.execution_log import ExecutionOptions, describe_execution
+    from netsp.online.execute.tether_reserve import ReservePolicy
+    from netsp.online.execute.tour_execution import execute
+    from netsp.online.execute.tour_repair import REPLAN_S
+    from netsp.view.pictures.execution import save_execution
 
     if args.solution is None:
         raise InputError(
@@ -173,7 +173,7 @@ def _problem(args: argparse.Namespace) -> int:
             write_execution(done, args.output)
             save_execution(done, Path(args.output) / "run.png")
         if args.output is None or args.json:
-            told.tell(done.summary)
+            json_output.tell(done.summary)
         if not args.quiet:
             print(describe_execution(done), file=sys.stderr)
     s = done.summary

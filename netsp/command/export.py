@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
-from netsp.command import messages, told
+from netsp.base.errors import InputError, counted
+from netsp.command import json_output, messages
 from netsp.command.clearance_flags import clearance_flags, warn_of_clearance, warn_of_problem
 from netsp.command.types import (
     check_writable,
@@ -16,7 +17,6 @@ from netsp.command.types import (
     positive,
     whole_bytes,
 )
-from netsp.errors import InputError, counted
 
 SPEED = 0.5
 """Metres per second, where none is given."""
@@ -81,29 +81,35 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="of a mission: z of the water's surface (m); default 0",
     )  # fmt: skip
     p.add_argument("-o", "--output", required=True, metavar="FILE")
-    told.json_flag(p)
+    json_output.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the file, warn of what is tight, and return the exit code."""
     from netsp.command.solve_mission import is_mission
 
-    told.check_stdout(args)
+    json_output.check_stdout(args)
     if is_mission(args.solution):
         return _mission(args)
     if args.problem is None:
         raise InputError(f"--problem: {args.solution} is no mission; expected its problem")
     check_writable(args.output, inputs=(args.solution, args.problem))
-    from netsp.export.common_depth import at_depth
-    from netsp.export.export_notes import export_notes
-    from netsp.export.fence import MIN_FENCE_BYTES, FencePolicy
-    from netsp.export.margins import warnings
-    from netsp.export.write import FOR_VEHICLES, Settings, export, format_of, predicted_s
+    from netsp.exchange.maps.goal_depths import surface_warning
+    from netsp.exchange.maps.projection import Projection
+    from netsp.exchange.missions.common_depth import at_depth
+    from netsp.exchange.missions.export_margins import warnings
+    from netsp.exchange.missions.export_notes import export_notes
+    from netsp.exchange.missions.fence import MIN_FENCE_BYTES, FencePolicy
+    from netsp.exchange.missions.mission_files import (
+        FOR_VEHICLES,
+        Settings,
+        export,
+        format_of,
+        predicted_s,
+    )
     from netsp.judge import verify
-    from netsp.problem import Problem
-    from netsp.site.goal_depths import surface_warning
-    from netsp.site.projection import Projection
-    from netsp.solution import Solution
+    from netsp.model.problem import Problem
+    from netsp.model.solution import Solution
 
     problem, solution = Problem.load(args.problem), Solution.load(args.solution)
     judged = verify(problem, solution)
@@ -140,7 +146,7 @@ def run(args: argparse.Namespace) -> int:
         file=sys.stderr,
     )
     if args.json:
-        told.tell({
+        json_output.tell({
             "file": args.output, "format": kind, "waypoints": len(points), "stops": goals,
             "seconds": seconds, "speed": settings.speed,
         })  # fmt: skip
@@ -164,11 +170,17 @@ def _mission(args: argparse.Namespace) -> int:
         raise InputError(f"--depth: {args.solution} is a mission, which has depths of its own")
     check_writable(args.output, inputs=(args.solution,))
     from netsp.command.interrupts import until_interrupted
-    from netsp.export.export_notes import bend_note
-    from netsp.export.mission import export_mission
-    from netsp.export.write import FOR_VEHICLES, SHALLOWEST, Settings, format_of, predicted_s
+    from netsp.exchange.maps.projection import Projection
+    from netsp.exchange.missions.export_notes import bend_note
+    from netsp.exchange.missions.mission_export import export_mission
+    from netsp.exchange.missions.mission_files import (
+        FOR_VEHICLES,
+        SHALLOWEST,
+        Settings,
+        format_of,
+        predicted_s,
+    )
     from netsp.online.mission import Mission
-    from netsp.site.projection import Projection
 
     mission = Mission.load(args.solution)
     kind = format_of(args.output, args.format)
@@ -196,7 +208,7 @@ def _mission(args: argparse.Namespace) -> int:
         file=sys.stderr,
     )
     if args.json:
-        told.tell({
+        json_output.tell({
             "file": args.output, "format": kind, "waypoints": len(done.points), "stops": stops,
             "seconds": seconds, "speed": settings.speed,
             "longest_tether": done.longest, "tether_length": mission.tether_length,

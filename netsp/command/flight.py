@@ -8,17 +8,17 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from netsp.command import told
+from netsp.base.errors import LimitReachedError
+from netsp.command import json_output
 from netsp.command.types import check_writable
-from netsp.errors import LimitReachedError
 
 if TYPE_CHECKING:
-    from netsp.clock import Clock
-    from netsp.online.log import LogRow, Run
+    from netsp.base.clock import Clock
     from netsp.online.mission import Mission
     from netsp.online.planner import Planner
-    from netsp.online.scene.scene import Scene
+    from netsp.online.run_log import LogRow, Run
     from netsp.online.surprises import SceneSurprises
+    from netsp.world.scene.scene import Scene
 
 
 WRITTEN = ("log.csv", "summary.json", "mission.json", "run.png", "run.html")
@@ -34,8 +34,8 @@ def fly(
 
     `check` has the mission's tour judged before; `inputs` are files that must not be overwritten;
     `how` is as of `simulate`. Ctrl-C ends the flight, and what was flown is written."""
-    from netsp.clock import until_interrupt
-    from netsp.compiled.compile_policy import long_work
+    from netsp.base.clock import until_interrupt
+    from netsp.base.compiled.compile_policy import long_work
 
     if output is not None:
         there = [str(Path(output) / name) for name in WRITTEN if (Path(output) / name).exists()]
@@ -51,7 +51,7 @@ def fly(
                 raise KeyboardInterrupt from None
             raise
     if output is None or as_json:
-        told.tell(runs[0].summary)
+        json_output.tell(runs[0].summary)
     return runs
 
 
@@ -59,11 +59,11 @@ def _flown(
     mission: Mission, planners: Sequence[str], clock: Clock, *, output: str | None, quiet: bool,
     surprises: SceneSurprises | None, source: str | None, check: bool, **how: Any,
 ) -> list[Run]:  # fmt: skip
+    from netsp.base.files import output_folder
     from netsp.command.plot_scene import note_scene, tell, warn_of_scene
-    from netsp.files import output_folder
-    from netsp.online.log import describe_run, write_run
-    from netsp.online.simulate import simulate
-    from netsp.online.tether import GeodesicTether
+    from netsp.online.mission_run import simulate
+    from netsp.online.run_log import describe_run, write_run
+    from netsp.world.tether import GeodesicTether
 
     show = not quiet and sys.stderr.isatty()
     runs: list[Run] = []
@@ -77,7 +77,7 @@ def _flown(
         if surprises is not None:
             surprises.check_places(mission, scene, field, source or "")
         if check:
-            from netsp.space.judge import checked_mission
+            from netsp.plan.space.judge import checked_mission
 
             clock.bounded("judging the tour", lambda: checked_mission(mission, scene, field))
         if clock.stopped:
@@ -96,7 +96,7 @@ def _flown(
             run = clock.bounded("flying", fly_by, winds_down=True)
             runs.append(run)
             if mission.tour is not None and not mission.track:
-                from netsp.space.flown import words_of_flight
+                from netsp.plan.space.flown import words_of_flight
 
                 run.summary["words"] = words_of_flight(run, scene=scene, field=field).told()
             if not quiet:
@@ -116,15 +116,15 @@ def _flown(
 
 def draw_runs(runs: list[Run], scene: Scene, folder: Path) -> None:
     """The pictures of one run, or of two side by side; the page only where plotly is installed."""
-    from netsp.pictures import mission as flights
+    from netsp.view.pictures import mission_picture as flights
 
     flights.save_runs(runs, scene, folder / "run.png")
     try:
         import plotly  # noqa: F401
     except ImportError:
         return
-    from netsp.pictures.film import film_of_flight
-    from netsp.pictures.film_page import FRAMES, save_page
+    from netsp.view.pictures.film import film_of_flight
+    from netsp.view.pictures.film_page import FRAMES, save_page
 
     films = [film_of_flight(run, scene, FRAMES) for run in runs]
     save_page(films, runs[0].mission.name, folder / "run.html")

@@ -11,23 +11,23 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from netsp.command import told
+from netsp.base.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
+from netsp.command import json_output as told
 from netsp.command.clearance_flags import clearance_flags, warn_of_problem
 from netsp.command.guard import PORT
 from netsp.command.types import length, natural, seconds, system_id
-from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 
 if TYPE_CHECKING:
-    from netsp.clock import Clock
-    from netsp.execute.events import Event
-    from netsp.execute.log import Execution, ExecutionRow
-    from netsp.fly.flight_time import FlightTime
-    from netsp.fly.resume import BeginsAt
-    from netsp.guard.page import Page
-    from netsp.link.frame import Frame
-    from netsp.link.session import Session
-    from netsp.problem import Problem
-    from netsp.solution import Solution
+    from netsp.base.clock import Clock
+    from netsp.model.problem import Problem
+    from netsp.model.solution import Solution
+    from netsp.online.execute.events import Event
+    from netsp.online.execute.execution_log import Execution, ExecutionRow
+    from netsp.online.fly.flight_time import FlightTime
+    from netsp.online.fly.resume import BeginsAt
+    from netsp.online.guard.guard_page import Page
+    from netsp.online.link.geo_frame import Frame
+    from netsp.online.link.session import Session
 
 EXAMPLE = "netsp fly problems/wharf.json tour.json --link udpin:14550 -o run"
 
@@ -120,8 +120,8 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--json: a dry run prints its targets as a table; expected no --json")
     if args.link is None and not args.dry_run:
         raise InputError("--link: missing; expected the vehicle's address, or --dry-run")
-    from netsp.execute.events import Surprises
-    from netsp.link.frame import Frame
+    from netsp.online.execute.events import Surprises
+    from netsp.online.link.geo_frame import Frame
 
     problem, solution, begins = _given(args)
     surprises = Surprises.load(args.surprise) if args.surprise else None
@@ -134,7 +134,7 @@ def run(args: argparse.Namespace) -> int:
         warn_of_problem(args, problem, solution.margin)
     predicted = None
     if begins is None and args.speed > 0.0:
-        from netsp.fly.flight_time import predicted_flight
+        from netsp.online.fly.flight_time import predicted_flight
 
         predicted = predicted_flight(problem, solution, args.speed, args.reach)
     if args.dry_run:
@@ -170,7 +170,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _given(args: argparse.Namespace) -> tuple[Problem, Solution, BeginsAt | None]:
     """Return problem and tour, and how the flight begins if not at the start of the tour."""
-    from netsp.fly.resume import (
+    from netsp.judge import verify
+    from netsp.model.problem import Problem
+    from netsp.model.solution import Solution
+    from netsp.online.fly.resume import (
         from_guard,
         from_record,
         from_word,
@@ -178,9 +181,6 @@ def _given(args: argparse.Namespace) -> tuple[Problem, Solution, BeginsAt | None
         read_run,
         whole_tour,
     )
-    from netsp.judge import verify
-    from netsp.problem import Problem
-    from netsp.solution import Solution
 
     if args.word is not None and args.class_from is not None:
         raise InputError("--class, --class-from: expected one of them")
@@ -232,7 +232,7 @@ def complain(text: str) -> None:
 def _told_failure(args: argparse.Namespace, done: Execution) -> tuple[Exception | None, bool]:
     """Write the files of the run and print its result; return an exception that this raised, and
     whether Ctrl-C was pressed meanwhile. The caller stands by the vehicle in either case."""
-    from netsp.clock import whole_or_interrupted
+    from netsp.base.clock import whole_or_interrupted
 
     failure = None
     try:
@@ -249,8 +249,8 @@ def _told_failure(args: argparse.Namespace, done: Execution) -> tuple[Exception 
 def _tell(args: argparse.Namespace, done: Execution) -> None:
     """Write the files of the run, and print its result."""
     if args.output is not None:
-        from netsp.execute.write import write_execution
-        from netsp.pictures.execution import save_execution
+        from netsp.online.execute.execution_files import write_execution
+        from netsp.view.pictures.execution import save_execution
 
         write_execution(done, args.output)
         save_execution(done, Path(args.output) / "run.png")
@@ -258,7 +258,7 @@ def _tell(args: argparse.Namespace, done: Execution) -> None:
         told.tell(done.summary)
         sys.stdout.flush()
     if not args.quiet:
-        from netsp.execute.log import describe_execution
+        from netsp.online.execute.execution_log import describe_execution
 
         print(describe_execution(done), file=sys.stderr)
         if done.stopped or done.interrupted:
@@ -271,7 +271,7 @@ def _stand_by(
     """Stand by the vehicle until another ground station takes over, or Ctrl-C: the second one, if
     the first ended the flight. If the second one came before standby began, standby ends as soon
     as it has printed what the vehicle will do."""
-    from netsp.fly.standby import stand_by
+    from netsp.online.fly.standby import stand_by
 
     has_stopped = clock.stopped
     said: list[str] = []
@@ -296,20 +296,20 @@ def _flown(
 ) -> tuple[Execution | BaseException, Session, Clock]:  # fmt: skip
     """Fly the tour, or return what ended the flight under way; the link stays open until the stack
     is left."""
-    from netsp.clock import until_interrupt
+    from netsp.base.clock import until_interrupt
+    from netsp.base.files import output_folder
     from netsp.command.execute import show_execution
-    from netsp.execute.events import Surprises
-    from netsp.execute.log import ExecutionOptions
-    from netsp.execute.repair import REPLAN_S
-    from netsp.execute.run_record import RunRecord
-    from netsp.execute.tether_reserve import ReservePolicy
-    from netsp.files import output_folder
-    from netsp.fly.flight import check_options, fly
-    from netsp.fly.flight_time import FlightClock
-    from netsp.fly.rehearsal import rehearse
-    from netsp.link.address import Address
-    from netsp.link.session import Session
-    from netsp.link.udp import UdpLink
+    from netsp.online.execute.events import Surprises
+    from netsp.online.execute.execution_log import ExecutionOptions
+    from netsp.online.execute.run_record import RunRecord
+    from netsp.online.execute.tether_reserve import ReservePolicy
+    from netsp.online.execute.tour_repair import REPLAN_S
+    from netsp.online.fly.flight_rehearsal import rehearse
+    from netsp.online.fly.flight_time import FlightClock
+    from netsp.online.fly.tour_flight import check_options, fly
+    from netsp.online.link.address import Address
+    from netsp.online.link.session import Session
+    from netsp.online.link.udp import UdpLink
 
     options = ExecutionOptions(
         speed=args.speed, reach=args.reach, seed=args.seed,
@@ -323,11 +323,11 @@ def _flown(
     rehearse()
     page, sources = None, []
     if args.events:
-        from netsp.fly.inputs import events_of
+        from netsp.online.fly.inputs import events_of
 
         sources.append(events_of(getattr(sys.stdin, "buffer", sys.stdin), complain))
     if args.page is not None:
-        from netsp.guard.page import Page
+        from netsp.online.guard.guard_page import Page
 
         page = stack.enter_context(Page(problem, args.page, takes_events=True))
         print(f"the page is {page.address}", file=sys.stderr)
@@ -378,7 +378,7 @@ def _flown(
 
 def _from(page: Page, complain: Callable[[str], None]) -> Callable[[], list[Event]]:
     """Events that pages have sent."""
-    from netsp.fly.inputs import event_of
+    from netsp.online.fly.inputs import event_of
 
     def since() -> list[Event]:
         found = []
@@ -395,9 +395,9 @@ def _from(page: Page, complain: Callable[[str], None]) -> Callable[[], list[Even
 
 def _watched(problem: Problem, page: Page, speed: float) -> Callable[[ExecutionRow], None]:
     """Has a page show what a guard makes of the flight."""
-    from netsp.guard.fix import Fix
-    from netsp.guard.guard import Guard, GuardOptions
-    from netsp.guard.rehearsal import rehearse
+    from netsp.online.guard.guard_rehearsal import rehearse
+    from netsp.online.guard.telemetry import Fix
+    from netsp.online.guard.tether_guard import Guard, GuardOptions
 
     rehearse(in_space=False)
     guard = Guard(problem, GuardOptions(noise=0.05, drift=0.05, speed=max(speed, 0.1)))
@@ -411,8 +411,8 @@ def _watched(problem: Problem, page: Page, speed: float) -> Callable[[ExecutionR
 
 def print_targets(problem: Problem, solution: Solution, frame: Frame) -> None:
     """What would be sent, in its order."""
-    from netsp.execute.plan import HOME, legs_of
-    from netsp.export.write import altitude
+    from netsp.exchange.missions.mission_files import altitude
+    from netsp.online.execute.tour_plan import HOME, legs_of
 
     head = ("latitude", "longitude", "above home") if frame.is_global else ("north", "east", "down")
     print(f"{'target':>6}  {head[0]:>12} {head[1]:>12} {head[2]:>10}  what")
@@ -435,7 +435,7 @@ def print_targets(problem: Problem, solution: Solution, frame: Frame) -> None:
 
 def way_home(done: Execution) -> str:
     """The path home in the class that the tether has, from where the vehicle was last."""
-    from netsp.geometry import polylines
+    from netsp.base.geometry import polylines
 
     line = done.tethers[-1][1][::-1]
     bends = ", ".join(f"({x:.1f}, {y:.1f}, {z:.1f})" for x, y, z in line[1:])

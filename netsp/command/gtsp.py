@@ -8,14 +8,14 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from netsp.command import told
+from netsp.base.errors import EXIT_INFEASIBLE, EXIT_NOT_ALL, InputError
+from netsp.command import json_output
 from netsp.command.command_clock import command_clock
 from netsp.command.types import check_writable, natural, option, positive, seconds
-from netsp.errors import EXIT_INFEASIBLE, EXIT_NOT_ALL, InputError
 
 if TYPE_CHECKING:
-    from netsp.gtsplib import Instance
-    from netsp.travel.result import Result
+    from netsp.gtsp.gtsplib import Instance
+    from netsp.gtsp.travel.result import Result
 
 EXAMPLE = "netsp gtsp examples/7ring28.gtsp -o ring.tour --plot ring.png"
 
@@ -46,21 +46,21 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument("--plot", metavar="FILE", help="draw the tour (png, svg or pdf)")
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    told.json_flag(p)
+    json_output.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Solve, write, and return the exit code."""
-    told.check_stdout(args)
+    json_output.check_stdout(args)
     check_writable(args.output, args.plot, inputs=(args.instance,))
-    from netsp.command.progress import ProgressTable
-    from netsp.files import write_text
-    from netsp.gtsplib import load
-    from netsp.gtsplib.tour import tour_text
-    from netsp.solvers.solve import solve_graph
+    from netsp.base.files import write_text
+    from netsp.command.progress_table import ProgressTable
+    from netsp.gtsp.gtsplib import load
+    from netsp.gtsp.gtsplib.tour_file import tour_text
+    from netsp.plan.solve_problem import solve_graph
 
     if args.plot:
-        from netsp.pictures import style
+        from netsp.view.pictures import style
 
         style.check_format(args.plot)
     if len(dict(args.option)) < len(args.option):
@@ -84,8 +84,8 @@ def run(args: argparse.Namespace) -> int:
     if result.tour is not None:
         write_text(args.output or "-", tour_text(instance, result))
     if args.plot:
-        from netsp.pictures import style
-        from netsp.pictures.gtsp import draw_gtsp
+        from netsp.view.pictures import style
+        from netsp.view.pictures.gtsp_picture import draw_gtsp
 
         style.save(draw_gtsp(instance, result).figure, args.plot)
     spent = time.monotonic() - begin
@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
         table.end()
         print(_summary(result, spent, args.output, args.plot), file=sys.stderr)
     if args.json:
-        told.tell(_told(instance, result, spent))
+        json_output.tell(_told(instance, result, spent))
     if result.tour is None:
         return EXIT_INFEASIBLE if result.status.value == "infeasible" else EXIT_NOT_ALL
     return 0

@@ -8,15 +8,15 @@ import sys
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any, TextIO
 
+from netsp.base.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 from netsp.command import messages
 from netsp.command.solve_mission import is_mission
 from netsp.command.types import check_writable, length, natural, system_id
-from netsp.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 
 if TYPE_CHECKING:
-    from netsp.guard.fix import Fix
-    from netsp.guard.report import Report
-    from netsp.guard.site import Site
+    from netsp.online.guard.guard_report import Report
+    from netsp.online.guard.site import Site
+    from netsp.online.guard.telemetry import Fix
 
 EXAMPLE = "netsp guard problems/wharf.json --link udpin:14550 --page"
 
@@ -93,17 +93,17 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--publish, --state, --ask-rates: are for links; a recording is over")
     output = None if args.output == "-" else args.output
     check_writable(output, args.state, inputs=(args.site, args.replay))
-    from netsp.guard.guard import Guard, GuardOptions
-    from netsp.link.frame import Frame
+    from netsp.model.problem import Problem
+    from netsp.online.guard.tether_guard import Guard, GuardOptions
+    from netsp.online.link.geo_frame import Frame
     from netsp.online.mission import Mission
-    from netsp.problem import Problem
 
     told_of = Mission.load(args.site) if is_mission(args.site) else Problem.load(args.site)
     options = GuardOptions(args.noise, args.drift, args.speed)
     frame = Frame(told_of, args.frame)
     fixes: list[Fix] = []
     if args.replay is not None:
-        from netsp.guard.replay import read_fixes
+        from netsp.online.guard.replay import read_fixes
 
         # all of it before anything is written: what is wrong may stand in its last line
         say = None if args.quiet else messages.note
@@ -118,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
             lines = stack.enter_context(open(args.output, "w", encoding="utf-8"))
         page = None
         if args.page is not None:
-            from netsp.guard.page import Page
+            from netsp.online.guard.guard_page import Page
 
             page = stack.enter_context(Page(guard.site, args.page))
             print(f"the page is {page.address}", file=sys.stderr)
@@ -133,13 +133,13 @@ def run(args: argparse.Namespace) -> int:
 
         try:
             if args.replay is not None:
-                from netsp.guard.stream import replayed
+                from netsp.online.guard.stream import replayed
 
                 say = None if args.quiet else messages.note
                 for report in replayed(guard, fixes, say):
                     take(report)
             else:
-                from netsp.guard.live import watch
+                from netsp.online.guard.live import watch
 
                 watch(
                     guard, frame, args.link, take, system=args.system, state=args.state,

@@ -7,18 +7,18 @@ import math
 import sys
 from typing import TYPE_CHECKING
 
-from netsp.command import messages, told
+from netsp.base.errors import InfeasibleError, InputError
+from netsp.command import json_output, messages
 from netsp.command.patience import Patience
 from netsp.command.types import check_writable, depth, length, option, positive
-from netsp.errors import InfeasibleError, InputError
 
 if TYPE_CHECKING:
     import shapely
 
-    from netsp.problem import Problem
-    from netsp.site.options import Looking
-    from netsp.site.read import ImportedSite
-    from netsp.site.sea_floor import SeaFloor
+    from netsp.exchange.maps.options import Looking
+    from netsp.exchange.maps.read_map import ImportedSite
+    from netsp.exchange.maps.sea_floor import SeaFloor
+    from netsp.model.problem import Problem
 
 EXAMPLE = "netsp import examples/site.geojson -o problem.json"
 
@@ -147,17 +147,17 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "-o", "--output", metavar="FILE", help="write the problem to this file (default: stdout)"
     )
-    told.json_flag(p)
+    json_output.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the problem, and return the exit code."""
-    told.check_stdout(args)
+    json_output.check_stdout(args)
     check_writable(
         args.output, args.plot, args.floor, inputs=(args.site, args.goals, args.candidates)
     )
-    from netsp.files import write_text
-    from netsp.site.sea_floor import check_suffix
+    from netsp.base.files import write_text
+    from netsp.exchange.maps.sea_floor import check_suffix
 
     if args.floor is not None:
         check_suffix(args.floor)
@@ -173,14 +173,19 @@ def run(args: argparse.Namespace) -> int:
             found = _of_map(args)
             problem, left_out, floor = found.problem, found.left_out, found.floor
             viewpoints = found.viewpoints
-    from netsp.site.goal_depths import HEIGHTS_REMEDY, height_warning, surface_warning, with_depth
+    from netsp.exchange.maps.goal_depths import (
+        HEIGHTS_REMEDY,
+        height_warning,
+        surface_warning,
+        with_depth,
+    )
 
     if args.depth is not None:
         problem = with_depth(problem, args.depth)
     why: list[str] = []
     is_cropped = problem.site is not None and problem.site.cropped is not None
     if args.skip_unreachable or (is_cropped and viewpoints):
-        from netsp.roadmap.within_reach import UNREACHED, unreached_note, within_reach
+        from netsp.roadmap.reachable_goals import UNREACHED, unreached_note, within_reach
 
         try:
             with Patience(sys.stderr, "looking for the goals in reach"):
@@ -212,11 +217,11 @@ def run(args: argparse.Namespace) -> int:
     if floor is not None:
         floor.save(args.floor)
     if args.plot is not None:
-        from netsp.pictures.problem import save_import
+        from netsp.view.pictures.problem_picture import save_import
 
         save_import(problem, left_out, args.plot)
     if args.json:
-        told.tell({
+        json_output.tell({
             "problem": problem.name, "units": problem.units, "goals": len(problem.goals),
             "obstacles": len(problem.obstacles), "tether_length": problem.tether_length,
             "clearance": problem.clearance, "left_out": list(why), "file": args.output,
@@ -242,7 +247,7 @@ def _extent(problem: Problem) -> str:
 
 def _is_image(args: argparse.Namespace) -> bool:
     """Return whether the site is an occupancy image; refuse options of the other kind."""
-    from netsp.site.occupancy import FILES, IMAGES
+    from netsp.exchange.maps.occupancy import FILES, IMAGES
 
     image: bool = args.site.lower().endswith((*FILES, *IMAGES))
     wrong = (
@@ -261,8 +266,8 @@ def _is_image(args: argparse.Namespace) -> bool:
 
 
 def _of_image(args: argparse.Namespace) -> Problem:
-    from netsp.site.occupancy import read_occupancy
-    from netsp.site.table import from_table
+    from netsp.exchange.maps.csv_table import from_table
+    from netsp.exchange.maps.occupancy import read_occupancy
 
     for name, what in (("base", "X,Y"), ("goals", "TABLE"), ("tether", "L")):
         if getattr(args, name) is None:
@@ -309,9 +314,9 @@ def show_table(site: str, found: ImportedSite) -> None:
 
 
 def _of_map(args: argparse.Namespace) -> ImportedSite:
-    from netsp.site.options import SiteOptions
-    from netsp.site.projection import Projection
-    from netsp.site.read import import_site
+    from netsp.exchange.maps.options import SiteOptions
+    from netsp.exchange.maps.projection import Projection
+    from netsp.exchange.maps.read_map import import_site
 
     projection = Projection.parse(args.base, name="--base") if args.base else None
     options = SiteOptions(
@@ -327,8 +332,8 @@ def _of_map(args: argparse.Namespace) -> ImportedSite:
 
 def _looking(args: argparse.Namespace) -> Looking | None:
     """Return how to inspect obstacles; None without --inspect."""
-    from netsp.site.options import Looking
-    from netsp.site.selection import Selection
+    from netsp.exchange.maps.options import Looking
+    from netsp.exchange.maps.selection import Selection
 
     if args.inspect is None:
         for name in ("standoff", "of"):

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from netsp.errors import interrupted
+from netsp.base.errors import interrupted
 
 T = TypeVar("T")
 
@@ -59,15 +59,15 @@ def until_interrupted(doing: str, call: Callable[[], T]) -> T:
     doing : str
         Name of the work in messages.
     call : callable
-        The work (`netsp.clock.Clock.bounded`).
+        The work (`netsp.base.clock.Clock.bounded`).
 
     Raises
     ------
     KeyboardInterrupt
         It was broken off.
     """
-    from netsp.clock import until_interrupt
-    from netsp.errors import LimitReachedError
+    from netsp.base.clock import until_interrupt
+    from netsp.base.errors import LimitReachedError
 
     with until_interrupt(None) as clock:
         try:

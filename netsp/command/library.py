@@ -8,14 +8,14 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from netsp.command import messages, told
+from netsp.base.errors import EXIT_NOT_VERIFIED, InputError, counted
+from netsp.command import json_output, messages
 from netsp.command.patience import span
 from netsp.command.types import check_writable, natural, seconds
-from netsp.errors import EXIT_NOT_VERIFIED, InputError, counted
-from netsp.lower_bound import Scope
+from netsp.model.bound_scope import Scope
 
 if TYPE_CHECKING:
-    from netsp.library import Library
+    from netsp.study.library import Library
 
 EXAMPLE = "netsp library rank --solver lns --time-limit 5 --only 'jetty-*' -o rows.jsonl"
 
@@ -63,7 +63,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """List, check or rank, and return the exit code."""
-    from netsp.library import Library
+    from netsp.study.library import Library
 
     if args.files and args.action != "check":
         raise InputError(f"FILE: expected none with {args.action}, got {args.files[0]!r}")
@@ -81,7 +81,7 @@ def _chosen(args: argparse.Namespace, library: Library) -> list[str]:
 def _list(args: argparse.Namespace, library: Library) -> int:
     names = _chosen(args, library)
     if args.json:
-        told.tell({"problems": [
+        json_output.tell({"problems": [
             {"problem": name} | (
                 {"length": r.length, "lower_bound": r.lower_bound, "gap": r.gap,
                  "lower_bound_of": None if r.bound is None else r.bound.scope.value,
@@ -107,7 +107,7 @@ def _list(args: argparse.Namespace, library: Library) -> int:
 
 
 def _check(args: argparse.Namespace, library: Library) -> int:
-    from netsp.solution import Solution
+    from netsp.model.solution import Solution
 
     if not args.files:
         raise InputError("FILE: expected solutions to check, got none")
@@ -143,12 +143,12 @@ def _check(args: argparse.Namespace, library: Library) -> int:
     if kept:
         library.save()
     if args.json:
-        told.tell({"checked": answers})
+        json_output.tell({"checked": answers})
     return EXIT_NOT_VERIFIED if failed else 0
 
 
 def _rank(args: argparse.Namespace, library: Library) -> int:
-    from netsp.library import rank
+    from netsp.study.library import rank
 
     output = args.output or f"{args.folder}/ranking.jsonl"
     rows = rank.read_rows(output)
@@ -189,7 +189,7 @@ def _rank(args: argparse.Namespace, library: Library) -> int:
     if len({e["problems"] for e in entries}) > 1 and not args.quiet:
         messages.note("not all ran over the same problems: their means are not of the same")
     if args.json:
-        told.tell({"ranking": entries})
+        json_output.tell({"ranking": entries})
         return 0
     if not entries:
         raise InputError(f"{output}: there is nothing to rank; expected --solver or --command")

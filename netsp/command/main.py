@@ -18,11 +18,7 @@ import sys
 from collections.abc import Container, Iterator, Sequence
 from typing import Any, NoReturn
 
-from netsp.command import background_warm_up, messages
-from netsp.command.command_clock import begin_command
-from netsp.command.interrupts import interrupts_are_heard
-from netsp.command.status_line import status_line
-from netsp.errors import (
+from netsp.base.errors import (
     EXIT_BAD_INPUT,
     EXIT_INTERRUPTED,
     EXIT_NOT_ALL,
@@ -31,6 +27,10 @@ from netsp.errors import (
     SeveralErrors,
     interrupted,
 )
+from netsp.command import background_warm_up, messages
+from netsp.command.command_clock import begin_command
+from netsp.command.interrupts import interrupts_are_heard
+from netsp.command.status_line import status_line
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -55,7 +55,7 @@ ABANDONED_GRACE_S = 0.5
 def _end_abandoned_work(code: int) -> None:
     """End the process at once if work that was abandoned still runs in another language: Python
     would end its thread in the middle of it, which aborts the process."""
-    clock = sys.modules.get("netsp.clock")
+    clock = sys.modules.get("netsp.base.clock")
     if clock is None or not clock.abandoned_work_goes_on(ABANDONED_GRACE_S):
         return
     with contextlib.suppress(OSError, ValueError):

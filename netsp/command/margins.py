@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from netsp.command.types import check_writable, friction, load_pair
 
 if TYPE_CHECKING:
-    from netsp.problem import Problem
-    from netsp.sizing.margins import Margins
+    from netsp.model.problem import Problem
+    from netsp.plan.sizing.tether_margins import Margins
 
 EXAMPLE = "netsp margins problems/wharf.json solution.json --friction 0.2"
 
@@ -30,8 +30,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the margins, and return the exit code."""
     check_writable(args.output, inputs=(args.problem, args.solution))
-    from netsp.files import write_text
-    from netsp.sizing.margins import margins
+    from netsp.base.files import write_text
+    from netsp.plan.sizing.tether_margins import margins
 
     problem, solution = load_pair(args.problem, args.solution)
     found = margins(problem, solution, args.friction)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from netsp.hsignature.measures import Measures, measure
-from netsp.pathmeasures import PathMeasures, measure_path
-from netsp.problem import Problem
-from netsp.report.path_wording import path_rows
+from netsp.hsignature.signature_measures import Measures, measure
+from netsp.model.problem import Problem
+from netsp.model.solution import Solution
 from netsp.roadmap.paths import TautPaths
-from netsp.solution import Solution
+from netsp.study.paths import PathMeasures, measure_path
+from netsp.view.report.path_wording import path_rows
 
 DEFINITIONS = (
     ("obstacle-free convex hull", "convex_hull"),

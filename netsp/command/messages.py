@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Iterator
 from typing import Any
 
-from netsp.errors import LeftOutWarning
+from netsp.base.errors import LeftOutWarning
 
 
 def error(text: str) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from netsp.base.errors import InputError
 from netsp.command import solve
-from netsp.errors import InputError
 
 EXAMPLE = "netsp order missions/basin.json -o better.json"
 
@@ -17,8 +17,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Plan, write the mission, and return the exit code."""
+    from netsp.base.files import read_text
     from netsp.command import solve_mission
-    from netsp.files import read_text
 
     if not solve_mission.is_mission(args.problem):
         read_text(args.problem)

@@ -7,7 +7,7 @@ import time
 from contextlib import ExitStack
 from typing import TextIO
 
-from netsp.steps import heard_by
+from netsp.base.progress import heard_by
 
 QUIET_S, EVERY_S = 3.0, 5.0
 """Seconds until it is told at first, and then between two lines."""
@@ -15,7 +15,7 @@ QUIET_S, EVERY_S = 3.0, 5.0
 
 class Patience:
     """While the body of a `with` runs, a line now and then of how far it is: by its steps, where
-    these are counted (`netsp.steps`), with about the time that is left.
+    these are counted (`netsp.base.progress`), with about the time that is left.
 
     Parameters
     ----------

@@ -6,6 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
+from netsp.base.errors import InputError
 from netsp.command.patience import Patience
 from netsp.command.solve_mission import is_mission
 from netsp.command.types import (
@@ -16,10 +17,9 @@ from netsp.command.types import (
     positive,
     roadmap_options,
 )
-from netsp.errors import InputError
 
 if TYPE_CHECKING:
-    from netsp.problem import Problem
+    from netsp.model.problem import Problem
 
 EXAMPLE = "netsp plot problems/wharf.json solution.json -o wharf.svg"
 
@@ -67,9 +67,9 @@ def _drawn(args: argparse.Namespace) -> int:
         from netsp.command.plot_scene import plot_scene
 
         return plot_scene(args)
-    from netsp.pictures import problem as plotting
-    from netsp.pictures import style
-    from netsp.problem import Problem
+    from netsp.model.problem import Problem
+    from netsp.view.pictures import problem_picture as plotting
+    from netsp.view.pictures import style
 
     style.check_format(args.output)
     if args.tethers_to is not None:
@@ -111,9 +111,9 @@ def _mission(args: argparse.Namespace) -> int:
         if getattr(args, name) is not None:
             raise InputError(f"{flag}: {args.problem} is a mission; expected nothing beside it")
     from netsp.online.mission import Mission
-    from netsp.pictures import style
-    from netsp.pictures.mission import save_mission
-    from netsp.pictures.scene import INTERACTIVE
+    from netsp.view.pictures import style
+    from netsp.view.pictures.mission_picture import save_mission
+    from netsp.view.pictures.scene_picture import INTERACTIVE
 
     style.check_format(args.output, INTERACTIVE)
     mission = Mission.load(args.problem)
@@ -123,8 +123,8 @@ def _mission(args: argparse.Namespace) -> int:
 
 def is_scene(path: str) -> bool:
     """A file that describes a scene rather than a problem: by its fields."""
-    from netsp.files import read_text
-    from netsp.models import kind_of, parse_json_object
+    from netsp.base.files import read_text
+    from netsp.model.validated import kind_of, parse_json_object
 
     data = parse_json_object(read_text(path), path)
     if kind_of(data) not in (None, "problem", "scene"):

@@ -8,18 +8,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from netsp.arrays import Floats
-from netsp.axes import read_path
+from netsp.base.arrays import Floats
+from netsp.base.axes import read_path
+from netsp.base.errors import InputError
+from netsp.base.geometry import polylines
 from netsp.command import messages
-from netsp.errors import InputError
-from netsp.geometry import polylines
-from netsp.online.limits import MOST_NODES
-from netsp.online.scene.field import DistanceField
-from netsp.online.scene.scene import Scene
-from netsp.online.tether import GeodesicTether, Tether, make_tether
-from netsp.online.tether.resolution import delta_for_path
-from netsp.pictures import scene as pictures
-from netsp.pictures import style
+from netsp.online.mission_limits import MOST_NODES
+from netsp.view.pictures import scene_picture as pictures
+from netsp.view.pictures import style
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.scene import Scene
+from netsp.world.tether import GeodesicTether, Tether, make_tether
+from netsp.world.tether.resolution import delta_for_path
 
 
 def plot_scene(args: argparse.Namespace) -> int:

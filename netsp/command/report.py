@@ -6,9 +6,9 @@ import argparse
 import sys
 from pathlib import Path
 
+from netsp.base.errors import InputError
 from netsp.command.solve_mission import is_mission
 from netsp.command.types import check_writable
-from netsp.errors import InputError
 
 EXAMPLE = "netsp report rows.jsonl -o report.html"
 
@@ -50,17 +50,17 @@ def _written(args: argparse.Namespace) -> None:
         if args.figures is not None:
             raise InputError(f"--figures: is for comparisons, and {args.results} is none")
         if _of_mission(args.results):
-            from netsp.report.mission import report_mission
+            from netsp.view.report.mission_page import report_mission
 
             if args.problem is not None:
                 raise InputError(f"--problem: {args.results} is of a mission; expected none")
             report_mission(args.results, args.output)
             return
-        from netsp.report.tour import report_tour
+        from netsp.view.report.tour_page import report_tour
 
         report_tour(args.results, args.problem, args.output)
         return
-    from netsp.report.page import write_report
+    from netsp.view.report.page import write_report
 
     write_report(args.results, args.output, args.figures)
 

@@ -8,14 +8,14 @@ import json
 EXAMPLE = "netsp schema problem > problem.schema.json"
 
 FORMATS = {
-    "problem": "netsp.problem:Problem",
-    "solution": "netsp.solution:Solution",
-    "scene": "netsp.online.scene.scene:Scene",
+    "problem": "netsp.model.problem:Problem",
+    "solution": "netsp.model.solution:Solution",
+    "scene": "netsp.world.scene.scene:Scene",
     "mission": "netsp.online.mission:Mission",
-    "surprises": "netsp.execute.events:Surprises",
-    "run-state": "netsp.execute.run_record:RunState",
+    "surprises": "netsp.online.execute.events:Surprises",
+    "run-state": "netsp.online.execute.run_record:RunState",
     "scene-surprises": "netsp.online.surprises:SceneSurprises",
-    "study": "netsp.compare.study:Study",
+    "study": "netsp.study.compare.study:Study",
 }
 """Format → where its model lives."""
 
@@ -27,7 +27,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the schema, and return the exit code."""
-    from netsp.registry import load
+    from netsp.base.registry import load
 
     print(json.dumps(load(FORMATS[args.format]).model_json_schema(), indent=1))
     return 0

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import argparse
 
-from netsp.command import told
+from netsp.base.errors import EXIT_DEFECT, EXIT_NOT_ALL, InputError
+from netsp.command import json_output
 from netsp.command.types import (
     choices,
     length,
     natural,
     vector,
 )
-from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, InputError
 
 EXAMPLE = "netsp simulate missions/basin.json -o run"
 
@@ -71,14 +71,14 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="folder for log.csv, summary.json, run.png and (with plotly) run.html",
     )
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    told.json_flag(p)
+    json_output.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Fly the mission, write what happened, and return the exit code."""
     from netsp.command.flight import fly
-    from netsp.online.limits import check_names
     from netsp.online.mission import Mission
+    from netsp.online.mission_limits import check_names
     from netsp.online.paths.refine import RefineParams
     from netsp.online.planner import PLANNERS, PlannerOptions
     from netsp.online.surprises import SceneSurprises

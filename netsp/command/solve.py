@@ -7,7 +7,8 @@ import contextlib
 import sys
 from typing import TYPE_CHECKING
 
-from netsp.command import messages, told
+from netsp.base.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InfeasibleError, InputError
+from netsp.command import json_output, messages
 from netsp.command.clearance_flags import clearance_flags, warn_of_problem
 from netsp.command.command_clock import command_clock
 from netsp.command.types import (
@@ -21,10 +22,9 @@ from netsp.command.types import (
     roadmap_options,
     seconds,
 )
-from netsp.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InfeasibleError, InputError
 
 if TYPE_CHECKING:
-    from netsp.travel.result import Progress
+    from netsp.gtsp.travel.result import Progress
 
 EXAMPLE = "netsp solve problems/wharf.json -o solution.json --plot wharf.png"
 
@@ -83,7 +83,7 @@ def for_all(p: argparse.ArgumentParser) -> None:
     p.add_argument("--plot", metavar="FILE", help="draw the solution (png, svg or pdf)")
     clearance_flags(p)
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    told.json_flag(p)
+    json_output.json_flag(p)
 
 
 def _for_problems(p: argparse._ArgumentGroup) -> None:
@@ -140,7 +140,7 @@ def _for_problems(p: argparse._ArgumentGroup) -> None:
 
 def run_mission(args: argparse.Namespace) -> int:
     """The same of a mission."""
-    told.check_stdout(args)
+    json_output.check_stdout(args)
     from netsp.command import solve_mission
 
     return solve_mission.solve(
@@ -158,16 +158,16 @@ def run(args: argparse.Namespace) -> int:
     if solve_mission.is_mission(args.problem):
         solve_mission.check_flags(args, _defaults())
         return run_mission(args)
-    from netsp.command.progress import ProgressTable, summary
-    from netsp.files import write_text
-    from netsp.problem import Problem
-    from netsp.solution import Solution
+    from netsp.base.files import write_text
+    from netsp.command.progress_table import ProgressTable, summary
+    from netsp.model.problem import Problem
+    from netsp.model.solution import Solution
 
-    told.check_stdout(args)
-    from netsp.clock import whole_or_interrupted
+    json_output.check_stdout(args)
+    from netsp.base.clock import whole_or_interrupted
     from netsp.judge import checked
-    from netsp.solvers import warm as warm_starts
-    from netsp.solvers.solve import solve
+    from netsp.plan import warm_start as warm_starts
+    from netsp.plan.solve_problem import solve
 
     clock = command_clock(args.time_limit)
     problem = clock.bounded("reading the problem", lambda: Problem.load(args.problem))
@@ -176,8 +176,8 @@ def run(args: argparse.Namespace) -> int:
         warm = clock.bounded("reading --warm-start", lambda: Solution.load(args.warm_start))
     check_writable(args.output, args.plot, args.plot_trace, inputs=(args.problem, args.warm_start))
     if args.plot or args.plot_trace:
-        from netsp.pictures import problem as plotting
-        from netsp.pictures import style
+        from netsp.view.pictures import problem_picture as plotting
+        from netsp.view.pictures import style
 
         for picture in filter(None, (args.plot, args.plot_trace)):
             style.check_format(picture)
@@ -217,7 +217,7 @@ def run(args: argparse.Namespace) -> int:
             )
         except InfeasibleError as error:
             if args.json:
-                told.tell(told.of_infeasible(problem, error))
+                json_output.tell(json_output.of_infeasible(problem, error))
             raise
     with whole_or_interrupted():  # Ctrl-C loses no tour
         text = checked(problem, solution).to_json()
@@ -239,7 +239,7 @@ def run(args: argparse.Namespace) -> int:
         if solution.tour:
             warn_of_problem(args, problem, args.margin)
     if args.json:
-        told.tell(told.of_solution(problem, solution))
+        json_output.tell(json_output.of_solution(problem, solution))
     return _EXIT.get(solution.status.value, 0)
 
 

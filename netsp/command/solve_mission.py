@@ -12,16 +12,16 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from netsp.command import told
+from netsp.base.errors import EXIT_NOT_ALL, InputError, counted
+from netsp.command import json_output
 from netsp.command.clearance_flags import warn_of_clearance
 from netsp.command.command_clock import command_clock
 from netsp.command.types import check_writable
-from netsp.errors import EXIT_NOT_ALL, InputError, counted
 
 if TYPE_CHECKING:
     from netsp.online.mission import Mission
-    from netsp.online.scene.scene import Scene
-    from netsp.space.solve import SolvedMission
+    from netsp.plan.space.mission_solver import SolvedMission
+    from netsp.world.scene.scene import Scene
 
 TIME_LIMIT = 60.0
 """Seconds, where no limit is given."""
@@ -38,8 +38,8 @@ FOR_PROBLEMS = {
 def is_mission(file: str) -> bool:
     """Whether a file is a mission, be it one that lacks a field or has it misspelt; what cannot be
     read is left to who reads problems."""
-    from netsp.files import read_text
-    from netsp.models import MARKS, kind_of, parse_json_object
+    from netsp.base.files import read_text
+    from netsp.model.validated import MARKS, kind_of, parse_json_object
 
     try:
         data = parse_json_object(read_text(file), file)
@@ -65,15 +65,15 @@ def solve(
 ) -> int:  # fmt: skip
     """Plan the mission, write it, and return the exit code."""
     check_writable(output, plot, inputs=(file,))
-    from netsp.files import read_text, write_text
+    from netsp.base.files import read_text, write_text
     from netsp.online.mission import Mission
 
     if plot:
-        from netsp.pictures import style
+        from netsp.view.pictures import style
 
         style.check_format(plot)
     from netsp.command.stages import Stages
-    from netsp.space.solve import MissionPolicy, solve_mission
+    from netsp.plan.space.mission_solver import MissionPolicy, solve_mission
 
     clock = command_clock(time_limit or TIME_LIMIT)
     begin = time.monotonic()
@@ -89,7 +89,7 @@ def solve(
                 lambda: scene.field(on_progress=None if quiet else tell),
             )
         if not quiet:
-            from netsp.online.tether import GeodesicTether
+            from netsp.world.tether import GeodesicTether
 
             note_scene(scene.name, field.notes)
             warn_of_scene(
@@ -120,18 +120,18 @@ def solve(
         )
         warn_of_clearance(position_error, current, mission.clearance, scene.units)
     if as_json:
-        told.tell(told.of_mission(mission, found, scene.units))
+        json_output.tell(json_output.of_mission(mission, found, scene.units))
     return EXIT_NOT_ALL if found.left_out else 0
 
 
 def draw(found: SolvedMission, scene: Scene, file: str) -> None:
     """The flight, or where there was no time for one, the tour in space."""
     if found.run is not None:
-        from netsp.pictures.mission import save_runs
+        from netsp.view.pictures.mission_picture import save_runs
 
         save_runs([found.run], scene, file)
     else:
-        from netsp.pictures.mission import save_mission
+        from netsp.view.pictures.mission_picture import save_mission
 
         save_mission(found.mission, scene, file)
 
@@ -145,10 +145,10 @@ def summary(
     units: str,
 ) -> str:  # fmt: skip
     """What was found, in a few lines."""
-    from netsp.lower_bound import LowerBound, Scope
-    from netsp.solution import Status
-    from netsp.space.plan import AS_GIVEN, OUT_AND_BACK, PLANE, SHORT_ORDER
-    from netsp.space.solve import GOING_ON, seconds_until_home
+    from netsp.model.bound_scope import LowerBound, Scope
+    from netsp.model.solution import Status
+    from netsp.plan.space.mission_solver import GOING_ON, seconds_until_home
+    from netsp.plan.space.space_plan import AS_GIVEN, OUT_AND_BACK, PLANE, SHORT_ORDER
 
     tour = found.tour
     legs = f"{counted(tour.legs, 'leg')} between {counted(tour.states, 'state')}"
@@ -249,7 +249,7 @@ def _gap_lines(found: SolvedMission, units: str) -> list[str]:
 
 
 def _as_given(found: SolvedMission) -> str:
-    from netsp.space.solve import seconds_until_home
+    from netsp.plan.space.mission_solver import seconds_until_home
 
     assert found.given is not None
     s = found.given.summary

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 
+from netsp.base.errors import EXIT_NOT_ALL
 from netsp.command import messages
 from netsp.command.command_clock import command_clock
 from netsp.command.types import check_writable, length, natural, seconds
-from netsp.errors import EXIT_NOT_ALL
 
 EXAMPLE = "netsp tether problems/wharf.json --longest 30 --plot tether.png"
 
@@ -33,9 +33,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the table, write what is asked for, and return the exit code."""
     check_writable(args.output, args.plot, inputs=(args.problem,))
-    from netsp.pictures import style
-    from netsp.problem import Problem
-    from netsp.sizing.tether import Step, tether_curve
+    from netsp.model.problem import Problem
+    from netsp.plan.sizing.tether_sizing import Step, tether_curve
+    from netsp.view.pictures import style
 
     if args.plot:
         style.check_format(args.plot)

@@ -9,11 +9,11 @@ import os
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from netsp.errors import InputError
+from netsp.base.errors import InputError
 
 if TYPE_CHECKING:
-    from netsp.problem import Problem
-    from netsp.solution import Solution
+    from netsp.model.problem import Problem
+    from netsp.model.solution import Solution
 
 
 def choices(own: str, group: str) -> str:
@@ -49,7 +49,7 @@ def depth(text: str) -> float:
 
 def friction(text: str) -> float:
     """Return a coefficient of friction, 0 to 10."""
-    from netsp.solution import MAX_FRICTION
+    from netsp.model.solution import MAX_FRICTION
 
     try:
         value = float(text)
@@ -144,7 +144,7 @@ def positive(text: str) -> int:
 
 def vector(text: str, name: str) -> tuple[float, float, float]:
     """Three numbers, separated by commas."""
-    from netsp.online.scene.field import finite_point
+    from netsp.world.scene.field import finite_point
 
     try:
         x, y, z = (float(v) for v in text.split(","))
@@ -155,7 +155,7 @@ def vector(text: str, name: str) -> tuple[float, float, float]:
 
 def margins(text: str) -> tuple[float, float]:
     """Least tether slack and clearance, from ``SLACK`` or ``SLACK,CLEARANCE``."""
-    from netsp.export.margins import LEAST_CLEARANCE
+    from netsp.exchange.missions.export_margins import LEAST_CLEARANCE
 
     try:
         numbers = [float(v) for v in text.split(",")]
@@ -168,7 +168,7 @@ def margins(text: str) -> tuple[float, float]:
 
 def check_writable(*paths: str | None, inputs: Sequence[str | None] = ()) -> None:
     """InputError before the work starts rather than after it; what is read is never written to."""
-    from netsp.files import STANDARD
+    from netsp.base.files import STANDARD
 
     paths = tuple(p for p in paths if p != STANDARD)
     read = {os.path.realpath(p) for p in inputs if p is not None}
@@ -206,7 +206,7 @@ def roadmap_options(args: argparse.Namespace) -> dict[str, object]:
 
 def load_pair(problem: str, solution: str) -> tuple[Problem, Solution]:
     """A problem file and a solution file."""
-    from netsp.problem import Problem
-    from netsp.solution import Solution
+    from netsp.model.problem import Problem
+    from netsp.model.solution import Solution
 
     return Problem.load(problem), Solution.load(solution)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from netsp.command import messages, told
+from netsp.base.errors import EXIT_NOT_VERIFIED, InputError
+from netsp.command import json_output, messages
 from netsp.command.types import load_pair, natural
-from netsp.errors import EXIT_NOT_VERIFIED, InputError
 
 if TYPE_CHECKING:
     from netsp.judge import Verification
-    from netsp.problem import Problem
+    from netsp.model.problem import Problem
 
 EXAMPLE = "netsp verify problems/wharf.json solution.json"
 
@@ -45,7 +45,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="the vehicle's system id in a .tlog to measure; default: the only one with positions",
     )  # fmt: skip
     p.add_argument("--quiet", action="store_true", help="exit code only")
-    told.json_flag(p)
+    json_output.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -54,9 +54,9 @@ def run(args: argparse.Namespace) -> int:
         for name in ("measures", "margins"):
             if getattr(args, name):
                 raise InputError(f"--{name}: is told in words only; expected no --json")
+    from netsp.base.files import read_text
     from netsp.command.plot import is_scene
     from netsp.command.solve_mission import is_mission
-    from netsp.files import read_text
 
     if is_mission(args.problem):
         return _mission(args)
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
         read_text(args.problem)  # a file that is not there is told as ever
         raise InputError(f"SOLUTION: {args.problem} is no mission; expected a solution beside it")
     if args.measures:
-        from netsp.problem import Problem
+        from netsp.model.problem import Problem
 
         if _is_path(args.solution):
             _measure_paths(Problem.load(args.problem), args)
@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"\n{describe_path(problem, solution.path)}\n\n{describe_tethers(problem, solution)}")
     if args.margins and verdict and not args.quiet:
         from netsp.command.margins import describe
-        from netsp.sizing.margins import margins
+        from netsp.plan.sizing.tether_margins import margins
 
         print(f"\n{describe(problem, margins(problem, solution))}")
     return 0 if verdict else EXIT_NOT_VERIFIED
@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _tell(args: argparse.Namespace, verdict: Verification) -> None:
     if args.json:
-        told.tell(told.of_verdict(verdict))
+        json_output.tell(json_output.of_verdict(verdict))
     elif not args.quiet:
         print(verdict)
         print("verified" if verdict else "NOT VERIFIED")
@@ -106,8 +106,8 @@ def _path_in_scene(args: argparse.Namespace) -> int:
     """Measure a path in a scene."""
     from netsp.command.interrupts import until_interrupted
     from netsp.command.plot_scene import points_of
-    from netsp.online.scene.scene import Scene
-    from netsp.space.measures import measure_path
+    from netsp.plan.space.mission_measures import measure_path
+    from netsp.world.scene.scene import Scene
 
     scene = Scene.load(args.problem)
     points = points_of(args.solution)
@@ -133,7 +133,7 @@ def _mission(args: argparse.Namespace) -> int:
             raise InputError(f"{flag}: is for problems, and {args.problem} is a mission")
     from netsp.command.interrupts import until_interrupted
     from netsp.online.mission import Mission
-    from netsp.space.judge import verify_mission
+    from netsp.plan.space.judge import verify_mission
 
     verdict = until_interrupted(
         "judging the tour", lambda: verify_mission(Mission.load(args.problem))
@@ -148,8 +148,8 @@ PATH_ENDINGS = (".csv", ".csv.gz", ".gpx", ".geojson", ".tlog", ".bin")
 
 def _is_path(file: str) -> bool:
     """Return whether a file holds a path; any other is left to the reader of solutions."""
-    from netsp.files import read_text
-    from netsp.models import parse_json_object
+    from netsp.base.files import read_text
+    from netsp.model.validated import parse_json_object
 
     if file.lower().endswith(PATH_ENDINGS):
         return True
@@ -161,10 +161,10 @@ def _is_path(file: str) -> bool:
 
 def _measure_paths(problem: Problem, args: argparse.Namespace) -> None:
     """Print the measures of every path of a file."""
-    from netsp.axes import read_path
+    from netsp.base.axes import read_path
     from netsp.command.measures import describe_path, entered
-    from netsp.guard.recorded_path import read_any_paths
-    from netsp.site.path_file import ENDINGS, FoundPath
+    from netsp.exchange.maps.path_file import ENDINGS, FoundPath
+    from netsp.online.guard.recorded_path import read_any_paths
 
     if args.solution.lower().endswith((*ENDINGS, *PATH_ENDINGS)):
         paths = read_any_paths(args.solution, problem, frame=args.frame, system=args.system)

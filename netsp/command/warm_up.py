@@ -42,9 +42,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compile, and return the exit code."""
+    from netsp.base.compiled.compile_policy import everything_compiled
     from netsp.command.background_warm_up import alone
     from netsp.command.compiling import CompileTimes
-    from netsp.compiled.compile_policy import everything_compiled
 
     times = CompileTimes()
     with everything_compiled(), times.measured():
@@ -114,7 +114,7 @@ def _compile(every: list[Step], quiet: bool) -> None:
 def _compile_likely(command: str) -> None:
     """Run all steps, first those that a user of the command likely needs next, until the disk is
     full."""
-    from netsp.compiled.tiered import TieredDispatcher
+    from netsp.base.compiled.tiered import TieredDispatcher
 
     for _, step in _likely_first(list(steps()), command):
         if not TieredDispatcher.is_disk_full:
@@ -129,8 +129,8 @@ def _likely_first(every: list[Step], command: str) -> list[Step]:
 
 def _print(seconds: dict[str, float]) -> None:
     """Print all kernels by compile time, longest first."""
+    from netsp.base.compiled.kernel import all_kernels
     from netsp.command.compiling import kernel_name
-    from netsp.compiled.kernel import all_kernels
 
     names = {kernel_name(kernel) for kernel in all_kernels()} | set(seconds)
     for name in sorted(names, key=lambda name: (-seconds.get(name, 0.0), name)):
@@ -143,30 +143,30 @@ def steps() -> Iterator[Step]:
     """Yield named steps that together compile all kernels."""
     import numpy as np
 
-    from netsp.clock import Clock
-    from netsp.errors import InputError, LimitReachedError
-    from netsp.fly.rehearsal import rehearse
-    from netsp.guard.rehearsal import rehearse as watched
+    from netsp.base.clock import Clock
+    from netsp.base.errors import InputError, LimitReachedError
+    from netsp.gtsp.limits import Limits
+    from netsp.gtsp.sparse_costs import LegRows
+    from netsp.gtsp.travel.graph import TravelGraph
     from netsp.judge import verify
+    from netsp.mip.cover_costs import OverClasses, OverWays
     from netsp.mip.covers import climb
     from netsp.mip.deadlegs import DeadLegs
-    from netsp.mip.parities import odd_letters
+    from netsp.mip.parity_cuts import odd_letters
     from netsp.mip.prices import Prices
     from netsp.mip.program import Duals
-    from netsp.mip.towers import OverClasses, OverWays
+    from netsp.model.random_worlds import random_world
     from netsp.online import ReactTether, Scene
     from netsp.online.equipment import TetherPhysics
+    from netsp.online.fly.flight_rehearsal import rehearse
+    from netsp.online.guard.guard_rehearsal import rehearse as watched
     from netsp.online.mission import Mission
-    from netsp.online.scene import voxels
-    from netsp.online.scene.field import DistanceField
-    from netsp.online.simulate import simulate
-    from netsp.solvers.solve import solve, solve_graph, travel_graph
-    from netsp.solvers.table import SOLVERS
-    from netsp.solving.legrows import LegRows
-    from netsp.solving.limits import Limits
-    from netsp.space.solve import solve_mission
-    from netsp.travel.graph import TravelGraph
-    from netsp.worlds import random_world
+    from netsp.online.mission_run import simulate
+    from netsp.plan.solve_problem import solve, solve_graph, travel_graph
+    from netsp.plan.solver_table import SOLVERS
+    from netsp.plan.space.mission_solver import solve_mission
+    from netsp.world.scene import voxels
+    from netsp.world.scene.field import DistanceField
 
     problem = random_world(1, goals=9, tether_length=450.0)
     polygons = random_world(1, family="harbour", goals=4, tether_length=250.0)

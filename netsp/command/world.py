@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 
+from netsp.base.errors import counted
 from netsp.command import messages
 from netsp.command.types import check_writable, count_or_range, length, natural, positive
-from netsp.errors import counted
 
 EXAMPLE = "netsp world --goals 30 --tether 350 --seed 7 -o world.json"
 
@@ -49,13 +49,13 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw a world, write it, and return the exit code."""
-    from netsp.files import write_text
-    from netsp.worlds import reachable_world
+    from netsp.base.files import write_text
+    from netsp.model.random_worlds import reachable_world
 
     check_writable(args.output, args.plot)
     if args.plot:
-        from netsp.pictures import problem as plotting
-        from netsp.pictures import style
+        from netsp.view.pictures import problem_picture as plotting
+        from netsp.view.pictures import style
 
         style.check_format(args.plot)
     problem, in_vain = reachable_world(

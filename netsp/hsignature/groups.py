@@ -1,12 +1,13 @@
 """Groups that are given by generators and relations, and the one word of each of their elements.
 
-The classes of loops in a scene make a group, which `netsp.space.labels` finds as generators and
-relations. Generators that a relation expresses by others are eliminated (Tietze 1908). What is left
-is mostly a free group, where a reduced word is an element. If relations are left, rules that turn
-the later of two equal words (in order of length, then letters) into the earlier are completed
-(Knuth & Bendix 1970): where that ends, every element has exactly one word that no rule applies to.
-It need not end. Capped, the rules still only join words that are equal: an empty word means
-contractible then, and a word that is not empty means nothing certain; `Group.exact` says which.
+The classes of loops in a scene make a group, which `netsp.plan.space.triangle_labels` finds as
+generators and relations. Generators that a relation expresses by others are eliminated (Tietze
+1908). What is left is mostly a free group, where a reduced word is an element. If relations are
+left, rules that turn the later of two equal words (in order of length, then letters) into the
+earlier are completed (Knuth & Bendix 1970): where that ends, every element has exactly one word
+that no rule applies to. It need not end. Capped, the rules still only join words that are equal: an
+empty word means contractible then, and a word that is not empty means nothing certain;
+`Group.exact` says which.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from fractions import Fraction
 from functools import cached_property
 from itertools import product
 
-from netsp.clock import end_if_abandoned
+from netsp.base.clock import end_if_abandoned
 from netsp.hsignature.words import Word, cyclically_reduced, invert, reduce
 
 MOST_RULES = 100

@@ -1,9 +1,9 @@
 """What tells classes of paths apart, whatever the words are made of.
 
 In the plane and among prisms letters are crossings of rays (`PlanarSignature`); in any scene they
-are those of a cubical complex (`netsp.space.signature.SpaceSignature`). Either way the words of
-loops at one point make a group, and whoever asks whether a tether is as planned, or free, need not
-know which.
+are those of a cubical complex (`netsp.plan.space.space_signature.SpaceSignature`). Either way the
+words of loops at one point make a group, and whoever asks whether a tether is as planned, or free,
+need not know which.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Floats
+from netsp.base.arrays import Floats
 from netsp.hsignature.rays import signature
 from netsp.hsignature.words import Word, concatenate
 

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from netsp.arrays import Ints
-from netsp.compiled.growing import more_int_rows, write_ints
-from netsp.compiled.kernel import kernel
+from netsp.base.arrays import Ints
+from netsp.base.compiled.dynamic_array import more_int_rows, write_ints
+from netsp.base.compiled.kernel import kernel
 from netsp.hsignature.words import Word
 
 ABOVE, LETTER, FIRST, LENGTH = range(4)

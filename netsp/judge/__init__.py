@@ -1,5 +1,5 @@
 """Independent verification of solutions."""
 
-from netsp.judge.checks import Check, Verification, checked, verify
+from netsp.judge.tour_checks import Check, Verification, checked, verify
 
 __all__ = ["Check", "Verification", "checked", "verify"]

@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from netsp.arrays import Floats
+from netsp.base.arrays import Floats
 
 ROUNDS = 60
 """Contacts that may come or go before the path is given up."""

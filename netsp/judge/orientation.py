@@ -13,7 +13,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from netsp.arrays import Floats, Ints
+from netsp.base.arrays import Floats, Ints
 
 Point = tuple[float, float]
 

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from netsp.arrays import Floats
+from netsp.base.arrays import Floats
 from netsp.judge.stringpull import StringPuller
 
 

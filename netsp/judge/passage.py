@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats
+from netsp.base.arrays import Bools, Floats
 from netsp.judge.orientation import orientations
-from netsp.judge.solids import Bridge
+from netsp.judge.solid_distances import Bridge
 
 
 def passes(bridge: Bridge, path: Floats, reach: float) -> bool:

@@ -27,11 +27,11 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from netsp.arrays import Bools, Floats, Ints
+from netsp.base.arrays import Bools, Floats, Ints
 from netsp.judge.chain import contacts_of, exact_length
 from netsp.judge.orientation import Point, orientation, orientations
-from netsp.judge.solids import SIDES, inset
-from netsp.problem import Problem
+from netsp.judge.solid_distances import SIDES, inset
+from netsp.model.problem import Problem
 
 PLACE_TOLERANCE = 1e-7
 """How far, relative to the problem's size, a path may miss a point or enter an obstacle."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
+from netsp.base.arrays import Bools, Floats, Ints
 from netsp.mip.cuts import Cut
 
 VIOLATION = 0.02

@@ -8,7 +8,8 @@ steps give on either side (strong branching, Applegate, Bixby, Chvátal & Cook 1
 A pair that must follow each other pays less for its legs, by so much that no tour without one can
 be the shortest, and that much is charged to all: with three clusters or more a tour has at most one
 such leg, so tours that have it cost what they did, the others more. So a node is a program like
-that of the root with other costs, and its bound rests on the same formula (`netsp.mip.bound`).
+that of the root with other costs, and its bound rests on the same formula
+(`netsp.mip.lagrangian_bound`).
 """
 
 from __future__ import annotations
@@ -21,13 +22,13 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.gtsp.solver_run import Stop
 from netsp.mip.blossoms import shrunk
 from netsp.mip.cuts import Cut
 from netsp.mip.legprices import LegPrices
 from netsp.mip.program import Point, WarmRelaxation
 from netsp.mip.root import Root, tour_legs
-from netsp.solving.run import Stop
 
 FRACTIONAL = 0.02
 """Farther than this from whole numbers is worth branching on."""

@@ -21,8 +21,8 @@ from pathlib import Path
 
 import pulp
 
-from netsp.clock import Clock, TimeLimit, whole_or_interrupted
-from netsp.errors import NetspError
+from netsp.base.clock import Clock, TimeLimit, whole_or_interrupted
+from netsp.base.errors import NetspError
 
 GRACE = 1.0
 """Seconds past its own limit after which CBC is killed."""

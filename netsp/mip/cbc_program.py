@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pulp
 
-from netsp.arrays import Bools, Floats, Ints
-from netsp.clock import TimeLimit
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.clock import TimeLimit
 from netsp.mip.cbc import run_cbc
 from netsp.mip.cutpool import CutPool
 from netsp.mip.cuts import Cut, cut_coefficients

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
+from netsp.base.arrays import Bools, Floats, Ints
 from netsp.mip.blossoms import VIOLATION, handles
 from netsp.mip.cuts import Cut
 from netsp.mip.program import Point

@@ -5,14 +5,14 @@ the relaxation falls to the bound over goals before it rises. In between are cov
 sheets: a *cell* is a goal, and of which of some obstacles the tether's word has an odd number of
 letters. The cells of no obstacle are the goals; with all of them there are still far fewer cells
 than classes. A leg between two cells costs no more than any between their classes
-(`netsp.mip.towers`), so that every tour over classes is one over cells, no longer: what bounds
+(`netsp.mip.cover_costs`), so that every tour over classes is one over cells, no longer: what bounds
 these bounds those.
 
 From one cover to the next a cell falls into those of another obstacle or two. A cut holds for any
 set of vertices, so it holds for all that lies above one; a leg that is in no better tour has none
 above it in one. So the program goes on where it stood, its bound does not fall, and most of the
 larger matrix is dead before it is looked at. Which obstacles come first makes all the difference
-(`netsp.mip.splits`).
+(`netsp.mip.cover_refinement`).
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
-from netsp.clock import Clock
-from netsp.errors import LimitReachedError, interrupted
-from netsp.lower_bound import OPTIMALITY_TOLERANCE
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.clock import Clock
+from netsp.base.errors import LimitReachedError, interrupted
+from netsp.gtsp.cost_matrix import LegCosts
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.searching import SearchingRun
+from netsp.gtsp.solver_run import Stop
+from netsp.gtsp.travel.costs import CostTable
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.mip.cover_bounds import Cells, OverCells
+from netsp.mip.cover_costs import Tower
+from netsp.mip.cover_refinement import Splits
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs
-from netsp.mip.overcells import Cells, OverCells
 from netsp.mip.root import Root, tour_legs
-from netsp.mip.splits import Splits
-from netsp.mip.towers import Tower
-from netsp.solving.legcosts import LegCosts
-from netsp.solving.limits import Limits
-from netsp.solving.run import Stop
-from netsp.solving.searching import SearchingRun
-from netsp.travel.costs import CostTable
-from netsp.travel.graph import TravelGraph
+from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
 
 GROWTH = 1.3
 """A cover has at most so many times as many cells as the one below, unless an obstacle alone adds

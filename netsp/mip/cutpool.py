@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
+from netsp.base.arrays import Bools, Floats, Ints
 from netsp.mip.cuts import Cut
 
 IDLE, SLACK = 8, 2

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
+from netsp.base.arrays import Bools, Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Cut:
 
     A subtour cut has no teeth. A comb (`netsp.mip.blossoms`, `netsp.mip.combs`) has an odd number
     of them, each partly in S, a union of clusters, and no C (-1). Teeth of more than two clusters
-    share none. Where S is no union of clusters (`netsp.mip.parities`), all teeth are pairs. Of a
+    share none. Where S is no union of clusters (`netsp.mip.parity_cuts`), all teeth are pairs. Of a
     pair only legs with one end in S count.
     """
 

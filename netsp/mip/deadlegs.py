@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Bools, Floats, Ints
-from netsp.compiled.kernel import kernel
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.compiled.kernel import kernel
 
 Bits = npt.NDArray[np.uint8]
 

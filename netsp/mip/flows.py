@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
-from netsp.compiled.growing import order_of
-from netsp.compiled.kernel import kernel
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.compiled.dynamic_array import order_of
+from netsp.base.compiled.kernel import kernel
 
 TINY = 1e-11
 """Residual capacity that counts as none."""

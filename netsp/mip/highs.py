@@ -9,12 +9,12 @@ from typing import Any
 import highspy
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
-from netsp.clock import Clock, TimeLimit
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.clock import Clock, TimeLimit
 from netsp.mip.cutpool import CutPool
 from netsp.mip.cuts import Cut, cut_coefficients
+from netsp.mip.highs_runner import NONE, Interruption, quiet_solver, run
 from netsp.mip.program import Duals, Point, duals_of_relaxation, restricted, scale_of
-from netsp.mip.quiet import NONE, Interruption, quiet_solver, run
 
 _SETTLED = (
     highspy.HighsModelStatus.kOptimal,

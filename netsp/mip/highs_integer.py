@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import highspy
 import numpy as np
 
-from netsp.arrays import Floats, Ints
-from netsp.clock import Clock, TimeLimit
+from netsp.base.arrays import Floats, Ints
+from netsp.base.clock import Clock, TimeLimit
 from netsp.mip.cuts import Cut
+from netsp.mip.highs_runner import NONE, Interruption, quiet_solver, run
 from netsp.mip.program import IntegerOutcome, Point, scale_of
-from netsp.mip.quiet import NONE, Interruption, quiet_solver, run
 
 
 class HighsInteger:

@@ -1,4 +1,5 @@
-"""The bound of `netsp.mip.bound` over a list of legs, all others being out of the question."""
+"""The bound of `netsp.mip.lagrangian_bound` over a list of legs, all others being out of the
+question."""
 
 from __future__ import annotations
 
@@ -6,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
-from netsp.mip.bound import least_of_clusters, rounding
+from netsp.base.arrays import Bools, Floats, Ints
 from netsp.mip.cuts import Cut
+from netsp.mip.lagrangian_bound import least_of_clusters, rounding
 from netsp.mip.program import Duals
 
 

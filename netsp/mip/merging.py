@@ -17,13 +17,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from netsp.arrays import Ints
-from netsp.clock import Clock
-from netsp.errors import LimitReachedError
-from netsp.solving.limits import Limits
-from netsp.solving.searching import SearchingRun
-from netsp.travel.graph import TravelGraph
-from netsp.travel.result import Result
+from netsp.base.arrays import Ints
+from netsp.base.clock import Clock
+from netsp.base.errors import LimitReachedError
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.searching import SearchingRun
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.result import Result
 
 MERGED = 8
 """Searches from the start whose tours are merged. With 500 goals, 8 or 32 of them, of 25,000 rounds

@@ -1,7 +1,7 @@
 """The prices of all legs at dual values: one pass for the bound, one for what it rules out.
 
-The bound is that of `netsp.mip.bound`. A tour through a given vertex, or along a given leg, pays
-what these cost above the cheapest of their clusters.
+The bound is that of `netsp.mip.lagrangian_bound`. A tour through a given vertex, or along a given
+leg, pays what these cost above the cheapest of their clusters.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from netsp.arrays import Floats, Ints
-from netsp.compiled.kernel import kernel
-from netsp.mip.bound import least_of_clusters, rounding
+from netsp.base.arrays import Floats, Ints
+from netsp.base.compiled.kernel import kernel
+from netsp.gtsp.sparse_costs import NO_ROWS, LegRows, Rows
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import NO_BITS, Bits, DeadLegs, mark_dead
+from netsp.mip.lagrangian_bound import least_of_clusters, rounding
+from netsp.mip.parity_paths import beyond, ways_from_base
 from netsp.mip.program import Duals
 from netsp.mip.reducedcosts import Terms, reduced_costs, reduced_row, rooms
-from netsp.mip.ways import beyond, ways_from_base
-from netsp.solving.legrows import NO_ROWS, LegRows, Rows
 
 ROWS = 256
 """Rows of a matrix that a thread works on at a time."""
@@ -30,7 +30,7 @@ CHEAPEST = 8
 
 
 class Prices:
-    """The reduced costs of `netsp.mip.bound` over a matrix of costs.
+    """The reduced costs of `netsp.mip.lagrangian_bound` over a matrix of costs.
 
     Parameters
     ----------

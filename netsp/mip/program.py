@@ -28,8 +28,8 @@ from typing import Protocol
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
-from netsp.clock import TimeLimit
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.clock import TimeLimit
 from netsp.mip.cutpool import CutPool
 from netsp.mip.cuts import Cut
 

@@ -28,15 +28,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from netsp.arrays import Floats, Ints
-from netsp.errors import InputError
-from netsp.memory import ask
+from netsp.base.arrays import Floats, Ints
+from netsp.base.errors import InputError
+from netsp.base.ram import ask
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.solver_run import SolverRun, Stop
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.result import Result
 from netsp.mip.cbc_program import CbcInteger
 from netsp.mip.subtours import tour_from
-from netsp.solving.limits import Limits
-from netsp.solving.run import SolverRun, Stop
-from netsp.travel.graph import TravelGraph
-from netsp.travel.result import Result
 
 CUTS = ("goals", "vertices")
 

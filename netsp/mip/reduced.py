@@ -20,13 +20,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from netsp.lns import Instance, best_classes
-from netsp.lns.solve import core_of
-from netsp.mip.solve import MipRun, Params
-from netsp.solving.limits import Limits
-from netsp.solving.run import SolverRun
-from netsp.travel.graph import TravelGraph, least_tethers
-from netsp.travel.result import Progress, Result
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.search import Instance, best_classes
+from netsp.gtsp.search.lns_solver import core_of
+from netsp.gtsp.solver_run import SolverRun
+from netsp.gtsp.travel.graph import TravelGraph, least_tethers
+from netsp.gtsp.travel.result import Progress, Result
+from netsp.mip.mip_solver import MipRun, Params
 
 MOST_POLISHED = 4000
 """Most classes, those of least tether, among which the last choice is made."""
@@ -61,7 +61,7 @@ def solve(
     """Solve the TSP over the classes of least tether.
 
     The tour is optimal for those classes only, so no bound is claimed for the problem unless they
-    are all there are. Iterations as of `netsp.mip.solve`; params : see `ReducedParams`.
+    are all there are. Iterations as of `netsp.mip.mip_solver`; params : see `ReducedParams`.
     """
     chosen, limits = params or ReducedParams(), limits or Limits()
     kept = least_tethers(graph.costs_to_base, graph.cluster, chosen.classes)

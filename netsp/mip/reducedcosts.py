@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from netsp.arrays import Floats, Ints
-from netsp.compiled.kernel import kernel
+from netsp.base.arrays import Floats, Ints
+from netsp.base.compiled.kernel import kernel
+from netsp.gtsp.sparse_costs import Rows, place_of
 from netsp.mip.deadlegs import Bits, not_dead
-from netsp.solving.legrows import Rows, place_of
 
 
 class Terms(NamedTuple):

@@ -1,8 +1,9 @@
 """The root: the relaxation, solved with cuts from a fractional point and legs from their prices.
 
-Every round yields a bound that holds whatever the solver's tolerances (`netsp.mip.bound`), and with
-an incumbent every bound rules out legs and vertices: those that cost more than what is missing.
-What is ruled out is forgotten, so the rounds get cheaper as the proof gets closer.
+Every round yields a bound that holds whatever the solver's tolerances
+(`netsp.mip.lagrangian_bound`), and with an incumbent every bound rules out legs and vertices: those
+that cost more than what is missing. What is ruled out is forgotten, so the rounds get cheaper as
+the proof gets closer.
 """
 
 from __future__ import annotations
@@ -12,22 +13,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.gtsp.cost_matrix import LEGS, LegCosts
+from netsp.gtsp.searching import SearchingRun
+from netsp.gtsp.solver_run import Stop
+from netsp.gtsp.sparse_costs import LegRows
 from netsp.mip.blossoms import blossom_cuts, shrunk
 from netsp.mip.combs import comb_cuts, tight_sets
+from netsp.mip.cover_bounds import OverGoals
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs
-from netsp.mip.overcells import OverGoals
-from netsp.mip.pace import WORTH, Pace
-from netsp.mip.parities import odd_letters, parity_cuts
+from netsp.mip.lp_warm_start import Warm
+from netsp.mip.parity_cuts import odd_letters, parity_cuts
 from netsp.mip.prices import Prices
+from netsp.mip.pricing_schedule import WORTH, Pace
 from netsp.mip.program import Duals, Point, Relaxation
 from netsp.mip.subtours import branches, fractional_cuts
-from netsp.mip.warm import Warm
-from netsp.solving.legcosts import LEGS, LegCosts
-from netsp.solving.legrows import LegRows
-from netsp.solving.run import Stop
-from netsp.solving.searching import SearchingRun
 
 NEAREST = 4
 """Legs per vertex in the first LP."""

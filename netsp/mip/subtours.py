@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
+from netsp.base.arrays import Bools, Floats, Ints
 from netsp.hsignature import Word
 from netsp.mip.blossoms import shrunk
 from netsp.mip.cuts import Cut

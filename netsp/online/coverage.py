@@ -13,16 +13,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from netsp.arrays import Bools, ComparesArrays, Floats, Ints
-from netsp.compiled.interpretation import interprets
-from netsp.compiled.kernel import kernel
-from netsp.errors import InputError
+from netsp.base.arrays import Bools, ComparesArrays, Floats, Ints
+from netsp.base.compiled.interpretation import interprets
+from netsp.base.compiled.kernel import kernel
+from netsp.base.errors import InputError
 from netsp.online.equipment import Camera
-from netsp.online.scene.field import DistanceField
-from netsp.online.scene.sampling import Field, lowest_along, lowest_along_each
-from netsp.online.scene.scene import Scene
-from netsp.online.scene.shapes import HalfSpace
-from netsp.online.scene.surfaces import drawn_points, extent, surface_of
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.sampling import Field, lowest_along, lowest_along_each
+from netsp.world.scene.scene import Scene
+from netsp.world.scene.shapes import HalfSpace
+from netsp.world.scene.surfaces import drawn_points, extent, surface_of
 
 MOST_PATCHES = 200_000
 

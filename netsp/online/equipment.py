@@ -6,11 +6,11 @@ from typing import Annotated
 
 from pydantic import Field
 
-from netsp.arrays import Floats
-from netsp.fields import NonNegative, Number, Positive
-from netsp.models import Model
-from netsp.online.tether.load import Load
-from netsp.solution import max_turning
+from netsp.base.arrays import Floats
+from netsp.model.field_types import NonNegative, Number, Positive
+from netsp.model.solution import max_turning
+from netsp.model.validated import Model
+from netsp.world.tether.load import Load
 
 SEA_WATER = 1025.0
 """kg / m^3."""
@@ -45,7 +45,7 @@ class Camera(Model):
 
 class TetherPhysics(Model):
     """What a tether needs beyond its taut length; all of it is nothing by default. See
-    `netsp.online.tether.load` for the formulas and their sources.
+    `netsp.world.tether.load` for the formulas and their sources.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class TetherPhysics(Model):
         Returns
         -------
         Load
-            For `netsp.online.tether.load`.
+            For `netsp.world.tether.load`.
         """
         drag = 0.5 * SEA_WATER * self.drag_coefficient * self.diameter
         x, y, z = (float(v) for v in water)

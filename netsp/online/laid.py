@@ -6,14 +6,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from netsp.arrays import Floats
-from netsp.errors import InputError
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
 from netsp.online.mission import Mission
 from netsp.online.paths.tree import Grid, ShortestTree
 from netsp.online.paths.tree import taut as taut_path
-from netsp.online.planner.base import Tethers
-from netsp.online.scene.field import DistanceField, pushed_out
-from netsp.online.tether import Tether
+from netsp.online.planner.planner import Tethers
+from netsp.world.scene.field import DistanceField, pushed_out
+from netsp.world.tether import Tether
 
 DEPTH = 0.25
 """Of delta: the edges of a taut tether dip into surfaces by an eighth of it (docs/tether.md), and

@@ -18,15 +18,23 @@ from pydantic import (
     model_validator,
 )
 
-from netsp.arrays import Floats
-from netsp.errors import InputError
-from netsp.fields import POINT3_SCHEMA, Name, NonNegative, Number, Point3, Positive, TrackPoint
-from netsp.files import FileModel, read_text
-from netsp.models import Model
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.base.files import FileModel, read_text
+from netsp.model.field_types import (
+    POINT3_SCHEMA,
+    Name,
+    NonNegative,
+    Number,
+    Point3,
+    Positive,
+    TrackPoint,
+)
+from netsp.model.validated import Model
 from netsp.online.equipment import Camera, PositionSensor, RangeSensor, TetherPhysics
-from netsp.online.scene.field import DistanceField, pushed_out
-from netsp.online.scene.scene import Scene
-from netsp.online.tour import PathField, PlannedTour
+from netsp.online.planned_tour import PathField, PlannedTour
+from netsp.world.scene.field import DistanceField, pushed_out
+from netsp.world.scene.scene import Scene
 
 TURN_TIME = 30.0
 """Seconds that are given to turn to a heading."""
@@ -83,7 +91,8 @@ class MissionWaypoint(Model):
     dwell : float
         Seconds to stay there, at that heading.
     alternatives : tuple of Viewpoint
-        Other places that would do as well: `netsp.space.plan` chooses, all else goes to `position`.
+        Other places that would do as well: `netsp.plan.space.space_plan` chooses, all else goes to
+        `position`.
     """
 
     position: Annotated[Point3, Field(description="(x, y, z) to reach, m")]
@@ -228,8 +237,8 @@ class Mission(FileModel):
         Of the grid that paths are sought on, metres; None for 0.2 m, or as much more as two million
         cells ask for.
     tour : PlannedTour or None
-        How the robot is to get from waypoint to waypoint (`netsp.space.solve`), which `predictive`
-        keeps to; None to leave it to the planner.
+        How the robot is to get from waypoint to waypoint (`netsp.plan.space.mission_solver`), which
+        `predictive` keeps to; None to leave it to the planner.
 
     Raises
     ------

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from netsp.arrays import Floats
-from netsp.compiled.kernel import kernel
+from netsp.base.arrays import Floats
+from netsp.base.compiled.kernel import kernel
 from netsp.online.equipment import RangeSensor
-from netsp.online.scene.field import DistanceField
-from netsp.online.scene.sampling import Field, distance
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.sampling import Field, distance
 
 RAYS = 240
 """In one look; they are turned from look to look, so that what stands between them comes up."""

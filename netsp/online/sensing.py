@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from netsp.arrays import Floats
+from netsp.base.arrays import Floats
 from netsp.online.equipment import PositionSensor
-from netsp.online.scene.field import DistanceField, pushed_out
+from netsp.world.scene.field import DistanceField, pushed_out
 
 TRUST = 0.25
 """Share of a new position that goes into the estimate: the others of the last second or so average

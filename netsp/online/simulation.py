@@ -8,19 +8,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from netsp.arrays import Floats
+from netsp.base.arrays import Floats
+from netsp.online.anchor_track import Track
 from netsp.online.coverage import Coverage
-from netsp.online.log import LogRow
 from netsp.online.mission import Mission
 from netsp.online.planner import Command, Planner
-from netsp.online.planner.ahead import DEEPEST
-from netsp.online.planner.base import HOME, Tethers
-from netsp.online.scene.field import DistanceField, pushed_out
+from netsp.online.planner.planner import HOME, Tethers
+from netsp.online.planner.preview import DEEPEST
+from netsp.online.run_log import LogRow
 from netsp.online.sensing import Positions
-from netsp.online.tether import GeodesicTether, Tether
-from netsp.online.tether.load import Load, payout, pull_on_robot, turning
-from netsp.online.track import Track
 from netsp.online.vehicle import Vehicle
+from netsp.world.scene.field import DistanceField, pushed_out
+from netsp.world.tether import GeodesicTether, Tether
+from netsp.world.tether.load import Load, payout, pull_on_robot, turning
 
 STEP = 0.1
 """Seconds between two decisions of the planner."""

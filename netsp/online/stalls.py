@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from netsp.geometry import polylines
+from netsp.base.geometry import polylines
 from netsp.online.planner import Command, Planner
-from netsp.online.planner.base import HOLD, WAIT
+from netsp.online.planner.planner import HOLD, WAIT
 from netsp.online.simulation import Simulation
 
 STALL, PROGRESS = 30.0, 0.05

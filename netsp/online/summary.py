@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from netsp.arrays import Floats
-from netsp.geometry import polylines
-from netsp.online.log import LogRow
+from netsp.base.arrays import Floats
+from netsp.base.geometry import polylines
+from netsp.model.solution import tension_ratio
 from netsp.online.mission import Mission
 from netsp.online.planner import Planner
-from netsp.online.planner.base import DWELL, FREE, WAIT
+from netsp.online.planner.planner import DWELL, FREE, WAIT
+from netsp.online.run_log import LogRow
 from netsp.online.simulation import STEP, Simulation
-from netsp.solution import tension_ratio
 
 
 def summarise(

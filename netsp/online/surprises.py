@@ -7,14 +7,14 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
-from netsp.errors import InputError
-from netsp.fields import Name, NonNegative, Point3, Positive
-from netsp.files import FileModel
-from netsp.models import Model
-from netsp.online.limits import check_bounds
+from netsp.base.errors import InputError
+from netsp.base.files import FileModel
+from netsp.model.field_types import Name, NonNegative, Point3, Positive
+from netsp.model.validated import Model
 from netsp.online.mission import Mission, WaypointLike
-from netsp.online.scene.field import DistanceField
-from netsp.online.scene.scene import Scene, Solid
+from netsp.online.mission_limits import check_bounds
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.scene import Scene, Solid
 
 KINDS = (
     "appear", "vanish", "move", "add_waypoint", "cancel_waypoint", "push", "tether_length",

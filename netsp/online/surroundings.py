@@ -11,19 +11,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from netsp.arrays import Floats
-from netsp.geometry import polylines
+from netsp.base.arrays import Floats
+from netsp.base.geometry import polylines
 from netsp.online.mission import Mission
 from netsp.online.planner import Planner
 from netsp.online.planner.predictive import CAUGHT
 from netsp.online.ranging import Ranging, cast
-from netsp.online.scene.field import DistanceField, pushed_out
-from netsp.online.scene.grid import VoxelGrid
-from netsp.online.scene.scene import Scene, Solid
 from netsp.online.simulation import Simulation
 from netsp.online.surprises import SceneEvent, SceneSurprises, changed, moved
-from netsp.online.tether import GeodesicTether, Tether
-from netsp.online.tether.load import payout
+from netsp.world.scene.field import DistanceField, pushed_out
+from netsp.world.scene.grid import VoxelGrid
+from netsp.world.scene.scene import Scene, Solid
+from netsp.world.tether import GeodesicTether, Tether
+from netsp.world.tether.load import payout
 
 MET = 3
 """So many rays must have met a solid before it is put on the map."""

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from netsp.arrays import Floats, Ints
-from netsp.compiled.kernel import kernel
-from netsp.problem import Circle, Problem
+from netsp.base.arrays import Floats, Ints
+from netsp.base.compiled.kernel import kernel
+from netsp.model.problem import Circle, Problem
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.slits import Slits
 from netsp.roadmap.tangents import TangentGraph

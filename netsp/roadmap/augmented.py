@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from netsp.arrays import Floats, Ints
-from netsp.clock import NEVER, Flag
-from netsp.compiled.growing import longer, more_int_rows
-from netsp.compiled.kernel import kernel
-from netsp.errors import InputError, NetspError
+from netsp.base.arrays import Floats, Ints
+from netsp.base.clock import NEVER, Flag
+from netsp.base.compiled.dynamic_array import longer, more_int_rows
+from netsp.base.compiled.kernel import kernel
+from netsp.base.errors import InputError, NetspError
 from netsp.hsignature import Word
 from netsp.roadmap.trie import LETTER, PARENT, Trie, add_child, trie_child
 

@@ -10,7 +10,7 @@ paths holds one taut path (docs/theory.md). So, with T the lengths of tethers,
 
 for all u and v beyond p and q that leave their arcs late enough. (c is twice the Gromov product of
 u and v.) Millions of legs have some ten thousand crossings: of each one leg is pulled
-(`netsp.roadmap.pulled`), the others are sums.
+(`netsp.roadmap.taut_by_word`), the others are sums.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from netsp.arrays import Floats, Ints
-from netsp.compiled.interpretation import interpreted, interprets
-from netsp.compiled.kernel import kernel
+from netsp.base.arrays import Floats, Ints
+from netsp.base.compiled.interpretation import interpreted, interprets
+from netsp.base.compiled.kernel import kernel
 from netsp.roadmap.arcs import Arcs
-from netsp.roadmap.pulled import NODE, SAME_ANGLE, SLID, path_for, pull
 from netsp.roadmap.slits import Ends, Slits, longest_word, room_for
+from netsp.roadmap.taut_by_word import NODE, SAME_ANGLE, SLID, path_for, pull
 from netsp.roadmap.tethertree import TetherTree
 
 BACK = 1e-9

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from netsp.arrays import Floats, Ints
-from netsp.clock import Clock
+from netsp.base.arrays import Floats, Ints
+from netsp.base.clock import Clock
 from netsp.hsignature import Word, is_looping, signature
+from netsp.roadmap.explain_unreachable import unreached
 from netsp.roadmap.explore import NON_LOOPING, Found, run_explore
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.reach import unreached
 from netsp.roadmap.trie import Trie
 
 STATES_PER_CLASS = 200

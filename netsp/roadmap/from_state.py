@@ -19,21 +19,21 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Bools, Floats, Ints
-from netsp.clock import Clock, TimeLimit
-from netsp.errors import InputError, NetspError
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.clock import Clock, TimeLimit
+from netsp.base.errors import InputError, NetspError
+from netsp.gtsp.travel.costs import rounded_down
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.parity_distances import BITS, WaysByParity
+from netsp.gtsp.travel.result import OnProgress, Progress, Result
 from netsp.hsignature import reduce
-from netsp.lower_bound import OPTIMALITY_TOLERANCE, LowerBound, Scope
-from netsp.problem import Goal, Problem
-from netsp.roadmap.legs import TautLegs
+from netsp.model.bound_scope import OPTIMALITY_TOLERANCE, LowerBound, Scope
+from netsp.model.problem import Goal, Problem
+from netsp.model.solution import Status
 from netsp.roadmap.paths import TautPaths
+from netsp.roadmap.reach_bounds import ways_by_parity
 from netsp.roadmap.taut import MAX_CLASSES, TautRoadmap
-from netsp.roadmap.ways import ways_by_parity
-from netsp.solution import Status
-from netsp.travel.costs import rounded_down
-from netsp.travel.graph import TravelGraph
-from netsp.travel.result import OnProgress, Progress, Result
-from netsp.travel.ways import BITS, WaysByParity
+from netsp.roadmap.taut_legs import TautLegs
 
 ENOUGH = 10.0 * OPTIMALITY_TOLERANCE
 """A path is called optimal when its bound is within this share of it."""

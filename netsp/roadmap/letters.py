@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Floats, Ints
-from netsp.compiled.kernel import kernel
+from netsp.base.arrays import Floats, Ints
+from netsp.base.compiled.kernel import kernel
 
 
 @kernel

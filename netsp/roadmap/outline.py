@@ -20,11 +20,11 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Floats, Ints
-from netsp.clock import Clock
-from netsp.compiled.growing import longer, more_rows, sort_in_place
-from netsp.compiled.kernel import kernel
-from netsp.geometry.kernels import (
+from netsp.base.arrays import Floats, Ints
+from netsp.base.clock import Clock
+from netsp.base.compiled.dynamic_array import longer, more_rows, sort_in_place
+from netsp.base.compiled.kernel import kernel
+from netsp.base.geometry.kernels import (
     TWO_PI,
     Blockers,
     circle_circle_angles,
@@ -35,8 +35,8 @@ from netsp.geometry.kernels import (
     point_in_polygon,
     segment_blocked,
 )
-from netsp.geometry.polygons import counterclockwise
-from netsp.problem import Circle, Problem
+from netsp.base.geometry.polygons import counterclockwise
+from netsp.model.problem import Circle, Problem
 
 MARGIN = 1e-10
 EPSILON = 1e-12

@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from netsp.arrays import Floats, Ints
-from netsp.clock import NEVER, Clock, Flag
-from netsp.errors import (
+from netsp.base.arrays import Floats, Ints
+from netsp.base.clock import NEVER, Clock, Flag
+from netsp.base.errors import (
     InputError,
     LimitReachedError,
     NetspError,
@@ -18,14 +18,14 @@ from netsp.errors import (
     warn_left_out,
 )
 from netsp.hsignature import Word
-from netsp.problem import Problem
+from netsp.model.problem import Problem
 from netsp.roadmap.arcs import Arcs, arcs_of
 from netsp.roadmap.explore import ALL, Found, run_explore
 from netsp.roadmap.outline import Outline, build_outline, is_free
-from netsp.roadmap.pulled import pull_each, pull_one
 from netsp.roadmap.shortest import ContactGraph
 from netsp.roadmap.slits import Ends, Slits, build_slits, flattened, slit_lengths
 from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
+from netsp.roadmap.taut_by_word import pull_each, pull_one
 from netsp.roadmap.trie import Trie
 
 FIRST, DEEPEST, LEAST = 1.02, 1.3, 1 / 32
@@ -346,7 +346,7 @@ class TautPaths:
         return all(abs(letter) <= len(self.outline.rays) for letter in word)
 
     def _pulled(self, a: int, b: int, word: Word) -> tuple[float, Ints, Floats]:
-        """As of `netsp.roadmap.pulled.pull_one`."""
+        """As of `netsp.roadmap.taut_by_word.pull_one`."""
         points = np.array([a, b])
         letters, row = flattened([(), word])
         places = self.outline.places[points]

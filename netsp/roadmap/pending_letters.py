@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from netsp.arrays import Floats, Ints
-from netsp.compiled.kernel import kernel
-from netsp.geometry.kernels import Blockers
+from netsp.base.arrays import Floats, Ints
+from netsp.base.compiled.kernel import kernel
+from netsp.base.geometry.kernels import Blockers
 
 XMIN, YMIN, XMAX, YMAX, MAX_PENDING = range(5)
 """Columns of a box. XMIN is infinite where nothing is cut off, so that the letter is final;

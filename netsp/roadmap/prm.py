@@ -17,23 +17,23 @@ from typing import Any
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
-from netsp.clock import Clock, TimeLimit
-from netsp.compiled.kernel import kernel
-from netsp.errors import InputError, LimitReachedError, counted, warn_left_out
-from netsp.geometry.kernels import Blockers, depth_in_obstacle, segment_blocked
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.clock import Clock, TimeLimit
+from netsp.base.compiled.kernel import kernel
+from netsp.base.errors import InputError, LimitReachedError, counted, warn_left_out
+from netsp.base.geometry.kernels import Blockers, depth_in_obstacle, segment_blocked
+from netsp.gtsp.travel.graph import UNTIMED, TravelGraph
+from netsp.gtsp.travel.tether_blind_legs import Detours
 from netsp.hsignature import Word
-from netsp.problem import Circle, Problem
+from netsp.model.problem import Circle, Problem
+from netsp.roadmap.any_class_paths import sub_goals, tabulate
 from netsp.roadmap.augmented import AugmentedGraph, augment
-from netsp.roadmap.detours import sub_goals, tabulate
-from netsp.roadmap.legs import TautLegs
+from netsp.roadmap.explain_unreachable import unreached
 from netsp.roadmap.letters import segment_letters
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.paths import TautPaths, UnknownPathError
-from netsp.roadmap.reach import unreached
 from netsp.roadmap.shortest import MilestoneGraph
-from netsp.travel.detours import Detours
-from netsp.travel.graph import UNTIMED, TravelGraph
+from netsp.roadmap.taut_legs import TautLegs
 
 SAMPLES = 1000
 """Milestones, as in the paper."""
@@ -46,7 +46,7 @@ MAX_AUGMENTED = 2_000_000
 
 
 class PrmRoadmap:
-    """PRM* and its homotopy-augmented graph. Satisfies `netsp.travel.graph.Legs`.
+    """PRM* and its homotopy-augmented graph. Satisfies `netsp.gtsp.travel.graph.Legs`.
 
     Parameters
     ----------

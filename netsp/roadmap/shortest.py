@@ -8,8 +8,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from netsp.arrays import Floats, Ints
-from netsp.clock import Clock
+from netsp.base.arrays import Floats, Ints
+from netsp.base.clock import Clock
 from netsp.roadmap.outline import Outline, is_free
 from netsp.roadmap.tangents import ARC_STEP, JOINING, TangentGraph, build_tangents
 

@@ -16,12 +16,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints, Singles
-from netsp.compiled.growing import more_int_rows
-from netsp.compiled.kernel import kernel
-from netsp.errors import InputError
-from netsp.geometry.box_tree import BoxTree, build_box_tree, spatial_order
-from netsp.geometry.kernels import TWO_PI, Blockers, point_segment_distance
+from netsp.base.arrays import Bools, Floats, Ints, Singles
+from netsp.base.compiled.dynamic_array import more_int_rows
+from netsp.base.compiled.kernel import kernel
+from netsp.base.errors import InputError
+from netsp.base.geometry.box_tree import BoxTree, build_box_tree, spatial_order
+from netsp.base.geometry.kernels import TWO_PI, Blockers, point_segment_distance
 
 SLACK = 1e-6
 """Angle (radians) by which a pencil reaches beyond its arc, and relative length by which horizons

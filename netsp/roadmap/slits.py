@@ -27,11 +27,11 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from netsp.arrays import Floats, Ints
-from netsp.clock import NEVER, Flag
-from netsp.compiled.kernel import kernel
+from netsp.base.arrays import Floats, Ints
+from netsp.base.clock import NEVER, Flag
+from netsp.base.compiled.kernel import kernel
 from netsp.hsignature import Word
-from netsp.problem import Circle, Problem
+from netsp.model.problem import Circle, Problem
 
 ROWS = 64
 """Rows of the matrix that one thread takes at a time."""

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Bools, Floats, Ints
-from netsp.clock import Clock, Flag
-from netsp.compiled.growing import more_rows
-from netsp.compiled.kernel import kernel
-from netsp.geometry.kernels import TWO_PI, Blockers, segment_blocked
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.clock import Clock, Flag
+from netsp.base.compiled.dynamic_array import more_rows
+from netsp.base.compiled.kernel import kernel
+from netsp.base.geometry.kernels import TWO_PI, Blockers, segment_blocked
 from netsp.roadmap.letters import arc_letters, segment_letters
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.pending_letters import pending_boxes

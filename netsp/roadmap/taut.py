@@ -14,19 +14,19 @@ from functools import partial
 
 import numpy as np
 
-from netsp.arrays import Floats
-from netsp.clock import Clock, TimeLimit
-from netsp.errors import InputError
+from netsp.base.arrays import Floats
+from netsp.base.clock import Clock, TimeLimit
+from netsp.base.errors import InputError
+from netsp.gtsp.travel.graph import TravelGraph
 from netsp.hsignature import Word, concatenate, is_looping, signature
-from netsp.problem import Problem
+from netsp.model.problem import Problem
+from netsp.model.solution import KeptClasses
+from netsp.roadmap.any_class_paths import taut_detours
 from netsp.roadmap.classes import find_classes
-from netsp.roadmap.detours import taut_detours
 from netsp.roadmap.explore import ALL, NON_LOOPING
-from netsp.roadmap.legs import TautLegs
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.ways import ways_by_parity
-from netsp.solution import KeptClasses
-from netsp.travel.graph import TravelGraph
+from netsp.roadmap.reach_bounds import ways_by_parity
+from netsp.roadmap.taut_legs import TautLegs
 
 MAX_CLASSES = 22_000
 """Default for the most augmented goals a travel graph may have: all legs of so many take 1.8 GiB
@@ -109,7 +109,7 @@ class TautRoadmap:
         return graph
 
     def ways(self, goal: int, most: int) -> list[tuple[int, Word]]:
-        """As `netsp.travel.graph.Carrier.ways`."""
+        """As `netsp.gtsp.travel.graph.Carrier.ways`."""
         contacts = self.paths.contacts
         length, before = contacts.tree_to_nearest(goal, most + 2)  # with itself and the base
         near = np.argsort(length[: contacts.points], kind="stable")
@@ -121,7 +121,7 @@ class TautRoadmap:
         ]
 
     def carried(self, start: int, word: Word, goal: int) -> Word | None:
-        """As `netsp.travel.graph.Carrier.carried`."""
+        """As `netsp.gtsp.travel.graph.Carrier.carried`."""
         contacts = self.paths.contacts
         line = contacts.draw(start, goal, contacts.tree_to(start, goal))
         there = concatenate(word, signature(line, self.outline.rays))
@@ -130,8 +130,8 @@ class TautRoadmap:
     def with_classes(
         self, wanted: Iterable[tuple[int, Word]], up: Callable[[], bool]
     ) -> TravelGraph:
-        """As `netsp.travel.graph.Carrier.with_classes`; the classes are in this roadmap from then
-        on."""
+        """As `netsp.gtsp.travel.graph.Carrier.with_classes`; the classes are in this roadmap from
+        then on."""
         known = set(zip(self.cluster.tolist(), self.signatures, strict=True))
         more = [
             (goal, word, length)

@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from netsp.arrays import Floats, Ints
-from netsp.clock import Flag
-from netsp.compiled.growing import more_int_rows, more_rows
-from netsp.compiled.kernel import kernel
+from netsp.base.arrays import Floats, Ints
+from netsp.base.clock import Flag
+from netsp.base.compiled.dynamic_array import more_int_rows, more_rows
+from netsp.base.compiled.kernel import kernel
 from netsp.roadmap.arcs import LENGTH, RADIUS, Arcs
-from netsp.roadmap.pulled import EDGE, NODE, SAME_ANGLE, SLID, Path, path_for, pull
 from netsp.roadmap.slits import Ends, Slits, longest_word, room_for
+from netsp.roadmap.taut_by_word import EDGE, NODE, SAME_ANGLE, SLID, Path, path_for, pull
 
 AT, PARENT, CHILD, SIBLING = range(4)
 """Columns of a bend: its directed arc, the bend before (-1 at the root), the last bend found after

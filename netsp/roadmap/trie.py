@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from netsp.arrays import Floats, Ints
-from netsp.compiled.kernel import kernel
+from netsp.base.arrays import Floats, Ints
+from netsp.base.compiled.kernel import kernel
 
 PARENT, LETTER, CHILD, SIBLING, CORE = range(5)
 """Columns of a trie's nodes. SIBLING chains the children of one parent."""

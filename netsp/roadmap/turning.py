@@ -16,12 +16,12 @@ import math
 
 import numpy as np
 
-from netsp.arrays import Floats
-from netsp.errors import InfeasibleError, LimitReachedError, counted, warn_left_out
-from netsp.lower_bound import Scope
-from netsp.problem import Problem
+from netsp.base.arrays import Floats
+from netsp.base.errors import InfeasibleError, LimitReachedError, counted, warn_left_out
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.model.bound_scope import Scope
+from netsp.model.problem import Problem
 from netsp.roadmap.paths import TautPaths, UnknownPathError
-from netsp.travel.graph import TravelGraph
 
 ROUNDING = 1e-9
 """Radians."""

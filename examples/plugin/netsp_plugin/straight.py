@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from netsp.online.tether import GeodesicTether, Tether
+from netsp.world.tether import GeodesicTether, Tether
 
 
 class StraightTether:

@@ -22,10 +22,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from netsp.arrays import Floats
-from netsp.errors import InputError
-from netsp.geometry import polylines
-from netsp.online.scene.field import DistanceField, pushed_out
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.base.geometry import polylines
+from netsp.world.scene.field import DistanceField, pushed_out
 
 REFINEMENTS = ("none", "paper", "gradient")
 

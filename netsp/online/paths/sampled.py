@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from netsp.arrays import Floats
-from netsp.errors import InputError
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
 from netsp.online.paths.tree import Grid
-from netsp.online.scene.sampling import distance, lowest_along
+from netsp.world.scene.sampling import distance, lowest_along
 
 OMPL_PLANNERS = {"rrtstar": "RRTstar", "bitstar": "BITstar", "prmstar": "PRMstar"}
 

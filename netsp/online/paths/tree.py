@@ -13,17 +13,17 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Bools, Floats, Ints
-from netsp.clock import Flag, abandoned, end_if_abandoned
-from netsp.compiled.growing import more_int_rows
-from netsp.compiled.interpretation import interprets
-from netsp.compiled.kernel import kernel
-from netsp.errors import InputError
-from netsp.geometry import polylines
-from netsp.online.scene.field import DistanceField
-from netsp.online.scene.point_batches import CHUNK, distances
-from netsp.online.scene.sampling import Field, distance, lowest_along, lowest_along_each
-from netsp.online.tether.geodesic import GeodesicTether
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.clock import Flag, abandoned, end_if_abandoned
+from netsp.base.compiled.dynamic_array import more_int_rows
+from netsp.base.compiled.interpretation import interprets
+from netsp.base.compiled.kernel import kernel
+from netsp.base.errors import InputError
+from netsp.base.geometry import polylines
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.point_batches import CHUNK, distances
+from netsp.world.scene.sampling import Field, distance, lowest_along, lowest_along_each
+from netsp.world.tether.geodesic import GeodesicTether
 
 MOST_CELLS = 20_000_000
 """So many cells take about 0.3 GiB."""

@@ -5,25 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from netsp.errors import InputError
+from netsp.base.errors import InputError
+from netsp.base.registry import Registry, later
 from netsp.online.mission import Mission
 from netsp.online.paths.refine import REFINEMENTS
 from netsp.online.paths.sampled import OMPL_PLANNERS
 from netsp.online.paths.tree import Grid
-from netsp.online.planner.base import Command, Planner, PlannerOptions, Tethers
+from netsp.online.planner.planner import Command, Planner, PlannerOptions, Tethers
 from netsp.online.planner.predictive import PredictivePlanner
-from netsp.online.planner.react import ReactPlanner
 from netsp.online.planner.react_draft import ReactDraftPlanner, ReactThresholdsPlanner
-from netsp.online.scene.field import DistanceField
-from netsp.online.tether import GeodesicTether
-from netsp.registry import Registry, later
+from netsp.online.planner.react_planner import ReactPlanner
+from netsp.world.scene.field import DistanceField
+from netsp.world.tether import GeodesicTether
 
 PLANNERS: Registry[Callable[..., Planner]] = Registry(
     "planner",
     "netsp.planners",
     {
         "predictive": PredictivePlanner,
-        "repair": later("repair", "netsp.space.repair:RepairPlanner"),
+        "repair": later("repair", "netsp.plan.space.mission_repair:RepairPlanner"),
         "react": ReactPlanner,
         "react-draft": ReactDraftPlanner,
         "react-thresholds": ReactThresholdsPlanner,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from netsp.arrays import Floats
-from netsp.geometry import polylines
-from netsp.online.planner.base import Planner
-from netsp.online.scene.field import pushed_out
-from netsp.online.tether import Tether
+from netsp.base.arrays import Floats
+from netsp.base.geometry import polylines
+from netsp.online.planner.planner import Planner
+from netsp.world.scene.field import pushed_out
+from netsp.world.tether import Tether
 
 
 class Pivots:

@@ -13,13 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from netsp.arrays import Floats
-from netsp.geometry import polylines
+from netsp.base.arrays import Floats
+from netsp.base.geometry import polylines
 from netsp.online.mission import MissionWaypoint
-from netsp.online.paths.beside import beside
+from netsp.online.paths.standoff import beside
 from netsp.online.paths.tree import ever_tauter, homotopic, roughly_taut
-from netsp.online.planner.ahead import DEEPEST, MARGIN, Ahead
-from netsp.online.planner.base import (
+from netsp.online.planner.planner import (
     FREE,
     HOME,
     NORMAL,
@@ -28,8 +27,9 @@ from netsp.online.planner.base import (
     Planner,
     Tethers,
 )
-from netsp.online.scene.field import DistanceField
-from netsp.online.tether import GeodesicTether, Tether
+from netsp.online.planner.preview import DEEPEST, MARGIN, Ahead
+from netsp.world.scene.field import DistanceField
+from netsp.world.tether import GeodesicTether, Tether
 
 PIVOTS = 24
 """At most so many places along the tether to turn at."""

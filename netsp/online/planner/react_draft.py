@@ -12,7 +12,7 @@ The planner follows the listing of the draft where its text, or common sense, di
   the robot: there is no path to follow, and the robot goes on to the waypoint for one step.
 - The robot then goes on to the waypoint in normal mode, which may well lead along the old path
   over the limit again. Nothing in the listing ends such a cycle; a mission gives the waypoint up
-  after `netsp.online.simulate.STUCK` seconds.
+  after `netsp.online.mission_run.STUCK` seconds.
 - Every recovery path is refined once, the fallback too. One that is then not free is not followed:
   the robot goes on to the waypoint, and the search begins anew at the next step.
 
@@ -44,13 +44,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from netsp.arrays import Floats
-from netsp.errors import InputError
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
 from netsp.online.paths.refine import clear
-from netsp.online.planner.base import NORMAL, RECOVERY
 from netsp.online.planner.pivots import Pivots
-from netsp.online.planner.react import ReactPlanner
-from netsp.online.tether import Tether
+from netsp.online.planner.planner import NORMAL, RECOVERY
+from netsp.online.planner.react_planner import ReactPlanner
+from netsp.world.tether import Tether
 
 
 @dataclass(frozen=True)

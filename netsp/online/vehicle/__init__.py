@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from netsp.base.registry import Registry, later
 from netsp.online.vehicle.kinematic import KinematicVehicle, Vehicle
-from netsp.registry import Registry, later
 
 
 def _bluerov2(place: npt.NDArray[np.float64], speed: float) -> Vehicle:

@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from netsp.arrays import Floats
+from netsp.base.arrays import Floats
 from netsp.online.vehicle.control import DT, HORIZON, PredictiveControl
 from netsp.online.vehicle.dynamics import step
 from netsp.online.vehicle.kinematic import advance, turned

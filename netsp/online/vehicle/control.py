@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from netsp.arrays import Floats
-from netsp.compiled.growing import write_floats, write_rows
-from netsp.compiled.kernel import kernel
+from netsp.base.arrays import Floats
+from netsp.base.compiled.dynamic_array import write_floats, write_rows
+from netsp.base.compiled.kernel import kernel
 from netsp.online.vehicle.dynamics import ALLOCATION, THRUST, linearised, step_into
 
 HORIZON, DT = 20, 0.1

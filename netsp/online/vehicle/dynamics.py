@@ -7,7 +7,7 @@ Control", 2011, in velocities relative to the water, which holds for a current t
 
 State: x, y, z (m, z up), yaw, and in the vehicle's frame surge, sway, heave (m/s, through the
 water) and yaw rate. Input: three forces (N) and the yaw moment (N m), to which the pull of the
-tether may be added (`netsp.online.tether.load.pull_on_robot`; the REACT paper leaves it out).
+tether may be added (`netsp.world.tether.load.pull_on_robot`; the REACT paper leaves it out).
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import math
 
 import numpy as np
 
-from netsp.arrays import Floats
-from netsp.compiled.growing import write_floats
-from netsp.compiled.kernel import kernel
+from netsp.base.arrays import Floats
+from netsp.base.compiled.dynamic_array import write_floats
+from netsp.base.compiled.kernel import kernel
 
 MASS, VOLUME, GRAVITY, DENSITY = 13.5, 0.0134, 9.82, 1000.0
 

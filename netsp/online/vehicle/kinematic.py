@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from netsp.arrays import Floats
+from netsp.base.arrays import Floats
 
 TURN = math.radians(60.0)
 """Radians per second that a kinematic vehicle turns by at most."""

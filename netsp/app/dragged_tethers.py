@@ -1,0 +1,100 @@
+"""Taut tethers for the page: to the cursor, along the tour, in all classes of a goal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.geometry import polylines
+from netsp.hsignature import concatenate
+from netsp.hsignature.rays import crossings
+from netsp.model.problem import Problem
+from netsp.roadmap.tether_classes import TautTether, Tethers
+
+MOST_CLASSES = 30
+"""Classes of a goal that are shown."""
+
+
+class Cursor:
+    """Answers about one version of a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        That version.
+    path : array_like, shape (n, 3)
+        Of its tour; empty while there is none.
+    """
+
+    def __init__(self, problem: Problem, path: Any = ()) -> None:
+        self.problem = problem
+        self.tethers = Tethers(problem)
+        self._path: Floats = np.array(path, dtype=float).reshape(-1, 3)
+        self._along = polylines.along(self._path) if len(self._path) > 1 else np.zeros(0)
+
+    def follow(self, path: Any) -> None:
+        """Take another tour."""
+        self._path = np.array(path, dtype=float).reshape(-1, 3)
+        self._along = polylines.along(self._path) if len(self._path) > 1 else np.zeros(0)
+
+    @property
+    def shares(self) -> Floats:
+        """Of the tour's length, up to each point of its path."""
+        return self._along / self._along[-1] if len(self._along) else self._along
+
+    def share_at(self, place: Floats) -> float:
+        """The share of the tour's length at which it is nearest to a place (3,)."""
+        k = int(np.argmin(np.linalg.norm(self._path - place, axis=1)))
+        return float(self.shares[k])
+
+    def hover(self, x: float, y: float) -> dict[str, Any]:
+        """The taut tether to a place, in the class that it would have coming from the nearest point
+        of the tour; the shortest of all while there is no tour."""
+        word = None
+        if len(self._path) > 1:
+            a, b = self._path[:-1, :2], self._path[1:, :2]
+            step = b - a
+            size = np.maximum((step**2).sum(1), 1e-300)
+            share = np.clip(((np.array([x, y]) - a) * step).sum(1) / size, 0.0, 1.0)
+            near = a + share[:, None] * step
+            k = int(np.argmin(np.hypot(*(near - [x, y]).T)))
+            there = np.vstack([self._path[: k + 1, :2], near[k], [x, y]])
+            rays = self.problem.representative_points
+            word = concatenate((), crossings(there, rays))
+        found = self.tethers.to(x, y, word)
+        if found is None and word is not None:
+            found = self.tethers.to(x, y)
+        return {"x": x, "y": y} | (_told(found) if found else {"length": None})
+
+    def classes(self, goal: int) -> dict[str, Any]:
+        """The shortest classes of a goal, and how many there are."""
+        x, y, z = self.problem.goals[goal].position
+        every = self.tethers.classes(x, y, z)
+        return {"classes": [_told(t) for t in every[:MOST_CLASSES]], "count": len(every)}
+
+    def along(self, share: float) -> dict[str, Any]:
+        """The tether in the class that the tour has at a share of its length."""
+        if len(self._path) < 2:
+            return {"length": None}
+        s = min(max(share, 0.0), 1.0) * self._along[-1]
+        k = min(int(np.searchsorted(self._along, s, side="right")) - 1, len(self._path) - 2)
+        span = self._along[k + 1] - self._along[k]
+        f = (s - self._along[k]) / span if span else 0.0
+        place = (1.0 - f) * self._path[k] + f * self._path[k + 1]
+        walked = np.vstack([self._path[: k + 1], place])
+        word = concatenate((), crossings(walked[:, :2], self.problem.representative_points))
+        found = self.tethers.to(float(place[0]), float(place[1]), word, float(place[2]))
+        told = {
+            "x": float(place[0]), "y": float(place[1]), "z": float(place[2]), "share": share,
+            "base_z": float(self.problem.base[2]),
+        }  # fmt: skip
+        return told | (_told(found) if found else {"length": None})
+
+
+def _told(tether: TautTether) -> dict[str, Any]:
+    return {
+        "length": tether.length, "word": list(tether.word),
+        "path": [[float(x), float(y)] for x, y in tether.path[:, :2]],
+    }  # fmt: skip

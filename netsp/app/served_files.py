@@ -1,0 +1,342 @@
+"""Files that come in by the page and go out by it; none but these are touched."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any
+
+from netsp.base.errors import InputError, UnansweredError
+from netsp.model.problem import Problem
+from netsp.model.solution import Solution
+from netsp.model.validated import shown
+
+LONGEST_NAME = 200
+"""Bytes: file systems take 255, and what is not saved yet is kept under a longer one."""
+
+MOST_BYTES = 64 * 2**20
+"""Of a file that comes in."""
+
+MAPS = (
+    ".geojson", ".kml", ".kmz", ".gpkg", ".dxf", ".000", ".gpx", ".plan", ".waypoints", ".wpl",
+    ".fen", ".ral",
+)  # fmt: skip
+"""Sites in one file; shapefiles come in several, and images with a YAML beside them."""
+
+EXPORTS = {
+    "plan": "mission.plan", "wpl": "mission.waypoints", "cockpit": "mission.cmp",
+    "geojson": "tour.geojson", "kml": "tour.kml", "csv": "tour.csv",
+}  # fmt: skip
+"""What a tour can be written as, and the name that it is offered under."""
+
+
+def bare_name(name: str) -> str:
+    """The last part of a name, whatever the system it comes from.
+
+    Parameters
+    ----------
+    name : str
+        As given.
+
+    Returns
+    -------
+    str
+        Without folders.
+
+    Raises
+    ------
+    InputError
+        Nothing is left, it is hidden, cannot be printed, or is too long.
+    """
+    last = PurePosixPath(PureWindowsPath(name).name).name
+    if not last or last.startswith(".") or not last.isprintable():
+        raise InputError(f"file: expected a name, got {shown(name)}")
+    if len(last.encode()) > LONGEST_NAME:
+        raise InputError(
+            f"file: expected a name of at most {LONGEST_NAME} bytes, got {len(last.encode())}"
+        )
+    return last
+
+
+@dataclass(frozen=True)
+class ImportAnswers:
+    """Answers to what an import asks for.
+
+    Attributes
+    ----------
+    base
+        Latitude and longitude of the base, with a comma, in degrees.
+    tether
+        Length of the tether, metres.
+    radius
+        Radius of obstacles that are points, metres.
+    line_width
+        Width of open lines that are obstacles, metres.
+    crs
+        Coordinate system, as ``EPSG:32632`` or ``local``.
+    viewpoints
+        Viewpoints about each obstacle.
+    standoff
+        Distance of viewpoints from its surface, metres.
+    units
+        Unit of lengths in the file, as ``mm``.
+    """
+
+    base: str | None = None
+    tether: float | None = None
+    radius: float | None = None
+    line_width: float | None = None
+    crs: str | None = None
+    viewpoints: int | None = None
+    standoff: float | None = None
+    units: str | None = None
+
+    @classmethod
+    def parse(cls, given: Mapping[str, str]) -> ImportAnswers:
+        """Return the answers in the fields of a form; those without text are none.
+
+        Parameters
+        ----------
+        given : mapping
+            Name of a field to text; other names do not count.
+
+        Returns
+        -------
+        ImportAnswers
+            The answers.
+
+        Raises
+        ------
+        InputError
+            A field is no positive number.
+        """
+        said = {k: v.strip() for k, v in given.items() if v.strip()}
+        viewpoints = _positive(said, "viewpoints")
+        if viewpoints is not None and viewpoints != int(viewpoints):
+            raise InputError(f"viewpoints: expected a whole number, got {viewpoints:g}")
+        return cls(
+            base=said.get("base"), crs=said.get("crs"), units=said.get("units"),
+            viewpoints=None if viewpoints is None else int(viewpoints),
+            tether=_positive(said, "tether"), radius=_positive(said, "radius"),
+            line_width=_positive(said, "line_width"), standoff=_positive(said, "standoff"),
+        )  # fmt: skip
+
+
+def without_options(text: str) -> str:
+    """Return a message without its clauses about options of the command line.
+
+    Parameters
+    ----------
+    text : str
+        One line.
+
+    Returns
+    -------
+    str
+        One line.
+
+    Examples
+    --------
+    >>> without_options("no coordinate system; give it with --crs EPSG:4326, or --crs local")
+    'no coordinate system'
+    >>> without_options("1 open line (pier); expected a width (--line-width W), in metres")
+    '1 open line (pier); expected a width, in metres'
+    """
+    bare = re.sub(r"\s*\([^()]*--[a-z][^()]*\)", "", text)
+    bare = re.sub(r"(?<![\w-])--([a-z][a-z-]*):", lambda m: m[1].replace("-", " ") + ":", bare)
+    return re.sub(r"(;|,| or)\s[^;,]*--[a-z][^;]*", "", bare)
+
+
+def _positive(said: Mapping[str, str], field: str) -> float | None:
+    if field not in said:
+        return None
+    called = field.replace("_", " ")
+    try:
+        value = float(said[field])
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise InputError(f"{called}: expected a positive number, got {shown(said[field])}")
+    return value
+
+
+def imported(
+    name: str,
+    content: bytes,
+    tether_length: float | None = None,
+    answers: ImportAnswers | None = None,
+) -> tuple[dict[str, Any], list[str]]:
+    """The problem in a file: a problem file, or a map of a site (docs/sites.md).
+
+    Parameters
+    ----------
+    name : str
+        Of the file; its ending says what it is.
+    content : bytes
+        Of the file.
+    tether_length : float, optional
+        Taken where a map says none.
+    answers : ImportAnswers, optional
+        What the user says of a map.
+
+    Returns
+    -------
+    data : dict
+        As a problem file has it.
+    notes : list of str
+        What was repaired or left out.
+
+    Raises
+    ------
+    UnansweredError
+        A map lacks what the user may say.
+    InputError
+        Too large, of no kind that is read, or not valid.
+    """
+    last = bare_name(name)
+    ending = Path(last).suffix.lower()
+    if len(content) > MOST_BYTES:
+        raise InputError(f"{last}: {len(content)} bytes; expected at most {MOST_BYTES}")
+    notes: list[str] = []
+    with tempfile.TemporaryDirectory(prefix="netsp-") as folder:
+        file = Path(folder) / last
+        file.write_bytes(content)
+        try:
+            if ending == ".json" and not is_map(content):
+                problem = Problem.load(file)
+            elif ending in (*MAPS, ".json"):
+                problem = _site(file, notes, tether_length, answers or ImportAnswers())
+            else:
+                raise InputError(f"{last}: expected .json, {', '.join(MAPS)}")
+        except UnansweredError as error:  # the folder is ours and gone
+            whole, plain = (
+                [without_options(text.replace(f"{folder}/", "")) for text in texts]
+                for texts in (error.complaints, error.plain)
+            )
+            raise UnansweredError(whole, plain, error.asks) from None
+        except InputError as error:
+            raise InputError(without_options(str(error).replace(f"{folder}/", ""))) from None
+    said = [without_options(note.replace(f"{folder}/", "")) for note in notes]
+    return json.loads(problem.to_json()), said
+
+
+def _site(
+    file: Path, notes: list[str], tether_length: float | None, answers: ImportAnswers
+) -> Problem:
+    from netsp.exchange.maps.options import Looking, SiteOptions
+    from netsp.exchange.maps.projection import Projection
+    from netsp.exchange.maps.read_map import import_site
+    from netsp.roadmap.reachable_goals import UNREACHED, unreached_note, within_reach
+
+    about = Projection.parse(answers.base, name="base") if answers.base else None
+    asked = answers.viewpoints is not None and answers.standoff is not None
+    looking = Looking(answers.viewpoints or 1, answers.standoff or 0.0) if asked else None
+    options = SiteOptions(
+        tether=answers.tether, radius=answers.radius, line_width=answers.line_width,
+        crs=answers.crs, units=answers.units, looking=looking,
+    )  # fmt: skip
+    try:
+        found = import_site(file, about, options=options)
+    except UnansweredError as error:
+        if tether_length is None or "tether" not in error.asks:
+            raise
+        notes.append(f"{file.name}: has no tether length: {tether_length:g} m, as before")
+        found = import_site(file, about, options=replace(options, tether=tether_length))
+    problem = found.problem
+    assert problem.site is not None
+    in_table = set(problem.site.notes)
+    notes += [f"{file.name}: {note}" for note in found.notes if note not in in_table]
+    if found.viewpoints and problem.site.cropped is not None:
+        problem, why = within_reach(problem, found.viewpoints)
+        if why:
+            notes.append(f"{file.name}: {unreached_note(found.problem.goals, problem.goals)}")
+            problem = found.keeping(problem, UNREACHED).problem
+    return problem
+
+
+def import_warnings(problem: Problem) -> list[str]:
+    """Return warnings about a problem that was imported from a map, one line each.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem, perhaps edited since its import; a problem from no map has no warnings.
+    """
+    if problem.site is None:
+        return []
+    from netsp.exchange.maps.goal_depths import HEIGHTS_REMEDY, height_warning, surface_warning
+
+    remedy = "set one depth for all in the panel"
+    found = (surface_warning(problem, remedy), height_warning(problem, HEIGHTS_REMEDY))
+    return [text for text in found if text is not None]
+
+
+def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str, list[str]]:
+    """A tour as a mission file.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was solved.
+    solution : Solution
+        Its solution.
+    kind : str
+        One of `EXPORTS`.
+
+    Returns
+    -------
+    name : str
+        That it is offered under.
+    text : str
+        What `netsp export` writes.
+    notes : list of str
+        Notes and warnings of `netsp export`, one line each.
+
+    Raises
+    ------
+    InputError
+        An unknown kind, no origin; as of `netsp.exchange.missions.mission_files.export`.
+    """
+    from netsp.exchange.maps.goal_depths import surface_warning
+    from netsp.exchange.missions.export_margins import LEAST_CLEARANCE, LEAST_SLACK, warnings
+    from netsp.exchange.missions.export_notes import export_notes
+    from netsp.exchange.missions.mission_files import Settings, export
+
+    if kind not in EXPORTS:
+        raise InputError(f"export: expected one of {', '.join(EXPORTS)}, got {kind!r}")
+    if problem.origin is None and kind != "csv":
+        raise InputError(
+            "origin: netsp does not know where the base is on the earth; enter its latitude and "
+            "longitude in the panel"
+        )
+    with tempfile.TemporaryDirectory(prefix="netsp-") as folder:
+        file = Path(folder) / EXPORTS[kind]
+        points = export(problem, solution, file, kind)
+        said = export_notes(problem, points, kind, Settings())
+        surface = surface_warning(problem, "set one depth for all in the panel")
+        notes = [
+            *([surface] if surface is not None else []),
+            *warnings(problem, solution, points, LEAST_SLACK, LEAST_CLEARANCE),
+            *said.warnings, *said.notes,
+        ]  # fmt: skip
+        return file.name, file.read_text(encoding="utf-8"), notes
+
+
+def is_map(content: bytes) -> bool:
+    """Return whether a JSON file is a map (GeoJSON or a QGroundControl plan) instead of a problem.
+
+    Parameters
+    ----------
+    content : bytes
+        Contents of the file.
+    """
+    try:
+        data = json.loads(content.decode("utf-8-sig"))
+    except (ValueError, RecursionError):  # `Problem.load` says what is wrong
+        return False
+    return isinstance(data, dict) and ("type" in data or "fileType" in data)

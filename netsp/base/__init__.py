@@ -1,0 +1,2 @@
+"""Foundations that know nothing of tethers: errors, files, clocks, registries, compiled kernels,
+geometry."""

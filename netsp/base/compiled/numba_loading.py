@@ -1,0 +1,29 @@
+"""Callbacks that run once a kernel has loaded Numba; this module does not load it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+_waiting: list[Callable[[], None]] = []
+
+
+def when_numba_is_loaded(call: Callable[[], None]) -> None:
+    """Call a function once a kernel has loaded Numba, or at once if Numba is loaded already.
+
+    Parameters
+    ----------
+    call : callable
+        Function without arguments.
+    """
+    if "numba" in sys.modules:
+        call()
+    else:
+        _waiting.append(call)
+
+
+def on_numba_loaded() -> None:
+    """Run the registered callbacks; `netsp.base.compiled.kernel` calls this when it has loaded
+    Numba."""
+    while _waiting:
+        _waiting.pop(0)()

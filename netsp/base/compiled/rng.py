@@ -1,0 +1,58 @@
+"""The random numbers of the compiled loops.
+
+xorshift64* (Vigna 2016, "An experimental exploration of Marsaglia's xorshift generators,
+scrambled"), its state an array of one word, seeded from the solver's generator: the same on every
+version of numpy and numba, and a tenth of the price of a method call.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.compiled.interpretation import interprets
+from netsp.base.compiled.kernel import kernel
+
+UINT64_MASK = 2**64 - 1  # keeps the low 64 bits, as arithmetic with uint64 does
+
+
+def seeded(rng: np.random.Generator) -> npt.NDArray[np.uint64]:
+    """State of a generator, drawn from another."""
+    return np.array([rng.integers(1, 2**63)], dtype=np.uint64)
+
+
+@kernel
+def uniform(state: npt.NDArray[np.uint64]) -> float:
+    """A double in [0, 1)."""
+    x = state[0]
+    x ^= x >> np.uint64(12)
+    x ^= x << np.uint64(25)
+    x ^= x >> np.uint64(27)
+    state[0] = x
+    return np.float64((x * np.uint64(2685821657736338717)) >> np.uint64(11)) / 9007199254740992.0
+
+
+@interprets(uniform)
+def _uniform_by_integers(state: npt.NDArray[np.uint64]) -> float:
+    """Compute `uniform` with Python's integers, because NumPy warns when a product overflows."""
+    x = int(state[0])
+    x ^= x >> 12
+    x = (x ^ (x << 25)) & UINT64_MASK
+    x ^= x >> 27
+    state[0] = x
+    return ((x * 2685821657736338717 & UINT64_MASK) >> 11) / 9007199254740992.0
+
+
+@kernel
+def below(n: int, state: npt.NDArray[np.uint64]) -> int:
+    """A whole number in 0 … n - 1."""
+    return int(uniform(state) * n)
+
+
+@kernel
+def metropolis(rise: float, theta: float, state: npt.NDArray[np.uint64]) -> bool:
+    """Whether a change of cost is accepted: always if it falls, else with probability
+    exp(-rise / θ); equation (5) of 2017, (2) of 2016."""
+    return rise <= 0.0 or uniform(state) < math.exp(-rise / theta)

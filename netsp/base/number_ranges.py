@@ -1,0 +1,41 @@
+"""Checks of the numbers in policies and params."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields
+from numbers import Real
+from typing import Any
+
+from netsp.base.errors import InputError
+
+
+def check_not_negative(policy: Any) -> None:
+    """Raise InputError, which names the field, if a number of a policy is negative or NaN.
+
+    Parameters
+    ----------
+    policy : dataclass
+        The policy. Only fields that are declared as int or float are checked.
+    """
+    _check(policy, 0.0, "a number that is not negative")
+
+
+def check_positive(policy: Any) -> None:
+    """Raise InputError, which names the field, if a number of a policy is not positive.
+
+    Parameters
+    ----------
+    policy : dataclass
+        The policy. Only fields that are declared as int or float are checked.
+    """
+    _check(policy, math.nextafter(0.0, 1.0), "a positive number")
+
+
+def _check(policy: Any, least: float, expected: str) -> None:
+    for field in fields(policy):
+        if field.type in ("int", "float", int, float):
+            value = getattr(policy, field.name)
+            # also refuses NaN, for which every comparison is false
+            if not (isinstance(value, Real) and float(value) >= least):
+                raise InputError(f"{field.name}: expected {expected}, got {value!r}")

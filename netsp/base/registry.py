@@ -1,0 +1,204 @@
+"""Named things of one kind, ours and other packages': the doors of netsp.
+
+A package adds to a kind by an entry point in its `pyproject.toml`, and the name then works wherever
+ours do, in study files and on the command line too:
+
+    [project.entry-points."netsp.solvers"]
+    my-solver = "my_package:solve"
+
+Without a package, ``module:attribute`` itself is a name.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+import os
+import re
+import sys
+from collections.abc import Callable, Iterator, MutableMapping
+from contextlib import contextmanager
+from functools import cached_property
+from typing import Any, Generic, TypeVar
+
+from netsp.base.errors import InputError, NetspError, PluginError
+
+R = TypeVar("R")
+
+
+_WHERE = re.compile(r"[\w.]+:[\w.]+")
+"""``module:attribute``."""
+
+
+class Registry(MutableMapping[str, R], Generic[R]):
+    """Records by name, ours first, in order.
+
+    Parameters
+    ----------
+    kind : str
+        What messages call them.
+    group : str
+        Name of the entry points of other packages.
+    own : dict
+        Our records by name.
+    record : callable
+        Makes the record of another package's entry point from its name and ``module:attribute``.
+    """
+
+    def __init__(
+        self, kind: str, group: str, own: dict[str, R], record: Callable[[str, str], R]
+    ) -> None:
+        self.kind, self.group, self._own, self._record = kind, group, own, record
+
+    @cached_property
+    def _foreign(self) -> dict[str, R]:
+        """Of other packages; a name of ours cannot be taken."""
+        found = importlib.metadata.entry_points(group=self.group)
+        return {e.name: self._record(e.name, e.value) for e in found if e.name not in self._own}
+
+    def __getitem__(self, name: str) -> R:
+        if name in self._own:
+            return self._own[name]
+        return self._foreign[name]
+
+    def __setitem__(self, name: str, record: R) -> None:
+        self._own[name] = record
+
+    def __delitem__(self, name: str) -> None:
+        del self._own[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter({**self._own, **self._foreign})
+
+    def __len__(self) -> int:
+        return len({**self._own, **self._foreign})
+
+    def named(self, name: object) -> R:
+        """The record of a name.
+
+        Parameters
+        ----------
+        name : object
+            The name.
+
+        Returns
+        -------
+        object
+            The record.
+
+        Raises
+        ------
+        InputError
+            No record has that name; tells the choices.
+        """
+        if isinstance(name, str) and name not in self and _WHERE.fullmatch(name):
+            self._check_there(name)
+            return self._record(name, name)
+        if not isinstance(name, str) or name not in self:
+            raise InputError(
+                f"{self.kind}: unknown {name!r}; expected one of {', '.join(self)}, or "
+                "module:attribute of yours"
+            )
+        return self[name]
+
+    def _check_there(self, where: str) -> None:
+        """InputError unless ``module:attribute`` can be imported, also from the folder one is in,
+        where an installed command does not look for modules."""
+        module, _, attribute = where.partition(":")
+        if (here := os.getcwd()) not in sys.path and "" not in sys.path:
+            sys.path.append(here)
+        with foreign(f"{self.kind}: {where}: cannot be loaded"):
+            try:
+                _found(module, attribute)
+            except (ImportError, AttributeError) as error:
+                raise InputError(f"{self.kind}: {where}: cannot be loaded: {error}") from None
+
+
+def later(name: str, where: str) -> Callable[..., Any]:
+    """The record of kinds whose records are callables: loaded when first called.
+
+    Parameters
+    ----------
+    name : str
+        The name.
+    where : str
+        ``module:attribute``.
+
+    Returns
+    -------
+    callable
+        Calls what is there.
+    """
+    del name
+    return lambda *args, **more: load(where)(*args, **more)
+
+
+def load(where: str) -> Any:
+    """What ``module:attribute`` names.
+
+    Parameters
+    ----------
+    where : str
+        ``module:attribute``.
+
+    Returns
+    -------
+    Any
+        The attribute.
+
+    Raises
+    ------
+    InputError
+        It belongs to another package, and is not there.
+    PluginError
+        It belongs to another package, which fails on import.
+    """
+    module, _, attribute = where.partition(":")
+    if module.split(".")[0] == "netsp":
+        return _found(module, attribute)
+    with foreign(f"{where}: cannot be loaded"):
+        try:
+            return _found(module, attribute)
+        except (ImportError, AttributeError) as error:
+            raise InputError(f"{where}: cannot be loaded: {error}") from error
+
+
+def _found(module: str, attribute: str) -> Any:
+    out: Any = importlib.import_module(module)
+    for part in attribute.split("."):
+        out = getattr(out, part)
+    return out
+
+
+@contextmanager
+def foreign(what: str) -> Iterator[None]:
+    """Around a call of another package's code: errors of netsp, and Ctrl-C, pass.
+
+    Parameters
+    ----------
+    what : str
+        How messages begin.
+
+    Yields
+    ------
+    None
+        Once, to the call.
+
+    Raises
+    ------
+    PluginError
+        Whatever else was raised, an exit as well; the error itself is the cause.
+    """
+    try:
+        yield
+    except (NetspError, MemoryError, KeyboardInterrupt):
+        raise
+    except BaseException as error:
+        raise PluginError(f"{what}: {type(error).__name__}: {_text(error)}") from error
+
+
+def _text(error: BaseException) -> str:
+    try:
+        return str(error)
+    except Exception:
+        return "it cannot be shown"

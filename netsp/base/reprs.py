@@ -1,0 +1,46 @@
+"""What a notebook shows of our objects: the short text, and the picture below it.
+
+The pictures live in an upper layer (`netsp.view.pictures`); what has one names it, and it is loaded
+when it is asked for, so models and graphs stay free of Matplotlib.
+"""
+
+from __future__ import annotations
+
+import html
+from typing import Any, ClassVar
+
+from netsp.base.registry import load
+
+
+class Drawn:
+    """Something with a picture: `picture` names the function that draws it on an axes."""
+
+    picture: ClassVar[str]
+
+    def plot(self, ax: Any = None, **more: Any) -> Any:
+        """Draw it with Matplotlib.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; by default, axes of a new figure.
+        **more : Any
+            Options of the picture. A solution takes its `problem`, to draw the map underneath; the
+            tour alone is drawn without.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            What it is drawn on; `.figure` of it can be saved.
+
+        Examples
+        --------
+        >>> from netsp import Problem, solve
+        >>> problem = Problem(base=(0, 0), goals=[(3, 4)], tether_length=6)
+        >>> solve(problem).plot(problem=problem).figure.savefig("tour.png")  # doctest: +SKIP
+        """
+        return load(self.picture)(self, ax=ax, **more)
+
+    def _repr_html_(self) -> str:
+        picture = load("netsp.view.pictures.style:svg")(self.plot().figure, bbox_inches="tight")
+        return f"<p><code>{html.escape(repr(self))}</code></p>{picture}"

@@ -1,0 +1,182 @@
+"""The progress table and the closing summary that people read."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Protocol, TextIO
+
+from netsp.base.errors import counted
+from netsp.gtsp.travel.result import Progress
+from netsp.model.problem import Problem
+from netsp.model.solution import Solution, Status
+
+_HEADER = (
+    f"{'time':>7}  {'stage':<10} {'tour':>12} {'bound':>12} {'gap':>9} {'of':>11} {'cuts':>6} "
+    f"{'vertices':>8} {'legs':>9} {'iteration':>11}"
+)
+
+QUIET_S = 3.0
+"""Seconds of silence after which the table says what takes so long."""
+
+EVERY = 0.2
+"""Least seconds between two rows that bring nothing but a better bound."""
+
+
+class Named(Protocol):
+    """What is solved."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def summary(self) -> str:
+        """In a line."""
+
+
+class ProgressTable:
+    """Prints a row for every better tour and every new stage, and now and then for the bound."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream = stream
+        self._header = False
+        self._last: Progress | None = None
+        self._shown = 0.0
+        self._held: tuple[float, Progress] | None = None
+        self._begin = time.monotonic()
+        self._slow = ""
+        self._patience = threading.Timer(QUIET_S, self._explain)
+        self._patience.daemon = True
+
+    def begin(self, problem: Named, slow: str = "building the roadmap …") -> None:
+        """Announce the problem.
+
+        Parameters
+        ----------
+        slow
+            What is said if nothing else is for `QUIET_S` seconds.
+        """
+        self._slow = slow
+        self._begin = time.monotonic()
+        self._print(f"{problem.name}: {problem.summary}")
+        self._patience.start()
+
+    def _explain(self) -> None:
+        self._print(self._slow)
+
+    def __call__(self, row: Progress) -> None:
+        """Print a row of progress, if it tells anything new."""
+        news = (
+            self._last is None
+            or row.stage != self._last.stage
+            or row.incumbent != self._last.incumbent
+        )
+        # the solver's own time does not count the roadmap, which the summary does
+        now = time.monotonic()
+        if news or now - self._shown >= EVERY:
+            self._show(now - self._begin, row)
+        else:
+            self._held = now - self._begin, row
+
+    def __enter__(self) -> ProgressTable:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._patience.cancel()
+
+    def end(self) -> None:
+        """Print the last row if it was held back."""
+        if self._held is not None:
+            self._show(*self._held)
+
+    def _show(self, seconds: float, row: Progress) -> None:
+        self._patience.cancel()
+        if not self._header:
+            self._print(_HEADER)
+            self._header = True
+        tour = "-" if row.incumbent is None else f"{row.incumbent:.6g}"
+        bound = gap = of = "-"
+        if row.bound is not None and row.bound.length > 0.0:  # no tour is shorter than 0 anyway
+            bound, of = f"{row.bound.length:.6g}", row.bound.scope.column
+            if row.incumbent is not None:
+                gap = row.bound.percent(row.incumbent, 3)
+        self._print(
+            f"{seconds:>6.1f}s  {row.stage:<10} {tour:>12} {bound:>12} {gap:>9} {of:>11} "
+            f"{row.cuts or '-':>6} {row.vertices or '-':>8} {row.legs or '-':>9} "
+            f"{row.iteration:>11}"
+        )
+        self._last, self._held, self._shown = row, None, time.monotonic()
+
+    def _print(self, text: str) -> None:
+        print(text, file=self.stream, flush=True)
+
+
+def summary(
+    problem: Problem,
+    solution: Solution,
+    output: str | None = None,
+    picture: str | None = None,
+    trace: str | None = None,
+) -> str:
+    """What was found, in a few lines."""
+    t = solution.timings
+    times = (
+        f"roadmap {t.roadmap_s:.2f} s, legs {t.matrix_s:.2f} s, solver {t.solve_s:.2f} s, "
+        f"total {t.total_s:.2f} s"
+    )
+    if solution.status is Status.INFEASIBLE:
+        return f"there is no tour ({times})"
+    if solution.length is None:
+        return (
+            f"no tour found by {solution.solver} ({times}); give it more time or more iterations, "
+            "or choose another --solver"
+        )
+    verdict = solution.proof
+    if solution.status is Status.INVALID:
+        verdict = "INVALID: the solver is blind to the tether"
+    elif solution.bound is not None and solution.lower_bound:
+        if not solution.status.is_optimal:
+            verdict = solution.bound.says(solution.length, problem.units)
+        elif not solution.bound.proves(solution.length):
+            said = solution.bound.says(solution.length, problem.units)
+            verdict = f"{solution.status.verdict}; {said}"
+    names = [problem.goal_name(v.goal) for v in solution.tour]
+    if solution.classes == "shortest" and solution.status is not Status.OPTIMAL_OF_KEPT:
+        verdict += "; not all classes were kept"
+    longest = max((v.tether_length for v in solution.tour), default=0.0)
+    wrapped = ", ".join(problem.obstacle_name(k) for k in solution.entangled)
+    lines = [
+        f"tour     {solution.length:.6f} {problem.units}, {verdict}",
+        f"order    base → {' → '.join(names)} → base",
+        f"tether   longest {longest:.6g} of {problem.tether_length:g} {problem.units}",
+        f"time     {times}",
+    ]
+    if solution.entangled:
+        lines.insert(1, f"wraps    {len(solution.entangled)} obstacles: {wrapped}")
+    if solution.legs_left_out:
+        lines.insert(1, _left_out(problem, solution))
+    if output:
+        lines.append(f"solution {output}")
+    if picture:
+        lines.append(f"picture  {picture}")
+    if trace:
+        lines.append(f"trace    {trace}")
+    return "\n".join(lines)
+
+
+MAX_NAMED_LEGS = 3
+"""Legs left out that the summary names; of more it says how many."""
+
+
+def _left_out(problem: Problem, solution: Solution) -> str:
+    """Return the line that says which legs were left out."""
+    legs = [
+        f"{problem.goal_name(a)} to {problem.goal_name(b)}" for a, b in solution.legs_left_out
+    ]  # fmt: skip
+    more = f" and {len(legs) - MAX_NAMED_LEGS} more" if len(legs) > MAX_NAMED_LEGS else ""
+    named = ", ".join(legs[:MAX_NAMED_LEGS]) + more
+    return (
+        f"left out {counted(len(legs), 'leg')} whose taut path was not found ({named}); the bound "
+        "holds for tours along them, too"
+    )

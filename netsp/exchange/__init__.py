@@ -1,0 +1,1 @@
+"""Maps in, missions out."""

@@ -1,0 +1,265 @@
+"""Depths of a chart: areas that are too shallow, and the features that shape the sea floor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.base.geometry.polygons import union
+from netsp.exchange.maps.chart_classes import (
+    CONTOURS,
+    DEPTH_AREAS,
+    LAND,
+    SOUNDINGS,
+    UNSURVEYED,
+    contour_depth,
+    depth_range,
+    is_covered,
+    sounding_depth,
+)
+from netsp.exchange.maps.feature import Feature
+from netsp.exchange.maps.options import FLOOR_CELLS
+from netsp.exchange.maps.sea_floor import Danger, DepthArea, SeaFloor, sea_floor
+
+if TYPE_CHECKING:
+    import shapely
+
+    from netsp.exchange.maps.crop import CropWindow
+
+
+def shallow_areas(features: Sequence[Feature], draught: float) -> list[Feature]:
+    """Return the areas of a chart that may be shallower than a draught.
+
+    Parameters
+    ----------
+    features : sequence of Feature
+        Those of the chart.
+    draught : float
+        Depth that is needed, metres.
+
+    Returns
+    -------
+    list of Feature
+        Depth areas and dredged areas whose least depth is less or not given, and areas that nobody
+        has surveyed.
+    """
+    out = []
+    for feature in features:
+        layer = feature.layer.upper()
+        if "Polygon" not in feature.shape.geom_type:
+            continue
+        least, _ = depth_range(feature)
+        if layer == UNSURVEYED or (layer in DEPTH_AREAS and (least is None or least < draught)):
+            out.append(feature)
+    return out
+
+
+def shoal_soundings(
+    features: Sequence[Feature], draught: float, shallow: Sequence[Feature]
+) -> list[Feature]:
+    """Return the soundings of a chart that are shallower than a draught.
+
+    Parameters
+    ----------
+    features : sequence of Feature
+        Those of the chart.
+    draught : float
+        Depth that is needed, metres.
+    shallow : sequence of Feature
+        Areas that are obstacles already; soundings within them are skipped.
+
+    Returns
+    -------
+    list of Feature
+        Features of class SOUNDG, reduced to their shoal soundings.
+    """
+    import shapely
+
+    tree = shapely.STRtree([area.shape for area in shallow])
+    out = []
+    for feature in features:
+        if feature.layer.upper() != SOUNDINGS or not feature.shape.has_z:
+            continue
+        places = shapely.get_coordinates(feature.shape, include_z=True)
+        places = places[-places[:, 2] < draught]
+        held, _ = tree.query(shapely.points(places[:, :2]), predicate="intersects")
+        open_ones = np.delete(places, held, axis=0)
+        if len(open_ones):
+            out.append(replace(feature, shape=shapely.MultiPoint(open_ones[:, :2])))
+    return out
+
+
+def uncharted_share(
+    features: Sequence[Feature], plane: Callable[[shapely.Geometry], Any], window: CropWindow
+) -> float:
+    """Return the share of a window that the chart does not cover.
+
+    Parameters
+    ----------
+    features : sequence of Feature
+        Those of the chart.
+    plane : callable
+        Projects a shape to the problem's plane.
+    window : CropWindow
+        What the tether reaches.
+
+    Returns
+    -------
+    float
+        Between 0 and 1; 0 where the chart does not say what it covers.
+    """
+    covered = [plane(feature.shape) for feature in features if is_covered(feature)]
+    return _share_beyond(covered, window) if covered else 0.0
+
+
+def depthless_share(
+    features: Sequence[Feature], plane: Callable[[shapely.Geometry], Any], window: CropWindow
+) -> float:
+    """Return the share of a window without land, depth area, dredged or unsurveyed area.
+
+    Parameters
+    ----------
+    features : sequence of Feature
+        Those of the chart.
+    plane : callable
+        Projects a shape to the problem's plane.
+    window : CropWindow
+        What the tether reaches.
+
+    Returns
+    -------
+    float
+        Between 0 and 1.
+    """
+    classes = (*DEPTH_AREAS, LAND, UNSURVEYED)
+    areas = [
+        plane(feature.shape)
+        for feature in features
+        if feature.layer.upper() in classes and "Polygon" in feature.shape.geom_type
+    ]
+    return _share_beyond(areas, window)
+
+
+def _share_beyond(areas: Sequence[shapely.Geometry], window: CropWindow) -> float:
+    import shapely
+
+    circle = window.polygon
+    near = [shapely.make_valid(area) for area in areas if not window.is_beyond(area)]
+    return float(circle.difference(union(near)).area / circle.area)
+
+
+@dataclass
+class FloorFeatures:
+    """Features of a chart that shape its sea floor.
+
+    Attributes
+    ----------
+    used
+        Features within the window.
+    beyond
+        Features beyond it.
+    depthless
+        Contours and soundings for which the chart gives no depth.
+    """
+
+    used: list[Feature] = field(default_factory=list)
+    beyond: list[Feature] = field(default_factory=list)
+    depthless: list[Feature] = field(default_factory=list)
+
+
+def chart_floor(
+    features: Sequence[Feature], plane: Callable[[shapely.Geometry], Any],
+    window: CropWindow | None, cell: float | None,
+) -> tuple[SeaFloor, FloorFeatures]:  # fmt: skip
+    """Return the sea floor of a chart, and the features that it is made of.
+
+    Parameters
+    ----------
+    features : sequence of Feature
+        Those of the chart.
+    plane : callable
+        Projects a shape to the problem's plane.
+    window : CropWindow or None
+        What the floor is to hold; None holds all depth areas.
+    cell : float or None
+        Side of its cells, metres; None takes `FLOOR_CELLS` along a side.
+
+    Returns
+    -------
+    floor : SeaFloor
+        Heights below the chart's datum.
+    found : FloorFeatures
+        What it is made of.
+
+    Raises
+    ------
+    InputError
+        The chart gives no depth there, or the cells are too small.
+    """
+    found = FloorFeatures()
+    areas: list[DepthArea] = []
+    contours: list[Floats] = [np.empty((0, 3))]
+    soundings: list[Floats] = [np.empty((0, 3))]
+    dangers: list[Danger] = []
+    land: list[Any] = []
+    for feature in features:
+        layer = feature.layer.upper()
+        is_area = "Polygon" in feature.shape.geom_type
+        top = sounding_depth(feature)
+        is_depth = layer in (SOUNDINGS, CONTOURS) or (layer in DEPTH_AREAS and is_area)
+        if not is_depth and top is None and not (layer == LAND and is_area):
+            continue
+        shape = plane(feature.shape)
+        if window is not None and window.is_beyond(shape):
+            if is_depth or top is not None:
+                found.beyond.append(feature)
+            continue
+        if layer == LAND:
+            land.append(shape)
+            continue
+        if layer in DEPTH_AREAS:
+            areas.append(DepthArea(shape, *depth_range(feature)))
+        elif top is not None and not is_depth:
+            dangers.append(Danger(shape, top))
+        else:
+            places = _depths(feature, shape)
+            if places is None:
+                found.depthless.append(feature)
+                continue
+            (soundings if layer == SOUNDINGS else contours).append(places)
+        found.used.append(feature)
+    if window is not None:
+        (x, y), r = window.center, window.radius
+        box = (x - r, y - r, x + r, y + r)
+    else:
+        if not areas:
+            raise InputError("floor: the chart has no area with depths")
+        corners = np.array([a.shape.bounds for a in areas])
+        low, high = corners[:, :2].min(axis=0), corners[:, 2:].max(axis=0)
+        box = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+    side = cell if cell is not None else max(box[2] - box[0], box[3] - box[1]) / FLOOR_CELLS
+    floor = sea_floor(
+        areas, np.vstack(contours), land, box, side, soundings=np.vstack(soundings),
+        dangers=dangers,
+    )  # fmt: skip
+    return floor, found
+
+
+def _depths(feature: Feature, shape: shapely.Geometry) -> Floats | None:
+    """Return x, y and depth of a feature's soundings or corners; None where it gives no depth."""
+    import shapely
+
+    places = shapely.get_coordinates(shape)
+    if feature.layer.upper() == CONTOURS:
+        depth = contour_depth(feature)
+        if depth is None:
+            return None
+        return np.column_stack([places, np.full(len(places), depth)])
+    depths = 0.0 - shapely.get_coordinates(feature.shape, include_z=True)[:, 2]
+    known = np.isfinite(depths)
+    return np.column_stack([places, depths])[known] if known.any() else None

@@ -1,0 +1,351 @@
+"""Occupancy images, as ROS's map server writes them: a picture of cells, and a few lines of YAML.
+
+A pixel's value v becomes the probability p = (255 - v) / 255 that its cell is occupied (v / 255 if
+`negate`); above `occupied_thresh` it is, below `free_thresh` it is free, between it is unknown.
+In the mode "trinary" an alpha channel is averaged in as if it were a colour, in the mode "scale" a
+cell that is not opaque is unknown (docs.ros.org, nav2_map_server, `MapMode`).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, ValidationError
+
+from netsp.base.arrays import Bools, Floats
+from netsp.base.errors import InputError, counted
+from netsp.base.files import check_file, read_text
+from netsp.exchange.maps.drawn_shapes import simple_polygons
+from netsp.model.field_types import Number, Positive
+from netsp.model.problem import Problem
+from netsp.model.validated import Model, explain, shown
+
+if TYPE_CHECKING:
+    import shapely
+
+IMAGES = (".png", ".pgm")
+FILES = (".yaml", ".yml")
+
+MODES = ("1", "L", "LA", "P", "RGB", "RGBA", "I", "I;16", "I;16B", "I;16L")
+"""Of Pillow: those whose values are known to run from black to white."""
+
+MOST_PIECES = 20_000
+"""Of occupied cells that hang together: more are noise, among which nobody plans."""
+
+MOST_CELLS = 100_000_000
+"""Of an image: 10 km by 10 km at a metre."""
+
+GROWN, SIMPLIFIED = 0.55, (0.45, 0.3, 0.15, 0.0)
+"""Of the tolerance: outlines are grown by the first and then simplified by one of the others, so
+that they hold every occupied cell and go no farther beyond than the tolerance. That is checked:
+what simplifies polygons may move the start of a ring by more than it is told, or make it cross
+itself."""
+
+
+class MapFile(Model):
+    """What the YAML file of a map says; other fields are passed over."""
+
+    image: Annotated[str, Field(description="file of the image, beside this file")]
+    resolution: Annotated[Positive, Field(description="size of a cell, m")]
+    origin: Annotated[
+        tuple[Number, Number, Number],
+        Field(description="x, y (m) of the lower left corner, and its rotation (radians)"),
+    ] = (0.0, 0.0, 0.0)
+    mode: Annotated[
+        Literal["trinary", "scale"], Field(description="meaning of values and of transparency")
+    ] = "trinary"
+    negate: Annotated[Literal[0, 1], Field(description="whether white is occupied")] = 0
+    occupied_thresh: Annotated[
+        Number, Field(description="probability from which a cell is occupied", ge=0, le=1)
+    ] = 0.65
+    free_thresh: Annotated[
+        Number, Field(description="probability up to which it is free", ge=0, le=1)
+    ] = 0.196
+
+
+def read_occupancy(
+    file: str | Path,
+    base: Sequence[float],
+    goals: Sequence[Any],
+    tether: float,
+    *,
+    clearance: float = 0.0,
+    resolution: float | None = None,
+    tolerance: float | None = None,
+    unknown_is_free: bool = False,
+    name: str | None = None,
+    on_note: Callable[[str], None] | None = None,
+) -> Problem:
+    """The problem of an occupancy image, in metres of the map's own coordinates.
+
+    Parameters
+    ----------
+    file : str or Path
+        YAML file of the map, or its image (PNG, PGM) with a resolution.
+    base : (x, y) or (x, y, z)
+        Of the tether.
+    goals : sequence
+        As a problem has them.
+    tether : float
+        Length, metres.
+    clearance : float
+        Kept from obstacles, metres.
+    resolution : float, optional
+        Size of a cell, metres, where there is no YAML file; the lower left corner is then (0, 0).
+    tolerance : float, optional
+        Obstacles hold all occupied cells, and go no farther beyond them; default: a cell.
+    unknown_is_free : bool
+        What cells are that the map does not know; default: obstacles.
+    name : str, optional
+        Of the problem; default: the file's.
+    on_note : callable, optional
+        Called with what was assumed, one line each.
+
+    Returns
+    -------
+    Problem
+        Its obstacles are simple polygons, its bounds the image.
+
+    Raises
+    ------
+    InputError
+        Not readable, too large, or not a problem.
+    """
+    said, image = _opened(file, resolution)
+    cell = said.resolution
+    slack = cell if tolerance is None else tolerance
+    if not slack >= 0.1 * cell:
+        raise InputError(
+            f"--tolerance: expected at least a tenth of the cell of {cell:g} m, got {slack:g}"
+        )
+    values, alpha = _values(image)
+    note = on_note or (lambda text: None)
+    occupied, unknown = _kinds(values, alpha, said)
+    if alpha is not None:
+        clear = counted(int((alpha < 255.0).sum()), "cell")
+        note(
+            f"{clear} not opaque: unknown, as map_server reads the mode scale"
+            if said.mode == "scale"
+            else f"its alpha channel is averaged in, as map_server reads the mode trinary; {clear} "
+            "not opaque"
+        )
+    if unknown.any():
+        taken = "free" if unknown_is_free else "obstacles"
+        note(f"{counted(int(unknown.sum()), 'cell')} that the map does not know: taken as {taken}")
+        if not unknown_is_free:
+            occupied = occupied | unknown
+    points = [base, *(_place(g) for g in goals)]
+    polygons, told = _polygons(occupied, said, slack, points)
+    for text in told:
+        note(text)
+    rows, columns = values.shape
+    corners = [(0.0, 0.0), (columns, 0.0), (columns, rows), (0.0, rows)]
+    outline = [_apply(_placing(said, 0), c, r) for c, r in corners]
+    straight = said.origin[2] == 0.0
+    try:
+        return Problem.model_validate({
+            "name": name or Path(file).stem, "base": tuple(base), "goals": list(goals),
+            "tether_length": tether, "clearance": clearance, "units": "m",
+            "obstacles": [
+                {"polygon": _corners(p), "name": f"W{k}"} for k, p in enumerate(polygons, 1)
+            ],
+            "bounds": [*outline[0], *outline[2]] if straight else outline,
+        })  # fmt: skip
+    except ValidationError as error:
+        raise InputError(f"{file}: {explain(error)}") from None
+
+
+def _place(goal: Any) -> Any:
+    return goal.get("position") if isinstance(goal, dict) else getattr(goal, "position", goal)
+
+
+def _opened(file: str | Path, resolution: float | None) -> tuple[MapFile, Path]:
+    """What is said of the map, and where its image is."""
+    path = Path(file)
+    if path.suffix.lower() in IMAGES:
+        if resolution is None:
+            raise InputError(f"{file}: an image alone; expected --resolution (m) or its YAML file")
+        return MapFile(image=path.name, resolution=resolution), path
+    if resolution is not None:
+        raise InputError(f"--resolution: {file} has one; expected it with an image alone")
+    try:
+        import yaml
+    except ImportError:
+        raise InputError("maps in YAML need PyYAML: pip install 'netsp[geo]'") from None
+    try:
+        # all scalars as text: what other fields hold does not matter, and 5e-2 is a number here
+        data = yaml.load(read_text(path), Loader=yaml.BaseLoader)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"{file}: not YAML: {reason[:200]}") from None
+    if not isinstance(data, dict):
+        raise InputError(f"{file}: expected image, resolution, origin, … as fields")
+    if data.get("mode", "trinary") not in ("trinary", "scale", "raw"):
+        raise InputError(f"{file}: mode: expected trinary or scale, got {shown(data['mode'])}")
+    if data.get("mode") == "raw":
+        raise InputError(f"{file}: mode: expected trinary or scale, got 'raw'")
+    own = {
+        k: v if k in ("image", "mode") else _numbers(v)
+        for k, v in data.items() if k in MapFile.model_fields
+    }  # fmt: skip
+    try:
+        said = MapFile.model_validate(own)
+    except ValidationError as error:
+        raise InputError(f"{file}: {explain(error)}") from None
+    if not said.free_thresh < said.occupied_thresh:
+        raise InputError(
+            f"{file}: free_thresh: expected less than occupied_thresh {said.occupied_thresh:g}, "
+            f"got {said.free_thresh:g}"
+        )
+    return said, path.parent / said.image
+
+
+def _numbers(value: Any) -> Any:
+    """Text as numbers, where it is some; yes and no as 1 and 0."""
+    if isinstance(value, list):
+        return [_numbers(v) for v in value]
+    if isinstance(value, str) and value.lower() in ("true", "false", "yes", "no"):
+        return int(value.lower() in ("true", "yes"))
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        return value
+    return int(number) if number in (0.0, 1.0) else number
+
+
+def _rasterio() -> Any:
+    try:
+        import rasterio
+        import rasterio.features
+    except ImportError:
+        raise InputError("occupancy images need rasterio: pip install 'netsp[geo]'") from None
+    return rasterio
+
+
+def _values(image: Path) -> tuple[Floats, Floats | None]:
+    """Return the means of the colours, (rows, columns) from 0 (black) to 255, the first row at the
+    top, and how opaque each cell is, from 0 to 255; None where all are."""
+    check_file(image)
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            with Image.open(image, formats=("PNG", "PPM")) as opened:
+                columns, rows = opened.size
+                if columns * rows > MOST_CELLS:
+                    raise InputError(
+                        f"{image}: {columns} x {rows} cells; expected at most {MOST_CELLS:g} in all"
+                    )
+                if opened.mode not in MODES:
+                    raise InputError(
+                        f"{image}: pixels of kind {opened.mode!r}; expected grey or colours of 8 "
+                        "or 16 bits"
+                    )
+                if "transparency" in opened.info and opened.mode in ("1", "L", "P", "RGB"):
+                    values = np.asarray(opened.convert("RGBA"))
+                elif opened.mode == "P":
+                    values = np.asarray(opened.convert("RGB"))
+                else:
+                    values = np.asarray(opened)
+    except (UnidentifiedImageError, Image.DecompressionBombError):
+        raise InputError(f"{image}: not an image; expected PNG or PGM") from None
+    except (OSError, ValueError, SyntaxError) as error:
+        raise InputError(f"{image}: not a whole image: {shown(str(error))}") from None
+    if values.dtype == bool:
+        return np.where(values, 255.0, 0.0), None
+    # pictures of 16 bits are opened as whole numbers of 32
+    largest = 255.0 if values.dtype == np.uint8 else 65535.0
+    alpha = None
+    if values.ndim == 3:  # the last of two or four channels is how opaque they are
+        if values.shape[2] in (2, 4):
+            alpha = values[:, :, -1].astype(float)
+        values = values[:, :, : 3 if values.shape[2] >= 3 else 1].mean(axis=2)
+    return np.asarray(values * (255.0 / largest)), alpha
+
+
+def _kinds(values: Floats, alpha: Floats | None, said: MapFile) -> tuple[Bools, Bools]:
+    """Return which cells are occupied, and which unknown."""
+    if alpha is not None and said.mode == "trinary":
+        values = (3.0 * values + alpha) / 4.0  # a grey is three equal colours
+    p = values / 255.0 if said.negate else 1.0 - values / 255.0
+    occupied = p > said.occupied_thresh
+    unknown = ~occupied & (p >= said.free_thresh)
+    if alpha is not None and said.mode == "scale":
+        clear = alpha < 255.0
+        occupied, unknown = occupied & ~clear, unknown | clear
+    return occupied, unknown
+
+
+def _placing(said: MapFile, rows: int) -> tuple[float, ...]:
+    """The affine map (a, b, c, d, e, f) from (column, row) to x = a column + b row + c, y = …;
+    rows count upwards from the lower left corner, or, with so many rows, downwards."""
+    size, (x, y, turn) = said.resolution, said.origin
+    right = size * np.array([math.cos(turn), math.sin(turn)])
+    up = size * np.array([-math.sin(turn), math.cos(turn)])
+    if not rows:
+        return (right[0], up[0], x, right[1], up[1], y)
+    top = np.array([x, y]) + rows * up
+    return (right[0], -up[0], top[0], right[1], -up[1], top[1])
+
+
+def _apply(m: tuple[float, ...], column: float, row: float) -> tuple[float, float]:
+    return (
+        float(m[0] * column + m[1] * row + m[2]),
+        float(m[3] * column + m[4] * row + m[5]),
+    )
+
+
+def _polygons(
+    occupied: Bools, said: MapFile, tolerance: float, points: Sequence[Any]
+) -> tuple[list[shapely.Polygon], list[str]]:
+    """Simple polygons about the occupied cells, and what is to be said of them."""
+    import shapely
+
+    rasterio = _rasterio()
+    cells = [
+        shapely.geometry.shape(shape)
+        for shape, _ in rasterio.features.shapes(
+            occupied.astype(np.uint8), mask=occupied, connectivity=4,
+            transform=rasterio.Affine(*_placing(said, len(occupied))),
+        )
+    ]  # fmt: skip
+    if not cells:
+        return [], []
+    if len(cells) > MOST_PIECES:
+        raise InputError(
+            f"{said.image}: {len(cells):,} separate pieces of obstacles; expected at most "
+            f"{MOST_PIECES:,}: a map without noise"
+        )
+    exact = shapely.union_all(cells)
+    grown = exact.buffer(GROWN * tolerance, quad_segs=4)
+    parts = list(getattr(grown, "geoms", [grown]))
+    own = shapely.STRtree(cells)
+    outlines = shapely.union_all([
+        _simplified(p, shapely.union_all([cells[k] for k in own.query(p, "intersects")]), tolerance)
+        for p in parts
+    ])  # fmt: skip
+    free = [shapely.Point(float(p[0]), float(p[1])) for p in points]
+    return simple_polygons(outlines, lambda hole: any(hole.contains(p) for p in free))
+
+
+def _simplified(
+    grown: shapely.Polygon, cells: shapely.Geometry, tolerance: float
+) -> shapely.Geometry:
+    """An outline with fewer corners that holds its cells and goes no farther than the tolerance."""
+    most = cells.buffer(tolerance, quad_segs=16)
+    for share, whole in itertools.product(SIMPLIFIED, (False, True)):
+        out = grown.simplify(share * tolerance, preserve_topology=whole)
+        if out.geom_type == "Polygon" and out.is_valid and out.covers(cells) and most.covers(out):
+            return out
+    return grown
+
+
+def _corners(polygon: shapely.Polygon) -> list[tuple[float, float]]:
+    return [(float(x), float(y)) for x, y in polygon.exterior.coords[:-1]]

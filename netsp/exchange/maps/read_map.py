@@ -1,0 +1,1392 @@
+"""Import of a problem from a map, by the contract of docs/sites.md.
+
+All complaints are collected and raised together. Every feature of the map ends in the ledger: used
+as one kind, or left out for a reason.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from pydantic import ValidationError
+
+from netsp.base import progress
+from netsp.base.axes import UNITS, column
+from netsp.base.errors import InputError, UnansweredError, counted
+from netsp.base.geometry.polygons import union
+from netsp.exchange.maps.chart_classes import (
+    DEPTH_AREAS,
+    EQUIPMENT,
+    SOUNDINGS,
+    UNSURVEYED,
+    chart_radius,
+    chart_width,
+    depth_range,
+    lone_equipment,
+    sounding_depth,
+)
+from netsp.exchange.maps.chart_depths import (
+    chart_floor,
+    depthless_share,
+    shallow_areas,
+    shoal_soundings,
+    uncharted_share,
+)
+from netsp.exchange.maps.chart_reader import is_chart, read_chart
+from netsp.exchange.maps.contract import (
+    FIELDS,
+    RADIUS,
+    SHAPE_LAYERS,
+    WIDTH,
+    Decision,
+    is_coastline,
+    kind_of,
+    words_of,
+)
+from netsp.exchange.maps.crop import CropWindow, cropped
+from netsp.exchange.maps.csv_table import from_table
+from netsp.exchange.maps.drawing import read_dxf
+from netsp.exchange.maps.drawn_shapes import outline_of, simple_polygons, spurs_of
+from netsp.exchange.maps.feature import Feature, Map
+from netsp.exchange.maps.fence_list import read_fence_list, read_rally_list
+from netsp.exchange.maps.geojson import read_geojson, read_geojson_sequence
+from netsp.exchange.maps.gpx import read_gpx_map
+from netsp.exchange.maps.kml_pages import read_kml
+from netsp.exchange.maps.ledger import Ledger
+from netsp.exchange.maps.line_work import is_land, lines_of, outlines, widened
+from netsp.exchange.maps.options import SiteOptions
+from netsp.exchange.maps.projection import Projection
+from netsp.exchange.maps.qgc_plan import is_plan, read_plan
+from netsp.exchange.maps.sea_floor import SeaFloor
+from netsp.exchange.maps.vector import in_degrees, read_vector
+from netsp.exchange.maps.waypoint_list import is_waypoint_list, read_waypoint_list
+from netsp.model.field_types import checked_number
+from netsp.model.import_record import KIND_COLUMNS, MAX_NAMED, CropCircle, Site, UsedAs
+from netsp.model.problem import Problem
+from netsp.model.validated import explain, shown
+
+if TYPE_CHECKING:
+    import shapely
+
+SEQUENCE_SUFFIXES = (".geojsonl", ".geojsons", ".geojsonseq", ".ndjson", ".ndgeojson", ".jsonl")
+"""Extensions of sequences of GeoJSON texts."""
+
+EARTH_READERS = {
+    ".plan": read_plan, ".waypoints": read_waypoint_list, ".wpl": read_waypoint_list,
+    ".gpx": read_gpx_map, ".fen": read_fence_list, ".ral": read_rally_list,
+}  # fmt: skip
+"""Readers of formats that are in degrees always, by extension."""
+
+MAX_LISTED = 20
+"""Properties that a message lists."""
+
+MAX_NAME = 200
+"""Characters of a file's name that a problem keeps."""
+
+
+@dataclass(frozen=True)
+class ImportedSite:
+    """Problem of a map, with what was left out of it.
+
+    Attributes
+    ----------
+    problem
+        The problem; its `site` records what became of every feature.
+    left_out
+        Shapes of the features that were left out, in the problem's plane, for the picture.
+    notes
+        What was assumed, changed or left out, one line each.
+    viewpoints
+        Names of the goals that stand for obstacles to be looked at.
+    floor
+        The sea floor, where one was asked for.
+    goal_features
+        Feature of each goal of the problem; None for viewpoints about obstacles.
+    """
+
+    problem: Problem
+    left_out: tuple[shapely.Geometry, ...]
+    notes: tuple[str, ...]
+    viewpoints: frozenset[str] = frozenset()
+    floor: SeaFloor | None = None
+    goal_features: tuple[Feature | None, ...] = ()
+
+    def keeping(self, problem: Problem, reason: str) -> ImportedSite:
+        """Return the import with fewer goals; features without a remaining goal count as left out.
+
+        Parameters
+        ----------
+        problem : Problem
+            The same problem with some of its goals, in their order.
+        reason : str
+            Why the others are left out.
+
+        Returns
+        -------
+        ImportedSite
+            Its record counts these features as left out.
+        """
+        import shapely
+
+        kept, staying, lost = 0, set(), {}
+        shapes: list[shapely.Geometry] = []
+        for goal, feature in zip(self.problem.goals, self.goal_features, strict=True):
+            left = problem.goals[kept] if kept < len(problem.goals) else None
+            if left is not None and (left.name, left.position[:2]) == (
+                goal.name, goal.position[:2],
+            ):  # fmt: skip
+                kept += 1
+                staying.add("" if feature is None else feature.where)
+                continue
+            shapes.append(shapely.Point(goal.position[:2]))
+            if feature is not None:
+                lost[feature.where] = feature.layer
+        assert problem.site is not None
+        layers = tuple(
+            layer.without_goals([w for w in lost if w not in staying and lost[w] == layer.layer],
+                                reason)
+            for layer in problem.site.imported
+        )  # fmt: skip
+        site = problem.site.model_copy(update={"imported": layers})
+        problem = problem.model_copy(update={"site": site})
+        return replace(self, problem=problem, left_out=(*self.left_out, *shapes))
+
+
+def import_site(
+    file: str | Path, projection: Projection | None = None, *, options: SiteOptions | None = None,
+    name: str | None = None,
+) -> ImportedSite:  # fmt: skip
+    """Import the problem of a map, in metres from its base, y to the projection's heading.
+
+    Parameters
+    ----------
+    file : str or Path
+        GeoJSON, GPX, .plan, .waypoints, KML, KMZ, shapefile, GeoPackage, DXF, S-57, or what else
+        GDAL reads.
+    projection : Projection, optional
+        About the base; None takes the map's own base, y to its heading or to the north.
+    options : SiteOptions, optional
+        What the user says of the map.
+    name : str, optional
+        Name of the problem; default: the file's.
+
+    Returns
+    -------
+    ImportedSite
+        The problem; where the map has a place on the earth, with its origin.
+
+    Raises
+    ------
+    InputError
+        Not readable, or not a site: `SeveralErrors` where more than one thing is wrong.
+    """
+    said = options or SiteOptions()
+    if said.units is not None and said.units not in UNITS:
+        raise InputError(f"units: expected one of {', '.join(UNITS)}, got {shown(said.units)}")
+    kinds, fields = words_of(said.maps)
+    found = read_map(file, said.crs, said.units)
+    for layer in kinds:
+        if layer not in found.layer_names and layer not in SHAPE_LAYERS:
+            raise InputError(
+                f"--map: {file} has no layer {layer!r}; it has "
+                f"{', '.join(k or 'no layers' for k in found.layers)}"
+            )
+    properties = {str(name).lower() for feature in found.features for name in feature.properties}
+    for ours, theirs in fields.items():
+        if theirs not in properties:
+            raise InputError(
+                f"--map: no feature of {file} has the property {theirs!r}, which is to be its "
+                f"{ours}; there are {', '.join(sorted(properties)[:MAX_LISTED]) or 'none'}"
+            )
+    site = _Site(file, found, said, kinds, fields, projection)
+    problem = site.problem(name or Path(file).stem)
+    assert problem.site is not None
+    notes = (*found.notes, *site.notes, *problem.site.notes)
+    viewpoints = frozenset(site.viewpoints)
+    return ImportedSite(
+        problem, site.left_out(), notes, viewpoints, site.floor, tuple(site.goal_features)
+    )
+
+
+def read_site(
+    file: str | Path, projection: Projection | None = None, *, options: SiteOptions | None = None,
+    name: str | None = None, on_note: Callable[[str], None] | None = None, **more: Any,
+) -> Problem:  # fmt: skip
+    """Return the problem of a map, as `import_site`.
+
+    Parameters
+    ----------
+    file : str or Path
+        The map.
+    projection : Projection, optional
+        About the base.
+    options : SiteOptions, optional
+        What the user says of the map; its fields may be given by name instead.
+    name : str, optional
+        Name of the problem.
+    on_note : callable, optional
+        Called with what was assumed, changed or left out, one line each.
+    **more
+        Fields of `SiteOptions`.
+
+    Returns
+    -------
+    Problem
+        The problem; its `site` records what became of every feature.
+
+    Raises
+    ------
+    InputError
+        As of `import_site`.
+    """
+    found = import_site(file, projection, options=options or SiteOptions(**more), name=name)
+    if on_note is not None:
+        for note in found.notes:
+            on_note(f"{file}: {note}")
+    return found.problem
+
+
+def read_map(file: str | Path, crs: str | None = None, units: str | None = None) -> Map:
+    """Return a map of any format.
+
+    Parameters
+    ----------
+    file : str or Path
+        The file; its extension tells GeoJSON from the others.
+    crs : str, optional
+        Coordinate system, ``local`` for a plane.
+    units : str, optional
+        Unit of lengths that the user says; None takes the file's.
+
+    Returns
+    -------
+    Map
+        Features, and what could not be read.
+
+    Raises
+    ------
+    InputError
+        Not readable.
+    """
+    suffix = Path(file).suffix.lower()
+    reader = EARTH_READERS.get(suffix)
+    if suffix == ".txt" and is_waypoint_list(file):
+        reader = read_waypoint_list
+    elif suffix == ".json" and is_plan(file):
+        reader = read_plan
+    if reader is not None:
+        if crs is not None:
+            raise InputError(f"--crs: {file} is in degrees always; expected no system")
+        return reader(file)
+    if is_chart(file):
+        return read_chart(file, crs, units)
+    if suffix == ".dxf":
+        return read_dxf(file, crs, units)
+    if suffix in (".kml", ".kmz"):
+        found = read_kml(file, crs)
+    elif suffix in (".geojson", ".json"):
+        found = read_geojson(file, crs)
+    elif suffix in SEQUENCE_SUFFIXES:
+        found = read_geojson_sequence(file, crs)
+    else:
+        return read_vector(file, crs)
+    return found if crs is None else in_degrees(found, crs, file)
+
+
+DEGREES = 0.01
+"""Of the tether's length: a plane that spans less is taken for one of degrees."""
+
+BASE_OFF = 0.01
+"""Distance of a given base from the file's own from which on a note says so, m: coordinates of a
+centimetre are written with seven decimals of a degree."""
+
+SKIP_OPTION = "; leave out what is out of reach with --skip-unreachable"
+
+MAX_HEIGHT_GAP = 0.005
+"""Largest distance in metres between a depth and the height of the same point that needs no note:
+files round heights to a centimetre."""
+
+MIN_SHARE = 5e-4
+"""Smallest share of the tether's reach without chart or depth that a note reports: 0.05 %, because
+smaller shares may be rounding of areas."""
+
+MOST_OF_A_KIND = 5
+"""Goals out of reach that are told one by one."""
+
+
+@dataclass
+class _Site:
+    """A map on its way to a problem."""
+
+    file: str | Path
+    map: Map
+    said: SiteOptions
+    kinds: dict[str, str]
+    fields: dict[str, str]
+    projection: Projection | None
+    complaints: list[tuple[str, str]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    asks: list[str] = field(default_factory=list)
+    cropped: CropCircle | None = None
+    window: CropWindow | None = None
+    viewpoints: list[str] = field(default_factory=list)
+    goal_features: list[Feature | None] = field(default_factory=list)
+    floor: SeaFloor | None = None
+
+    def __post_init__(self) -> None:
+        self.is_chart = self.map.is_chart
+        for name, value in (("draught", self.said.draught), ("floor", self.said.floor or None)):
+            if value is not None and not self.is_chart:
+                raise InputError(
+                    f"{name}: expected a chart (S-57, .000), whose depths are known, got "
+                    f"{self.file}"
+                )
+        self.ledger = Ledger(self.map.layers)
+        self.beyond: dict[str, Feature] = {}
+        self.cut_off: set[str] = set()
+        self.joined: dict[str, list[Feature]] = {}  # pieces of outlines, by the feature that names
+
+    def problem(self, name: str) -> Problem:
+        """Return the problem, or raise all complaints."""
+        self.complaints += [(text, "") for text in self.map.complaints]
+        parts = self._parts()
+        base = self._base(parts)
+        if base is None:
+            raise self._refused()
+        anchor, own = base
+        tether = self._length(own, "tether_length", self.said.tether)
+        if tether is None:
+            self._complain(
+                "has no tether length; expected tether_length of the base",
+                ", or --tether L",
+                "tether",
+            )
+        clearance = self._length(own, "clearance", self.said.clearance) or 0.0
+        goals = self._goals(parts["goal"]) + self._table_goals()
+        candidates = [place for _, place in self._table_places("candidate", self.said.candidates)]
+        reach = None
+        if tether is not None:
+            reach = CropWindow.about(
+                [anchor, *candidates], tether + clearance, self.said.crop_margin
+            )
+        if self.is_chart if self.said.crop is None else self.said.crop:
+            self.window = reach
+        if self.is_chart:
+            places = {"base": anchor, **{_label(goal): goal["position"] for goal in goals}}
+            self._chart_depths(parts, places, reach)
+        free = [anchor, *candidates, *(g["position"] for g in goals)]
+        obstacles = self._within_crop(self._obstacles(parts["obstacle"], free))
+        bounds, islands = self._bounds(parts["bounds"])
+        obstacles += islands
+        self._check_names(obstacles, "obstacles")
+        goals += self._inspections(obstacles, anchor, tether, clearance)
+        self._check_names(goals, "goals")
+        self.viewpoints = [str(goal["name"]) for goal in goals if "layer" in goal]
+        if not goals and not self.complaints:
+            self._complain_of_no_goal()
+        elif not goals and self.said.looking is None:
+            self.asks.append("inspect")  # so that all is answered at once
+        if tether is not None:
+            self._check_scale(goals, obstacles, anchor, tether)
+            goals = self._within_reach(goals, anchor, tether)
+        if self.complaints:
+            raise self._refused()
+        self.goal_features = [goal.get("source") for goal in goals]
+        return self._made(
+            {
+                "schema_version": 1, "name": name, "base": list(anchor),
+                "goals": [_bare(g) for g in goals], "obstacles": [_bare(o) for o in obstacles],
+                "tether_length": tether, "clearance": clearance,
+                **({"bounds": bounds} if bounds else {}), **self._origin(),
+                "site": Site(
+                    file=Path(self.file).name[:MAX_NAME], imported=self.ledger.records(),
+                    cropped=self.cropped,
+                ),
+            },
+            goals, obstacles,
+        )  # fmt: skip
+
+    def _made(self, data: dict[str, Any], goals: list[Any], obstacles: list[Any]) -> Problem:
+        """A problem; what it complains of is told by the map's own names."""
+        try:
+            return Problem.model_validate(data)
+        except ValidationError as error:
+            wheres = {"goals": goals, "obstacles": obstacles}
+
+            def there(found: re.Match[str]) -> str:
+                things, k = wheres[found[1]], int(found[2])
+                return str(things[k]["where"]) if k < len(things) else found[0]
+
+            text = re.sub(r"\b(goals|obstacles)\[(\d+)\]", there, explain(error))
+            raise InputError(f"{self.file}: {text}") from None
+
+    # What is what
+
+    def _parts(self) -> dict[str, list[Feature]]:
+        parts: dict[str, list[Feature]] = {k: [] for k in KIND_COLUMNS}
+        for unread in self.map.unread:
+            self.ledger.leave_out(unread, unread.reason)
+        wrong: dict[str, list[str]] = {}
+        layers = self.map.layer_names
+        lone = lone_equipment(self.map.features) if self.is_chart else set()
+        for feature in self.map.features:
+            try:
+                decision = kind_of(feature, self.kinds, chart=self.is_chart, layers=layers)
+            except InputError as error:
+                what = str(error).removeprefix(feature.where)
+                wrong.setdefault(what, []).append(feature.where)
+                continue
+            if decision.reason == EQUIPMENT and feature.where in lone:
+                decision = Decision("obstacle")
+            if decision.kind in parts:
+                kind = cast("UsedAs", decision.kind)
+                parts[kind].append(_marked(feature) if kind in ("base", "goal") else feature)
+                self.ledger.use(feature, kind)
+            else:
+                self.ledger.leave_out(feature, decision.reason)
+        for what, places in wrong.items():  # as like as not the same slip in all of them
+            self._complain(f"{_first_of(places)}{what}")
+        for layer, size in self.map.layers.items():
+            if layer and not size:
+                self.notes.append(f"layer {layer!r} is empty")
+        return parts
+
+    def _chart_depths(
+        self, parts: dict[str, list[Feature]], places: Mapping[str, Any], reach: CropWindow | None
+    ) -> None:
+        """Make obstacles of shallow areas, and the sea floor, where they are asked for."""
+        free = [f for f in self.map.features if self.kinds.get(f.layer.lower()) != "ignore"]
+        left_out = [
+            f for f in free if self.ledger.is_left_out(f) and f.layer.lower() not in self.kinds
+        ]
+        draught = self.said.draught
+        if draught is not None:
+            shallow = shallow_areas(left_out, draught)
+            self._check_depth(shallow, places, draught)
+            shoals = shoal_soundings(left_out, draught, shallow)
+            for feature in (*shallow, *shoals):
+                self.ledger.use(feature, "obstacle")
+            parts["obstacle"] += [*shallow, *shoals]
+        if reach is not None:
+            if draught is not None:
+                self._note_share(
+                    depthless_share(self.map.features, self._plane, reach),
+                    "is water whose depth the chart does not give; --draught makes no obstacle of "
+                    "it",
+                )
+            self._note_share(
+                uncharted_share(self.map.features, self._plane, reach),
+                "is not on this chart, and free of obstacles in the problem",
+            )
+        if not self.said.floor or self.complaints:
+            return
+        self.floor, found = chart_floor(free, self._plane, self.window, self.said.floor_cell)
+        for feature in found.used:  # a shallow area is an obstacle, too
+            if self.ledger.is_left_out(feature):
+                self.ledger.use(feature, "floor")
+        for feature in found.beyond:
+            if self.ledger.is_left_out(feature):
+                self.ledger.leave_out(feature, self._beyond_reach)
+        for feature in found.depthless:
+            self.ledger.leave_out(feature, "a depth that the chart does not give")
+
+    def _check_depth(
+        self, shallow: list[Feature], places: Mapping[str, Any], draught: float
+    ) -> None:
+        """Report a base or goals that lie in water that may be too shallow."""
+        import shapely
+
+        areas = [self._plane(feature.shape) for feature in shallow]
+        tree = shapely.STRtree(areas)
+        for called, place in places.items():
+            held = tree.query(shapely.Point(place[:2]), predicate="within").tolist()
+            if not held:
+                continue
+            area = shallow[min(held)]
+            least, _ = depth_range(area)
+            depth = "of unknown depth" if least is None else f"from {_metres(least)} of depth on"
+            self._complain(
+                f"{called}: lies in {self._called(area)}, {depth}, and the draught is "
+                f"{_metres(draught)}; expected a place in deeper water, or a smaller draught"
+            )
+
+    def _note_share(self, share: float, what: str) -> None:
+        if share >= MIN_SHARE:
+            self.notes.append(f"{100.0 * share:.2g} % of the tether's reach {what}")
+
+    def _table_places(
+        self, kind: UsedAs, file: str | Path | None
+    ) -> list[tuple[Feature, tuple[float, float, float]]]:
+        """Return the rows of a table of goals or candidates, and their places in the plane."""
+        import shapely
+
+        if file is None:
+            return []
+        found, names = from_table(file, self.projection, self.notes.append)
+        places = np.column_stack([found, np.zeros(len(found))])[:, :3]  # at the surface without z
+        layer = self.ledger.add_layer(Path(file).name, len(places))
+        out = []
+        for k, (place, name) in enumerate(zip(places.tolist(), names, strict=True)):
+            # as the map's own features have it, in degrees or in its unit
+            at = (
+                tuple(self.projection.to_earth([place[:2]])[0][::-1])
+                if self.projection is not None
+                else (place[0] / self._unit, place[1] / self._unit)
+            )
+            row = Feature(f"{layer}[{k}]", layer, "", {"name": name}, shapely.Point(at))
+            self.ledger.use(row, kind)
+            out.append((row, (place[0], place[1], place[2])))
+        return out
+
+    def _table_goals(self) -> list[dict[str, Any]]:
+        return [
+            {"name": self._name(row), "position": place, "where": row.where, "source": row}
+            for row, place in self._table_places("goal", self.said.goals)
+        ]
+
+    def left_out(self) -> tuple[shapely.Geometry, ...]:
+        """Return the shapes that were left out, in the plane."""
+        return tuple(self._plane(shape) for shape in self.ledger.left_out_shapes)
+
+    def _base(self, parts: dict[str, list[Feature]]) -> tuple[Any, Feature | None] | None:
+        """Where the tether is fixed, and the feature that says so; sets the projection."""
+        bases = parts["base"]
+        if len(bases) > 1:
+            self._complain(
+                f"expected one base, got {len(bases)}: {', '.join(b.where for b in bases)[:100]}"
+            )
+            return None
+        own = bases[0] if bases else None
+        if not self.map.geographic:
+            if own is None:
+                if not self.complaints:  # a feature that is damaged may be it
+                    self._complain("has no base; expected a Point of kind base")
+                return None
+            return self._place(own.shape, own), own
+        if self.projection is None:
+            if own is None:
+                if not self.complaints:
+                    self._complain(
+                        "has no base; expected a Point of kind base",
+                        ", or --base LAT,LON",
+                        "base",
+                    )
+                return None
+            heading = self._number(own, "heading") or 0.0
+            try:
+                self.projection = Projection(own.shape.y, own.shape.x, heading, name=own.where)
+            except InputError as error:
+                self._complain(str(error))
+                return None
+        x, y = self.projection.base.tolist()
+        z = self._height(own) if own is not None else 0.0
+        if own is not None:
+            there = self._plane(own.shape)
+            away = float(np.hypot(there.x - x, there.y - y))
+            if away > BASE_OFF:
+                self.notes.append(
+                    f"{own.where}: the base is at the place that was given, {_metres(away)} away; "
+                    "only the properties of the file's base are used"
+                )
+        return (x, y, z), own
+
+    # Places and lengths
+
+    @property
+    def _unit(self) -> float:
+        """Return the metres per unit of the file; the unit in the options overrides the file's."""
+        if self.is_chart:  # its reader converts them
+            return 1.0
+        return UNITS[self.said.units] if self.said.units else self.map.metres or 1.0
+
+    def _plane(self, shape: shapely.Geometry) -> Any:
+        """A shape in metres in the problem's plane."""
+        import shapely
+
+        flat = shapely.force_2d(shape)
+        if not self.map.geographic:
+            return shapely.transform(flat, lambda c: c * self._unit)
+        projection = self.projection
+        assert projection is not None
+        return shapely.transform(flat, lambda c: projection.to_plane(c[:, ::-1]))
+
+    def _place(self, point: Any, feature: Feature) -> tuple[float, float, float]:
+        at = self._plane(point)
+        return (float(at.x), float(at.y), self._height(feature, point))
+
+    def _height(self, feature: Feature, point: Any = None) -> float:
+        """Return z in metres: of a depth, else of the point itself, whose height on the earth is
+        in metres by its format."""
+        depth = self._depth(feature)
+        at = point if point is not None else feature.shape
+        if depth is not None:
+            if depth < 0.0:
+                self._complain(
+                    f"{self._called(feature)}: depth: counts downwards; expected 0 or more, got "
+                    f"{depth:g} m; if it is a height, give it as the z of the point"
+                )
+            self._note_other_height(feature, at, depth)
+            return 0.0 - depth
+        if feature.is_above_floor:
+            self._complain(
+                f"{self._called(feature)}: its height counts from the sea floor, which the map "
+                "does not have; expected a height above the water, or a depth"
+            )
+            return 0.0
+        if at.geom_type != "Point" or not at.has_z or at.z != at.z:
+            self._note_unread(
+                feature,
+                [name for name in feature.properties if _is_height(str(name))],
+                "expected a depth (downwards), or the height as z of the point",
+            )
+            return 0.0
+        return float(at.z) * (1.0 if self.map.geographic else self._unit)
+
+    def _depth(self, feature: Feature) -> float | None:
+        """Return the depth in metres that a property of a feature states; None without one."""
+        for name in [] if "depth" in self.fields else feature.properties:
+            if not str(name).lower().startswith("depth"):
+                continue
+            try:
+                meaning = column(str(name))
+            except InputError as error:
+                self._complain(f"{feature.where}: {error}")
+                return None
+            if meaning is not None and meaning.quantity == "z" and meaning.unit:
+                value = self._number(feature, "depth", str(name).lower())
+                return None if value is None else -meaning.factor * value
+        depth = self._number(feature, "depth")
+        if depth is None and self.is_chart:
+            return sounding_depth(feature)
+        return None if depth is None else depth * self._unit
+
+    def _get(self, feature: Feature, ours: str) -> Any:
+        mapped = self.fields.get(ours)
+        return feature.get(mapped) if mapped is not None else feature.get(*FIELDS[ours])
+
+    def _number(self, feature: Feature, ours: str, name: str | None = None) -> float | None:
+        value = self._get(feature, ours) if name is None else feature.get(name)
+        if value is None:
+            return None
+        if isinstance(value, str):  # fields of KML and of tables are text
+            try:
+                value = float(value)
+            except ValueError:
+                self._complain(f"{feature.where}: {ours}: expected a number, got {shown(value)}")
+                return None
+        try:
+            return float(checked_number(value))
+        except ValueError as error:
+            self._complain(f"{feature.where}: {ours}: {error}")
+            return None
+
+    def _length(self, base: Feature | None, ours: str, said: float | None) -> float | None:
+        if said is not None or base is None:
+            return said
+        value = self._number(base, ours)
+        return None if value is None else value * self._unit
+
+    def _name(self, feature: Feature) -> str | None:
+        value = self._get(feature, "name")
+        if value is not None:
+            return str(value).strip()
+        return feature.identity.strip() or None
+
+    # Goals and obstacles
+
+    def _goals(self, features: list[Feature]) -> list[dict[str, Any]]:
+        goals: list[dict[str, Any]] = []
+        for feature in features:
+            points = getattr(feature.shape, "geoms", [feature.shape])
+            for k, point in enumerate(points, 1):
+                name = self._name(feature)
+                if name is not None and len(points) > 1:
+                    name = f"{name} {k}"
+                place = self._place(point, feature)
+                goals.append(
+                    {"name": name, "position": place, "where": feature.where, "source": feature}
+                )
+        return goals
+
+    def _obstacles(self, features: list[Feature], free: list[Any]) -> list[dict[str, Any]]:
+        """Circles and polygons, in whose holes places that must stay free are."""
+        import shapely
+
+        spots = shapely.MultiPoint([p[:2] for p in free])
+        drawn: dict[str, list[tuple[Feature, shapely.LineString]]] = {}
+        out: list[dict[str, Any]] = []
+
+        def area(feature: Feature, shape: shapely.Geometry) -> list[dict[str, Any]]:
+            """Return the obstacles of an area; parts without an area become lines."""
+            if self.window is not None:
+                if self.window.is_beyond(shape):
+                    self.beyond[feature.where] = feature
+                    return []
+                if "Polygon" in shape.geom_type:
+                    shape, is_cut = self.window.cut(shape)
+                    if is_cut:
+                        self.cut_off.add(feature.where)
+                    if shape.is_empty:
+                        self.beyond[feature.where] = feature
+                        return []
+            polygons, notes = simple_polygons(shape, lambda p: p.intersects(spots))
+            self.notes += [f"{self._called(feature)}: {note}" for note in notes]
+            walls = spurs_of(shape, polygons, self.said.join_tolerance)
+            drawn.setdefault(feature.layer, []).extend((feature, wall) for wall in walls)
+            if not polygons and not walls:
+                self._complain(
+                    f"{self._called(feature)}: encloses nothing; expected a polygon with an area"
+                )
+            return [{"feature": feature, **outline_of(polygon)} for polygon in polygons]
+
+        pointlike: list[Feature] = []
+        for feature in progress.each(features):
+            for shape in _blocks_of(feature.shape):
+                out += self._obstacle(feature, shape, area, drawn, pointlike)
+        self._complain_of_points(pointlike)
+        for pieces in drawn.values():
+            out += self._line_work(pieces, area)
+        return self._named(out)
+
+    def _obstacle(
+        self, feature: Feature, shape: shapely.Geometry,
+        area: Callable[[Feature, shapely.Geometry], list[dict[str, Any]]],
+        drawn: dict[str, list[tuple[Feature, shapely.LineString]]], pointlike: list[Feature],
+    ) -> list[dict[str, Any]]:  # fmt: skip
+        """Return the obstacles of a shape; defer open lines and points without a radius."""
+        kind = shape.geom_type
+        out: list[dict[str, Any]] = []
+        if "Point" in kind:
+            radius = self._radius(feature)
+            if self._is_beyond(self._plane(shape), radius or 0.0):
+                self.beyond[feature.where] = feature
+                return out
+            if radius is None:
+                pointlike.append(feature)
+                return out
+            for point in getattr(shape, "geoms", [shape]):
+                at = self._plane(point)
+                out.append({"feature": feature, "center": (at.x, at.y), "radius": radius})
+        elif "Line" in kind:
+            lines = lines_of(self._plane(shape))
+            if not lines:
+                self._complain(
+                    f"{self._called(feature)}: is a line without length; expected two places"
+                )
+            for line in lines:
+                if line.is_closed and not (is_coastline(feature) and not is_land(line)):
+                    out += area(feature, self._with_rim(line, [(feature, line)]))
+                else:
+                    drawn.setdefault(feature.layer, []).append((feature, line))
+        else:
+            out += area(feature, self._plane(shape))
+        return out
+
+    def _line_work(
+        self, pieces: list[tuple[Feature, shapely.LineString]],
+        area: Callable[[Feature, shapely.Geometry], list[dict[str, Any]]],
+    ) -> list[dict[str, Any]]:  # fmt: skip
+        """Return the obstacles of a layer's open lines: joined outlines, and lines with a width."""
+        out: list[dict[str, Any]] = []
+        areas, rest = outlines([line for _, line in pieces], self.said.join_tolerance)
+        for polygon, members in areas:
+            own = [pieces[k][0] for k in members]
+            coast = all(map(is_coastline, own))
+            if coast and not any(is_land(pieces[k][1], polygon) for k in members):
+                rest += members  # the water lies inside: its coast is a wall
+                continue
+            named = next((f for f in own if self._name(f) is not None), own[0])
+            found = area(named, self._with_rim(polygon, [pieces[k] for k in members]))
+            self.joined.setdefault(named.where, []).extend(own)
+            names = list(dict.fromkeys(n for f in own if (n := self._name(f)) is not None))
+            if found and len(names) > 1:
+                self.notes.append(
+                    f"{_first_of([f.where for f in own])}: lines joined to one outline, named "
+                    f"{names[0]!r}; their other names: {', '.join(map(repr, names[1:MAX_NAMED]))}"
+                    + (", …" if len(names) > MAX_NAMED else "")
+                )
+            out += found
+        narrow: list[Feature] = []
+        for k in rest:
+            feature, line = pieces[k]
+            width = self._width(feature)
+            if self._is_beyond(line, width or 0.0):
+                self.beyond[feature.where] = feature
+                continue
+            if width is None:
+                narrow.append(feature)
+            else:
+                out += area(feature, widened(line, width))
+        if narrow:
+            layer = narrow[0].layer
+            places = list(dict.fromkeys(f.where for f in narrow))
+            called = f"layer {layer!r}: " if layer else ""
+            pick = layer or "lines"
+            self._complain(
+                f"{called}{counted(len(narrow), 'open line')} ({_first_of(places)}); expected a "
+                "width for them",
+                f" (--line-width W), or --map path={pick} or --map ignore={pick} to leave them out",
+                "line_width",
+            )
+        return out
+
+    def _with_rim(
+        self, outline: shapely.Geometry, pieces: list[tuple[Feature, shapely.LineString]]
+    ) -> shapely.Geometry:
+        """Return an outline with the area of those of its lines that state a width."""
+        import shapely
+
+        rims = [
+            widened(line, width)
+            for feature, line in pieces
+            if self._number(feature, "width") is not None and (width := self._width(feature))
+        ]
+        if not rims:
+            return outline
+        inner = shapely.Polygon(outline.coords) if "Line" in outline.geom_type else outline
+        return union([*shapely.get_parts(shapely.make_valid(inner)), *rims])
+
+    def _is_beyond(self, shape: shapely.Geometry, grown: float) -> bool:
+        return self.window is not None and self.window.is_beyond(shape, grown)
+
+    def _width(self, feature: Feature) -> float | None:
+        width = self._number(feature, "width")
+        if width is None and self.is_chart:
+            width = chart_width(feature)
+        if width is None:
+            return self.said.line_width
+        if not width > 0.0:
+            self._complain(f"{feature.where}: width_m: expected a positive width, got {width:g}")
+        metres = "width" not in self.fields and feature.get(WIDTH[0]) is not None
+        return abs(width) * (1.0 if metres else self._unit) or None
+
+    def _named(self, things: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Give obstacles the names of their features, numbered where a feature has several."""
+        size = Counter(thing["feature"].where for thing in things)
+        number: Counter[str] = Counter()
+        out = []
+        for thing in things:
+            feature = thing["feature"]
+            number[feature.where] += 1
+            name = self._name(feature)
+            if name is not None and size[feature.where] > 1:
+                name = f"{name} {number[feature.where]}"
+            out.append({"name": name, **thing, "where": feature.where})
+        return out
+
+    @property
+    def _beyond_reach(self) -> str:
+        """Return the reason to leave out features beyond the window."""
+        assert self.window is not None
+        about = "the base and the candidates" if self.said.candidates is not None else "the base"
+        return f"beyond the reach of the tether ({_metres(self.window.radius)} about {about})"
+
+    def _within_crop(self, obstacles: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Return the obstacles within the reach of the tether; the others go to the ledger."""
+        if self.window is None:
+            return obstacles
+        kept, dropped, cut_off = cropped(obstacles, self.window)
+        self.beyond |= {thing["where"]: thing["feature"] for thing in (*dropped, *cut_off)}
+        self.cut_off |= {thing["where"] for thing in cut_off}
+        if not self.beyond and not self.cut_off:
+            return kept
+        self.cropped = CropCircle(center=self.window.center, radius=self.window.radius)
+        staying = {thing["where"] for thing in kept}
+        for where, feature in self.beyond.items():
+            if where not in staying:
+                for piece in (feature, *self.joined.get(where, ())):
+                    if piece.where not in staying:
+                        self.ledger.leave_out(piece, self._beyond_reach)
+        # some parts of a feature may lie beyond while others stay
+        if cut_count := len((self.cut_off | set(self.beyond)) & staying):
+            self.notes.append(
+                f"{counted(cut_count, 'obstacle')} cut off where the reach of the tether ends "
+                f"({_metres(self.window.radius)})"
+            )
+        return kept
+
+    def _called(self, feature: Feature) -> str:
+        label = self._name(feature)
+        return feature.where + (f" ({label})" if label else "")
+
+    def _radius(self, feature: Feature) -> float | None:
+        metres = "radius" not in self.fields and feature.get(RADIUS[0]) is not None
+        radius = self._number(feature, "radius")
+        if radius is not None:
+            return radius * (1.0 if metres else self._unit)
+        self._note_unread(
+            feature,
+            [n for n in feature.properties if str(n).lower().startswith(("radius", "diameter"))],
+            "expected radius_m, in metres",
+        )
+        own = chart_radius(feature) if self.is_chart else None
+        return own if own is not None else self.said.radius
+
+    def _note_other_height(self, feature: Feature, at: Any, depth: float) -> None:
+        """Note that the depth of a feature is taken, where its point has another height."""
+        if self.is_chart or at.geom_type != "Point" or not at.has_z:
+            return
+        z = float(at.z) * (1.0 if self.map.geographic else self._unit)
+        # files write 0 where they have no height
+        if z and abs(z + depth) > MAX_HEIGHT_GAP:
+            self.notes.append(
+                f"{self._called(feature)}: its depth of {depth:g} m is taken, and its height of "
+                f"{z:g} m is not"
+            )
+
+    def _note_unread(self, feature: Feature, names: list[Any], expected: str) -> None:
+        """Note once a layer that properties which look like a height or a size are not read."""
+        for name in names:
+            if self.is_chart or feature.properties[name] is None:
+                continue
+            layer = f"layer {feature.layer!r}: " if feature.layer else ""
+            note = f"{layer}property {str(name)!r} is not read: {expected}"
+            if note not in self.notes:
+                self.notes.append(note)
+
+    def _complain_of_points(self, features: list[Feature]) -> None:
+        """Complain of points without a radius, a line for each layer."""
+        by_layer: dict[str, list[str]] = {}
+        for feature in features:
+            by_layer.setdefault(feature.layer, []).append(feature.where)
+        for layer, places in by_layer.items():
+            what = "an obstacle" if len(places) == 1 else "obstacles"
+            ignore = f", or --map ignore={layer} to leave them out" if layer else ""
+            self._complain(
+                f"{_first_of(places)}: {what} without radius_m; expected one, or a radius for all "
+                "that have none",
+                f" (--radius R){ignore}",
+                "radius",
+            )
+
+    def _complain_of_no_goal(self) -> None:
+        self._complain(
+            "has no goal; expected a point without radius_m, a layer of goals, a table of goals, "
+            "or obstacles to inspect",
+            " (--map goal=LAYER, --goals TABLE, --inspect N --standoff S)",
+            "inspect",
+        )
+
+    def _inspections(
+        self, obstacles: list[dict[str, Any]], anchor: Any, tether: float | None, clearance: float
+    ) -> list[dict[str, Any]]:
+        """The goals about obstacles that are to be looked at."""
+        from netsp.model.shorthand import Inspection
+
+        goals: list[dict[str, Any]] = []
+        chosen = self._chosen(obstacles)
+        for k, o in enumerate(obstacles):
+            feature, look = o["feature"], self.said.looking if k in chosen else None
+            own = feature.get("viewpoints", "inspect")
+            if own is None and look is None:
+                continue
+            standoff = feature.get("standoff")
+            heights = feature.get("depths")
+            try:
+                asked = Inspection.model_validate(
+                    {
+                        "inspect": o["name"] or f"#{k}",
+                        "viewpoints": _whole(own) if own is not None else look and look.viewpoints,
+                        "standoff": look.standoff
+                        if standoff is None and look is not None
+                        else _real(standoff) * self._unit,
+                        "depths": [h * self._unit for h in _list(heights)]
+                        if heights is not None
+                        else (look.depths if look is not None else (0.0,)),
+                    }
+                )
+            except (ValidationError, ValueError, TypeError) as error:
+                text = explain(error) if isinstance(error, ValidationError) else str(error)
+                self._complain(f"{feature.where}: {text}")
+                continue
+            goals += [{**g, "where": feature.where, "layer": feature.layer} for g in asked.goals(o)]
+        if self.said.looking is not None:
+            goals = self._free_viewpoints(goals, obstacles, anchor, tether, clearance)
+        return goals
+
+    def _chosen(self, obstacles: list[dict[str, Any]]) -> set[int]:
+        """Return which obstacles the user wants to have looked at."""
+        import shapely
+
+        look = self.said.looking
+        if look is None:
+            return set()
+        rule = look.chosen
+        areas = [shapely.box(*box) for box in rule.boxes]
+        if rule.earth_boxes and self.projection is None:
+            raise InputError(
+                f"{self.file}: has no place on the earth; expected a box in its plane (m)"
+            )
+        for south, west, north, east in rule.earth_boxes:
+            corners = [(south, west), (south, east), (north, east), (north, west)]
+            assert self.projection is not None
+            areas.append(shapely.Polygon(self.projection.to_plane(corners)))
+        found = {
+            k
+            for k, o in enumerate(obstacles)
+            if (rule.layers or not self._is_shallow(o["feature"]))
+            and any(
+                rule.takes(layer, self._name(o["feature"]) or o["name"])
+                for layer in (o["feature"].layer, *o["feature"].folders)
+            )
+            and rule.holds(_shape(o), areas)
+        }
+        if not found and obstacles:
+            layers = dict.fromkeys(o["feature"].layer for o in obstacles)
+            self._complain(
+                "no obstacle within the tether's reach is among those chosen to be inspected; "
+                f"there are obstacles of the layers {', '.join(n or '(none)' for n in layers)}"
+            )
+        return found
+
+    def _is_shallow(self, feature: Feature) -> bool:
+        """Return whether a feature is water that is an obstacle only because of its depth."""
+        return self.is_chart and feature.layer.upper() in (*DEPTH_AREAS, UNSURVEYED, SOUNDINGS)
+
+    def _free_viewpoints(
+        self, goals: list[dict[str, Any]], obstacles: list[dict[str, Any]], anchor: Any,
+        tether: float | None, clearance: float,
+    ) -> list[dict[str, Any]]:  # fmt: skip
+        """Return the viewpoints with room for the robot; note the others by layer and cause."""
+        if not goals:
+            return goals
+        places = np.array([g["position"] for g in goals])
+        away = np.linalg.norm(places - np.array(anchor), axis=1)
+        is_far = (away > tether) if self.window is not None and tether is not None else away < 0.0
+        is_in = _distance(places[:, :2], obstacles) < max(clearance, 1e-9)
+        seen: set[tuple[float, ...]] = set()
+        kept: list[dict[str, Any]] = []
+        groups: dict[tuple[str, str], list[str]] = {}
+        for k, goal in enumerate(goals):
+            cause = ""
+            if is_in[k]:
+                cause = "within an obstacle or its clearance"
+            elif is_far[k]:
+                cause = "farther from the base than the tether is long"
+            elif (place := tuple(places[k])) in seen:
+                cause = "in the same place as another"
+            else:
+                seen.add(place)
+                kept.append(goal)
+                continue
+            groups.setdefault((goal["layer"], cause), []).append(str(goal["name"]))
+        for (layer, cause), names in groups.items():
+            shown_names = ", ".join(names[:MAX_NAMED]) + (", …" if len(names) > MAX_NAMED else "")
+            called = f"layer {layer!r}: " if layer else ""
+            self.notes.append(
+                f"{called}{counted(len(names), 'viewpoint')} left out: {cause} ({shown_names})"
+            )
+        if not kept and not self._complains_of_base(anchor, obstacles):
+            number: Counter[str] = Counter()
+            for (_, cause), names in groups.items():
+                number[cause] += len(names)
+            causes = ", ".join(f"{n} {cause}" for cause, n in number.items())
+            self._complain(
+                f"no viewpoint about an obstacle is left ({causes}); expected another standoff, "
+                "base or tether"
+            )
+        return kept
+
+    def _complains_of_base(self, anchor: Any, obstacles: list[dict[str, Any]]) -> bool:
+        """Complain of a base within an obstacle, and return whether it is."""
+        import shapely
+
+        spot = shapely.Point(anchor[:2])
+        for thing in obstacles:
+            if self._is_shallow(thing["feature"]):
+                continue  # named with its depth already
+            if _shape(thing).contains(spot):
+                self._complain(
+                    f"base: lies inside {self._called(thing['feature'])}; expected a place in the "
+                    "water"
+                )
+                return True
+        return False
+
+    def _bounds(self, features: list[Feature]) -> tuple[list[list[float]] | None, list[Any]]:
+        """Return the outline of the bounds, and the islands in it: obstacles without a name."""
+        import shapely
+
+        if not features:
+            return None, []
+        shapes = [self._plane(f.shape) for f in features]
+        lines = [line for shape in shapes if "Line" in shape.geom_type for line in lines_of(shape)]
+        areas, rest = outlines(lines, self.said.join_tolerance)
+        whole = [area for area, _ in areas] + [s for s in shapes if "Polygon" in s.geom_type]
+        places = ", ".join(f.where for f in features)[:100]
+        if rest:
+            self._complain(
+                f"{places}: bounds that are not closed; expected a closed line or a polygon"
+            )
+            return None, []
+        if len(whole) > 1 and all(f.get("fence") == "inclusion" for f in features):
+            common = shapely.intersection_all(list(map(shapely.make_valid, whole)))
+            areas_in = [g for g in shapely.get_parts(common) if g.geom_type == "Polygon"]
+            whole = [shapely.MultiPolygon(areas_in)]
+            self.notes.append(
+                f"{len(features)} inclusion fences ({places}): the bounds are where all of them "
+                "overlap, because the vehicle stays within each"
+            )
+            if whole[0].area <= 0.0:
+                self._complain(f"{places}: inclusion fences that do not overlap; expected one area")
+                return None, []
+        if len(whole) != 1:
+            self._complain(
+                f"expected one outline of kind bounds, got {len(whole)}: {places}; keep one, or "
+                "make obstacles of what lies between them",
+                "; --map ignore=LAYER leaves out a layer",
+            )
+            return None, []
+        feature = features[0]
+        drawn = shapely.get_parts(whole[0])
+        holes = [shapely.Polygon(ring) for part in drawn for ring in part.interiors]
+        filled = shapely.MultiPolygon([shapely.Polygon(part.exterior) for part in drawn])
+        polygons, notes = simple_polygons(filled, lambda p: False)
+        self.notes += [f"{feature.where}: {note}" for note in notes]
+        if len(polygons) != 1:
+            self._complain(f"{feature.where}: expected bounds in one piece, got {len(polygons)}")
+            return None, []
+        ring: list[list[float]] = shapely.get_coordinates(polygons[0].exterior)[:-1].tolist()
+        islands = [
+            {"feature": feature, "name": None, "where": feature.where, **outline_of(polygon)}
+            for hole in holes for polygon in simple_polygons(hole, lambda p: False)[0]
+        ]  # fmt: skip
+        if islands:
+            self.notes.append(
+                f"{feature.where}: {counted(len(islands), 'hole')} in the bounds: an obstacle each"
+            )
+        return ring, islands
+
+    # What is checked of the whole
+
+    def _check_names(self, things: list[dict[str, Any]], what: str) -> None:
+        """Number the names that several goals or obstacles share, and say so."""
+        _number_parts(things)
+        numbered = _number_names(things)
+        if numbered:
+            shown_names = ", ".join(
+                f"{old!r} is {new!r} ({where})" for old, new, where in numbered[:MAX_NAMED]
+            )
+            self.notes.append(
+                f"names that several {what} share are numbered: {shown_names}"
+                + (f", and {len(numbered) - MAX_NAMED} more" if len(numbered) > MAX_NAMED else "")
+            )
+
+    def _check_scale(
+        self, goals: list[dict[str, Any]], obstacles: list[dict[str, Any]], anchor: Any,
+        tether: float,
+    ) -> None:  # fmt: skip
+        """A plane in which a tether would reach everything many times over is one of degrees."""
+        if self.map.geographic or not goals:
+            return
+        places = np.array([anchor, *(g["position"] for g in goals)])[:, :2] / self._unit
+        span = float(np.ptp(places * self._unit, axis=0).max())
+        small = bool((np.abs(places) <= [180.0, 90.0]).all())
+        whole = bool((places == np.round(places)).all())
+        if small and not whole and span <= DEGREES * tether:
+            self._complain(
+                f"coordinates span {span:g} m, and the tether is {_metres(tether)} long: they look "
+                "like degrees; expected metres",
+                ", or --crs EPSG:4326",
+                "crs",
+            )
+
+    def _within_reach(
+        self, goals: list[dict[str, Any]], anchor: Any, tether: float
+    ) -> list[dict[str, Any]]:
+        """Goals that a tether could reach if nothing were in the way; the others are complained of,
+        or left out."""
+        near: list[dict[str, Any]] = []
+        far: list[tuple[float, dict[str, Any]]] = []
+        for goal in goals:
+            away = float(np.linalg.norm(np.array(goal["position"]) - np.array(anchor)))
+            if away <= tether:
+                near.append(goal)
+            else:
+                far.append((away, goal))
+        if self.said.skip_unreachable and near:
+            staying = {goal["where"] for goal in near}
+            for away, goal in far:
+                feature = goal.get("source")
+                if feature is None or goal["where"] in staying:  # one of several of its feature
+                    self.notes.append(f"{_label(goal)}: is {_metres(away)} from the base: left out")
+                else:
+                    self.ledger.leave_out(
+                        feature,
+                        f"farther from the base than the tether is long ({_metres(tether)})",
+                    )
+        elif len(far) > MOST_OF_A_KIND:
+            away, goal = max(far, key=lambda f: f[0])
+            self._complain(
+                f"{len(far)} goals are farther from the base than the tether is long "
+                f"({_metres(tether)}), {_label(goal)} {_metres(away)}{self._cause(goal, tether)}",
+                SKIP_OPTION,
+            )
+        else:
+            for away, goal in far:
+                self._complain(
+                    f"{_label(goal)}: is {_metres(away)} from the base, and the tether "
+                    f"{_metres(tether)} long{self._cause(goal, tether)}",
+                    SKIP_OPTION,
+                )
+        return near
+
+    def _cause(self, goal: dict[str, Any], tether: float) -> str:
+        """Why a goal may be so far off."""
+        if self.projection is None:
+            return ""
+        ((lat, lon),) = self.projection.to_earth([goal["position"][:2]])
+        if abs(lon) <= 90.0:
+            ((x, y),) = self.projection.to_plane([[lon, lat]])
+            as_read, swapped = (
+                np.hypot(*(np.array(place) - self.projection.base))
+                for place in (goal["position"][:2], (x, y))
+            )
+            if swapped <= 10.0 * tether < as_read:
+                return ": latitude and longitude look swapped"
+        return ""
+
+    def _origin(self) -> dict[str, Any]:
+        p = self.projection
+        if p is None:
+            return {}
+        return {"origin": {"latitude": p.latitude, "longitude": p.longitude, "heading": p.heading}}
+
+    def _complain(self, text: str, option: str = "", ask: str | None = None) -> None:
+        """Note what is wrong; the options that help on the command line stand apart."""
+        self.complaints.append((f"{self.file}: {text.removeprefix(f'{self.file}: ')}", option))
+        if ask is not None:
+            self.asks.append(ask)
+
+    def _refused(self) -> InputError:
+        whole = [text + option for text, option in self.complaints]
+        return UnansweredError(whole, [text for text, _ in self.complaints], self.asks)
+
+
+def _blocks_of(shape: shapely.Geometry) -> list[shapely.Geometry]:
+    """Return the shapes of a block of a drawing, or the shape alone."""
+    return list(shape.geoms) if shape.geom_type == "GeometryCollection" else [shape]  # type: ignore[attr-defined]
+
+
+def _marked(feature: Feature) -> Feature:
+    """Return a goal or a base as a point: one drawn as a symbol stands where the symbol marks."""
+    if feature.marker is None or "Point" in feature.shape.geom_type:
+        return feature
+    return replace(feature, shape=feature.marker)
+
+
+def _bare(thing: dict[str, Any]) -> dict[str, Any]:
+    """Without where it came from, nor a name that it does not have."""
+    ours = ("where", "feature", "source", "layer")
+    return {k: v for k, v in thing.items() if k not in ours and v is not None}
+
+
+def _shape(thing: dict[str, Any]) -> shapely.Geometry:
+    """Return an obstacle of a problem file as an area."""
+    import shapely
+
+    if "radius" in thing:
+        return shapely.Point(thing["center"]).buffer(thing["radius"])
+    return shapely.Polygon(thing["polygon"])
+
+
+def _distance(places: np.ndarray, obstacles: list[dict[str, Any]]) -> np.ndarray:
+    """Return the distance of each place from the nearest obstacle, 0 or less within one."""
+    import shapely
+
+    out = np.full(len(places), np.inf)
+    circles = [(*o["center"], o["radius"]) for o in obstacles if "radius" in o]
+    for x, y, radius in circles:
+        out = np.minimum(out, np.hypot(places[:, 0] - x, places[:, 1] - y) - radius)
+    polygons = [shapely.Polygon(o["polygon"]) for o in obstacles if "polygon" in o]
+    if polygons:
+        tree = shapely.STRtree(polygons)
+        points = shapely.points(places)
+        (own, _), away = tree.query_nearest(points, return_distance=True, all_matches=False)
+        out[own] = np.minimum(out[own], away)
+    return out
+
+
+def _first_of(places: list[str]) -> str:
+    """Return the first of some places and how many more there are."""
+    return places[0] + (f" and {len(places) - 1} more" if len(places) > 1 else "")
+
+
+def _is_height(name: str) -> bool:
+    """Return whether the name of a property means a height."""
+    try:
+        meaning = column(name)
+    except InputError:
+        return False
+    return meaning is not None and meaning.quantity == "z"
+
+
+def _number_parts(things: list[dict[str, Any]]) -> None:
+    """Number the names of things that are parts of one collection: "pier 1", "pier 2"."""
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for thing in things:
+        whole, dot, _ = thing["where"].partition(".geometries[")
+        if thing["name"] is not None and dot:
+            groups.setdefault((whole, thing["name"]), []).append(thing)
+    for (_, name), parts in groups.items():
+        for number, part in enumerate(parts, 1):
+            part["name"] = f"{name} {number}" if len(parts) > 1 else name
+
+
+def _number_names(things: list[dict[str, Any]]) -> list[tuple[str, str, str]]:
+    """Number names that stand more than once ("pier", "pier 2"); return old, new and place."""
+    taken = {thing["name"] for thing in things}
+    seen: Counter[str] = Counter()
+    changed = []
+    for thing in things:
+        name = thing["name"]
+        if name is None:
+            continue
+        seen[name] += 1
+        number = seen[name]
+        while number > 1:
+            other = f"{name} {number}"
+            if other not in taken:
+                thing["name"] = other
+                taken.add(other)
+                changed.append((name, other, str(thing["where"])))
+                break
+            number += 1
+        seen[name] = number
+    return changed
+
+
+def _label(thing: dict[str, Any]) -> str:
+    return str(thing["where"]) + (f" ({thing['name']})" if thing["name"] else "")
+
+
+def _metres(length: float) -> str:
+    return f"{length / 1e3:.4g} km" if length >= 1e4 else f"{length:.4g} m"
+
+
+def _whole(value: Any) -> int:
+    number = _real(value)
+    if number != int(number):
+        raise ValueError(f"viewpoints: expected a whole number, got {shown(value)}")
+    return int(number)
+
+
+def _real(value: Any) -> float:
+    if value is None:
+        raise ValueError("standoff: missing; expected a distance from its surface")
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"expected a number, got {shown(value)}") from None
+
+
+def _list(value: Any) -> list[float]:
+    """Heights of a list, or of text with commas, as tables have them."""
+    values = value.replace(",", " ").split() if isinstance(value, str) else value
+    return [_real(v) for v in (values if isinstance(values, list) else [values])]

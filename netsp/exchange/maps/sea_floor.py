@@ -1,0 +1,301 @@
+"""Sea floor of a chart: depth areas, contours and soundings as a grid of heights."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.base.files import write_text
+from netsp.model.validated import shown
+
+if TYPE_CHECKING:
+    import shapely
+
+SUFFIXES = (".asc", ".tif", ".tiff")
+"""Formats that a sea floor is written in: ESRI's text grid, and GeoTIFF."""
+
+NO_HEIGHT = -9999.0
+"""Value of cells whose depth the chart does not give."""
+
+MAX_CELLS = 2000
+"""Cells along a side: a floor has twice as many triangles as cells."""
+
+
+@dataclass(frozen=True)
+class DepthArea:
+    """Area of a chart with a range of depths.
+
+    Attributes
+    ----------
+    shape
+        In the problem's plane.
+    least
+        Least depth, metres downwards; None where the chart does not give it.
+    greatest
+        Greatest depth.
+    """
+
+    shape: shapely.Geometry
+    least: float | None
+    greatest: float | None
+
+
+@dataclass(frozen=True)
+class Danger:
+    """Rock, wreck or obstruction with the depth of its top.
+
+    Attributes
+    ----------
+    shape
+        Point, line or area in the problem's plane.
+    depth
+        Depth of its top, metres downwards; negative where it dries.
+    """
+
+    shape: shapely.Geometry
+    depth: float
+
+
+@dataclass(frozen=True)
+class SeaFloor:
+    """Grid of heights below the chart's datum.
+
+    Attributes
+    ----------
+    west, south
+        Corner of the grid, in the problem's plane, metres.
+    cell
+        Side of a cell, metres.
+    heights
+        Heights z, the northernmost row first; NaN where the chart gives none.
+    """
+
+    west: float
+    south: float
+    cell: float
+    heights: Floats
+
+    def save(self, file: str | Path) -> None:
+        """Write the grid to a file that a scene takes as its floor.
+
+        Parameters
+        ----------
+        file : str or Path
+            Its extension is one of `SUFFIXES`.
+
+        Raises
+        ------
+        InputError
+            Another extension, or it cannot be written.
+        """
+        check_suffix(file)
+        filled = np.where(np.isfinite(self.heights), self.heights, NO_HEIGHT)
+        rows, columns = filled.shape
+        if Path(file).suffix.lower() == ".asc":
+            head = (
+                f"ncols {columns}\nnrows {rows}\nxllcorner {self.west:.6f}\n"
+                f"yllcorner {self.south:.6f}\ncellsize {self.cell:.9g}\n"
+                f"NODATA_value {NO_HEIGHT:g}\n"
+            )
+            lines = (" ".join(f"{v:.3f}" for v in row) for row in filled)
+            write_text(file, head + "\n".join(lines) + "\n")
+            return
+        _save_geotiff(file, filled, (self.west, self.south + rows * self.cell), self.cell)
+
+
+def check_suffix(file: str | Path) -> None:
+    """Raise an `InputError` unless a sea floor can be written to a file of this name."""
+    if Path(file).suffix.lower() not in SUFFIXES:
+        raise InputError(f"floor: expected a name that ends in {', '.join(SUFFIXES)}, got "
+                         f"{shown(str(file))}")  # fmt: skip
+
+
+def sea_floor(
+    areas: Sequence[DepthArea], contours: Floats, land: Sequence[shapely.Geometry],
+    box: tuple[float, float, float, float], cell: float, *, soundings: Floats | None = None,
+    dangers: Sequence[Danger] = (),
+) -> SeaFloor:  # fmt: skip
+    """Return the sea floor that a chart's depths give.
+
+    Depths are interpolated between soundings and contours, and kept within the range of depths of
+    the area that they lie in, the shallower where areas overlap. Beyond all soundings and contours
+    an area has its least depth. Land is at the datum.
+
+    The floor is never deeper than a sounding or the top of a danger within it, also between the
+    middles of cells, where a scene interpolates. A sounding shallower than its area raises the
+    floor as far as the neighbouring soundings and contours.
+
+    Parameters
+    ----------
+    areas : sequence of DepthArea
+        Areas with depths.
+    contours : ndarray, shape (k, 3)
+        Corners of contours: x, y and depth downwards.
+    land : sequence of shapely.Geometry
+        Areas of land.
+    box : (xmin, ymin, xmax, ymax)
+        Extent that the grid must hold.
+    cell : float
+        Side of a cell, metres.
+    soundings : ndarray, shape (k, 3), optional
+        x, y and depth downwards.
+    dangers : sequence of Danger
+        Rocks, wrecks and obstructions whose depth is known.
+
+    Returns
+    -------
+    SeaFloor
+        The grid.
+
+    Raises
+    ------
+    InputError
+        The grid would be too large, or the chart gives no depth within the box.
+    """
+    west, south, east, north = box
+    columns, rows = (max(2, int(np.ceil(span / cell))) for span in (east - west, north - south))
+    if max(columns, rows) > MAX_CELLS:
+        raise InputError(
+            f"floor: {columns} x {rows} cells of {cell:g} m; expected at most {MAX_CELLS} along a "
+            "side, so larger cells"
+        )
+    spots = np.empty((0, 3)) if soundings is None else soundings
+    x: Floats = west + cell * np.arange(0.5, columns)
+    y: Floats = south + cell * np.arange(0.5, rows)
+    least = np.full((rows, columns), -np.inf)
+    greatest = np.full((rows, columns), np.inf)
+    has_area = np.zeros((rows, columns), dtype=bool)
+    for area in areas:
+        inside = _covered(area.shape, x, y)
+        low = area.least if area.least is not None else -np.inf
+        high = area.greatest if area.greatest is not None else np.inf
+        greatest[inside] = np.minimum(greatest[inside], high)
+        first = inside & ~has_area
+        least[first] = low
+        both = inside & has_area
+        least[both] = np.minimum(least[both], low)
+        has_area |= inside
+    between, by_shoal = _interpolated(contours, spots, _is_shoal(spots, areas), x, y)
+    depth = np.where(np.isfinite(between), between, least)  # beyond all soundings: the least depth
+    depth = np.minimum(np.maximum(depth, least), np.maximum(greatest, least))
+    depth[by_shoal] = np.minimum(depth, between)[by_shoal]
+    depth[~has_area] = np.nan
+    for shape in land:
+        depth[_covered(shape, x, y)] = 0.0
+    depth[~np.isfinite(depth)] = np.nan
+    _cap(depth, spots, (west, south), cell)
+    for danger in dangers:
+        _cap_danger(depth, danger, x, y, (west, south), cell)
+    if np.isnan(depth).all():
+        raise InputError("floor: the chart gives no depth within the tether's reach")
+    return SeaFloor(west, south, cell, 0.0 - depth[::-1])
+
+
+def _is_shoal(soundings: Floats, areas: Sequence[DepthArea]) -> np.ndarray:
+    """Return which soundings are shallower than the least depth of every area that they lie in."""
+    import shapely
+
+    least = np.full(len(soundings), np.inf)
+    tree = shapely.STRtree([area.shape for area in areas])
+    spots = shapely.points(soundings[:, :2])
+    for spot, area in tree.query(spots, predicate="intersects").T.tolist():
+        low = areas[area].least
+        least[spot] = min(least[spot], -np.inf if low is None else low)
+    return np.asarray(np.isfinite(least) & (soundings[:, 2] < least))
+
+
+def _cap(depth: Floats, soundings: Floats, corner: tuple[float, float], cell: float) -> None:
+    """Keep the floor above soundings: each limits the depth of the four cells about it."""
+    rows, columns = depth.shape
+    left, low = (np.floor((soundings[:, k] - corner[k]) / cell - 0.5).astype(int) for k in (0, 1))
+    for row, column in ((low, left), (low, left + 1), (low + 1, left), (low + 1, left + 1)):
+        held = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+        np.fmin.at(depth, (row[held], column[held]), soundings[held, 2])
+
+
+def _cap_danger(
+    depth: Floats, danger: Danger, x: Floats, y: Floats, corner: tuple[float, float], cell: float
+) -> None:
+    """Keep the floor above the top of a danger, wherever it lies."""
+    import shapely
+
+    if "Point" in danger.shape.geom_type:
+        places = shapely.get_coordinates(danger.shape)
+        _cap(depth, np.column_stack([places, np.full(len(places), danger.depth)]), corner, cell)
+        return
+    # the middles of cells about any of its points are at most a diagonal of 1.42 cells away
+    held = _covered(danger.shape.buffer(1.5 * cell), x, y)
+    depth[held] = np.fmin(depth[held], danger.depth)
+
+
+def _covered(shape: shapely.Geometry, x: Floats, y: Floats) -> np.ndarray:
+    """Return which middles of cells lie in a shape."""
+    import shapely
+
+    low_x, low_y, high_x, high_y = shape.bounds
+    columns = np.flatnonzero((x >= low_x) & (x <= high_x))
+    rows = np.flatnonzero((y >= low_y) & (y <= high_y))
+    inside = np.zeros((len(y), len(x)), dtype=bool)
+    if len(columns) and len(rows):
+        shapely.prepare(shape)
+        at = np.ix_(rows, columns)
+        gx, gy = np.meshgrid(x[columns], y[rows])
+        inside[at] = shapely.contains_xy(shape, gx, gy)
+    return inside
+
+
+def _interpolated(
+    contours: Floats, soundings: Floats, is_shoal: np.ndarray, x: Floats, y: Floats
+) -> tuple[Floats, np.ndarray]:
+    """Return depths interpolated linearly (NaN outside), and a mask of those that use a shoal."""
+    from scipy.interpolate import LinearNDInterpolator
+    from scipy.spatial import Delaunay, QhullError
+
+    points = np.vstack([contours, soundings])
+    marks = np.concatenate([np.zeros(len(contours), dtype=bool), is_shoal])
+    order = np.lexsort((points[:, 2], points[:, 1], points[:, 0]))
+    points, marks = points[order], marks[order]
+    # one depth at one place: the least
+    is_first = np.any(np.diff(points[:, :2], axis=0, prepend=np.nan) != 0.0, axis=1)
+    known, marks = points[is_first], marks[is_first]
+    none = np.full((len(y), len(x)), np.nan)
+    if len(known) < 3:
+        return none, np.isfinite(none)
+    try:
+        triangles = Delaunay(known[:, :2])
+    except QhullError:  # all on one line
+        return none, np.isfinite(none)
+    gx, gy = np.meshgrid(x, y)
+    depths = np.asarray(LinearNDInterpolator(triangles, known[:, 2])(gx, gy), dtype=float)
+    own = triangles.find_simplex(np.stack([gx, gy], axis=-1))
+    by_shoal = marks[triangles.simplices].any(axis=1)[own] & (own >= 0) & np.isfinite(depths)
+    return depths, by_shoal
+
+
+def _save_geotiff(
+    file: str | Path, heights: Floats, corner: tuple[float, float], cell: float
+) -> None:
+    import warnings
+
+    try:
+        import rasterio
+        from rasterio.transform import from_origin
+    except ImportError:
+        raise InputError("GeoTIFF needs rasterio: pip install 'netsp[geo]'") from None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a plane of its own has no place on the map
+        try:
+            with rasterio.open(
+                str(file), "w", driver="GTiff", height=heights.shape[0], width=heights.shape[1],
+                count=1, dtype="float32", nodata=NO_HEIGHT,
+                transform=from_origin(corner[0], corner[1], cell, cell), compress="deflate",
+            ) as grid:  # fmt: skip
+                grid.write(heights.astype("float32"), 1)
+        except Exception as error:
+            raise InputError(f"{file}: cannot be written: {str(error)[:120]}") from None

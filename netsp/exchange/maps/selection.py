@@ -1,0 +1,132 @@
+"""Choice of the features of a map that are to be inspected: by layer, name or box."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING
+
+from netsp.base.errors import InputError
+from netsp.model.validated import shown
+
+if TYPE_CHECKING:
+    import shapely
+
+Box = tuple[float, float, float, float]
+
+WORDS = ("layer", "name", "box", "earth")
+"""Words of a choice: ``earth`` is a box in degrees, ``box`` one in the problem's plane."""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Choice of obstacles; a feature that fits one of each kind of rule is chosen.
+
+    Attributes
+    ----------
+    layers
+        Names of layers, in lower case, with ``*`` and ``?`` as in names of files.
+    names
+        Names of features, likewise.
+    boxes
+        ``(xmin, ymin, xmax, ymax)`` in the problem's plane; a feature within or across is chosen.
+    earth_boxes
+        ``(south, west, north, east)`` in degrees.
+
+    Examples
+    --------
+    >>> chosen = Selection.parse([("layer", "SLCONS"), ("name", "Pier *")])
+    >>> chosen.takes("slcons", "Pier 3"), chosen.takes("slcons", None)
+    (True, False)
+    """
+
+    layers: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
+    boxes: tuple[Box, ...] = ()
+    earth_boxes: tuple[Box, ...] = field(default=())
+
+    @classmethod
+    def parse(cls, rules: Sequence[tuple[str, str]]) -> Selection:
+        """Return the choice that pairs of a word and a value stand for.
+
+        Parameters
+        ----------
+        rules : sequence of (str, str)
+            As ``("layer", "SLCONS")`` or ``("box", "0,0,50,20")``.
+
+        Returns
+        -------
+        Selection
+            The choice.
+
+        Raises
+        ------
+        InputError
+            An unknown word, or a box that is none.
+        """
+        for word, _ in rules:
+            if word not in WORDS:
+                raise InputError(f"--of: expected one of {', '.join(WORDS)} before the =, got "
+                                 f"{shown(word)}")  # fmt: skip
+
+        def of(word: str) -> list[str]:
+            return [value for own, value in rules if own == word]
+
+        return cls(
+            tuple(v.lower() for v in of("layer")), tuple(v.lower() for v in of("name")),
+            tuple(_box("box", v, "XMIN,YMIN,XMAX,YMAX") for v in of("box")),
+            tuple(_box("earth", v, "SOUTH,WEST,NORTH,EAST") for v in of("earth")),
+        )  # fmt: skip
+
+    def takes(self, layer: str, name: str | None) -> bool:
+        """Return whether layer and name of a feature fit.
+
+        Parameters
+        ----------
+        layer : str
+            Its layer.
+        name : str or None
+            Its name.
+
+        Returns
+        -------
+        bool
+            Whether they do; whatever they are where the choice says nothing of them.
+        """
+        return (not self.layers or _fits(layer, self.layers)) and (
+            not self.names or (name is not None and _fits(name, self.names))
+        )
+
+    def holds(self, shape: shapely.Geometry, areas: Sequence[shapely.Geometry]) -> bool:
+        """Return whether a shape lies in or across one of the boxes.
+
+        Parameters
+        ----------
+        shape : shapely.Geometry
+            In the problem's plane.
+        areas : sequence of shapely.Geometry
+            All boxes in the same plane.
+
+        Returns
+        -------
+        bool
+            Whether it does; True without boxes.
+        """
+        return not areas or any(shape.intersects(area) for area in areas)
+
+
+def _fits(text: str, patterns: Sequence[str]) -> bool:
+    own = text.lower()
+    return any(own == pattern or fnmatchcase(own, pattern) for pattern in patterns)
+
+
+def _box(word: str, text: str, expected: str) -> Box:
+    try:
+        low_x, low_y, high_x, high_y = (float(v) for v in text.split(","))
+    except ValueError:
+        raise InputError(f"--of {word}: expected {expected}, got {shown(text)}") from None
+    if not (low_x < high_x and low_y < high_y):
+        raise InputError(f"--of {word}: expected {expected} with the smaller values first, got "
+                         f"{shown(text)}")  # fmt: skip
+    return low_x, low_y, high_x, high_y

@@ -1,0 +1,365 @@
+"""Well-known binary of all geometry types (ISO 19125-1, SQL/MM part 3) as shapes of Shapely.
+
+Shapely reads points, lines and polygons only. Curves become lines of short steps, faces of surfaces
+the outline of what they cover from above, and rings that are not closed are closed.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import struct
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.geometry.polygons import union
+
+if TYPE_CHECKING:
+    import shapely
+
+MAX_ARC_STEP = math.radians(4.0)
+"""Largest step between the points of an arc, radians: GDAL's, so that all formats are alike."""
+
+MAX_NESTING = 32
+"""Geometries within geometries that are read; damaged files could nest without end."""
+
+POINT, LINE, POLYGON = 1, 2, 3
+MULTI_POINT, MULTI_LINE, MULTI_POLYGON, COLLECTION = 4, 5, 6, 7
+ARCS, COMPOUND_CURVE, CURVE_POLYGON, MULTI_CURVE, MULTI_SURFACE = 8, 9, 10, 11, 12
+POLYHEDRAL_SURFACE, TIN, TRIANGLE = 15, 16, 17
+FACES = (POLYHEDRAL_SURFACE, TIN)
+COLLECTIONS = (
+    MULTI_POINT, MULTI_LINE, MULTI_POLYGON, COLLECTION, MULTI_CURVE, MULTI_SURFACE,
+    POLYHEDRAL_SURFACE, TIN,
+)  # fmt: skip
+
+CLOSED = "a ring is not closed: closed by its first corner"
+FROM_ABOVE = "made of faces: taken as their outline from above"
+COLLAPSED = "an area of no width: taken as a line"
+
+
+class ShapeError(Exception):
+    """Shape that cannot be used; the text is the reason."""
+
+
+class NotFiniteError(ShapeError):
+    """Shape with a place that is no number, which is a defect of the file."""
+
+    def __init__(self) -> None:
+        super().__init__("expected finite coordinates")
+
+
+def shape_of(data: bytes) -> tuple[shapely.Geometry, tuple[str, ...]]:
+    """Return the shape of well-known binary of any type.
+
+    Parameters
+    ----------
+    data : bytes
+        ISO or extended well-known binary.
+
+    Returns
+    -------
+    shape : shapely.Geometry
+        Point, line, polygon, one of their collections, or a `GeometryCollection`; measures (M) are
+        dropped.
+    changes : tuple of str
+        What was changed, as `CLOSED`.
+
+    Raises
+    ------
+    ShapeError
+        Damaged, or a type that is none of these.
+
+    Examples
+    --------
+    >>> import shapely, struct
+    >>> corners = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)]
+    >>> ring = struct.pack("<I", 3) + b"".join(struct.pack("<2d", *c) for c in corners)
+    >>> shape, changes = shape_of(struct.pack("<BII", 1, 3, 1) + ring)
+    >>> shape.area, changes
+    (2.0, ('a ring is not closed: closed by its first corner',))
+    """
+    import shapely
+
+    reader = _Reader(data)
+    try:
+        shape = reader.geometry()
+    except (struct.error, IndexError, MemoryError):
+        raise ShapeError("its geometry is damaged (cut short)") from None
+    except (ValueError, shapely.errors.ShapelyError) as error:
+        raise ShapeError(f"its geometry is damaged ({str(error).splitlines()[0][:80]})") from None
+    return shape, tuple(dict.fromkeys(reader.changes))
+
+
+def ring_of(points: Floats, changes: list[str]) -> Floats:
+    """Return the corners of a ring with the first repeated at the end.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2 or 3)
+        Corners.
+    changes : list of str
+        Gets `CLOSED` where the ring was not closed.
+
+    Returns
+    -------
+    ndarray
+        Closed.
+    """
+    if len(points) and not np.array_equal(points[0, :2], points[-1, :2]):
+        changes.append(CLOSED)
+        return np.vstack([points, points[:1]])
+    return points
+
+
+def area_of(rings: list[Floats], changes: list[str]) -> shapely.Geometry:
+    """Return the polygon of rings; a line or a point where the outer one has no three corners.
+
+    Parameters
+    ----------
+    rings : list of ndarray
+        The outer ring first.
+    changes : list of str
+        Gets what was changed.
+
+    Returns
+    -------
+    shapely.Geometry
+        A polygon, perhaps empty; a line that stands for a ring of two corners.
+    """
+    import shapely
+
+    if not rings or not len(rings[0]):
+        return shapely.Polygon()
+    if not np.isfinite(np.vstack(rings)[:, :2]).all():
+        raise NotFiniteError
+    outer = rings[0]
+    distinct = np.unique(outer[:, :2], axis=0)
+    if len(distinct) == 1:
+        raise ShapeError("an area that is one point")
+    if len(distinct) == 2:
+        changes.append(COLLAPSED)
+        return shapely.LineString(
+            outer[np.append(True, (np.diff(outer[:, :2], axis=0) != 0).any(1))]
+        )
+    holes = [r for r in rings[1:] if len(np.unique(r[:, :2], axis=0)) > 2]
+    return shapely.Polygon(ring_of(outer, changes), [ring_of(h, changes) for h in holes])
+
+
+def outline_of_faces(faces: list[shapely.Geometry], changes: list[str]) -> shapely.Geometry:
+    """Return what faces in space cover from above.
+
+    Parameters
+    ----------
+    faces : list of shapely.Geometry
+        Polygons in space.
+    changes : list of str
+        Gets `FROM_ABOVE`.
+
+    Returns
+    -------
+    shapely.Geometry
+        A polygon or several; the line of a wall whose faces are all upright.
+    """
+    import shapely
+
+    changes.append(FROM_ABOVE)
+    flat = [shapely.force_2d(f) for f in faces if not f.is_empty]
+    solid = [f for f in flat if f.geom_type == "Polygon" and _has_area(f)]
+    whole = union([shapely.make_valid(f) for f in solid])
+    areas = [p for p in getattr(whole, "geoms", [whole]) if "Polygon" in p.geom_type]
+    whole = union(areas)
+    if not whole.is_empty:
+        return whole
+    lines = [shapely.LineString(shapely.get_coordinates(f)) for f in flat]
+    wall = shapely.line_merge(shapely.union_all([s for s in lines if s.length > 0.0]))
+    return wall
+
+
+def arc_points(start: Floats, middle: Floats, end: Floats) -> Floats:
+    """Return points along the arc through three points, both ends among them.
+
+    Parameters
+    ----------
+    start, middle, end : ndarray, shape (2,) or (3,)
+        In the order of the arc; a full circle ends where it starts, with the middle opposite.
+
+    Returns
+    -------
+    ndarray
+        Points no farther apart than `MAX_ARC_STEP`; three points of one line are returned as such.
+    """
+    a, b, c = start[:2], middle[:2], end[:2]
+    if np.array_equal(a, c):
+        centre, turn = 0.5 * (a + b), 2.0 * math.pi
+    else:
+        d1, d2 = b - a, c - a
+        cross = float(d1[0] * d2[1] - d1[1] * d2[0])
+        if abs(cross) <= 1e-12 * float(np.hypot(*d1) * np.hypot(*d2)):
+            return np.vstack([start, middle, end])
+        q1, q2 = float(d1 @ d1), float(d2 @ d2)
+        centre = a + np.array([d2[1] * q1 - d1[1] * q2, d1[0] * q2 - d2[0] * q1]) / (2.0 * cross)
+        angles = [math.atan2(*(p - centre)[::-1]) for p in (a, c)]
+        turn = (angles[1] - angles[0]) % (2.0 * math.pi)
+        if cross < 0.0:
+            turn -= 2.0 * math.pi
+    radius = float(np.hypot(*(a - centre)))
+    first = math.atan2(*(a - centre)[::-1])
+    steps = max(2, math.ceil(abs(turn) / MAX_ARC_STEP - 1e-9))
+    share = np.linspace(0.0, 1.0, steps + 1)
+    at = first + turn * share
+    plane = centre + radius * np.column_stack([np.cos(at), np.sin(at)])
+    plane[0], plane[-1] = a, c
+    if len(start) == 2:
+        return plane
+    height = start[2] + (end[2] - start[2]) * share
+    return np.column_stack([plane, height])
+
+
+def _has_area(polygon: shapely.Geometry) -> bool:
+    """Return whether a face is seen from above: more than rounding of its upright sides."""
+    return bool(polygon.area > 1e-9 * polygon.length**2)
+
+
+@dataclass
+class _Reader:
+    """Reader of one geometry."""
+
+    data: bytes
+    at: int = 0
+
+    def __post_init__(self) -> None:
+        self.changes: list[str] = []
+
+    def geometry(self, depth: int = 0, *, is_face: bool = False) -> shapely.Geometry:
+        import shapely
+
+        if depth > MAX_NESTING:
+            raise ShapeError(f"geometries nested more than {MAX_NESTING} times")
+        kind, order, has_z, has_m = self._head()
+        size = 2 + has_z + has_m
+        if kind == POINT:
+            return self._point(self._floats(1, size, order)[:, : 2 + has_z])
+        if kind in (LINE, ARCS):
+            points = self._points(order, size)[:, : 2 + has_z]
+            return _line(_along_arcs(points) if kind == ARCS else points)
+        if kind in (POLYGON, TRIANGLE):
+            count = self._count(order)
+            rings = [self._points(order, size)[:, : 2 + has_z] for _ in range(count)]
+            # faces that stand upright are lines from above, as they should be
+            area = area_of(rings, [] if is_face else self.changes)
+            return area if kind == POLYGON or is_face else outline_of_faces([area], self.changes)
+        count = self._count(order) if kind in (*COLLECTIONS, COMPOUND_CURVE, CURVE_POLYGON) else 0
+        if kind in (COMPOUND_CURVE, CURVE_POLYGON) or kind in COLLECTIONS:
+            parts = [self.geometry(depth + 1, is_face=kind in FACES) for _ in range(count)]
+        else:
+            raise ShapeError(f"its geometry is of a type that is not read (number {kind})")
+        parts = [p for p in parts if not p.is_empty]
+        if kind == COMPOUND_CURVE:
+            pieces = [np.asarray(shapely.get_coordinates(p, include_z=has_z)) for p in parts]
+            return _line(_joined(pieces))
+        if kind == CURVE_POLYGON:
+            rings = [np.asarray(shapely.get_coordinates(p, include_z=has_z)) for p in parts]
+            return area_of(rings, self.changes)
+        if kind in FACES:
+            return outline_of_faces(parts, self.changes) if parts else shapely.Polygon()
+        return collected(parts)
+
+    def _point(self, at: Floats) -> shapely.Geometry:
+        import shapely
+
+        if np.isnan(at).all():  # ISO: an empty point
+            return shapely.Point()
+        if not np.isfinite(at[:, :2]).all():
+            raise NotFiniteError
+        return shapely.Point(at[0])
+
+    def _head(self) -> tuple[int, str, bool, bool]:
+        order = "<" if self.data[self.at] else ">"
+        (code,) = struct.unpack_from(f"{order}I", self.data, self.at + 1)
+        self.at += 5
+        has_z, has_m = bool(code & 0x80000000), bool(code & 0x40000000)
+        if code & 0x20000000:  # extended: the system's number
+            self.at += 4
+        code &= 0x0FFFFFFF
+        has_z |= code // 1000 in (1, 3)
+        has_m |= code // 1000 in (2, 3)
+        return code % 1000, order, has_z, has_m
+
+    def _count(self, order: str) -> int:
+        (count,) = struct.unpack_from(f"{order}I", self.data, self.at)
+        self.at += 4
+        if count > len(self.data):
+            raise ShapeError("its geometry is damaged (cut short)")
+        return int(count)
+
+    def _points(self, order: str, size: int) -> Floats:
+        return self._floats(self._count(order), size, order)
+
+    def _floats(self, count: int, size: int, order: str) -> Floats:
+        stop = self.at + 8 * count * size
+        if stop > len(self.data):
+            raise ShapeError("its geometry is damaged (cut short)")
+        out = np.frombuffer(self.data, f"{order}f8", count * size, self.at).astype(float)
+        self.at = stop
+        return out.reshape(count, size)
+
+
+def collected(parts: list[shapely.Geometry]) -> shapely.Geometry:
+    """Return geometries as one: a collection of one type where they are of one.
+
+    Parameters
+    ----------
+    parts : list of shapely.Geometry
+        Any.
+
+    Returns
+    -------
+    shapely.Geometry
+        A multipart geometry, or a `GeometryCollection` where types differ.
+    """
+    import shapely
+
+    simple = [p for part in parts for p in getattr(part, "geoms", [part])]
+    kinds = {p.geom_type for p in simple}
+    for kind, whole in (
+        ("Point", shapely.MultiPoint), ("LineString", shapely.MultiLineString),
+        ("Polygon", shapely.MultiPolygon),
+    ):  # fmt: skip
+        if kinds == {kind}:
+            return whole(simple)
+    return shapely.GeometryCollection(parts)
+
+
+def _line(points: Floats) -> shapely.Geometry:
+    import shapely
+
+    if not len(points):
+        return shapely.LineString()
+    if not np.isfinite(points[:, :2]).all():
+        raise NotFiniteError
+    if len(points) == 1:
+        raise ShapeError("a line of one place")
+    return shapely.LineString(points)
+
+
+def _along_arcs(points: Floats) -> Floats:
+    """Return the points along arcs, each through a corner, a middle and the next corner."""
+    if len(points) < 3 or len(points) % 2 == 0:
+        return points
+    arcs = [arc_points(*points[k : k + 3]) for k in range(0, len(points) - 2, 2)]
+    return _joined(arcs)
+
+
+def _joined(pieces: list[Floats]) -> Floats:
+    """Return pieces of a curve as one, where each starts at the end of the one before."""
+    if not pieces:
+        return np.empty((0, 2))
+    rest = [
+        after[1:] if np.array_equal(before[-1], after[0]) else after
+        for before, after in itertools.pairwise(pieces)
+    ]
+    return np.vstack([pieces[0], *rest])

@@ -1,0 +1,7 @@
+"""Hands a tour to a vehicle's ground station or a map."""
+
+from netsp.exchange.maps.projection import Projection
+from netsp.exchange.missions.mission_files import FORMATS, export
+from netsp.exchange.missions.waypoints import Waypoint, waypoints_of
+
+__all__ = ["FORMATS", "Projection", "Waypoint", "export", "waypoints_of"]

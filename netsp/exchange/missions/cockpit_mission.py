@@ -1,0 +1,113 @@
+"""Mission files of Blue Robotics' Cockpit (.cmp), as its mission library imports them.
+
+On upload, Cockpit adds a home item before the waypoints, and after the first waypoint it sets the
+file's cruise speed. It has no fences. Each waypoint has a place and a list of commands, which are
+carried out at that place.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import uuid
+from collections.abc import Sequence
+from typing import Any
+
+from netsp.exchange.maps.projection import Projection
+from netsp.exchange.missions.waypoints import Waypoint
+
+NAMESPACE = uuid.UUID("bf7570c1-32a1-54d7-ba10-af9107bb67c8")
+"""Namespace of waypoint ids; exporting a mission again gives the same ids."""
+
+MAP_PIXELS = 600.0
+"""Width of the map view that shows all waypoints when the mission is opened, pixels."""
+
+EARTH_PIXEL_M = 156_543.0
+"""Size of a pixel of a web map at zoom 0 on the equator, metres."""
+
+MIN_ZOOM, MAX_ZOOM = 2, 19
+"""Range of the zoom levels of web maps."""
+
+
+def cockpit_mission(
+    name: str | None, points: Sequence[Waypoint], holds: Sequence[int],
+    altitudes: Sequence[float], projection: Projection, speed: float | None,
+) -> str:  # fmt: skip
+    """Return the text of a Cockpit mission file.
+
+    Parameters
+    ----------
+    name : str or None
+        Name of the mission in Cockpit's library; None for a default.
+    points : sequence of Waypoint
+        Waypoints, the start first.
+    holds : sequence of int
+        Hold time at each waypoint, s.
+    altitudes : sequence of float
+        Altitude of each waypoint above home, metres; negative under water.
+    projection : Projection
+        Projection from (x, y) to degrees.
+    speed : float or None
+        Cruise speed, m/s; None keeps the vehicle's own.
+
+    Returns
+    -------
+    str
+        JSON.
+    """
+    places = projection.to_earth([p.position[:2] for p in points])
+    title = name or "netsp tour"
+    waypoints: list[dict[str, Any]] = []
+    for k, (p, hold, altitude, (lat, lon)) in enumerate(
+        zip(points, holds, altitudes, places, strict=True)
+    ):
+        waypoints.append({
+            "id": str(uuid.uuid5(NAMESPACE, f"{title} {k}")),
+            "coordinates": [round(float(lat), 9), round(float(lon), 9)],
+            "altitude": altitude,
+            "altitudeReferenceType": "Relative to home",
+            "commands": [_command("MAV_CMD_NAV_WAYPOINT", hold, 0, 0, p.heading or 0)],
+        })  # fmt: skip
+    if speed is not None:  # older versions do not add it themselves
+        waypoints[0]["commands"].append(_command("MAV_CMD_DO_CHANGE_SPEED", 1, speed, -1, 0))
+    south, west = (min(float(c[k]) for c in places) for k in (0, 1))
+    north, east = (max(float(c[k]) for c in places) for k in (0, 1))
+    return json.dumps(
+        {
+            "version": 0,
+            "name": title,
+            "description": "Tour of a tethered vehicle, planned by netsp: keep the order and the "
+            "places, or the tether will be wrapped around something.",
+            "vehicleType": "MAV_TYPE_SUBMARINE",
+            "createdAt": 0,
+            "updatedAt": 0,
+            "settings": {
+                "mapCenter": [round(0.5 * (south + north), 9), round(0.5 * (west + east), 9)],
+                "zoom": _zoom(points, 0.5 * (south + north)),
+                "currentWaypointAltitude": altitudes[0],
+                "currentWaypointAltitudeRefType": "Relative to home",
+                "defaultCruiseSpeed": 0 if speed is None else speed,
+            },
+            "waypoints": waypoints,
+            "surveys": [],
+        },
+        indent=1, allow_nan=False,
+    ) + "\n"  # fmt: skip
+
+
+def _command(name: str, *params: float) -> dict[str, Any]:
+    """Return a command for the list of a waypoint."""
+    numbered = {f"param{k}": value for k, value in enumerate(params, 1)}
+    return {"type": "MAVLINK_NAV_COMMAND", "command": name, **numbered}
+
+
+def _zoom(points: Sequence[Waypoint], latitude: float) -> int:
+    """Return the largest integer zoom level at which all waypoints are on the map."""
+    extent = max(
+        max(p.position[k] for p in points) - min(p.position[k] for p in points) for k in (0, 1)
+    )
+    if extent <= 0.0:
+        return MAX_ZOOM
+    pixel = EARTH_PIXEL_M * math.cos(math.radians(latitude))
+    zoom = math.floor(math.log2(pixel * MAP_PIXELS / extent))
+    return max(MIN_ZOOM, min(MAX_ZOOM, zoom))

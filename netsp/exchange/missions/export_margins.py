@@ -1,0 +1,34 @@
+"""Is a plan too tight for a real vehicle?"""
+
+from __future__ import annotations
+
+from netsp.exchange.missions.waypoints import Waypoint, clearance_of
+from netsp.model.problem import Problem
+from netsp.model.solution import Solution
+
+LEAST_SLACK, LEAST_CLEARANCE = 0.3, 0.2
+"""Metres: a vehicle that flew exported missions lost 0.13 m of clearance and took up to 0.16 m more
+tether than planned."""
+
+
+def warnings(
+    problem: Problem, solution: Solution, points: list[Waypoint], slack: float, clearance: float
+) -> list[str]:
+    """What may go wrong because the plan is too tight."""
+    out = []
+    longest = max(solution.tour, key=lambda v: v.tether_length, default=None)
+    if longest is not None and problem.tether_length - longest.tether_length < slack:
+        left = problem.tether_length - longest.tether_length
+        out.append(
+            f"only {left:.2f} {problem.units} of tether is left at "
+            f"{problem.goal_label(longest.goal)}, less than the margin of {slack:g}: plan with a "
+            "shorter tether_length, or set another margin"
+        )
+    near = clearance_of(problem, points)
+    if near < clearance:
+        out.append(
+            f"the lines between waypoints come within {near:.2f} {problem.units} of an obstacle; "
+            f"less than the margin of {clearance:g}: plan with a larger clearance, or set another "
+            "margin"
+        )
+    return out

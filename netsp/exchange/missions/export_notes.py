@@ -1,0 +1,137 @@
+"""Notes and warnings on an exported file: points moved, things not written, assumptions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from netsp.base.errors import counted
+from netsp.exchange.maps.goal_depths import height_warning
+from netsp.exchange.missions.fence import Fence
+from netsp.exchange.missions.mission_files import (
+    FOR_VEHICLES,
+    SHALLOWEST,
+    Settings,
+    fence_of_points,
+    not_written,
+    told_apart,
+)
+from netsp.exchange.missions.waypoints import Waypoint
+from netsp.model.problem import Problem
+
+
+@dataclass(frozen=True)
+class ExportNotes:
+    """Notes on a file that was written.
+
+    Attributes
+    ----------
+    warnings
+        Possible problems in use, one line each.
+    notes
+        Changes, assumptions and omissions, one line each.
+    """
+
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def export_notes(
+    problem: Problem, points: list[Waypoint], kind: str, settings: Settings
+) -> ExportNotes:
+    """Return the notes and warnings on an exported tour.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem that was solved.
+    points : list of Waypoint
+        Waypoints that were written.
+    kind : str
+        One of `netsp.exchange.missions.FORMATS`.
+    settings : Settings
+        Settings of the file.
+    """
+    warnings, notes = [], []
+    if kind != "csv" and (text := not_written(problem, kind)):
+        notes.append(text)
+    if kind in FOR_VEHICLES and (text := bend_note(points, settings)):
+        notes.append(text)
+    if kind in FOR_VEHICLES:
+        if kind == "plan":
+            warnings += fence_warnings(problem, fence_of_points(problem, points, settings))
+        remedy = f"heights are negative below it; moved to {SHALLOWEST} m of depth"
+        if (text := height_warning(problem, remedy)) is not None:
+            warnings.append(text)
+        high = sum(p.goal is not None and p.goal >= 0 and p.position[2] > 0.0 for p in points)
+        shallow = sum(p.position[2] > -SHALLOWEST for p in points) - high
+        if shallow:
+            notes.append(
+                f"{counted(shallow, 'waypoint')} shallower than {SHALLOWEST} m moved to that depth"
+            )
+        notes.append("home is assumed to be at the surface above the base; do not set it by hand")
+    return ExportNotes(tuple(warnings), tuple(notes))
+
+
+def bend_note(points: list[Waypoint], settings: Settings) -> str | None:
+    """Return a note if the vehicle holds longer at bends than the settings say; None otherwise.
+
+    Parameters
+    ----------
+    points : list of Waypoint
+        Waypoints that were written.
+    settings : Settings
+        Settings of the file.
+    """
+    seconds = told_apart(points, settings).bend
+    if seconds <= settings.bend:
+        return None
+    return (
+        f"the vehicle holds {seconds} s at bends instead of {settings.bend} s, because it holds "
+        f"{settings.bend} s at a goal: netsp import tells goals from bends by these times"
+    )
+
+
+def fence_warnings(problem: Problem, fence: Fence) -> list[str]:
+    """Return warnings about obstacles that the fence of a plan simplifies or leaves out, and about
+    zones that the tour touches.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem with the obstacles.
+    fence : Fence
+        Fence of the plan.
+
+    Returns
+    -------
+    list of str
+        One line for each kind of warning.
+    """
+    lines = []
+    if fence.simplified:
+        most = max(z.growth for z in fence.simplified)
+        lines.append(
+            f"{counted(len(fence.simplified), 'obstacle')} simplified in the fence, by up to "
+            f"{most:.2g} {problem.units}, to fit into the vehicle's storage; if your vehicle "
+            "stores more, raise --fence-bytes"
+        )
+    if fence.left_out:
+        lines.append(
+            f"{counted(len(fence.left_out), 'obstacle')} left out of the fence "
+            f"({_names(problem, fence.left_out)}), which takes the nearest to the tour first and "
+            "is full; if your vehicle stores more, raise --fence-bytes"
+        )
+    if fence.touched:
+        lines.append(
+            f"the tour touches the fence at {counted(len(fence.touched), 'obstacle')} "
+            f"({_names(problem, fence.touched)}), where the vehicle may report a breach; plan with "
+            "a larger clearance"
+        )
+    return lines
+
+
+def _names(problem: Problem, obstacles: Sequence[int], most: int = 3) -> str:
+    """Return the names of the first few obstacles."""
+    names = [problem.obstacle_name(k) for k in obstacles[:most]]
+    return ", ".join(names) + (", …" if len(obstacles) > most else "")

@@ -1,0 +1,289 @@
+"""Fence of a plan: obstacles as exclusion zones that fit into the vehicle's storage.
+
+ArduPilot stores a fence as one record of bytes per zone between a header and an end mark. A
+circle takes its kind, two coordinates and a radius; a polygon takes its kind, its number of corners
+and two coordinates per corner. So the limit counts bytes, not points: a flight controller of the
+Pixhawk family without a memory card stores 51 circles, or one polygon of 83 corners.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.model.field_types import Point2
+from netsp.model.problem import Circle, Polygon, Problem
+
+GROWTH_STEPS = 8
+"""Number of growth limits up to the largest one; zones grow by the smallest limit that makes the
+fence fit."""
+
+MIN_FENCE_BYTES = 18
+"""Bytes of the smallest fence with a zone: header, end mark and one circle."""
+
+QUARTER_SEGMENTS = 16
+"""Segments per quarter circle of the region that a zone may fill; they cut its growth limit by up
+to 0.12 %."""
+
+ROUNDING = 2e-3
+"""Distance, m, below which a path counts as touching a zone: plan files round radii up to 1 mm and
+coordinates to 0.1 mm."""
+
+
+@dataclass(frozen=True)
+class FencePolicy:
+    """Storage of a vehicle for its fence, and limits of the fence's zones.
+
+    Attributes
+    ----------
+    max_bytes
+        Storage of the vehicle for its fence, bytes. Flight controllers of the Pixhawk family
+        without a memory card have 672, and ArduSub 4.7 stored 51 circles there. At least 18.
+    head_bytes
+        Bytes of the header and the end mark together.
+    circle_bytes
+        Bytes of a circle.
+    polygon_bytes
+        Bytes of a polygon without its corners.
+    corner_bytes
+        Bytes of a corner.
+    max_corners
+        Maximum number of corners of a polygon; the vehicle stores the number in one byte.
+    max_growth
+        Share of the clearance by which a simplified zone may reach beyond its obstacle, from 0 to
+        less than 1. The path keeps the whole clearance; the rest is room for the vehicle's errors.
+    """
+
+    max_bytes: int = 672
+    head_bytes: int = 5
+    circle_bytes: int = 13
+    polygon_bytes: int = 2
+    corner_bytes: int = 8
+    max_corners: int = 255
+    max_growth: float = 0.5
+
+    def __post_init__(self) -> None:
+        if not self.max_bytes >= self.head_bytes + self.circle_bytes:
+            raise InputError(
+                f"max_bytes: expected {self.head_bytes + self.circle_bytes} or more, got "
+                f"{self.max_bytes!r}"
+            )
+        if not 0.0 <= self.max_growth < 1.0:
+            raise InputError(f"max_growth: expected 0 to less than 1, got {self.max_growth!r}")
+
+    def size(self, zones: Sequence[Zone]) -> int:
+        """Return the number of bytes of a fence.
+
+        Parameters
+        ----------
+        zones : sequence of Zone
+            Zones of the fence.
+
+        Returns
+        -------
+        int
+            Bytes, with header and end mark.
+        """
+        return self.head_bytes + sum(self.size_of(z) for z in zones)
+
+    def size_of(self, zone: Zone) -> int:
+        """Return the number of bytes of a zone.
+
+        Parameters
+        ----------
+        zone : Zone
+            Zone of a fence.
+
+        Returns
+        -------
+        int
+            Bytes, without header and end mark.
+        """
+        if isinstance(zone.shape, Circle):
+            return self.circle_bytes
+        return self.polygon_bytes + self.corner_bytes * len(zone.shape.polygon)
+
+
+@dataclass(frozen=True)
+class Zone:
+    """Exclusion zone of a fence.
+
+    Attributes
+    ----------
+    obstacle
+        Index of its obstacle in the problem.
+    shape
+        Circle or polygon that contains the obstacle.
+    growth
+        Upper bound on the distance by which the zone reaches beyond its obstacle, in the problem's
+        units; 0 for the obstacle itself.
+    """
+
+    obstacle: int
+    shape: Circle | Polygon
+    growth: float = 0.0
+
+
+@dataclass(frozen=True)
+class Fence:
+    """Fence of a plan.
+
+    Attributes
+    ----------
+    zones
+        Zones in the order of the problem's obstacles.
+    left_out
+        Indices of the obstacles without a zone.
+    n_bytes
+        Number of bytes that the vehicle needs to store the fence.
+    touched
+        Indices of the obstacles whose zones the path touches or enters.
+    """
+
+    zones: tuple[Zone, ...]
+    left_out: tuple[int, ...]
+    n_bytes: int
+    touched: tuple[int, ...] = ()
+
+    @property
+    def simplified(self) -> tuple[Zone, ...]:
+        """Zones that reach beyond their obstacles."""
+        return tuple(z for z in self.zones if z.growth > 0.0)
+
+
+def fence_of(
+    problem: Problem, path: Sequence[Point2] | Floats, policy: FencePolicy | None = None
+) -> Fence:
+    """Return a fence around the obstacles of a problem that fits into the vehicle's storage.
+
+    If the exact obstacles take too many bytes, polygons are simplified: a polygon with fewer
+    corners, or a circle, replaces each. A simplified zone contains its obstacle, reaches beyond it
+    by a share of the clearance at most, and does not touch the path. The share is the smallest of
+    `GROWTH_STEPS` shares at which the fence fits. If none fits, the fence takes obstacles by their
+    distance from the path, the nearest first, and leaves out those that do not fit any more.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem with obstacles.
+    path : sequence of (x, y)
+        Vertices of the tour, in the problem's units.
+    policy : FencePolicy, optional
+        Storage of the vehicle and limits of the zones.
+
+    Returns
+    -------
+    Fence
+        Zones of the fence, and obstacles without one.
+
+    Examples
+    --------
+    >>> site = Problem(base=(0, 0), goals=[(9, 0)], tether_length=20,
+    ...                obstacles=[Circle(center=(x, 5), radius=0.1) for x in range(60)])
+    >>> fence = fence_of(site, [(0, 0), (9, 0)])
+    >>> len(fence.zones), fence.left_out[0], fence.n_bytes
+    (51, 51, 668)
+    """
+    policy = policy or FencePolicy()
+    line = shapely.LineString(np.asarray(path, dtype=float)[:, :2])
+    zones = _fitting_zones(problem, line, policy)
+    far = {z.obstacle: problem.obstacles[z.obstacle].shape().distance(line) for z in zones}
+    kept: list[Zone] = []
+    for zone in sorted(zones, key=lambda z: (far[z.obstacle], z.obstacle)):
+        if not _is_large(zone, policy) and policy.size([*kept, zone]) <= policy.max_bytes:
+            kept.append(zone)
+    kept.sort(key=lambda z: z.obstacle)
+    held = {z.obstacle for z in kept}
+    out = tuple(k for k in range(len(problem.obstacles)) if k not in held)
+    touched = tuple(z.obstacle for z in kept if _distance(z.shape, line) <= ROUNDING)
+    return Fence(tuple(kept), out, policy.size(kept), touched)
+
+
+def _fitting_zones(problem: Problem, line: shapely.LineString, policy: FencePolicy) -> list[Zone]:
+    """Return zones that grow as little as it takes to fit; zones of the largest growth if none
+    fit."""
+
+    def grown(step: int) -> list[Zone]:
+        most = policy.max_growth * problem.clearance * step / GROWTH_STEPS
+        return [_simplified(z, problem.obstacles[z.obstacle], most, line, policy) for z in exact]
+
+    def fits(zones: list[Zone]) -> bool:
+        return policy.size(zones) <= policy.max_bytes and not any(
+            _is_large(z, policy) for z in zones
+        )
+
+    exact = [Zone(k, o) for k, o in enumerate(problem.obstacles)]
+    if fits(exact):
+        return exact
+    too_small, step = 0, GROWTH_STEPS
+    zones = grown(step)
+    if not fits(zones):
+        return zones
+    while step - too_small > 1:
+        middle = (too_small + step) // 2
+        tried = grown(middle)
+        if fits(tried):
+            zones, step = tried, middle
+        else:
+            too_small = middle
+    return zones
+
+
+def _distance(shape: Circle | Polygon, line: shapely.LineString) -> float:
+    """Return the distance from a zone to a path; 0 if they touch."""
+    if isinstance(shape, Circle):  # the polygon that stands for a circle is inscribed in it
+        return max(0.0, float(line.distance(shapely.Point(shape.center))) - shape.radius)
+    return float(shape.shape().distance(line))
+
+
+def _is_large(zone: Zone, policy: FencePolicy) -> bool:
+    return isinstance(zone.shape, Polygon) and len(zone.shape.polygon) > policy.max_corners
+
+
+def _simplified(
+    zone: Zone, obstacle: Circle | Polygon, most: float, line: shapely.LineString,
+    policy: FencePolicy,
+) -> Zone:  # fmt: skip
+    """Return the zone of the fewest bytes found that contains an obstacle and reaches beyond it by
+    `most` at most."""
+    if isinstance(obstacle, Circle) or most <= 0.0:
+        return zone
+    body = shapely.Polygon(obstacle.polygon)
+    limit = body.buffer(most, quad_segs=QUARTER_SEGMENTS)
+    best = zone
+    for share in (0.0, 0.25, 0.5, 0.75):
+        wide = body.buffer(share * most, join_style="mitre") if share else body
+        for shape in (wide.simplify((1.0 - share) * most), wide.convex_hull.simplify(0.5 * most)):
+            if shape.geom_type != "Polygon" or shape.interiors or len(shape.exterior.coords) < 4:
+                continue
+            is_clear = shape.distance(line) > ROUNDING
+            if not (is_clear and shape.covers(body) and limit.covers(shape)):
+                continue
+            corners = tuple((float(x), float(y)) for x, y in shape.exterior.coords[:-1])
+            tried = Zone(zone.obstacle, Polygon(polygon=corners), most)
+            if policy.size_of(tried) < policy.size_of(best):
+                best = tried
+    circle = _circle_about(obstacle)
+    outside = circle.radius / np.cos(np.pi / (4.0 * QUARTER_SEGMENTS))  # of a polygon around it
+    disc = shapely.Point(circle.center).buffer(outside, quad_segs=QUARTER_SEGMENTS)
+    round_zone = Zone(zone.obstacle, circle, most)
+    if (
+        limit.covers(disc)
+        and _distance(circle, line) > ROUNDING
+        and policy.size_of(round_zone) < policy.size_of(best)
+    ):
+        best = round_zone
+    return best
+
+
+def _circle_about(obstacle: Polygon) -> Circle:
+    """Return the smallest circle around a polygon, enlarged by a rounding error."""
+    corners = np.array(obstacle.polygon)
+    middle = shapely.minimum_bounding_circle(shapely.MultiPoint(corners)).centroid
+    radius = float(np.hypot(corners[:, 0] - middle.x, corners[:, 1] - middle.y).max())
+    return Circle(center=(middle.x, middle.y), radius=radius * (1.0 + 1e-9))

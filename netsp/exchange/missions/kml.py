@@ -1,0 +1,220 @@
+"""Tours as KML 2.2 (OGC 07-147r2) for Google Earth and other globes.
+
+Elements stand in the order of the KML schema. Altitudes are absolute, so that what is below the
+water is drawn there. A member `kind` in the data of each placemark lets `netsp import` read the
+file back.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import zipfile
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import escape, quoteattr
+
+from netsp.base.errors import InputError
+from netsp.model.problem import Circle, Problem
+from netsp.online.execute.tour_plan import HOME
+
+if TYPE_CHECKING:
+    from netsp.base.arrays import Floats
+    from netsp.exchange.maps.projection import Projection
+    from netsp.exchange.missions.waypoints import Waypoint
+
+CIRCLE_CORNERS = 64
+"""Corners of the polygon, on the circle, that stands for a round obstacle; KML has no circle."""
+
+STYLES = {
+    "base": "<IconStyle><scale>1.2</scale><Icon><href>"
+    "http://maps.google.com/mapfiles/kml/shapes/sailing.png</href></Icon></IconStyle>",
+    "goal": "<IconStyle><scale>0.8</scale><Icon><href>"
+    "http://maps.google.com/mapfiles/kml/shapes/placemark_circle.png</href></Icon></IconStyle>",
+    "obstacle": "<LineStyle><color>ff404040</color><width>1</width></LineStyle>"
+    "<PolyStyle><color>a0808080</color></PolyStyle>",
+    "path": "<LineStyle><color>ff0080ff</color><width>3</width></LineStyle>",
+    "tether": "<LineStyle><color>ff00c0c0</color><width>2</width></LineStyle>",
+}  # fmt: skip
+"""Style of each kind of placemark; colours are alpha, blue, green, red."""
+
+
+def kml_of(problem: Problem, points: Sequence[Waypoint], projection: Projection) -> str:
+    """Return a tour as a KML document.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem that the tour solves.
+    points : sequence of Waypoint
+        Waypoints, the start first.
+    projection : Projection
+        From the problem's plane to degrees.
+
+    Returns
+    -------
+    str
+        Document with folders for the base, goals, obstacles, the path and, switched off, the taut
+        tether at every stop.
+    """
+    page = _Page(projection)
+    base = page.placemark(
+        "base", page.point(problem.base), name="base",
+        data={"tether_length": problem.tether_length, "clearance": problem.clearance,
+              "heading": projection.heading or None},
+    )  # fmt: skip
+    stops = {p.goal: (n, p) for n, p in enumerate((q for q in points if _is_stop(q)), 1)}
+    goals = []
+    for k, goal in enumerate(problem.goals):
+        said = f"depth {-goal.position[2]:g} {problem.units}"
+        data: dict[str, Any] = {}
+        if k in stops:
+            number, stop = stops[k]
+            said = f"stop {number}, {said}, taut tether {stop.tether:.2f} {problem.units}"
+            data = {"visit": number, "taut_tether": round(stop.tether, 4)}
+        goals.append(page.placemark(
+            "goal", page.point(goal.position), name=goal.name, said=said, data=data
+        ))  # fmt: skip
+    obstacles = [
+        page.placemark("obstacle", page.polygon(_outline(o)), name=o.name)
+        for o in problem.obstacles
+    ]
+    path = page.placemark("path", page.line([p.position for p in points]), name="tour")
+    folders = [
+        page.folder("base", [base]), page.folder("goals", goals),
+        page.folder("obstacles", obstacles), page.folder("path", [path]),
+    ]  # fmt: skip
+    drawn = list(_tethers(problem, points))
+    tethers = [
+        page.placemark(
+            "tether", page.line(line.tolist()), hidden=True,
+            name=f"tether at stop {number}: {problem.goal_name(goal)}",
+        )
+        for number, goal, line in drawn if line is not None
+    ]  # fmt: skip
+    missing = [problem.goal_name(goal) for _, goal, line in drawn if line is None]
+    said = f"no taut tether was found at {', '.join(missing)}" if missing else ""
+    if drawn:
+        folders.append(page.folder("tethers", tethers, hidden=True, said=said))
+    styles = "".join(f'<Style id="{kind}">{style}</Style>\n' for kind, style in STYLES.items())
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2">\n'
+        f"<Document><name>{_text(problem.name or 'tour')}</name>\n{styles}{''.join(folders)}"
+        "</Document>\n</kml>\n"
+    )
+
+
+def kmz_of(page: str) -> bytes:
+    """Return an archive (KMZ) that holds a KML page.
+
+    Parameters
+    ----------
+    page : str
+        KML document.
+
+    Returns
+    -------
+    bytes
+        Archive with the page as ``doc.kml`` at its root; equal pages give equal archives.
+    """
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        entry = zipfile.ZipInfo("doc.kml")  # dated 1980
+        entry.compress_type = zipfile.ZIP_DEFLATED
+        archive.writestr(entry, page.encode())
+    return out.getvalue()
+
+
+def _is_stop(point: Waypoint) -> bool:
+    return point.goal is not None and point.goal != HOME
+
+
+def _text(text: object) -> str:
+    return escape(str(text))
+
+
+def _outline(obstacle: Any) -> list[tuple[float, float]]:
+    if not isinstance(obstacle, Circle):
+        return [(float(x), float(y)) for x, y in obstacle.polygon]
+    (x, y), r = obstacle.center, obstacle.radius
+    turns = (2.0 * math.pi * k / CIRCLE_CORNERS for k in range(CIRCLE_CORNERS))
+    return [(x + r * math.cos(a), y + r * math.sin(a)) for a in turns]
+
+
+def _tethers(
+    problem: Problem, points: Sequence[Waypoint]
+) -> Iterable[tuple[int, int, Floats | None]]:
+    """Yield number, goal and taut tether of each stop; nothing where the solids are unknown."""
+    from netsp.roadmap.paths import TautPaths
+
+    stops = [p for p in points if _is_stop(p)]
+    n_solids = len(problem.obstacles)
+    if any(abs(letter) > n_solids for p in stops for letter in p.word):
+        return  # a mission in space, whose words are those of its scene
+    paths = TautPaths(problem)
+    for number, stop in enumerate(stops, 1):
+        assert stop.goal is not None
+        try:
+            line: Floats | None = paths.tether(stop.goal, stop.word)
+        except InputError:
+            line = None
+        yield number, stop.goal, line
+
+
+class _Page:
+    """Elements of a KML document."""
+
+    def __init__(self, projection: Projection) -> None:
+        self.projection = projection
+
+    def _coordinates(self, places: Sequence[Sequence[float]]) -> str:
+        latlon = self.projection.to_earth([p[:2] for p in places])
+        heights = [p[2] if len(p) > 2 else 0.0 for p in places]
+        return " ".join(
+            f"{lon:.9f},{lat:.9f},{z:.3f}"
+            for (lat, lon), z in zip(latlon.tolist(), heights, strict=True)
+        )
+
+    def point(self, place: Sequence[float]) -> str:
+        return (
+            "<Point><altitudeMode>absolute</altitudeMode>"
+            f"<coordinates>{self._coordinates([place])}</coordinates></Point>"
+        )
+
+    def line(self, places: Sequence[Sequence[float]]) -> str:
+        return (
+            "<LineString><altitudeMode>absolute</altitudeMode>"
+            f"<coordinates>{self._coordinates(places)}</coordinates></LineString>"
+        )
+
+    def polygon(self, outline: Sequence[Sequence[float]]) -> str:
+        ring = [*outline, outline[0]]
+        return (
+            "<Polygon><altitudeMode>absolute</altitudeMode><outerBoundaryIs><LinearRing>"
+            f"<coordinates>{self._coordinates(ring)}</coordinates>"
+            "</LinearRing></outerBoundaryIs></Polygon>"
+        )
+
+    def placemark(
+        self, style: str, shape: str, *, name: str | None = None, said: str = "",
+        data: dict[str, Any] | None = None, hidden: bool = False,
+    ) -> str:  # fmt: skip
+        kind = "path" if style == "tether" else style
+        values = {"kind": kind, **{k: v for k, v in (data or {}).items() if v is not None}}
+        fields = "".join(
+            f"<Data name={quoteattr(k)}><value>{_text(v)}</value></Data>" for k, v in values.items()
+        )
+        return (
+            "<Placemark>" + ("" if name is None else f"<name>{_text(name)}</name>")
+            + ("<visibility>0</visibility>" if hidden else "")
+            + (f"<description>{_text(said)}</description>" if said else "")
+            + f"<styleUrl>#{style}</styleUrl><ExtendedData>{fields}</ExtendedData>{shape}"
+            "</Placemark>\n"
+        )  # fmt: skip
+
+    def folder(
+        self, name: str, placemarks: Sequence[str], *, hidden: bool = False, said: str = ""
+    ) -> str:
+        more = "<visibility>0</visibility>" if hidden else ""
+        more += f"<description>{_text(said)}</description>" if said else ""
+        return f"<Folder><name>{name}</name>{more}\n{''.join(placemarks)}</Folder>\n"

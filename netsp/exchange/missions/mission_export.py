@@ -1,0 +1,248 @@
+"""A planned mission as a mission file of a ground station: what
+`netsp.exchange.missions.mission_files` writes of tours in the plane, of tours in space.
+
+The straight lines between waypoints are asked once more: free of solids, also where a vehicle cuts
+corners, of the planned classes, and within the tether. Solids are not written: fences of ground
+stations are upright, and would forbid what is above and below.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.base.geometry import polylines
+from netsp.exchange.maps.projection import Projection
+from netsp.exchange.missions.mission_files import (
+    FOR_VEHICLES,
+    FORMATS,
+    Settings,
+    check_settings,
+    told_apart,
+    write_page,
+)
+from netsp.exchange.missions.waypoints import STRAIGHT, Waypoint, turn
+from netsp.model.field_types import Point3, checked_argument
+from netsp.model.problem import Goal, Problem
+from netsp.online.execute.tour_plan import HOME
+from netsp.online.mission import Mission
+from netsp.plan.space.planning_context import Water
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.scene import Scene
+
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Of the acceptance radius: a vehicle cuts corners by as much as that, or by less."""
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written.
+
+    Parameters
+    ----------
+    points : list of Waypoint
+        The start first; heights above the surface.
+    longest : float
+        Metres of taut tether along the lines between them.
+    room : float
+        Metres from these lines to the nearest solid.
+    """
+
+    points: list[Waypoint]
+    longest: float
+    room: float
+
+
+def export_mission(
+    mission: Mission, file: str | Path, kind: str, projection: Projection | None = None, *,
+    acceptance: float = 0.0, settings: Settings | None = None, surface: float = 0.0,
+    scene: Scene | None = None,
+) -> Exported:  # fmt: skip
+    """Write a planned mission as a mission file.
+
+    Parameters
+    ----------
+    mission : Mission
+        With a tour.
+    file : str or Path
+        The file.
+    kind : str
+        One of `netsp.exchange.missions.FORMATS`.
+    projection : Projection, optional
+        From (x, y) to degrees; needed by all but csv.
+    acceptance : float
+        The vehicle's acceptance radius, metres.
+    settings : Settings, optional
+        Speed, seconds at waypoints and more of the format.
+    surface : float
+        z of the water's surface, metres.
+    scene : Scene, optional
+        When it is at hand.
+
+    Returns
+    -------
+    Exported
+        What was written.
+
+    Raises
+    ------
+    InputError
+        A mission without a tour; waypoints above the surface; corners that a vehicle could cut
+        through a solid; lines that are not of the planned classes, or take more tether.
+    """
+    if mission.tour is None:
+        raise InputError("tour: the mission has none; expected one that `netsp solve` has planned")
+    if mission.track:
+        raise InputError("track: a ground station knows no moving anchor; expected none")
+    settings = settings or Settings()
+    acceptance = checked_argument("acceptance", acceptance, 0.0)
+    check_settings(kind, settings)
+    if projection is None and kind != "csv":
+        raise InputError(f"origin: format {kind!r} needs latitude and longitude of the start")
+    points = _waypoints(mission, projection)
+    if len(points) > settings.max_waypoints and kind in FOR_VEHICLES:
+        raise InputError(
+            f"mission: needs {len(points)} waypoints, and the vehicle takes "
+            f"{settings.max_waypoints}; raise that number if yours takes more"
+        )
+    high = max(p.position[2] for p in points)
+    if high > surface and kind in FOR_VEHICLES:
+        raise InputError(
+            f"surface: {surface:g} is below the tour, which rises to z {high:.4g}; expected the z "
+            "of the water's surface"
+        )
+    scene = scene or mission.load_scene()
+    field = scene.field()
+    water = Water.of(mission, scene, field)
+    line = np.array([p.position for p in points])
+    longest = 0.0
+    for share in SHARES if acceptance else SHARES[:1]:
+        way = pursued(line, share * acceptance) if share else line
+        _check_free(field, way, share * acceptance)
+        longest = max(longest, _checked(water, points, way, share == 0.0))
+    sunk = [_sunk(p, surface) for p in points]
+    settings = told_apart(sunk, settings)
+    write_page(file, kind, FORMATS[kind](_stand_in(mission, surface), sunk, projection, settings))
+    room = float(field.distance(polylines.dense(line, 0.05)).min())
+    return Exported(sunk, longest, room)
+
+
+def _waypoints(mission: Mission, projection: Projection | None) -> list[Waypoint]:
+    """The start, bends, waypoints, and home; a bend that turns by nothing is none."""
+    tour = mission.tour
+    assert tour is not None
+    north = 0.0 if projection is None else projection.heading
+    out = [Waypoint(mission.begin, None, start=True)]
+    for k, stop in enumerate(tour.stops):
+        out += _bends(stop.path)
+        heading = mission.waypoints[k].heading
+        out.append(
+            Waypoint(
+                stop.path[-1], k, stop.signature, stop.tether_length,
+                # from the x axis towards y, to clockwise from north
+                heading=None if heading is None else (north + 90.0 - heading) % 360.0,
+                stay=math.ceil(mission.waypoints[k].dwell),
+            )
+        )  # fmt: skip
+    return [*out, *_bends(tour.home), Waypoint(mission.start, HOME)]
+
+
+def _bends(path: tuple[Point3, ...]) -> list[Waypoint]:
+    """Where a path turns between its ends; a point that it comes to twice in a row is no bend."""
+    line = np.array(path)
+    line = line[np.r_[True, (np.diff(line, axis=0) != 0.0).any(axis=1)]]
+    return [
+        Waypoint(tuple(b.tolist()), None)
+        for a, b, c in zip(line, line[1:], line[2:], strict=False)
+        if turn(a, b, c) > STRAIGHT
+    ]
+
+
+def pursued(line: Floats, radius: float) -> Floats:
+    """Where a vehicle goes that heads for each waypoint until it is within a radius of it, and then
+    for the next; of bends that are nearer to one another it may pass several at once.
+
+    Parameters
+    ----------
+    line : ndarray, shape (k, 3)
+        The waypoints, metres.
+    radius : float
+        Its acceptance radius, metres.
+
+    Returns
+    -------
+    ndarray, shape (m, 3)
+        Metres.
+    """
+    out = [line[0]]
+    for k, target in enumerate(line[1:], 1):
+        here = out[-1]
+        far = float(np.linalg.norm(target - here))
+        short = radius if k < len(line) - 1 else 0.0
+        if far > short:
+            out.append(here + (target - here) * (1.0 - short / far))
+    return np.array(out)
+
+
+def _check_free(field: DistanceField, line: Floats, radius: float) -> None:
+    for a, b in pairwise(line):
+        if field.line_of_sight(a, b, depth=1e-3):
+            continue
+        x, y, z = a
+        if radius:
+            raise InputError(
+                f"acceptance: the vehicle could cut the corner at ({x:.4g}, {y:.4g}, {z:.4g}) "
+                "through a solid; expected a smaller radius, or a plan with a larger clearance"
+            )
+        raise InputError(f"mission: the line from ({x:.4g}, {y:.4g}, {z:.4g}) on enters a solid")
+
+
+def _checked(water: Water, points: list[Waypoint], line: Floats, exact: bool) -> float:
+    """The longest taut tether along a line, whose word at the end is empty as in the plan; where it
+    goes exactly through the waypoints, those at the stops are asked, too."""
+    words, tether = water.words, water.present
+    word, broken = words.word_until(np.vstack([tether.nodes, line, water.laid.nodes[::-1]]))
+    if broken is not None or word != ():
+        raise InputError("mission: its waypoints are not of the plan's homotopy class")
+    if exact:
+        for k, p in enumerate(points):
+            if p.goal is None or p.goal == HOME:
+                continue
+            there = np.vstack([tether.nodes, line[: k + 1], water.mission.places[p.goal]])
+            word, broken = words.word_until(there)
+            if broken is not None or word != p.word:
+                raise InputError(
+                    f"mission: at waypoint #{p.goal} the lines are not of the planned class"
+                )
+    _, longest = water.driven(tether, line, fine=True)
+    limit = water.mission.tether_length
+    if longest > limit:
+        raise InputError(
+            f"tether_length: the lines between waypoints take {longest:.4g} m; expected no more "
+            f"than {limit:g}"
+        )
+    return longest
+
+
+def _sunk(p: Waypoint, surface: float) -> Waypoint:
+    x, y, z = p.position
+    return replace(p, position=(x, y, z - surface))
+
+
+def _stand_in(mission: Mission, surface: float) -> Problem:
+    """A problem with the mission's places, which the formats ask for names and the base."""
+    x, y, z = mission.start
+    goals = tuple(
+        Goal(position=(a, b, c - surface), name=f"waypoint {k}")
+        for k, (a, b, c) in enumerate(mission.places.tolist())
+    )
+    return Problem(
+        name=mission.name, base=(x, y, z - surface), goals=goals, obstacles=(),
+        tether_length=mission.tether_length, clearance=mission.clearance,
+    )  # fmt: skip

@@ -1,0 +1,518 @@
+"""Mission files: QGroundControl plans, waypoint lists and Cockpit missions for ArduSub, GeoJSON,
+KML and CSV.
+
+Formats: QGroundControl's plan files and MAVLink's mission items; RFC 7946 for GeoJSON, which has no
+circle, so that obstacles are points with `radius_m`. ArduSub: depth is a negative altitude relative
+to the surface, never 0 (0 has meant "keep the present one"); there is no take-off; the plan ends at
+the base and not with return-to-launch; waypoints without a hold are flown through, so bends are
+held. The first item is a held waypoint where the tour starts, because the vehicle goes straight to
+the first item from wherever it was armed. A speed is an item of its own: those of a plan's head
+change nothing on the vehicle, and before the first waypoint neither does the item.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from netsp.base.errors import InputError
+from netsp.base.files import cell, write_bytes, write_text
+from netsp.exchange.maps.projection import Projection
+from netsp.exchange.missions.cockpit_mission import cockpit_mission
+from netsp.exchange.missions.fence import Fence, FencePolicy, fence_of
+from netsp.exchange.missions.kml import kml_of, kmz_of
+from netsp.exchange.missions.leg_times import VehicleMotion, leg_times
+from netsp.exchange.missions.waypoints import Waypoint, waypoints_of
+from netsp.model.field_types import checked_argument, checked_instance
+from netsp.model.problem import Circle, Problem
+from netsp.model.solution import Solution
+from netsp.online.execute.tour_plan import HOME
+
+SHALLOWEST = 0.1
+"""Metres of depth that the least altitude stands for."""
+
+HOLD = 5
+"""Seconds at every goal, where nothing else is said."""
+
+MOST_ITEMS = 650
+"""Mission items: MAVLink counts to 65,535, but ArduSub takes 655 with home and the speed."""
+
+FASTEST = 20.0
+"""Metres per second that no underwater vehicle reaches."""
+
+NAV_WAYPOINT, CHANGE_SPEED, RELATIVE_ALTITUDE, MISSION_FRAME = 16, 178, 3, 2
+GROUND_SPEED, KEEP_THROTTLE = 1, -1
+
+ARDUPILOT, SUBMARINE = 3, 12
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a mission file is to say.
+
+    Attributes
+    ----------
+    hold
+        Whole seconds at goals.
+    bend
+        Whole seconds at bends, at the start and at the end, at least 1; longer if the vehicle holds
+        that long at a goal (`told_apart`).
+    speed
+        m/s; None leaves it to the vehicle.
+    max_waypoints
+        Waypoints.
+    fence
+        Policy of what the fence of a plan may take.
+    """
+
+    hold: int | None = None
+    bend: int = 1
+    speed: float | None = 0.5
+    max_waypoints: int = MOST_ITEMS
+    fence: FencePolicy = field(default_factory=FencePolicy)
+
+
+def export(
+    problem: Problem, solution: Solution, file: str | Path, kind: str,
+    projection: Projection | None = None, *, acceptance: float = 0.0,
+    settings: Settings | None = None,
+) -> list[Waypoint]:  # fmt: skip
+    """Write a solution as a mission file.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was solved.
+    solution : Solution
+        Its solution.
+    file : str or Path
+        The file.
+    kind : str
+        One of `FORMATS`.
+    projection : Projection, optional
+        From the plane to degrees; by default that of the problem's origin. Needed by all but csv.
+    acceptance : float
+        The vehicle's acceptance radius, metres.
+    settings : Settings, optional
+        Speed, dwell and more of the format.
+
+    Returns
+    -------
+    list of Waypoint
+        The waypoints written, the start first.
+
+    Raises
+    ------
+    InputError
+        An unknown kind, units other than metres, no projection, more waypoints than the format
+        allows, waypoints that would not be of the plan's class.
+    """
+    checked_instance("problem", problem, Problem)
+    checked_instance("solution", solution, Solution)
+    if not solution.tour or len(solution.path) < 2:
+        raise InputError("solution: has no tour to export")
+    if max(v.goal for v in solution.tour) >= len(problem.goals):
+        raise InputError(f"solution: tour: expected goals #0 to #{len(problem.goals) - 1}")
+    if problem.units != "m" and kind != "csv":
+        raise InputError(
+            f"units: format {kind!r} is in metres; expected a problem in m, got {problem.units!r}"
+        )
+    acceptance = checked_argument("acceptance", acceptance, 0.0)
+    settings = settings or Settings()
+    check_settings(kind, settings)
+    projection = projection or Projection.of(problem)
+    if projection is None and kind != "csv":
+        raise InputError(
+            f"origin: format {kind!r} needs latitude and longitude of the base; expected --origin "
+            "LAT,LON, or the field origin in the problem"
+        )
+    points = [start_of(problem, solution), *waypoints_of(problem, solution, acceptance)]
+    settings = told_apart(points, settings)
+    if len(points) > settings.max_waypoints and kind in FOR_VEHICLES:
+        raise InputError(
+            f"solution: needs {len(points)} waypoints, and the vehicle takes "
+            f"{settings.max_waypoints}; raise that number if yours takes more"
+        )
+    write_page(file, kind, FORMATS[kind](problem, points, projection, settings))
+    return points
+
+
+def write_page(file: str | Path, kind: str, text: str) -> None:
+    """Write the text of a format to a file; for ``kmz``, into an archive.
+
+    Parameters
+    ----------
+    file : str or Path
+        The file.
+    kind : str
+        One of `FORMATS`.
+    text : str
+        Contents in that format.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+    """
+    if kind == "kmz":
+        write_bytes(file, kmz_of(text))
+    else:
+        write_text(file, text)
+
+
+def check_settings(kind: str, settings: Settings) -> None:
+    """What a mission file is to say, asked before anything is written.
+
+    Parameters
+    ----------
+    kind : str
+        One of `FORMATS`.
+    settings : Settings
+        Of the file.
+
+    Raises
+    ------
+    InputError
+        An unknown kind; a speed, seconds or a number of waypoints out of range.
+    """
+    if not isinstance(kind, str) or kind not in FORMATS:
+        raise InputError(f"format: expected {', '.join(FORMATS)}, got {kind!r}")
+    if settings.speed is not None and not checked_argument("speed", settings.speed, 0.0, FASTEST):
+        raise InputError("speed: expected more than 0, got 0")
+    for name, least in (("hold", 0), ("bend", 1)):
+        seconds = getattr(settings, name)
+        if name == "hold" and seconds is None:
+            continue
+        if not isinstance(seconds, int | np.integer) or not least <= seconds <= 3600:
+            raise InputError(
+                f"{name}: expected whole seconds from {least} to 3600, got {seconds!r}"
+            )
+    checked_argument("max_waypoints", settings.max_waypoints, 1)
+
+
+def start_of(problem: Problem, solution: Solution) -> Waypoint:
+    """Where the tour starts: the base, or the problem's state."""
+    x, y, z = solution.path[0] if problem.state is not None else problem.base
+    return Waypoint((float(x), float(y), float(z)), None, start=True)
+
+
+def predicted_s(
+    points: list[Waypoint], settings: Settings, motion: VehicleMotion | None = None
+) -> float | None:
+    """Return the seconds that a mission takes from its first waypoint on; None without a speed.
+
+    Parameters
+    ----------
+    points : list of Waypoint
+        Waypoints of the mission, the start first.
+    settings : Settings
+        Speed and holds.
+    motion : VehicleMotion, optional
+        Motion of the vehicle; by default that of ArduSub as it comes.
+    """
+    if settings.speed is None:
+        return None
+    told = told_apart(points, settings)
+    holds = [_hold(p, told) for p in points]
+    places = [(*p.position[:2], altitude(p.position[2])) for p in points]
+    return holds[0] + sum(leg_times(places, holds, settings.speed, motion))
+
+
+def fence_of_points(problem: Problem, points: list[Waypoint], settings: Settings) -> Fence:
+    """Return the fence that a plan of these waypoints has."""
+    return fence_of(problem, [p.position[:2] for p in points], settings.fence)
+
+
+def not_written(problem: Problem, kind: str) -> str | None:
+    """Return a note on the parts of a problem that a format cannot store; None if it stores all.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem that was solved.
+    kind : str
+        One of `FORMATS`.
+    """
+    lost = []
+    if kind in ("wpl", "cockpit"):
+        lost += ["the tether's length", "the clearance"]
+        lost += ["obstacles"] if problem.obstacles else []
+        lost += ["names of goals"] if any(g.name is not None for g in problem.goals) else []
+    if kind == "plan" and any(o.name is not None for o in problem.obstacles):
+        lost.append("names of obstacles")
+    lost += ["bounds"] if problem.bounds is not None else []
+    lost += ["the state of the tether"] if problem.state is not None else []
+    return f"not written in this format: {', '.join(lost)}" if lost else None
+
+
+def altitude(z: float) -> float:
+    """The relative altitude that stands for a height."""
+    return round(min(z, -SHALLOWEST), 3)
+
+
+def told_apart(points: Sequence[Waypoint], settings: Settings) -> Settings:
+    """Return the settings with a hold at bends that differs from the hold at every goal.
+
+    An import tells goals from bends by these times, because a ground station keeps no other mark of
+    a waypoint when it saves the file.
+
+    Parameters
+    ----------
+    points : sequence of Waypoint
+        Waypoints that are written.
+    settings : Settings
+        Settings of the file; their hold at bends is the minimum.
+    """
+    holds = {_hold(p, settings) for p in points if p.goal not in (None, HOME)}
+    free = (s for s in range(settings.bend, settings.bend + len(holds) + 1) if s not in holds)
+    return replace(settings, bend=next(free))
+
+
+def _hold(point: Waypoint, settings: Settings) -> int:
+    if point.goal in (None, HOME):
+        return settings.bend
+    if settings.hold is not None:
+        return settings.hold
+    return HOLD if point.stay is None else point.stay
+
+
+def _plan(
+    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+) -> str:
+    assert projection is not None
+    places = projection.to_earth([p.position[:2] for p in points])
+    items: list[dict[str, Any]] = [
+        {
+            "type": "SimpleItem", "command": NAV_WAYPOINT, "frame": RELATIVE_ALTITUDE,
+            "autoContinue": True, "AltitudeMode": 1,
+            "Altitude": altitude(p.position[2]), "AMSLAltAboveTerrain": None,
+            "params": [_hold(p, settings), 0, 0, p.heading, _degrees(lat), _degrees(lon),
+                       altitude(p.position[2])],
+        }
+        for p, (lat, lon) in zip(points, places, strict=True)
+    ]  # fmt: skip
+    for item, p in zip(items, points, strict=True):
+        item["netsp"] = _mark(problem, p)  # ground stations pass over what they do not know
+    if settings.speed is not None:
+        change: dict[str, Any] = {
+            "type": "SimpleItem", "command": CHANGE_SPEED, "frame": MISSION_FRAME,
+            "autoContinue": True,
+            "params": [GROUND_SPEED, settings.speed, KEEP_THROTTLE, 0, 0, 0, 0],
+        }  # fmt: skip
+        items.insert(1, change)
+    for k, item in enumerate(items):
+        item["doJumpId"] = k + 1
+    circles: list[Any] = []
+    polygons: list[Any] = []
+    fence = fence_of_points(problem, points, settings)
+    for zone in fence.zones:
+        o = zone.shape
+        if isinstance(o, Circle):
+            ((lat, lon),) = projection.to_earth([o.center])
+            radius = math.ceil(1000.0 * o.radius - 1e-3) / 1000.0  # no smaller than the obstacle
+            centre = {"center": [_degrees(lat), _degrees(lon)], "radius": radius}
+            circles.append({"version": 1, "inclusion": False, "circle": centre})
+        else:
+            corners = [[_degrees(a), _degrees(b)] for a, b in projection.to_earth(o.polygon)]
+            polygons.append({"version": 1, "inclusion": False, "polygon": corners})
+    plan = {
+        "fileType": "Plan", "version": 1, "groundStation": "QGroundControl",
+        "netsp": {
+            "tether_length": problem.tether_length, "clearance": problem.clearance,
+            "heading": projection.heading,
+            "fence": {
+                "simplified": [problem.obstacle_name(z.obstacle) for z in fence.simplified],
+                "left_out": [problem.obstacle_name(k) for k in fence.left_out],
+            },
+        },
+        "geoFence": {"version": 2, "circles": circles, "polygons": polygons},
+        "rallyPoints": {"version": 2, "points": []},
+        "mission": {
+            "version": 2, "firmwareType": ARDUPILOT, "vehicleType": SUBMARINE,
+            "globalPlanAltitudeMode": 1, "cruiseSpeed": settings.speed or 0.5,
+            "hoverSpeed": settings.speed or 0.5,
+            "plannedHomePosition": [projection.latitude, projection.longitude, 0],
+            "items": items,
+        },
+    }  # fmt: skip
+    return json.dumps(plan, indent=1, allow_nan=False) + "\n"
+
+
+def _mark(problem: Problem, point: Waypoint) -> dict[str, Any]:
+    """Return what a waypoint is, so that `netsp import` tells goals from bends."""
+    if point.start:
+        return {"kind": "start"}
+    if point.goal is None:
+        return {"kind": "bend"}
+    if point.goal == HOME:
+        return {"kind": "base"}
+    name = problem.goals[point.goal].name
+    return {"kind": "goal", **({} if name is None else {"name": name})}
+
+
+def _wpl(
+    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+) -> str:
+    del problem
+    assert projection is not None
+    rows: list[list[Any]] = [
+        [0, 1, 0, NAV_WAYPOINT, 0, 0, 0, 0, projection.latitude, projection.longitude, 0, 1]
+    ]
+    places = projection.to_earth([p.position[:2] for p in points])
+    for p, (lat, lon) in zip(points, places, strict=True):
+        rows.append([len(rows), 0, RELATIVE_ALTITUDE, NAV_WAYPOINT, _hold(p, settings), 0, 0,
+                     p.heading or 0, _degrees(lat), _degrees(lon), altitude(p.position[2]),
+                     1])  # fmt: skip
+        if len(rows) == 2 and settings.speed is not None:
+            rows.append([2, 0, MISSION_FRAME, CHANGE_SPEED, GROUND_SPEED, settings.speed,
+                         KEEP_THROTTLE, 0, 0, 0, 0, 1])  # fmt: skip
+    return "QGC WPL 110\n" + "".join("\t".join(map(_cell, r)) + "\n" for r in rows)
+
+
+def _cockpit(
+    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+) -> str:
+    assert projection is not None
+    holds = [_hold(p, settings) for p in points]
+    depths = [altitude(p.position[2]) for p in points]
+    return cockpit_mission(problem.name, points, holds, depths, projection, settings.speed)
+
+
+def _cell(value: Any) -> str:
+    return f"{value:.9f}" if isinstance(value, float) else str(value)
+
+
+def _degrees(value: float) -> float:
+    """To nine places: a tenth of a millimetre."""
+    return round(float(value), 9)
+
+
+def _geojson(
+    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+) -> str:
+    del settings
+    assert projection is not None
+
+    def lonlat(xy: Any, z: float | None = None) -> list[float]:
+        ((lat, lon),) = projection.to_earth([xy])
+        return [_degrees(lon), _degrees(lat)] + ([] if z is None else [z])
+
+    def feature(kind: str, shape: str, coordinates: Any, **more: Any) -> dict[str, Any]:
+        properties = {"kind": kind, **{k: v for k, v in more.items() if v is not None}}
+        return {
+            "type": "Feature", "properties": properties,
+            "geometry": {"type": shape, "coordinates": coordinates},
+        }  # fmt: skip
+
+    visits = {p.goal: (n, p) for n, p in enumerate(q for q in points if q.goal not in (None, HOME))}
+    features = [
+        feature("base", "Point", lonlat(problem.base[:2], problem.base[2]),
+                tether_length=problem.tether_length, clearance=problem.clearance,
+                heading=projection.heading or None)
+    ]  # fmt: skip
+    for k, goal in enumerate(problem.goals):
+        visit, point = visits.get(k, (None, None))
+        features.append(
+            feature(
+                "goal", "Point", lonlat(goal.position[:2], goal.position[2]), name=goal.name,
+                visit=None if visit is None else visit + 1,
+                tether_length=None if point is None else point.tether,
+                signature=None if point is None else list(point.word),
+            )
+        )  # fmt: skip
+    for o in problem.obstacles:
+        if isinstance(o, Circle):
+            features.append(
+                feature("obstacle", "Point", lonlat(o.center), radius_m=o.radius, name=o.name)
+            )
+        else:
+            ring = [lonlat(c) for c in _counter_clockwise(o.polygon)]
+            features.append(feature("obstacle", "Polygon", [[*ring, ring[0]]], name=o.name))
+    line = [lonlat(p.position[:2], p.position[2]) for p in points]
+    features.append(feature("path", "LineString", line))
+    return json.dumps({"type": "FeatureCollection", "features": features}, allow_nan=False) + "\n"
+
+
+def _counter_clockwise(corners: Any) -> Any:
+    """RFC 7946 wants outer rings so."""
+    c = np.array(corners)
+    x, y = c[:, 0], c[:, 1]
+    area = float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
+    return corners if area > 0.0 else corners[::-1]
+
+
+def _csv(
+    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+) -> str:
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    head = ["x", "y", "z", "kind", "goal", "name", "hold_s", "tether_length", "signature"]
+    table.writerow(head + (["latitude", "longitude"] if projection else []))
+    places = projection.to_earth([p.position[:2] for p in points]) if projection else None
+    for k, p in enumerate(points):
+        visited = p.goal not in (None, HOME)
+        row: list[Any] = [*(f"{v:.6f}" for v in p.position)]
+        row += ["start" if p.start else "goal" if visited else "base" if p.goal == HOME else "bend"]
+        row += [p.goal, cell(problem.goals[p.goal or 0].name)] if visited else ["", ""]
+        row += [_hold(p, settings), f"{p.tether:.6f}" if visited else ""]
+        row += [" ".join(map(str, p.word)) if visited else ""]
+        if places is not None:
+            row += [f"{v:.9f}" for v in places[k]]
+        table.writerow(row)
+    return text.getvalue()
+
+
+def _kml(
+    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+) -> str:
+    del settings
+    assert projection is not None
+    return kml_of(problem, points, projection)
+
+
+FORMATS: dict[str, Callable[[Problem, list[Waypoint], Projection | None, Settings], str]] = {
+    "plan": _plan,
+    "wpl": _wpl,
+    "cockpit": _cockpit,
+    "geojson": _geojson,
+    "kml": _kml,
+    "csv": _csv,
+    "kmz": _kml,  # packed by `write_page`
+}
+
+FOR_VEHICLES = ("plan", "wpl", "cockpit")
+"""Formats that are uploaded to a vehicle, with its limits and depths."""
+
+__all__ = ["FORMATS", "FOR_VEHICLES", "Settings", "altitude", "export"]
+
+
+EXTENSIONS = {
+    ".plan": "plan", ".waypoints": "wpl", ".txt": "wpl", ".cmp": "cockpit", ".geojson": "geojson",
+    ".json": "geojson", ".kml": "kml", ".kmz": "kmz", ".csv": "csv",
+}  # fmt: skip
+"""Which format a file's name asks for."""
+
+
+def format_of(file: str, asked: str | None) -> str:
+    """The format by the file's extension, or that asked for; InputError where they disagree or
+    neither says."""
+    extension = os.path.splitext(file)[1].lower()
+    own = EXTENSIONS.get(extension)
+    if asked is not None and asked not in FORMATS:
+        raise InputError(f"format: expected {', '.join(FORMATS)}, got {asked!r}")
+    if asked is not None and own is not None and asked != own:
+        raise InputError(f"format: {asked!r}, but {file!r} ends like a file of format {own}")
+    if asked is None and own is None:
+        raise InputError(
+            f"file: expected a name that ends in {', '.join(EXTENSIONS)}, got {file!r}; or a format"
+        )
+    return asked or own or ""

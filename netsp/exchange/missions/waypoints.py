@@ -1,0 +1,275 @@
+"""A tour as waypoints that are joined by straight lines, safe with a vehicle that cuts corners.
+
+A vehicle goes on to the next waypoint when it is within its acceptance radius of one. So at a bend
+it may cut off the triangle between the bend and the points that far before and after it. Where an
+obstacle reaches into that triangle the bend is moved outward; if that does not help, the radius is
+too large for the site, and that is said.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import shapely
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.hsignature import Word, concatenate, crossings, signature
+from netsp.model.problem import Circle, Problem
+from netsp.model.solution import Solution
+from netsp.online.execute.tour_plan import HOME, legs_of
+
+Mark = tuple[int | None, Word, float]
+"""Goal, word and tether of a waypoint, as in `Waypoint`."""
+
+STRAIGHT = 1e-6
+"""Bends of fewer radians are none."""
+
+COARSE = np.radians(30.0)
+"""Bends of an arc are joined up to this turn: 3.5 % of its radius farther out."""
+
+OUTWARD = (1.0, 2.0, 4.0)
+"""A bend is moved outward by so many acceptance radii, the least that helps."""
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """A place to pass.
+
+    Parameters
+    ----------
+    position : tuple of float
+        (x, y, z), z up, in the problem's units.
+    goal : int or None
+        The goal visited here, HOME (-1) for the base at the end; None for a bend and for the start.
+    word : Word
+        Of the taut tether at a goal.
+    tether : float
+        Length of the taut tether at a goal, in the problem's units.
+    start : bool
+        Whether it is the start.
+    heading : float, optional
+        Degrees clockwise from north; None where it does not matter.
+    stay : int, optional
+        Seconds that are asked for there; None where nothing is said of it.
+    """
+
+    position: tuple[float, float, float]
+    goal: int | None
+    word: Word = ()
+    tether: float = 0.0
+    start: bool = False
+    heading: float | None = None
+    stay: int | None = None
+
+
+def waypoints_of(problem: Problem, solution: Solution, radius: float = 0.0) -> list[Waypoint]:
+    """The waypoints of a solution, without the start.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was solved.
+    solution : Solution
+        Its solution.
+    radius : float
+        Acceptance radius of the vehicle, in the problem's units.
+
+    Returns
+    -------
+    list of Waypoint
+        In the order in which they are passed.
+
+    Raises
+    ------
+    InputError
+        With this radius corners could be cut through an obstacle, or the class of the straight
+        lines is not the plan's.
+    """
+    legs = legs_of(problem, solution)
+    solids = [o.shape() for o in problem.obstacles]
+    shapely.prepare(solids)
+    points: list[Floats] = [legs[0].path[0]]
+    kinds: list[Mark] = [(None, (), 0.0)]
+    for leg in legs:
+        for point in leg.path[1:-1]:
+            points.append(point)
+            kinds.append((None, (), 0.0))
+        points.append(leg.path[-1])
+        kinds.append((leg.goal, leg.word, leg.tether))
+    keep = [0]
+    for k in range(1, len(points)):
+        here = points[keep[-1]]
+        if np.linalg.norm(points[k] - here) == 0.0 and kinds[k][0] is None:
+            continue
+        if (
+            k + 1 < len(points)
+            and kinds[k][0] is None
+            and turn(here, points[k], points[k + 1]) < STRAIGHT
+        ):
+            continue
+        keep.append(k)
+    line = np.array([points[k] for k in keep])
+    marks = [kinds[k] for k in keep]
+    line, marks = _coarsened(line, marks, [o.shape(problem.clearance) for o in problem.obstacles])
+    line = _widened(line, marks, solids, radius)
+    _check_class(problem, solution, line, marks)
+    return [
+        Waypoint((float(x), float(y), float(z)), *mark)
+        for (x, y, z), mark in zip(line[1:], marks[1:], strict=True)
+    ]
+
+
+def clearance_of(problem: Problem, points: list[Waypoint]) -> float:
+    """How near the straight lines between waypoints come to any obstacle (not grown)."""
+    line = shapely.LineString([p.position[:2] for p in points])
+    return min(
+        (
+            line.distance(shapely.Point(o.center)) - o.radius if isinstance(o, Circle)
+            else line.distance(shapely.Polygon(o.polygon))
+            for o in problem.obstacles
+        ),
+        default=float("inf"),
+    )  # fmt: skip
+
+
+def _coarsened(
+    line: Floats, marks: list[Mark], grown: list[shapely.Polygon]
+) -> tuple[Floats, list[Mark]]:
+    """Arcs with fewer bends: those in a row that turn one way by `COARSE` or less in all become the
+    one where the line before them meets the line after them, farther out, if that is free."""
+    slim = [g.buffer(-1e-6 * float(np.ptp(line[:, :2]))) for g in grown]
+    tree = shapely.STRtree(slim) if slim else None
+    out, kept, k = [line[0]], [marks[0]], 1
+    while k < len(line):
+        best = None
+        m = k
+        total = 0.0
+        while m + 1 < len(line) and marks[m][0] is None:
+            total += _side(out[-1] if m == k else line[m - 1], line[m], line[m + 1])
+            if abs(total) > COARSE:
+                break
+            corner = _meeting(out[-1], line[k], line[m], line[m + 1]) if m > k else line[k]
+            if corner is not None:
+                paths = [shapely.LineString([a[:2], b[:2]])
+                        for a, b in ((out[-1], corner), (corner, line[m + 1]))]  # fmt: skip
+                if tree is None or not any(len(tree.query(w, "intersects")) for w in paths):
+                    best = (m, corner)
+            m += 1
+        if best is None:
+            out.append(line[k])
+            kept.append(marks[k])
+            k += 1
+        else:
+            out.append(best[1])
+            kept.append(marks[k])
+            k = best[0] + 1
+    return np.array(out), kept
+
+
+def _side(a: Floats, b: Floats, c: Floats) -> float:
+    """Signed angle in the plan by which a path turns at b."""
+    u, v = (b - a)[:2], (c - b)[:2]
+    return float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))
+
+
+def _meeting(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats | None:
+    """Where the line from a through b meets the line through c to d, between b and c; None if it
+    does not. Its height is between theirs."""
+    u, v, w = (b - a)[:2], (d - c)[:2], (c - a)[:2]
+    cross = u[0] * v[1] - u[1] * v[0]
+    if abs(cross) < 1e-12:
+        return None
+    s, t = (w[0] * v[1] - w[1] * v[0]) / cross, (w[0] * u[1] - w[1] * u[0]) / cross
+    if s < 1.0 - 1e-9 or t > 1e-9:
+        return None
+    return np.array([*(a[:2] + s * u), 0.5 * (b[2] + c[2])])
+
+
+def turn(a: Floats, b: Floats, c: Floats) -> float:
+    """Angle by which a path turns.
+
+    Parameters
+    ----------
+    a : ndarray, shape (k,)
+        A point of it.
+    b : ndarray, shape (k,)
+        The next.
+    c : ndarray, shape (k,)
+        The one after it.
+
+    Returns
+    -------
+    float
+        Radians; pi where two of them are one.
+    """
+    u, v = b - a, c - b
+    lu, lv = np.linalg.norm(u), np.linalg.norm(v)
+    if lu == 0.0 or lv == 0.0:
+        return np.pi
+    return float(np.arctan2(np.linalg.norm(np.cross(u, v)), u @ v))
+
+
+def _widened(
+    line: Floats, marks: list[Mark], solids: list[shapely.Polygon], radius: float
+) -> Floats:
+    """The bends moved outward where a vehicle could cut through something."""
+    if radius <= 0.0 or not solids:
+        return line
+    tree = shapely.STRtree(solids)
+    out = line.copy()
+    for k in range(1, len(line) - 1):
+        if marks[k][0] is not None or not _cuts(tree, out, k, radius):
+            continue
+        middle = 0.5 * (out[k - 1, :2] + out[k + 1, :2])
+        away = out[k, :2] - middle
+        far = float(np.linalg.norm(away))
+        if far == 0.0:
+            continue
+        for times in OUTWARD:
+            tried = out.copy()
+            tried[k, :2] += away / far * times * radius
+            free = not any(
+                len(tree.query(shapely.LineString(tried[[i, i + 1], :2]), "intersects"))
+                for i in (k - 1, k)
+            )
+            if free and not _cuts(tree, tried, k, radius):
+                out = tried
+                break
+    bad = [k for k in range(1, len(out) - 1) if _cuts(tree, out, k, radius)]
+    if bad:
+        x, y, _ = out[bad[0]]
+        raise InputError(
+            f"acceptance: {radius:g} would let the vehicle cut a corner at ({x:.6g}, {y:.6g}) "
+            "through an obstacle; expected a smaller radius, or a plan with a larger clearance"
+        )
+    return out
+
+
+def _cuts(tree: shapely.STRtree, line: Floats, k: int, radius: float) -> bool:
+    """Whether an obstacle reaches into the triangle that may be cut off at bend k."""
+    a, b, c = line[k - 1, :2], line[k, :2], line[k + 1, :2]
+    u, v = a - b, c - b
+    lu, lv = float(np.linalg.norm(u)), float(np.linalg.norm(v))
+    if lu == 0.0 or lv == 0.0:
+        return False
+    corner = [b + u * min(1.0, radius / lu), b, b + v * min(1.0, radius / lv)]
+    return bool(len(tree.query(shapely.LineString(corner).convex_hull, "intersects")))
+
+
+def _check_class(problem: Problem, solution: Solution, line: Floats, marks: list[Mark]) -> None:
+    """The word of the straight lines at every goal is the plan's, and empty at the end."""
+    rays = problem.representative_points
+    tether = np.array(solution.start_tether).reshape(-1, 3)
+    word = signature(tether[:, :2], rays) if len(tether) else ()
+    solids = [o.shape() for o in problem.obstacles]
+    for (a, b), (goal, planned, _) in zip(pairwise(line), marks[1:], strict=True):
+        word = concatenate(word, crossings(np.array([a, b])[:, :2], rays))
+        step = shapely.LineString([a[:2], b[:2]])
+        inside = [s for s in solids if s.buffer(-1e-6 * problem.scale).intersects(step)]
+        if inside:
+            raise InputError("solution: straight lines between its waypoints enter an obstacle")
+        if goal is not None and word != (planned if goal != HOME else ()):
+            raise InputError("solution: its waypoints are not of the plan's homotopy class")

@@ -1,0 +1,105 @@
+"""Who remembers whom: the sets of the ng-route relaxation (Baldacci, Mingozzi & Roberti 2011).
+
+A walk that has reached goal g remembers, of the goals it visited, those that g remembers and that
+it never forgot on the way: M(h) = (M(g) ∩ N(h)) ∪ {h}. It must not go to a goal it remembers. With
+all of N full the walks are tours; with little memory there are few states and the bound is weaker.
+Where the best walk repeats a goal, the goals between learn to remember it (Roberti & Mingozzi 2014,
+Martinelli, Pecin & Poggi 2014).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.arrays import Bools, Ints
+from netsp.model.arrangement import UNORDERED
+
+Masks = npt.NDArray[np.int32]
+
+CHUNK = 7
+"""Bits of a memory that one table translates."""
+
+MOST = 3 * CHUNK
+"""Most goals that a goal can remember, itself among them."""
+
+
+class Memory:
+    """For every goal the goals it remembers; bit k of a memory at goal g stands for the k-th.
+
+    Parameters
+    ----------
+    near
+        (n + 1, k) clusters, nearest first, of every cluster.
+    size
+        So many nearest goals are remembered at first, the goal itself being one (bit 0).
+    before
+        (n + 1, n + 1) which goals come before which (`TravelGraph.before`), (0, 0) for none: a walk
+        that remembers a goal must not go to one that comes before it.
+    """
+
+    def __init__(self, near: Ints, size: int, before: Bools = UNORDERED) -> None:
+        self.n = len(near) - 1
+        self.before = before if len(before) else np.zeros((self.n + 1, self.n + 1), dtype=bool)
+        self.sets: list[list[int]] = [[]]
+        for g in range(1, self.n + 1):
+            others = [int(h) for h in near[g] if h not in (0, g)]
+            self.sets.append([g, *others[: size - 1]])
+        self._tables: dict[bool, Masks] = {}
+
+    @property
+    def bits(self) -> Ints:
+        """(n + 1,) how many goals each remembers."""
+        return np.array([1, *(len(s) for s in self.sets[1:])], dtype=np.int64)
+
+    def tables(self, *, backwards: bool = False) -> Masks:
+        """(n + 1, n + 1, 3, 2^CHUNK) by goal g left, goal h entered and chunk of the memory at g:
+        that chunk's part of the memory at h, to be joined by "or"; negative if h is remembered, or
+        a goal that it comes before. Of walks read backwards it is the other way round."""
+        if backwards in self._tables:
+            return self._tables[backwards]
+        n = self.n
+        before = self.before.T if backwards else self.before
+        bit = np.full((n + 1, n + 1), -1)
+        for g in range(1, n + 1):
+            bit[g, self.sets[g]] = np.arange(len(self.sets[g]))
+        tables = np.zeros((n + 1, n + 1, 3, 1 << CHUNK), dtype=np.int32)
+        tables[:, :, 0] = 1
+        chunk = np.arange(1 << CHUNK)
+        for g in range(1, n + 1):
+            for k, remembered in enumerate(self.sets[g]):
+                part, place = divmod(k, CHUNK)
+                held = (chunk >> place) & 1
+                image = np.where(bit[:, remembered] >= 0, 1 << np.maximum(bit[:, remembered], 0), 0)
+                tables[g, :, part] |= (image[:, None] * held[None, :]).astype(np.int32)
+            for k, remembered in enumerate(self.sets[g]):
+                part, place = divmod(k, CHUNK)
+                held = (chunk >> place) & 1 == 1
+                tables[g, remembered, part, held] = -1
+                for earlier in np.flatnonzero(before[:, remembered]):
+                    tables[g, earlier, part, held] = -1
+        self._tables[backwards] = tables
+        return tables
+
+    def widen(self, goals: list[int]) -> bool:
+        """Remember along the cycles of a walk, the short ones first, and between goals in the wrong
+        order; whether anything changed."""
+        last: dict[int, int] = {}
+        cycles = []
+        for k, g in enumerate(goals):
+            if g in last:
+                cycles.append((k - last[g], last[g], k))
+            last[g] = k
+            later = (i for h, i in last.items() if self.before[g, h])
+            cycles += [(k - i, i, k) for i in later]
+        changed = False
+        for _, first, again in sorted(cycles):
+            g = goals[first]
+            forget = [h for h in set(goals[first + 1 : again]) if g not in self.sets[h]]
+            if all(len(self.sets[h]) < MOST for h in forget):
+                for h in forget:
+                    self.sets[h].append(g)
+                    changed = True
+        if changed:
+            self._tables = {}
+        return changed

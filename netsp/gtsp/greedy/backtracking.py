@@ -1,0 +1,198 @@
+"""Greedy backtracking: nearest goal by tether, then back along the own path.
+
+McCammon & Hollinger 2017, section V-A: the robot goes to the closest goal that does not violate the
+tether length, again and again, and retraces its path after the last one (`greedy`).
+
+The 2016 workshop paper has one sentence: the planner "also travels to the closest goal, but then
+retraces its path back to the start position, ensuring no entanglements". It has two readings:
+
+- *out and back*: the robot returns after every goal, so each time the goal closest to the base is
+  next. This is `greedy-2016`, and its published figures are for this reading.
+- *retrace once*: the robot goes from goal to goal, like the Greedy-TSP of the sentence before, and
+  retraces its whole path from the last (`greedy-2016` with `retrace=end`). This is the reading of
+  the 2017 paper, so the tour is that of `greedy`.
+
+On the covering space a leg between two admissible classes never needs more tether than its ends do
+(docs/theory.md), so "does not violate the tether length" is: is a vertex of the travel graph. With
+a roadmap every vertex is joined to every other, so greedy always succeeds; on a graph made from
+costs it can run into a dead end, and says that it found nothing. Such a graph has no way to retrace
+(its costs need not be those of a metric), so there the tour is closed by its own leg.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from netsp.base.arrays import Floats, Ints
+from netsp.gtsp.cost_matrix import MEASURE_AT_ONCE
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.solver_run import SolverRun
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.result import Result
+
+BATCH = 16
+"""So many legs are measured at a time when the nearest goal is looked for."""
+
+
+@dataclass(frozen=True)
+class Params:
+    """Options of the solver.
+
+    Attributes
+    ----------
+    retrace
+        ``path``, home along the own path as in the paper, or ``tether``, home along the taut tether
+        from the last goal, which is never longer.
+    """
+
+    retrace: str = "path"
+
+    def __post_init__(self) -> None:
+        if self.retrace not in ("path", "tether"):
+            raise ValueError(f"option 'retrace': expected path or tether, got {self.retrace!r}")
+
+
+def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
+    """`greedy`: to the nearest goal not yet visited, in whatever class is nearest on the covering
+    space; home from the last.
+
+    One iteration builds the whole tour.
+
+    Parameters
+    ----------
+    graph : TravelGraph
+        What to solve.
+    params : Params, optional
+        See `Params`.
+    limits : Limits, optional
+        Time, iterations, random generator, warm start, listener.
+
+    Returns
+    -------
+    Result
+        The tour; no bound.
+    """
+    chosen, limits = params or Params(), limits or Limits()
+    run = SolverRun(graph, limits)
+    stage = "trivial"
+    with run.until_stopped():
+        run.update_incumbent(limits.warm_start)
+        if not run.trivial():
+            stage = _nearest_by_tether(run, retrace=chosen.retrace == "path" and graph.geometric)
+    return run.finish(stage)
+
+
+def _nearest_by_tether(run: SolverRun, *, retrace: bool) -> str:
+    graph = run.graph
+    tour = [0]
+    left = graph.cluster != 0
+    small = graph.measured or len(graph) <= MEASURE_AT_ONCE
+    every = np.arange(len(graph))
+    while left.any():
+        run.check()
+        at = tour[-1]
+        bounds = graph.costs[at] if small else graph.lower_bounds(every, [at])[0]
+        here = _nearest(graph, at, np.flatnonzero(left), bounds, exact=small)
+        if here is None:
+            return "dead end"
+        tour.append(here)
+        left &= graph.cluster != graph.cluster[here]
+    run.iterations = 1
+    run.update_incumbent(tour, walk=[*tour, *tour[-2::-1]] if retrace else None)
+    return "greedy"
+
+
+def _nearest(
+    graph: TravelGraph, here: int, candidates: Ints, bounds: Floats, *, exact: bool
+) -> int | None:
+    """The candidate with the cheapest leg from here; None if no leg leads on. Legs are measured in
+    the order of their lower bounds, until no bound is below the best leg."""
+    candidates = candidates[np.argsort(bounds[candidates], kind="stable")]
+    if exact:
+        return int(candidates[0]) if np.isfinite(bounds[candidates[0]]) else None
+    best, nearest = np.inf, None
+    for batch in np.array_split(candidates, -(-len(candidates) // BATCH)):
+        if bounds[batch[0]] >= best:
+            break
+        star = np.zeros((len(batch) + 1, len(batch) + 1), dtype=bool)
+        star[0] = star[:, 0] = True
+        legs = graph.costs_among([here, *batch], star)[0, 1:]
+        k = int(np.argmin(legs))
+        if legs[k] < best:
+            best, nearest = float(legs[k]), int(batch[k])
+    return nearest
+
+
+@dataclass(frozen=True)
+class Params2016:
+    """Options of `greedy-2016`.
+
+    Attributes
+    ----------
+    retrace
+        Time at which the robot retraces its path: ``goal``, after every goal, or ``end``, after the
+        last goal only. The paper's sentence can be read either way.
+    """
+
+    retrace: str = "goal"
+
+    def __post_init__(self) -> None:
+        if self.retrace not in ("goal", "end"):
+            raise ValueError(f"option 'retrace': expected goal or end, got {self.retrace!r}")
+
+
+def solve_2016(
+    graph: TravelGraph, params: Params2016 | None = None, limits: Limits | None = None
+) -> Result:
+    """`greedy-2016`: out to the goal nearest to the base and back, then the next.
+
+    This is the first of two readings of the paper's sentence (see `Params2016`). By it no leg
+    between goals is ever measured. One iteration builds the whole tour. Source: McCammon &
+    Hollinger 2016, section IV.
+
+    Parameters
+    ----------
+    graph : TravelGraph
+        What to solve.
+    params : Params2016, optional
+        See `Params2016`.
+    limits : Limits, optional
+        Time, iterations, random generator, warm start, listener.
+
+    Returns
+    -------
+    Result
+        The tour; no bound.
+    """
+    chosen, limits = params or Params2016(), limits or Limits()
+    run = SolverRun(graph, limits)
+    stage = "greedy"
+    with run.until_stopped():
+        run.update_incumbent(limits.warm_start)
+        if not run.trivial():
+            run.check()
+            if chosen.retrace == "goal":
+                _out_and_back(run)
+            else:
+                stage = _nearest_by_tether(run, retrace=graph.geometric)
+    return run.finish(stage)
+
+
+def _out_and_back(run: SolverRun) -> None:
+    graph = run.graph
+    out = graph.costs_to_base
+    nearest = []
+    for c in range(1, graph.goal_count + 1):
+        members = graph.members(c)
+        nearest.append(int(members[np.argmin(out[members])]))
+    nearest.sort(key=lambda v: (out[v], v))
+    run.iterations = 1
+    if graph.geometric:
+        walk = [0]
+        for v in nearest:
+            walk += [v, 0]
+        run.update_incumbent([0, *nearest], walk=walk, length=2.0 * float(out[nearest].sum()))
+    else:
+        run.update_incumbent([0, *nearest])

@@ -1,0 +1,294 @@
+"""A tour as links between clusters, with what every place in it costs.
+
+For each cluster c of the tour, ``ahead[c, j]`` is the shortest path from the base through all
+clusters before it to its vertex j, less the least of them over j, and ``grown[c]`` by how much that
+least is longer than that of the cluster before; ``behind[c, j]`` and ``rest[c]`` are the same for
+paths home. The base begins and ends the tour: ``rest[0]`` is of its first leg, ``grown[0]`` of its
+last. The tour's length is the sum of ``grown``; with vertex i of p and l of q, its successor,
+``min ahead[p, i] + c_ij + c_jl + behind[q, l]`` less ``min ahead[p, i] + c_il + behind[q, l]`` is
+what cluster c costs between them, every class of every other goal chosen anew.
+
+Both tables are known up to a constant for each cluster only, so a change is written down as far as
+it changes which classes are best, and no farther: seldom more than a few clusters, however long the
+tour is. Legs are the same in either sense.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.compiled.interpretation import interprets
+from netsp.base.compiled.kernel import kernel
+from netsp.base.compiled.rng import uniform
+
+EVEN = 1e-13
+"""Relative difference up to which two lengths are equal. Each table may be off by this share of its
+largest number at every cluster along the tour (`netsp.gtsp.search.layers.Instance.rounding`)."""
+
+
+class Tables(NamedTuple):
+    """Of an instance: where the vertices of each cluster begin; legs; least legs between clusters
+    (m + 1, m + 1); whether a cluster is put next to another, and for each cluster c to which, from
+    first[c] to first[c + 1] of ``beside``; the nearest clusters of each (m + 1, k), nearest first;
+    which clusters come before which, (0, 0) for none; the share of the tour's length that a move
+    must save to count, and the gain that rounding in the tables of the links may feign
+    (`netsp.gtsp.search.layers.Instance`). The kernels that are called most take what they need of
+    it one by one: handing a tuple of arrays on costs them more than the work."""
+
+    start: Ints
+    costs: Floats
+    nearest: Floats
+    near: Bools
+    first: Ints
+    beside: Ints
+    rank: Ints
+    before: Bools
+    min_gain: float
+    rounding: float
+
+
+class Links(NamedTuple):
+    """Of a tour: the clusters after and before each, -1 for one that is out of it; the tables of
+    the module."""
+
+    after: Ints
+    prior: Ints
+    ahead: Floats
+    behind: Floats
+    grown: Floats
+    rest: Floats
+
+
+def no_links(clusters: int, largest: int) -> Links:
+    """Links to be filled, of so many clusters, the base included, of so many vertices at most."""
+    ahead, behind = np.zeros((2, clusters, largest))
+    grown, rest = np.zeros((2, clusters))
+    after, prior = np.full((2, clusters), -1, dtype=np.int64)
+    return Links(after, prior, ahead, behind, grown, rest)
+
+
+@kernel
+def carry_on(
+    c: int, sure: int, after: Ints, prior: Ints, start: Ints, costs: Floats, ahead: Floats,
+    grown: Floats, row: Floats,
+) -> float:  # fmt: skip
+    """Fill ``ahead`` and ``grown`` from cluster c on, until a cluster after the next `sure` ones
+    has what it had; returns by how much the tour has become longer. With ``after`` and ``prior``
+    exchanged it is ``behind`` and ``rest`` that are filled, towards the base. What is there already
+    stays where it is within rounding: were it written again and again without those after it, they
+    would drift apart."""
+    longer = 0.0
+    while True:
+        p, begin, size = prior[c], start[c], start[c + 1] - start[c]
+        least = np.inf
+        for j in range(size):
+            best = np.inf
+            for i in range(start[p], start[p + 1]):
+                d = ahead[p, i - start[p]] + costs[i, begin + j]
+                if d < best:
+                    best = d
+            row[j] = best
+            least = min(least, best)
+        if c == p:
+            least = 0.0  # the base alone
+        longer += least - grown[c]
+        grown[c] = least
+        if c == 0:
+            return float(longer)
+        even = sure <= 0
+        for j in range(size):
+            if abs(row[j] - least - ahead[c, j]) > EVEN * row[j]:
+                even = False
+        if even:
+            return float(longer)
+        for j in range(size):
+            ahead[c, j] = row[j] - least
+        sure -= 1
+        c = after[c]
+
+
+@interprets(carry_on)
+def _carry_on_in_numpy(
+    c: int, sure: int, after: Ints, prior: Ints, start: Ints, costs: Floats, ahead: Floats,
+    grown: Floats, row: Floats,
+) -> float:  # fmt: skip
+    """Vectorise `carry_on` over the vertices of a cluster."""
+    longer = 0.0
+    while True:
+        p, begin, end = prior[c], start[c], start[c + 1]
+        legs = costs[start[p] : start[p + 1], begin:end]
+        best = np.fmin.reduce(ahead[p, : len(legs), None] + legs, axis=0, initial=np.inf)
+        row[: len(best)] = best
+        least = 0.0 if c == p else float(best.min(initial=np.inf))
+        longer += least - float(grown[c])
+        grown[c] = least
+        if c == 0:
+            return longer
+        rest = best - least
+        if sure <= 0 and not (np.abs(rest - ahead[c, : len(best)]) > EVEN * best).any():
+            return longer
+        ahead[c, : len(best)] = rest
+        sure -= 1
+        c = int(after[c])
+
+
+@kernel
+def link(order: Ints, links: Links, start: Ints, costs: Floats, row: Floats) -> float:
+    """Link clusters in an order, base first, and fill the tables; returns the tour's length."""
+    after, prior, ahead, behind, grown, rest = links
+    n = len(order)
+    after[:], prior[:] = -1, -1
+    grown[:], rest[:] = 0.0, 0.0
+    for k in range(n):
+        after[order[k]], prior[order[k]] = order[(k + 1) % n], order[k - 1]
+    carry_on(after[0], n, after, prior, start, costs, ahead, grown, row)
+    carry_on(prior[0], n, prior, after, start, costs, behind, rest, row)
+    return tour_length(after, grown)
+
+
+@kernel
+def tour_length(after: Ints, grown: Floats) -> float:
+    """Length of the tour."""
+    length, c = grown[0], after[0]
+    while c != 0:
+        length += grown[c]
+        c = after[c]
+    return float(length)
+
+
+@kernel
+def write_order(after: Ints, order: Ints) -> None:
+    """Write the clusters of the tour down in their order, base first."""
+    c = 0
+    for k in range(len(order)):
+        order[k] = c
+        c = after[c]
+
+
+@kernel
+def put(
+    c: int, p: int, after: Ints, prior: Ints, start: Ints, costs: Floats, ahead: Floats,
+    behind: Floats, grown: Floats, rest: Floats, row: Floats,
+) -> float:  # fmt: skip
+    """Put cluster c after p; returns by how much the tour has become longer."""
+    q = after[p]
+    after[p], prior[c], after[c], prior[q] = c, p, q, c
+    carry_on(c, 1, prior, after, start, costs, behind, rest, row)
+    return float(carry_on(c, 1, after, prior, start, costs, ahead, grown, row))
+
+
+@kernel
+def take_out(
+    c: int, after: Ints, prior: Ints, start: Ints, costs: Floats, ahead: Floats,
+    behind: Floats, grown: Floats, rest: Floats, row: Floats,
+) -> float:  # fmt: skip
+    """Take a cluster out; returns by how much the tour has become longer, a number below 0."""
+    p, q, own = prior[c], after[c], grown[c]
+    after[p], prior[q], after[c], prior[c] = q, p, -1, -1
+    grown[c] = 0.0
+    carry_on(p, 0, prior, after, start, costs, behind, rest, row)
+    return float(carry_on(q, 0, after, prior, start, costs, ahead, grown, row) - own)
+
+
+@kernel
+def between(
+    c: int, p: int, most: float, after: Ints, start: Ints, costs: Floats, nearest: Floats,
+    ahead: Floats, behind: Floats, rest: Floats,
+) -> float:  # fmt: skip
+    """By how much the best tour becomes longer with cluster c after p; `most` if by no less."""
+    q = after[p]
+    now = np.inf
+    for i in range(start[p + 1] - start[p]):
+        now = min(now, ahead[p, i] + behind[p, i])
+    now += rest[p]
+    # no leg is shorter than the least between its clusters, and both tables are 0 or more
+    if nearest[p, c] + nearest[c, q] - now >= most:
+        return most
+    limit = most + now
+    best = limit
+    for j in range(start[c], start[c + 1]):
+        there = np.inf
+        for i in range(start[p], start[p + 1]):
+            d = ahead[p, i - start[p]] + costs[j, i]
+            if d < there:
+                there = d
+        if there >= best:
+            continue
+        for i in range(start[q], start[q + 1]):
+            d = there + costs[j, i] + behind[q, i - start[q]]
+            if d < best:
+                best = d
+    return best - now if best < limit else most
+
+
+@interprets(between)
+def _between_in_numpy(
+    c: int, p: int, most: float, after: Ints, start: Ints, costs: Floats, nearest: Floats,
+    ahead: Floats, behind: Floats, rest: Floats,
+) -> float:  # fmt: skip
+    """Vectorise `between` over the vertices of the clusters."""
+    q = after[p]
+    left, right = start[p], start[q]
+    left_end, right_end = start[p + 1], start[q + 1]
+    far = ahead[p, : left_end - left]
+    now = float(np.fmin.reduce(far + behind[p, : left_end - left]) + rest[p])
+    if nearest[p, c] + nearest[c, q] - now >= most:
+        return most
+    limit = float(most + now)
+    legs = costs[start[c] : start[c + 1]]
+    there = np.fmin.reduce(legs[:, left:left_end] + far, 1)
+    onward = there[:, None] + legs[:, right:right_end]
+    onward += behind[q, : right_end - right]
+    best = float(np.fmin.reduce(onward, None))
+    return best - now if best < limit else most
+
+
+@kernel
+def best_place(
+    c: int, after: Ints, prior: Ints, start: Ints, costs: Floats, nearest: Floats, near: Bools,
+    first: Ints, beside: Ints, before: Bools, ahead: Floats, behind: Floats, rest: Floats,
+    place: Ints, blink: float, chance: npt.NDArray[np.uint64],
+) -> tuple[int, float]:  # fmt: skip
+    """After which cluster c costs least, and by how much the tour becomes longer: next to one of
+    its near clusters, or at either end of the stretch between those that come before and after it,
+    without precedences the base. With precedences closed transitively there is such a stretch,
+    whatever is still to be put back. Other places than its ends are overlooked with the chance
+    `blink`; `place` is room for the places of clusters in the order."""
+    low, high = 0, prior[0]
+    if len(before) > 0:
+        x, k = after[0], 1
+        place[0], open_end = 0, True
+        while x != 0:
+            place[x] = k
+            if before[x, c]:
+                low = x
+            if before[c, x] and open_end:
+                high, open_end = prior[x], False
+            x, k = after[x], k + 1
+    best, at = between(c, low, np.inf, after, start, costs, nearest, ahead, behind, rest), low
+    if high != low:
+        d = between(c, high, best, after, start, costs, nearest, ahead, behind, rest)
+        if d < best:
+            best, at = d, high
+    for k in range(2 * first[c], 2 * first[c + 1]):
+        p = beside[k // 2]
+        if after[p] < 0:
+            continue
+        if k % 2 == 1:
+            p = prior[p]
+            if near[c, p]:
+                continue  # the place after that one
+        if p in (low, high):
+            continue
+        if len(before) > 0 and not place[low] <= place[p] <= place[high]:
+            continue
+        if blink > 0.0 and uniform(chance) < blink:
+            continue
+        d = between(c, p, best, after, start, costs, nearest, ahead, behind, rest)
+        if d < best:
+            best, at = d, p
+    return at, best

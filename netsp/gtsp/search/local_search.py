@@ -1,0 +1,206 @@
+"""Local search, then ruin and recreate, over orders of clusters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.arrays import Bools, Ints
+from netsp.base.clock import NEVER, Clock
+from netsp.base.compiled.rng import seeded
+from netsp.gtsp.search.descent import descend, two_opt
+from netsp.gtsp.search.layers import Instance, best_classes
+from netsp.gtsp.search.links import Tables, link, no_links
+from netsp.gtsp.search.ruin import ruin_and_recreate
+
+HOT, COLD = 1.0, 2e-2
+"""First and last temperature of ruin and recreate, in mean legs of the tour. A tenth of the first
+ends in the same poor tour from most starts, with few rounds and with many."""
+
+STEPS = 100
+"""Temperatures from first to last, when the rounds are limited."""
+
+CHUNK_SECONDS = 0.02
+"""About the time between two looks at the clock."""
+
+
+def local_search(
+    instance: Instance,
+    rng: np.random.Generator,
+    *,
+    rounds: int,
+    clock: Clock,
+    start_order: npt.ArrayLike | None = None,
+) -> tuple[float, tuple[int, ...]]:
+    """The best tour after rounds of ruin and recreate, or when the clock runs out.
+
+    Deterministic by `rng` as long as the clock does not run out.
+
+    Parameters
+    ----------
+    instance : Instance
+        What is searched.
+    rng : numpy.random.Generator
+        Of all that is random.
+    rounds : int
+        Rounds of ruin and recreate.
+    clock : Clock
+        Ends it.
+    start_order : array_like of int, optional
+        Clusters in the order to start from; by default a random one.
+
+    Returns
+    -------
+    length : float
+        Its length.
+    tour : tuple of int
+        Its vertices in the travel graph.
+    """
+    search = Search(instance, rng, start_order, clock)
+    search.settle()
+    search.run(rounds, clock)
+    return search.best()
+
+
+class Search:
+    """A search in progress: the present order and the best.
+
+    Parameters
+    ----------
+    instance : Instance
+        What is searched.
+    rng : numpy.random.Generator
+        Of all that is random.
+    start_order : array_like of int, optional
+        Clusters in the order to start from; by default a random one.
+    clock : Clock, optional
+        Ends it.
+    """
+
+    def __init__(
+        self,
+        instance: Instance,
+        rng: np.random.Generator,
+        start_order: npt.ArrayLike | None = None,
+        clock: Clock | None = None,
+    ) -> None:
+        self.instance = instance
+        self._stop = NEVER if clock is None else clock.flag
+        order = (
+            _insertion(instance.cluster_costs, instance.before)
+            if start_order is None else start_order
+        )  # fmt: skip
+        self.order: Ints = np.array(order, dtype=np.int64)
+        self._links = no_links(len(self.order), instance.largest)
+        self._row = np.empty(instance.largest)
+        self.chance = seeded(rng)
+        self.length = np.inf
+        self.best_order, self.best_length = self.order.copy(), np.inf
+
+    @property
+    def _tables(self) -> Tables:
+        i = self.instance
+        return Tables(
+            i.start, i.costs, i.cluster_costs, i.near, *i.beside, i.rank, i.before, i.min_gain,
+            i.rounding,
+        )  # fmt: skip
+
+    def _link(self) -> None:
+        """Links of the present order."""
+        i = self.instance
+        self.length = link(self.order, self._links, i.start, i.costs, self._row)
+
+    def settle(self) -> None:
+        """Descend to an order that no move of one cluster and no reversal improves."""
+        n = len(self.order)
+        before = np.inf
+        while True:
+            self._link()
+            self.length = descend(self.order, self._tables, self._links, self.chance, self._stop)
+            if n > 3:
+                self.length = two_opt(self.order, self._tables, self._stop)
+            if not self.length < before * (1.0 - self.instance.min_gain):
+                break
+            before = self.length
+        self._keep()
+
+    def run(
+        self,
+        rounds: float,
+        clock: Clock,
+        progress: Callable[[], float] | None = None,
+        tell: Callable[[int], None] | None = None,
+    ) -> None:
+        """Ruin and recreate, cooling from `HOT` to `COLD`.
+
+        Parameters
+        ----------
+        rounds : float
+            Rounds of ruin and recreate; inf for as long as the clock allows.
+        clock : Clock
+            Ends it.
+        progress : callable, optional
+            How far the cooling is, from 0 to 1; by default by the rounds.
+        tell : callable, optional
+            Called after every chunk with the number of rounds it had.
+        """
+        n = len(self.order)
+        self._link()
+        done, chunk = 0, 1
+        leg = self.length / n
+        # the temperature falls in steps of so many rounds, whatever the time that they take
+        step = 1 if progress else max(1, int(rounds) // STEPS)
+        while done < rounds and n > 3 and not clock.up:
+            share = progress() if progress else (done - done % step) / rounds
+            theta = leg * HOT * (COLD / HOT) ** min(share, 1.0)
+            count = int(min(chunk, rounds - done if progress else step - done % step))
+            begin = clock.elapsed
+            self.length, self.best_length = ruin_and_recreate(
+                self.order, self.best_order, self.length, self.best_length, count, theta,
+                self._tables, self._links, self.chance,
+            )  # fmt: skip
+            done += count
+            if clock.elapsed - begin < CHUNK_SECONDS and chunk < max(1, rounds / STEPS):
+                chunk *= 2
+            if tell:
+                tell(count)
+
+    def best(self) -> tuple[float, tuple[int, ...]]:
+        """The best tour so far.
+
+        Returns
+        -------
+        length : float
+            Its length; inf if it would need a leg that there is not.
+        tour : tuple of int
+            Its vertices.
+        """
+        i = self.instance
+        length, tour = best_classes(self.best_order[1:], i.start, i.costs)
+        return float(length) if length < i.penalty else float("inf"), i.original(tour)
+
+    def _keep(self) -> None:
+        if self.length < self.best_length:
+            self.best_length = self.length
+            self.best_order[:] = self.order
+
+
+def _insertion(d: npt.NDArray[np.float64], before: Bools) -> Ints:
+    """Order of clusters, base first, by farthest insertion on the least legs between clusters."""
+    left = list(range(1, len(d)))
+    tour = [0]
+    while left:
+        inside = d[np.ix_(left, tour)].min(axis=1)
+        k = left[int(np.argmax(inside))]
+        t = np.array(tour)
+        after = np.roll(t, -1)
+        between = d[t, after] if len(t) > 1 else np.zeros(1)
+        more = d[t, k] + d[k, after] - between
+        if len(before):
+            more[: int(np.flatnonzero(before[t, k]).max(initial=0))] = np.inf
+            more[int(np.flatnonzero(before[k, t]).min(initial=len(t))) :] = np.inf
+        tour.insert(int(np.argmin(more)) + 1, k)
+        left.remove(k)
+    return np.array(tour, dtype=np.int64)

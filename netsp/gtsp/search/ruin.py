@@ -1,0 +1,161 @@
+"""Ruin and recreate on orders of clusters, with the classes of every order chosen exactly.
+
+Slack induction by string removals (Christiaens & Vanden Berghe 2020, "Slack induction by string
+removals for vehicle routing problems"), carried over to the generalised TSP: a stretch of the tour
+near a random goal is taken out, its clusters are put back one by one where they cost least
+(`netsp.gtsp.search.links`), and the new tour is accepted by simulated annealing.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.arrays import Floats, Ints
+from netsp.base.compiled.dynamic_array import write_floats, write_ints, write_rows
+from netsp.base.compiled.kernel import kernel
+from netsp.base.compiled.rng import below, uniform
+from netsp.gtsp.search.layers import best_classes
+from netsp.gtsp.search.links import (
+    Links,
+    Tables,
+    best_place,
+    carry_on,
+    put,
+    tour_length,
+    write_order,
+)
+
+LONGEST_STRING = 10
+"""Most clusters in one removed stretch."""
+
+REMOVED = 10
+"""Average number of clusters removed together."""
+
+BLINK = 0.01
+"""Chance that a place is overlooked (same paper, section 3.3)."""
+
+
+@kernel
+def ruin_and_recreate(
+    order: Ints,
+    best: Ints,
+    length: float,
+    best_length: float,
+    count: int,
+    theta: float,
+    tables: Tables,
+    links: Links,
+    chance: npt.NDArray[np.uint64],
+) -> tuple[float, float]:
+    """Make `count` rounds at temperature θ, in place; returns the lengths of the present order and
+    of the best, which is kept in `best`. ``links`` are those of the present order, before and
+    after; they are never filled afresh in between, so that nothing depends on how rounds are
+    counted out. A round that is not accepted is undone by a copy of them."""
+    start, costs, nearest, near, first, beside, rank, before, _, rounding = tables
+    n = len(order)
+    after, prior, ahead, behind = (
+        links.after.copy(), links.prior.copy(), links.ahead.copy(), links.behind.copy()
+    )  # fmt: skip
+    grown, rest = links.grown.copy(), links.rest.copy()
+    out = np.zeros(n, dtype=np.bool_)
+    gone, place = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    work = np.empty(n, dtype=np.int64)
+    key, row = np.empty(n), np.empty(ahead.shape[1])
+    for _ in range(count):
+        # strings around clusters near a seed, as in the paper, section 3.1
+        longest = min(LONGEST_STRING, n - 1)
+        strings = int(uniform(chance) * (4.0 * REMOVED / (1.0 + longest))) + 1
+        seed = 1 + below(n - 1, chance)
+        removed = 0
+        for r in range(-1, rank.shape[1]):
+            if strings == 0:
+                break
+            c = seed if r < 0 else rank[seed, r]
+            if c == 0 or out[c]:
+                continue
+            strings -= 1
+            size = 1 + below(longest, chance)
+            back = below(size, chance)
+            while back > 0 and prior[c] != 0:
+                c = prior[c]
+                back -= 1
+            for _ in range(size - back):
+                if c == 0:
+                    break
+                if not out[c]:
+                    out[c] = True
+                    gone[removed] = c
+                    removed += 1
+                c = after[c]
+        d = length
+        for r in range(removed):
+            c = gone[r]
+            out[c] = False
+            p, q = prior[c], after[c]
+            after[p], prior[q], after[c] = q, p, -1
+            d -= grown[c]
+            grown[c] = 0.0
+        for r in range(removed):
+            p, q = links.prior[gone[r]], links.after[gone[r]]
+            if after[q] >= 0:
+                d += carry_on(q, 0, after, prior, start, costs, ahead, grown, row)
+            if after[p] >= 0:
+                carry_on(p, 0, prior, after, start, costs, behind, rest, row)
+        # put back in random order, the farthest from the base first, or the nearest first
+        mode = below(4, chance)
+        for r in range(removed):
+            if mode == 0:
+                key[r] = -nearest[0, gone[r]]
+            elif mode == 1:
+                key[r] = nearest[0, gone[r]]
+            else:
+                key[r] = uniform(chance)
+        for r in range(1, removed):
+            c, x = gone[r], key[r]
+            k = r - 1
+            while k >= 0 and key[k] > x:
+                gone[k + 1], key[k + 1] = gone[k], key[k]
+                k -= 1
+            gone[k + 1], key[k + 1] = c, x
+        for r in range(removed):
+            p, _ = best_place(
+                gone[r], after, prior, start, costs, nearest, near, first, beside, before, ahead,
+                behind, rest, place, BLINK, chance,
+            )  # fmt: skip
+            d += put(gone[r], p, after, prior, start, costs, ahead, behind, grown, rest, row)
+        if d < length - theta * math.log(max(uniform(chance), 1e-300)):
+            _write(links, Links(after, prior, ahead, behind, grown, rest))
+            length = tour_length(after, grown)
+            if length < best_length * (1.0 - 1e-12) and (
+                best_length - length > rounding or _is_shorter(after, best, start, costs, work)
+            ):
+                best_length = length
+                write_order(after, best)
+        else:
+            _write(Links(after, prior, ahead, behind, grown, rest), links)
+    write_order(links.after, order)
+    return length, best_length
+
+
+@kernel
+def _write(to: Links, links: Links) -> None:
+    """Copy links to others."""
+    write_ints(to.after, links.after, len(links.after))
+    write_ints(to.prior, links.prior, len(links.prior))
+    write_rows(to.ahead, links.ahead, len(links.ahead))
+    write_rows(to.behind, links.behind, len(links.behind))
+    write_floats(to.grown, links.grown, len(links.grown))
+    write_floats(to.rest, links.rest, len(links.rest))
+
+
+@kernel
+def _is_shorter(after: Ints, best: Ints, start: Ints, costs: Floats, work: Ints) -> bool:
+    """Measure the tour and the best one afresh and return whether the tour is shorter: the tables
+    of the links carry the rounding of the largest numbers that went through them."""
+    write_order(after, work)
+    measured, _ = best_classes(work[1:], start, costs)
+    length, _ = best_classes(best[1:], start, costs)
+    return bool(measured < length)

@@ -1,0 +1,144 @@
+"""Travel graphs of given costs: checked, and as the legs of a graph."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.clock import Clock
+from netsp.base.errors import InputError
+
+ROWS = 512
+"""Of a matrix that are worked on at a time, so that what is in between stays small."""
+
+
+def rounded_down(values: Floats) -> Floats:
+    """In single precision, and no larger."""
+    out = values.astype(np.float32)
+    np.nextafter(out, np.float32(-np.inf), out=out, where=out > values)
+    return out  # type: ignore[return-value]
+
+
+class CostTable:
+    """Legs given as a matrix."""
+
+    at_once = True
+
+    def __init__(self, costs: Floats, cluster: Ints) -> None:
+        self.costs, self.cluster = costs, cluster
+
+    def lengths(
+        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+    ) -> Floats:
+        """As `netsp.gtsp.travel.graph.Legs.lengths`; nothing has to be measured."""
+        return self.costs[np.ix_(vertices, vertices)]
+
+    def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
+        """As `netsp.gtsp.travel.leg_provider.LegsAtOnce.rounded`."""
+        out = np.empty((len(vertices), len(vertices)), dtype=np.float32)
+        for k in range(0, len(vertices), ROWS):
+            out[k : k + ROWS] = rounded_down(self.costs[np.ix_(vertices[k : k + ROWS], vertices)])
+        return out  # type: ignore[return-value]
+
+    def to_base(self) -> Floats:
+        """(V,) costs from the base."""
+        return np.asarray(self.costs[0])
+
+    def lower_bounds(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Floats:
+        """The costs themselves."""
+        return self.lengths(vertices) if rows is None else self.lengths(vertices)[rows]
+
+    def path(self, u: int, v: int) -> Floats:
+        """There is none: InputError."""
+        raise InputError(f"no path from vertex {u} to {v}: this travel graph was made from costs")
+
+
+LARGEST_WHOLE = 2.0**40
+"""Costs are sums of whole numbers as long as none is larger than this."""
+
+
+def grain_of(costs: Floats) -> float:
+    """1 if all costs are whole numbers, so that lengths of tours are, too; else 0."""
+    finite = costs[np.isfinite(costs)]
+    whole = bool((finite == np.rint(finite)).all()) and finite.max(initial=0.0) <= LARGEST_WHOLE
+    return 1.0 if whole else 0.0
+
+
+def checked_costs(
+    costs: npt.ArrayLike, clusters: npt.ArrayLike, *, base: bool = True
+) -> tuple[Floats, Ints]:
+    """The matrix with inf within clusters, and the clusters, or InputError with what is wrong.
+
+    Parameters
+    ----------
+    base
+        Whether vertex 0 must be alone in cluster 0.
+    """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    try:
+        c = np.array(costs, dtype=float)
+        numbers = np.array(clusters, dtype=float)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"costs, clusters: expected numbers: {error}") from None
+    if c.ndim != 2 or c.shape[0] != c.shape[1] or len(c) == 0:
+        raise InputError(f"costs: expected a square matrix, got shape {c.shape}")
+    n = len(c)
+    if numbers.shape != (n,):
+        raise InputError(
+            f"clusters: expected {n} numbers, one per row of costs, got {numbers.shape}"
+        )
+    good = np.isfinite(numbers) & (numbers >= 0) & (numbers == np.floor(numbers))
+    if not good.all():
+        raise InputError(f"clusters: expected whole numbers from 0 on, got {numbers[~good][0]:g}")
+    if numbers.max() >= n:
+        raise InputError(
+            f"clusters: {n} vertices cannot fill clusters 0 to {numbers.max():g}; expected numbers "
+            "without gaps"
+        )
+    cluster = numbers.astype(np.int64)
+    if base and (cluster[0] != 0 or (cluster == 0).sum() != 1):
+        raise InputError(
+            "clusters: vertex 0, where the tour starts, must be alone in cluster 0; cluster 0 is "
+            f"{np.flatnonzero(cluster == 0).tolist()}; expected that (numbers "
+            "begin at 0), or base=None"
+        )
+    missing = sorted(set(range(int(cluster.max()) + 1)) - set(cluster.tolist()))
+    if missing:
+        raise InputError(
+            f"clusters: cluster {missing[0]} has no vertex; expected 0 to {cluster.max()} all used"
+        )
+    c[cluster[:, None] == cluster[None, :]] = np.inf
+    if np.isnan(c).any():
+        u, v = np.argwhere(np.isnan(c))[0]
+        raise InputError(f"costs: costs[{u}][{v}] is not a number")
+    if (c < 0).any():
+        u, v = np.argwhere(c < 0)[0]
+        raise InputError(f"costs: costs[{u}][{v}] is {c[u, v]:g}; expected no negative cost")
+    scale = float(np.max(c[np.isfinite(c)], initial=0.0))
+    if scale > 1e100:
+        raise InputError(f"costs: {scale:g} is too large; expected at most 1e100")
+    with np.errstate(invalid="ignore"):
+        uneven = (c != c.T) & ~(np.abs(c - c.T) <= 1e-9 * scale)
+    if uneven.any():
+        u, v = np.argwhere(uneven)[0]
+        raise InputError(
+            f"costs: expected a symmetric matrix, but costs[{u}][{v}] is {c[u, v]:g} and "
+            f"costs[{v}][{u}] is {c[v, u]:g}"
+        )
+    c = np.minimum(c, c.T)
+    _, part = connected_components(csr_array(np.isfinite(c)), directed=False)
+    every = set(cluster.tolist())
+    starts = [0] if base else np.unique(part, return_index=True)[1].tolist()
+    missed = [sorted(every - set(cluster[part == part[k]].tolist())) for k in starts]
+    if all(missed):
+        where = "vertex 0" if base else "the others"
+        raise InputError(
+            f"costs: infinite costs cut cluster {min(missed, key=len)[0]} off from {where}, so "
+            "there is no tour"
+        )
+    return c, cluster

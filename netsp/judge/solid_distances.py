@@ -1,0 +1,246 @@
+"""Obstacles as the judge sees them: a little smaller than they are, however thin they are.
+
+A path may touch an obstacle, and rounding may put it a hair inside. So what must not be entered is
+an *inset* obstacle: each circle's radius, and each corner of a polygon, is drawn in by the judge's
+tolerance, or by a fifth of the room that there is at that place, if that is less. A wall thinner
+than the tolerance keeps three fifths of its thickness, so nothing passes through it. Where two
+obstacles touch, their insets do not, and a *bridge* closes the gap. A path may reach the contact of
+two obstacles and stop there, but not pass from one side of it to the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from netsp.base.arrays import Floats, Ints
+from netsp.base.geometry.polygons import counterclockwise
+from netsp.model.problem import Circle, Polygon, Problem
+
+SHARE = 0.2
+"""Of the room at a corner, or of a radius, the part that an inset may take."""
+
+SIDES, SIDES_AT_CORNER = 64, 32
+"""Edges of the polygon that stands in for a circle, and for the whole circle that a clearance would
+draw around a corner. They decide which way a path goes round; lengths come from the disks."""
+
+NO_ROOM = 10.0
+"""In tolerances: with less clearance a polygon is not grown, for its rounded corners would be of
+rounding themselves."""
+
+PHASE = 0.2371
+"""Of a side: a phase no drawing has, so that symmetric worlds give no degenerate triangles."""
+
+
+TOUCHING = 2e-10
+"""Largest gap between two obstacles that touch, as a share of the problem's size. The free space of
+the theory is that among obstacles grown by half of this gap."""
+
+Outline = tuple[shapely.Geometry, float]
+"""Polygon with radius 0, or centre of a circle with its radius."""
+
+
+@dataclass(frozen=True)
+class Inset:
+    """One obstacle, smaller by the tolerance, relative to an origin.
+
+    Attributes
+    ----------
+    shape
+        What a path must not enter (of a circle, an inscribed polygon).
+    ring
+        (k, 2) its corners, each of which stands on the disk `owner` (k,) of `disks` (d, 3), x, y,
+        radius: the disks that a taut path may bend around.
+    depth
+        How far a path may reach into the obstacle.
+    """
+
+    shape: shapely.Polygon
+    ring: Floats
+    owner: Ints
+    disks: Floats
+    depth: float
+
+
+def inset(problem: Problem, obstacle: Circle | Polygon, place: float, origin: Floats) -> Inset:
+    """An obstacle, grown by the clearance, drawn in by a tolerance."""
+    c = problem.clearance
+    if isinstance(obstacle, Circle):
+        radius = obstacle.radius + c
+        by = min(place, SHARE * radius)
+        centre = np.array(obstacle.center) - origin
+        ring = centre + (radius - by) * _unit_ring()
+        disks = np.array([[*centre, radius]])
+        owner = np.zeros(len(ring), dtype=np.int64)
+        return Inset(shapely.Polygon(ring), ring, owner, disks, by)
+    v = counterclockwise(np.array(obstacle.polygon) - origin)
+    disks = np.column_stack([v, np.full(len(v), c)])
+    if c <= NO_ROOM * place:
+        back = np.minimum(place, SHARE * room(v, place / SHARE))
+        shape = shapely.Polygon(v + back[:, None] * _inward(v))
+        if not shape.is_valid:  # needles of rounding: better too strict than blind
+            shape = shapely.Polygon(v)
+        ring = shapely.get_coordinates(shape)[:-1]
+        by = min(place, SHARE * c) if c else float(back.max())
+        return Inset(shape, ring, np.arange(len(v)), disks, by)
+    by = min(place, SHARE * c)
+    shape = shapely.Polygon(v).buffer(c - by, quad_segs=SIDES_AT_CORNER // 4)
+    ring = shapely.get_coordinates(shape.exterior)[:-1]
+    return Inset(shapely.Polygon(ring), ring, _nearest(v, ring), disks, by)
+
+
+def _nearest(v: Floats, ring: Floats) -> Ints:
+    """Return for each point of a ring the nearest of some corners, the first of two as near."""
+    from scipy.spatial import cKDTree
+
+    away, index = cKDTree(v).query(ring, k=2)
+    index = np.where((away[:, 0] == away[:, 1])[:, None], np.sort(index, axis=1), index)
+    return np.asarray(index[:, 0], dtype=np.int64)
+
+
+def room(v: Floats, limit: float) -> Floats:
+    """Return how near the two edges at each corner of a polygon come to any other part of it.
+
+    Parameters
+    ----------
+    v : ndarray, shape (k, 2)
+        Corners.
+    limit : float
+        Larger distances are infinite, so that not all pairs need be looked at.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        Distances.
+    """
+    k = len(v)
+    edges = shapely.linestrings(np.stack([v, np.roll(v, -1, axis=0)], axis=1))
+    corners = shapely.points(v)
+    edge, corner = shapely.STRtree(corners).query(edges, predicate="dwithin", distance=limit)
+    other = (corner != edge) & (corner != (edge + 1) % k)  # the ends of an edge are its own
+    edge, corner = edge[other], corner[other]
+    far = shapely.distance(edges[edge], corners[corner])
+    of_edge, of_corner = np.full(k, np.inf), np.full(k, np.inf)
+    np.minimum.at(of_edge, edge, far)
+    np.minimum.at(of_corner, corner, far)
+    return np.asarray(np.minimum(np.minimum(of_edge, np.roll(of_edge, 1)), of_corner))
+
+
+def _inward(v: Floats) -> Floats:
+    """(k, 2) unit vectors into a counter-clockwise polygon along the bisectors of its corners."""
+    ahead = np.roll(v, -1, axis=0) - v
+    ahead /= np.hypot(*ahead.T)[:, None]
+    behind = np.roll(ahead, 1, axis=0)
+    left = np.column_stack([-ahead[:, 1] - behind[:, 1], ahead[:, 0] + behind[:, 0]])
+    size = np.hypot(*left.T)
+    # a corner that turns right back has no sum of normals: there it is behind the tip
+    out = np.where(size[:, None] > 1e-6, left / np.maximum(size, 1e-300)[:, None], ahead - behind)
+    return np.asarray(out / np.maximum(np.hypot(*out.T), 1e-300)[:, None])
+
+
+@dataclass(frozen=True)
+class Bridge:
+    """Contact of two obstacles, and the line between their insets that closes it.
+
+    Attributes
+    ----------
+    first, second
+        Indices of the obstacles.
+    contact
+        (2,) place where they touch.
+    line
+        (k, 2) from inside one inset, through the contact, to inside the other.
+    """
+
+    first: int
+    second: int
+    contact: Floats
+    line: Floats
+
+
+def bridges(problem: Problem, insets: list[Inset], origin: Floats, place: float) -> list[Bridge]:
+    """Return the contacts of obstacles that are grown by the clearance.
+
+    Two obstacles may touch in several places. Where the insets touch, too, no bridge is needed.
+    """
+    if len(insets) < 2:
+        return []
+    outlines = [_outline(o, origin) for o in problem.obstacles]
+    shapes = np.array([o if isinstance(o, shapely.Polygon) else o.buffer(r) for o, r in outlines])
+    reach = 2.0 * problem.clearance + TOUCHING * problem.scale + 2.0 * place
+    # the polygon in place of a circle lies inside of it by this distance
+    back = max(r for _, r in outlines) * (1.0 - np.cos(np.pi / 32.0))
+    pairs = shapely.STRtree(shapes).query(shapes, predicate="dwithin", distance=reach + 2.0 * back)
+
+    def _inside(i: int, point: Floats) -> Floats:
+        """Return a point of the inset that a straight line within the obstacle joins to `point`."""
+        outline, radius = outlines[i]
+        if radius:
+            return np.asarray(shapely.get_coordinates(outline)[0])
+        line = shapely.shortest_line(shapely.Point(point), insets[i].shape)
+        return np.asarray(shapely.get_coordinates(line)[-1])
+
+    out = []
+    for i, j in sorted({(min(a, b), max(a, b)) for a, b in pairs.T.tolist() if a != b}):
+        for one, other in _contacts(problem, outlines[i], outlines[j], insets[i], insets[j], place):
+            line = [_inside(i, one), one, other, _inside(j, other)]
+            out.append(Bridge(i, j, 0.5 * (one + other), np.array(line)))
+    return out
+
+
+def _outline(obstacle: Circle | Polygon, origin: Floats) -> Outline:
+    if isinstance(obstacle, Circle):
+        return shapely.Point(np.array(obstacle.center) - origin), obstacle.radius
+    return shapely.Polygon(np.array(obstacle.polygon) - origin), 0.0
+
+
+def _contacts(
+    problem: Problem, a: Outline, b: Outline, inset_a: Inset, inset_b: Inset, place: float
+) -> list[tuple[Floats, Floats]]:
+    """Return the contacts of two obstacles, each as a point (2,) of the one and one of the
+    other."""
+    gap = 2.0 * problem.clearance + TOUCHING * problem.scale
+    (one, r), (other, q) = a, b
+    if r and q:
+        p, c = shapely.get_coordinates([one, other])
+        far = float(np.hypot(*(c - p)))
+        if far - r - q > gap or far <= abs(r - q):  # apart, or one within the other
+            return []
+        return [(p + r / far * (c - p), c + q / far * (p - c))]
+    if r or q:
+        circle, polygon, radius = (one, other, r) if r else (other, one, q)
+        centre = shapely.get_coordinates(circle)[0]
+        v = shapely.get_coordinates(polygon)
+        step = np.diff(v, axis=0)
+        along = ((centre - v[:-1]) * step).sum(1) / np.maximum((step * step).sum(1), 1e-300)
+        feet = v[:-1] + np.clip(along, 0.0, 1.0)[:, None] * step
+        far = np.hypot(*(feet - centre).T)
+        out = []
+        # deeper in the circle the insets overlap, too
+        touched = (far - radius <= gap) & (far - radius >= -4.0 * place)
+        for foot in np.unique(feet[touched], axis=0):
+            rim = centre + radius / np.hypot(*(foot - centre)) * (foot - centre)
+            out.append((rim, foot) if r else (foot, rim))
+        return out
+    if one.distance(other) > gap:
+        return []
+    # one contact in each part of the plane that is near to both
+    wide = 0.5 * gap + place
+    shut = inset_a.shape.intersection(inset_b.shape)
+    out = []
+    for part in shapely.get_parts(one.buffer(wide).intersection(other.buffer(wide))):
+        if part.intersects(shut):
+            continue
+        here = part.buffer(place)
+        p, c = one.intersection(here), other.intersection(here)
+        if not p.is_empty and not c.is_empty and p.distance(c) <= gap:
+            ends = shapely.get_coordinates(shapely.shortest_line(p, c))
+            out.append((ends[0], ends[1]))
+    return out
+
+
+def _unit_ring() -> Floats:
+    angle = 2.0 * np.pi * (np.arange(SIDES) + PHASE) / SIDES
+    return np.column_stack([np.cos(angle), np.sin(angle)])

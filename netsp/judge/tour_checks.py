@@ -1,0 +1,617 @@
+"""The independent judge of a solution. Imports no roadmap and no solver.
+
+Words come from the rays (`netsp.hsignature`); that the tour is contractible and each tether fits is
+found a second time over a triangulation (`netsp.judge.stringpull`); obstacles are kept clear of by
+plain distances (Shapely).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import deque
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError, VerificationError
+from netsp.hsignature import Word, concatenate, crossings, entangled, reduce
+from netsp.judge.overstretch import first_overstretch
+from netsp.judge.passage import passes
+from netsp.judge.solid_distances import Inset, bridges
+from netsp.judge.stringpull import PLACE_TOLERANCE, StringPuller, reduce_sleeve
+from netsp.model.bound_scope import Scope
+from netsp.model.problem import Circle, Problem
+from netsp.model.solution import Solution, Status, scope_of, tension_ratio
+
+STAND_OFF_ALLOWANCE = 3e-8
+"""As a share of the problem's size, what standing off from a boundary may add to a length."""
+
+MAX_GAP_ERROR = 1e-6
+"""Largest difference between a stated gap and the gap of the stated lengths; files round both."""
+
+MAX_CLOSED_GAP = 1e-5
+"""Largest gap of a tour with an optimal status; tours from a robot's state are proven to this
+accuracy only."""
+
+LENGTH_TOLERANCE = 1e-3
+"""How much longer than the stated length the drawn path may be (arcs are circumscribed)."""
+
+TAUT_TOLERANCE = 1e-7
+"""How far, as a share of the tether, a stated length may lie from the one found again: the offline
+geometry stands off from what it touches by some 1e-8 of the problem's size."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One question and its answer.
+
+    Parameters
+    ----------
+    name : str
+        The question.
+    passed : bool
+        Whether it holds.
+    detail : str
+        What was found.
+    """
+
+    name: str
+    passed: bool
+    detail: str
+
+
+@dataclass(frozen=True)
+class Verification:
+    """All checks of a solution; truthy when every one passed.
+
+    Parameters
+    ----------
+    checks : tuple of Check
+        In order.
+    """
+
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every check passed."""
+        return all(c.passed for c in self.checks)
+
+    def __bool__(self) -> bool:
+        return self.passed
+
+    def __repr__(self) -> str:
+        """In a line."""
+        failed = ", ".join(c.name for c in self.checks if not c.passed)
+        return f"<Verification: {f'fails {failed}' if failed else f'all {len(self.checks)} pass'}>"
+
+    def __str__(self) -> str:
+        width = max(len(c.name) for c in self.checks)
+        return "\n".join(
+            f"{'ok  ' if c.passed else 'FAIL'}  {c.name:<{width}}  {c.detail}" for c in self.checks
+        )
+
+
+def verify(problem: Problem, solution: Solution) -> Verification:
+    """Judge a solution against its problem.
+
+    Checks that the files belong together; that the path is a closed polyline from the base through
+    every goal in the order of the tour, clear of obstacles and within bounds; that its word at
+    every goal is the stated one and its whole word is empty; that the tether, pulled taut again by
+    another method, fits the tether length and has the stated length; and that length, bound, gap
+    and status are consistent.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was to be solved.
+    solution : Solution
+        What is judged.
+
+    Returns
+    -------
+    Verification
+        All checks, in order.
+
+    Raises
+    ------
+    InputError
+        The solution names obstacles or goals that the problem does not have.
+    """
+    for name, value, kind in (("problem", problem, Problem), ("solution", solution, Solution)):
+        if not isinstance(value, kind):
+            raise InputError(f"{name}: expected a {kind.__name__}, got {value!r}")
+    # copies of a model may hold what its validation would have turned into a status
+    solution = solution.model_copy(update={"status": Status(solution.status)})
+    return Verification(tuple(_Judge(problem, solution).run()))
+
+
+def checked(problem: Problem, solution: Solution) -> Solution:
+    """Return a solution if it passes the judge, else raise.
+
+    Solutions without a tour pass, as do solutions with the status `invalid`.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    solution : Solution
+        Its solution.
+
+    Returns
+    -------
+    Solution
+        The same solution.
+
+    Raises
+    ------
+    VerificationError
+        The tour fails a check.
+    """
+    if solution.length is None or solution.status is Status.INVALID:
+        return solution
+    failed = [c for c in verify(problem, solution).checks if not c.passed]
+    if failed:
+        raise VerificationError(
+            f"the tour that was found fails its check {failed[0].name!r}: {failed[0].detail}; "
+            "it is not kept. Please report the problem file, or the package whose roadmap it is"
+        )
+    return solution
+
+
+NOT_OF_PROBLEMS = frozenset({Scope.TRAVEL_GRAPH, Scope.PART, Scope.STATES, Scope.STATES_IN_ORDER})
+"""Scopes of bounds on travel graphs, on parts of them and on missions in space."""
+
+TURNING_TOLERANCE = 1e-6
+"""Radians; contacts with obstacles are found exactly."""
+
+AT_CONTACT = 8.0
+"""Distance, in place tolerances, by which a path may reach beyond a contact of two obstacles if it
+comes back."""
+
+
+class _Judge:
+    def __init__(self, problem: Problem, solution: Solution) -> None:
+        self.sha256 = problem.sha256
+        # planned with a margin: what is said holds among obstacles grown by it
+        if solution.margin or solution.slack:
+            problem = problem.grown(solution.margin, solution.slack)
+        self.problem, self.solution = problem, solution
+        # a path that starts in the middle is judged with the tether that is out already before it
+        before: Floats = np.array(solution.start_tether, dtype=float).reshape(-1, 3)
+        walked: Floats = np.array(solution.path, dtype=float).reshape(-1, 3)
+        self.path: Floats = np.vstack([before, walked])
+        self.out = len(before)
+        self.place = max(PLACE_TOLERANCE * problem.scale, problem.tolerance)
+        self.tiny = 5.0 * problem.tolerance
+        xy = problem.points[:, :2]
+        near = [float(o.signed_distance(xy).min()) - problem.clearance for o in problem.obstacles]
+        if min(near, default=np.inf) < self.place:
+            # the offline geometry stands off from boundaries, which moves the ends of its paths
+            self.tiny += STAND_OFF_ALLOWANCE * problem.scale
+        self.visits: list[int] = []
+
+    @cached_property
+    def puller(self) -> StringPuller:
+        """Triangles of the free space, which cover the path."""
+        return StringPuller(self.problem, self.problem.tether_length, self.place, self.path)
+
+    def run(self) -> list[Check]:
+        checks = [self._belongs()]
+        if self.solution.length is None:
+            checks.append(Check("has a tour", False, f"status {self.solution.status.value}"))
+            return checks
+        if not self._is_finite():
+            checks.append(Check("numbers are finite", False, "one is not a number, or infinite"))
+            return checks
+        if self.problem.state is not None or self.out:
+            checks.append(self._starts())
+        checks += [self._closed(), self._every_goal()]
+        if not all(c.passed for c in checks[1:]):
+            return checks
+        judged = len(checks)
+        checks += [self._visited(), self._clear(), *self._bounds()]
+        if not checks[judged].passed:
+            return checks
+        checks += [self._words(), self._empty(), *self._tethers(), self._length(), self._status()]
+        if self.solution.status is Status.INVALID and all(c.passed for c in checks):
+            checks[-1] = Check(
+                checks[-1].name, False, "invalid, yet nothing is wrong with the tour"
+            )
+        return checks
+
+    def _belongs(self) -> Check:
+        same = self.sha256 == self.solution.problem.sha256
+        return Check(
+            "belongs to the problem",
+            same,
+            f"sha256 {self.sha256[:12]}…"
+            + (f", obstacles grown by {self.solution.margin:g}" if self.solution.margin else "")
+            + (f", tether less {100.0 * self.solution.slack:g} % slack" * (self.solution.slack > 0))
+            if same
+            else f"solution is for another problem or another version of it "
+            f"({self.solution.problem.sha256[:12]}…, this is {self.sha256[:12]}…)",
+        )
+
+    def _is_finite(self) -> bool:
+        """Return whether all numbers are finite; copies of a model are not validated."""
+        s = self.solution
+        numbers = [s.length, s.lower_bound, s.gap, *(v.tether_length for v in s.tour)]
+        return bool(np.isfinite(self.path).all()) and all(
+            x is None or math.isfinite(x) for x in numbers
+        )
+
+    def _starts(self) -> Check:
+        """The path starts at the problem's state, with a tether of the state's word."""
+        name, state = "starts at the state", self.problem.state
+        if state is None or self.out < 2 or len(self.path) < self.out + 1:
+            return Check(name, False, "only one of problem and solution has a starting state")
+        tether = self.path[: self.out]
+        miss = max(
+            np.linalg.norm(self.path[k] - np.array(state.position))
+            for k in (self.out - 1, self.out)
+        )
+        if miss <= self.place:
+            self.path[[self.out - 1, self.out]] = state.position
+        word = reduce(crossings(tether, self.problem.representative_points))
+        if word != reduce(state.signature):
+            return Check(name, False, f"the tether there has the word {list(word)}")
+        return Check(name, bool(miss <= self.place), self._off(float(miss)))
+
+    def _closed(self) -> Check:
+        if len(self.path) < 2:
+            return Check("starts and ends at the base", False, "the path has fewer than 2 points")
+        base = self.problem.points[0]
+        miss = max(np.linalg.norm(self.path[0] - base), np.linalg.norm(self.path[-1] - base))
+        if miss <= self.place:
+            self.path[[0, -1]] = base
+        return Check(
+            "starts and ends at the base", bool(miss <= self.place), self._off(float(miss))
+        )
+
+    def _off(self, miss: float) -> str:
+        return f"off by {miss:.3g} {self.problem.units}" if miss else "exactly"
+
+    def _every_goal(self) -> Check:
+        order = [v.goal for v in self.solution.tour]
+        goals = range(len(self.problem.goals))
+        own = self.problem.clusters
+        taken = {int(own[g]) for g in order if g in goals}
+        missing = [g for g in goals if int(own[g]) not in taken]
+        too_many = [
+            g for g in sorted(set(order) & set(goals))
+            if sum(own[h] == own[g] for h in set(order) & set(goals)) > 1
+        ]  # fmt: skip
+        repeated = sorted({g for g in order if order.count(g) > 1})
+        unknown = sorted(set(order) - set(goals))
+        if missing or repeated or unknown or too_many:
+            parts = [
+                f"{what}: {', '.join(map(self._goal, which))}"
+                for what, which in (
+                    ("missing", missing),
+                    ("repeated", repeated),
+                    ("unknown", unknown),
+                    ("several of one choice", too_many),
+                )
+                if which
+            ]
+            return Check("names every goal once", False, "; ".join(parts))
+        before = self.problem.precedences
+        for i, j in itertools.combinations(range(len(order) if len(before) else 0), 2):
+            if before[own[order[j]], own[order[i]]]:
+                wrong = f"{self._goal(order[i])} before {self._goal(order[j])}"
+                return Check("names every goal once", False, f"the wrong way round: {wrong}")
+        if self.solution.kept_order and list(own[order]) != sorted(own[order]):
+            return Check("names every goal once", False, "not in the order of the problem")
+        kept = ", in the order of the problem" if self.solution.kept_order else ""
+        return Check("names every goal once", True, f"{len(order)} goals{kept}")
+
+    def _goal(self, k: int) -> str:
+        """A goal that the solution names; the problem may have no such."""
+        return self.problem.goal_label(k) if k < len(self.problem.goals) else f"goal #{k}"
+
+    def _visited(self) -> Check:
+        """Find for each visit the path vertex at its goal, in order; several may lie there, so the
+        first with the stated word is taken. From then on the path runs through the goal itself, so
+        that words and lengths are those of exact places."""
+        name = "visits every goal in order"
+        rays = self.problem.representative_points
+        at = 0
+        word: Word = ()
+        stops: list[tuple[int, Floats]] = []
+        if self.out:  # goals that the tether passes at the start are not visited by that
+            at = self.out
+            word = reduce(crossings(self.path[: at + 1], rays))
+        here = self.path[at]
+        for visit in self.solution.tour:
+            label = self.problem.goal_label(visit.goal)
+            target = self.problem.points[visit.goal + 1]
+            if visit.position is not None and (
+                np.linalg.norm(np.array(visit.position) - target) > self.place
+            ):
+                return Check(name, False, f"{label} is not at {list(visit.position)}, as stated")
+            gaps = np.linalg.norm(self.path[at:] - target, axis=1)
+            candidates = at + np.flatnonzero(gaps <= self.place)
+            if len(candidates) == 0:
+                return Check(
+                    name, False,
+                    f"no path point at {label} after point {at}; nearest misses by "
+                    f"{gaps.min():.3g}",
+                )  # fmt: skip
+            words = [
+                concatenate(word, crossings(np.vstack([here, self.path[at + 1 : k], target]), rays))
+                for k in candidates
+            ]
+            pick = next((i for i, w in enumerate(words) if w == reduce(visit.signature)), 0)
+            at, word, here = int(candidates[pick]), words[pick], target
+            stops.append((at, target))
+        self._run_through(stops)
+        return Check(name, True, f"{len(self.path)} path points")
+
+    def _run_through(self, stops: list[tuple[int, Floats]]) -> None:
+        """Replace each path vertex within the tolerance of its goal by the goal."""
+        ends = {0, len(self.path) - 1, self.out}
+        rows: list[Floats] = []
+        waiting = deque(stops)
+        for k, point in enumerate(self.path):
+            here = [] if waiting and waiting[0][0] == k and k not in ends else [point]
+            if k == len(self.path) - 1:
+                here = []
+            while waiting and waiting[0][0] == k:
+                here.append(waiting.popleft()[1])
+                self.visits.append(len(rows) + len(here) - 1)
+            if k == len(self.path) - 1:
+                here.append(point)
+            rows += here
+        self.path = np.array(rows)
+
+    def _clear(self) -> Check:
+        name = "enters no obstacle"
+        if not self.problem.obstacles:
+            return Check(name, True, "there are none")
+        line = shapely.LineString(self.path[:, :2] - self.puller.origin)
+        shapely.prepare(line)
+        nearest, where = np.inf, ""
+        for i, solid in enumerate(self.puller.solids):
+            room = self._room(i, line)
+            label = self.problem.obstacle_label(i)
+            if room < -solid.depth or self._pierced(i, solid, line):
+                how = f"by {-room:.3g}" if room < -solid.depth else "and leaves it elsewhere"
+                return Check(name, False, f"enters {label} {how}")
+            if room < nearest:
+                nearest, where = room, label
+        for bridge in bridges(self.problem, self.puller.solids, self.puller.origin, self.place):
+            if line.dwithin(shapely.LineString(bridge.line), self.place) and passes(
+                bridge, self.path[:, :2] - self.puller.origin, AT_CONTACT * self.place
+            ):
+                one, other = map(self.problem.obstacle_label, (bridge.first, bridge.second))
+                return Check(name, False, f"passes between {one} and {other}, which touch")
+        if not where:
+            return Check(name, True, "there is none")
+        near = f"{nearest:.3g} {self.problem.units} from" if nearest > self.place else "touches"
+        return Check(name, True, f"{near} {where}, the nearest")
+
+    def _room(self, i: int, line: shapely.LineString) -> float:
+        """How far the path stays from an obstacle grown by the clearance; negative inside, and of a
+        polygon's own inside not told."""
+        o, origin = self.problem.obstacles[i], self.puller.origin
+        if isinstance(o, Circle):
+            centre = shapely.Point(np.array(o.center) - origin)
+            return float(line.distance(centre)) - o.radius - self.problem.clearance
+        shape = shapely.Polygon(np.array(o.polygon) - origin)
+        return float(line.distance(shape)) - self.problem.clearance
+
+    def _pierced(self, i: int, solid: Inset, line: shapely.LineString) -> bool:
+        """Whether the path meets a polygon drawn in by the tolerance or, if the polygon is thinner,
+        by a part of its thickness."""
+        return not isinstance(self.problem.obstacles[i], Circle) and bool(
+            line.intersects(solid.shape)
+        )
+
+    def _bounds(self) -> list[Check]:
+        if self.problem.bounds is None:
+            return []
+        xmin, ymin, xmax, ymax = self.problem.bounds
+        x, y = self.path[:, 0], self.path[:, 1]
+        out = max(xmin - x.min(), x.max() - xmax, ymin - y.min(), y.max() - ymax)
+        return [
+            Check("stays within bounds", bool(out <= self.place), f"outside by {max(out, 0):.3g}")
+        ]
+
+    def _words(self) -> Check:
+        rays = self.problem.representative_points
+        word: Word = ()
+        before = 0
+        for visit, stop in zip(self.solution.tour, self.visits, strict=True):
+            word = concatenate(word, crossings(self.path[before : stop + 1], rays))
+            before = stop
+            if word != tuple(visit.signature):
+                return Check(
+                    "tether word at every goal",
+                    False,
+                    f"at {self.problem.goal_label(visit.goal)} the path writes {list(word)}, "
+                    f"the solution says {list(visit.signature)}",
+                )
+        return Check("tether word at every goal", True, f"{len(self.visits)} words agree")
+
+    def _empty(self) -> Check:
+        word = reduce(crossings(self.path, self.problem.representative_points))
+        if self.solution.entangled and not word:
+            known = range(len(self.problem.obstacles))
+            stated = ", ".join(
+                self.problem.obstacle_name(k) if k in known else f"#{k}"
+                for k in self.solution.entangled
+            )
+            return Check(
+                "total word is empty",
+                False,
+                f"yet the solution states entangled obstacles {stated}",
+            )
+        if word:
+            names = ", ".join(self.problem.obstacle_label(i - 1) for i in entangled(word))
+            return Check("total word is empty", False, f"{list(word)}: entangles {names}")
+        return Check("total word is empty", True, "nothing is wrapped")
+
+    def _tethers(self) -> list[Check]:
+        """The second opinion: triangulate, pull each prefix and each leg taut."""
+        limit = self.problem.tether_length
+        puller = self.puller
+        pieces = puller.crossings(self.path)
+        known: dict[int, float] = {len(self.path) - 1: 0.0}
+        points = self.problem.points
+        # the tether that is out at the start is no leg
+        sleeve: list[tuple[int, bool]] = reduce_sleeve(
+            [c for piece in pieces[: self.out] for c in piece]
+        )
+        before, place = self.out, 0
+        if self.problem.state is not None:
+            points = np.vstack([points, self.problem.state.position])
+            place = len(points) - 1
+        pulled_total = 0.0
+        fits: tuple[float, str] = (-np.inf, "")
+        turns: tuple[float, str] = (0.0, "")
+        wrong: tuple[float, str] = (-np.inf, "")
+        stops = [*((v.goal + 1, s) for v, s in zip(self.solution.tour, self.visits, strict=True))]
+        stops.append((0, len(self.path) - 1))
+        for k, (point, stop) in enumerate(stops):
+            leg = [c for piece in pieces[before:stop] for c in piece]
+            sleeve = reduce_sleeve(sleeve + leg)
+            pulled = puller.pull(points[place], points[point], reduce_sleeve(leg))
+            dz = points[point, 2] - points[place, 2]
+            pulled_total += float(np.hypot(pulled.low, dz))
+            before, place = stop, point
+            if point == 0:
+                break
+            tether = puller.pull(points[0], points[point], sleeve)
+            dz = points[point, 2] - points[0, 2]
+            low, high = np.hypot(tether.low, dz), np.hypot(tether.high, dz)
+            label = self.problem.goal_label(point - 1)
+            fits = max(fits, (float(low), label))
+            known[stop] = float(high)
+            turns = max(turns, (tether.turning, label))
+            stated = self.solution.tour[k].tether_length
+            slack = TAUT_TOLERANCE * limit + self.tiny
+            wrong = max(wrong, (float(max(low - stated, stated - high) - slack), label))
+        self.pulled_total = pulled_total
+        excess = fits[0] - limit
+        fit = excess <= 1e-9 * limit + self.tiny
+        longest = f"longest {fits[0]:.6g} of {limit:g}, at {fits[1]}"
+        return [
+            Check(
+                "contractible over triangles",
+                not sleeve,
+                "the tour shrinks to the base" if not sleeve else f"{len(sleeve)} edges remain",
+            ),
+            self._along(pieces, known, longest)
+            if fit and not sleeve
+            else Check("taut tether fits", fit, longest),
+            Check(
+                "taut lengths as stated",
+                wrong[0] <= 0.0,
+                f"within {TAUT_TOLERANCE:g} of the tether length"
+                if wrong[0] <= 0.0
+                else f"off by {wrong[0] + TAUT_TOLERANCE * limit + self.tiny:.6g} at {wrong[1]}",
+            ),
+            *self._tension(*turns),
+        ]
+
+    def _along(
+        self, pieces: list[list[tuple[int, bool]]], known: dict[int, float], longest: str
+    ) -> Check:
+        """Check that the tether, which fits at the goals, also fits between them."""
+        name, limit = "taut tether fits", self.problem.tether_length
+        found = first_overstretch(
+            self.puller, self.path, pieces, limit * (1.0 + 1e-9) + self.tiny, known,
+            self._proud, self.out,
+        )  # fmt: skip
+        if found is None:
+            return Check(name, True, longest)
+        x, y, z = self.path[found.vertex]
+        at = f"({x:.6g}, {y:.6g})" if z == self.problem.base[2] else f"({x:.6g}, {y:.6g}, {z:.6g})"
+        return Check(name, False, f"{found.length:.6g} of {limit:g} on the way, at {at}")
+
+    def _proud(self, point: Floats) -> float:
+        """Return the distance of a point of a path from the arc around which it is circumscribed.
+
+        The tether fits on the arc itself, which is part of a taut leg. A corner of the
+        circumscribed polyline lies outside of the arc, straight away from the disk, and the tether
+        there is longer by that distance. The polyline is longer than its arc by the share
+        `LENGTH_TOLERANCE` at most. So its corners lie outside by at most 1.5 times that share of
+        the radius: for half the angle x between two contacts, tan x = x (1 + x²/3 + …) and sec x =
+        1 + x²/2 + ….
+        """
+        disks = self.puller.disks
+        if not len(disks):
+            return 0.0
+        centre = disks[:, :2] + self.puller.origin
+        out = np.hypot(*(point[:2] - centre).T) - disks[:, 2]
+        on_arc = out <= 1.5 * LENGTH_TOLERANCE * disks[:, 2]
+        return max(float(out[on_arc].max(initial=0.0)), 0.0)
+
+    def _tension(self, turning: float, label: str) -> list[Check]:
+        """What friction does to the tension (capstan), where that has a limit."""
+        s = self.solution
+        if s.max_tension_ratio is None:
+            return []
+        ratio = tension_ratio(s.friction, turning)
+        return [
+            Check(
+                "tension ratio is kept",
+                turning <= s.max_turning + TURNING_TOLERANCE,
+                f"{ratio:.4g} of {s.max_tension_ratio:g}, at {label}" if label else "no turning",
+            )
+        ]
+
+    def _length(self) -> Check:
+        stated = float(self.solution.length or 0.0)
+        drawn = float(np.linalg.norm(np.diff(self.path[self.out :], axis=0), axis=1).sum())
+        tiny = self.tiny * (len(self.visits) + 1)
+        ok = (
+            self.pulled_total <= stated * (1.0 + 1e-7) + tiny
+            and stated <= drawn * (1.0 + 1e-7) + tiny
+            and drawn <= stated * (1.0 + LENGTH_TOLERANCE) + tiny
+        )
+        return Check(
+            "length is right",
+            bool(ok),
+            f"stated {stated:.6f}, drawn {drawn:.6f}, legs pulled taut {self.pulled_total:.6f}",
+        )
+
+    def _status(self) -> Check:
+        s = self.solution
+        fault = self._fault_of_bound()
+        said = "no bound" if s.bound is None else s.bound.says(s.length, self.problem.units)
+        return Check(
+            "bound, gap and status agree", fault is None, fault or f"{s.status.value}, {said}"
+        )
+
+    def _fault_of_bound(self) -> str | None:
+        """Return the fault in the bound, gap and status that the solution states; None if none."""
+        s = self.solution
+        length, gap, status = float(s.length or 0.0), s.gap, s.status
+        if status in (Status.INFEASIBLE, Status.NO_SOLUTION_FOUND):
+            return f"{status.value}, yet has a tour"
+        if (s.lower_bound is None) != (gap is None):
+            return "bound without gap or gap without bound"
+        if s.bound is None:
+            return f"{status.value}, but there is no bound" if status.is_optimal else None
+        bound, scope = s.bound.length, s.bound.scope
+        if scope in NOT_OF_PROBLEMS:
+            return f"a bound on {scope.tours}, which no solution of a problem has"
+        if bound > length + 1e-9 * max(length, self.problem.scale):
+            return f"bound {bound:g} above length {length:g}"
+        if gap is None or abs(gap - s.bound.gap(length)) > MAX_GAP_ERROR:
+            return f"the stated gap is not that of the bound, {s.bound.percent(length, 6)}"
+        able = scope_of(s.roadmap, s.classes, kept_order=s.kept_order)
+        if not able.includes(scope) or scope.keeps_order != s.kept_order:
+            return f"a bound on {scope.tours}, but a run like this can bound {able.tours}"
+        closed = gap <= MAX_CLOSED_GAP
+        if status.is_optimal and status is not Status.OPTIMAL_OF_KEPT and not closed:
+            return f"{status.value}, but the gap is {s.bound.percent(length, 6)}"
+        if status.is_optimal and closed and status is not Status.optimal_of(scope):
+            return f"{status.value}, but the bound is one on {scope.tours}"
+        return None

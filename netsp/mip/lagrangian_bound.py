@@ -1,0 +1,77 @@
+"""A lower bound from dual values, computed here and not taken from the solver.
+
+For any λ, π free and μ <= 0 the Lagrangian gives, for every tour,
+
+    length >= Σ_C λ_C + Σ_k μ_k room_k + Σ over its vertices of r_v + Σ over its legs of r_uv,
+
+with reduced costs r_uv = c_uv - π_u - π_v - Σ_k μ_k [u, v ∈ S_k or uv in a tooth of k] and
+r_v = 2 π_v - λ_C(v) + Σ_k μ_k [v ∈ S_k \\ C_k]. A tour takes one vertex of each cluster, and there
+two legs (m >= 2), each of which has two ends; so
+
+    length >= Σ_k μ_k room_k + Σ_C (λ_C + min over v in C of (r_v + half of its two least r_uv)).
+
+It holds whatever the solver's tolerances were. At an LP optimum no r_uv is negative and it is no
+less than that; before, when many legs of negative r_uv are not in the LP yet, it is far above what
+one gets by taking all of them.
+
+It is summed in floating point (`netsp.mip.prices`), so `ROUNDING` times the size of what is summed
+is taken off; the test suite compares with the same formula in exact rationals (`exact_bound`).
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from netsp.base.arrays import Floats, Ints
+from netsp.mip.cuts import Cut
+from netsp.mip.program import Duals
+
+ROUNDING = 1e-12
+"""Relative rounding allowed for: some thousand additions at 1.1e-16 each, with room to spare."""
+
+
+def rounding(duals: Duals, longest: float) -> float:
+    """What the sums of a bound can be off by: `ROUNDING` of all duals, and of the reduced cost of
+    largest size for every leg of a tour."""
+    size = float(np.abs(duals.cluster).sum() + np.abs(duals.cut).sum() - duals.constant)
+    most = longest + float(np.abs(duals.degree).max(initial=0.0))
+    return ROUNDING * (size + len(duals.cluster) * most)
+
+
+def least_of_clusters(values: Floats, cluster: Ints) -> Floats:
+    """(m + 1,) the least value of any vertex, by cluster."""
+    least = np.full(int(cluster.max()) + 1, np.inf)
+    np.minimum.at(least, cluster, values)
+    return least
+
+
+def exact_bound(costs: Floats, cluster: Ints, cuts: list[Cut], duals: Duals) -> Fraction:
+    """The module's formula in exact rationals, of the very same floating-point numbers; for small
+    instances, in which every vertex has two legs."""
+    n = len(cluster)
+    cluster_dual = [Fraction(x) for x in duals.cluster.tolist()]
+    degree = [Fraction(x) for x in duals.degree.tolist()]
+    active = [(c, Fraction(x)) for c, x in zip(cuts, duals.cut.tolist(), strict=True) if x]
+    legs: list[list[Fraction]] = [[] for _ in range(n)]
+    for u in range(n):
+        for v in range(n):
+            if u != v and np.isfinite(costs[u, v]):
+                r = Fraction(float(costs[u, v])) - degree[u] - degree[v]
+                pair = {int(cluster[u]), int(cluster[v])}
+                r -= sum(mu for c, mu in active if c.inside[u] and c.inside[v])
+                bitten = sum(
+                    mu for c, mu in active
+                    if any(pair <= set(t) for t in c.teeth)
+                    and (c.inside[u] != c.inside[v] or any(len(t) > 2 for t in c.teeth))
+                )  # fmt: skip
+                legs[u].append(r - bitten)
+    vertex = []
+    for v in range(n):
+        r = 2 * degree[v] - cluster_dual[cluster[v]]
+        r += sum(mu for c, mu in active if c.inside[v] and c.cluster != cluster[v])
+        vertex.append(r + sum(sorted(legs[v])[:2]) / 2)
+    least = [min(vertex[v] for v in range(n) if cluster[v] == c) for c in range(max(cluster) + 1)]
+    rooms = sum((mu * Fraction(c.room) for c, mu in active), Fraction(0))
+    return Fraction(sum(cluster_dual) + sum(least) + rooms)

@@ -1,0 +1,258 @@
+"""Inequalities of even crossing: a tour that is not entangled crosses every ray an even number of
+times.
+
+Its word is empty, so each letter stands in it as often as its inverse, and the legs that write an
+odd number of letters of an obstacle are even in number. On the cover that is nothing new: they are
+the legs between vertices whose words have an even and an odd number of that letter, a set H of
+vertices that the tour enters and leaves. But the relaxation takes halves of vertices, and what goes
+once around an obstacle costs it nothing: it returns on another sheet. As in generalised 2-matching
+inequalities (`netsp.mip.blossoms`), for an odd number k of teeth, pairs of clusters,
+
+    y(δ(H)) - 2 Σ y(legs of a tooth in δ(H)) >= 1 - k,
+
+for a tour has at most one leg between two clusters, and one that had all k of these and no other in
+δ(H) would cross it an odd number of times. Those inequalities are the case that H is a union of
+clusters, and together they are the {0, 1/2}-cuts (Caprara & Fischetti 1996) of the equations of
+degree and parity. Within a set of obstacles and one of clusters, H is where the letters of the
+former, and membership of the latter, add up to an odd number.
+
+Which clusters: with q the flow of a pair across H, it costs min(q, 1 - q), and is a tooth where q
+is more than a half; where the number of teeth is even, one pair is changed. A violated cut is one
+of cost below 1. To find the cheapest is NP-hard (it is the frustration index of a signed graph); it
+is sought by changing sides of one cluster after another.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.compiled.interpretation import interprets
+from netsp.base.compiled.kernel import kernel
+from netsp.hsignature import Word
+from netsp.mip.cuts import Cut
+
+VIOLATION = 0.02
+"""Least violation worth a cut."""
+
+MOST_CUTS = 40
+"""Most cuts from one point."""
+
+ENOUGH = 4
+"""With so many cuts of single obstacles, two at a time are not looked at."""
+
+MOST_SETS = 500
+"""Of obstacles that are looked at."""
+
+PASSES = 4
+"""Times that the sides of all clusters are gone through."""
+
+
+def odd_letters(signatures: Sequence[Word], obstacles: int | None = None) -> Bools:
+    """(V, n) of which obstacles each word has an odd number of letters; of the first so many,
+    where that is given, or up to the last that is in any word."""
+    last = max((abs(a) for word in signatures for a in word), default=0)
+    out = np.zeros((len(signatures), last if obstacles is None else obstacles), dtype=bool)
+    for v, word in enumerate(signatures):
+        for a in word:
+            out[v, abs(a) - 1] ^= True
+    return out
+
+
+def parity_cuts(
+    legs: Ints, y: Floats, cluster: Ints, odd: Bools, check: Callable[[], None] = lambda: None
+) -> list[Cut]:
+    """Violated inequalities of even crossing, the most violated first.
+
+    Parameters
+    ----------
+    odd
+        (V, n) as of `odd_letters`.
+    check
+        Called for each set of obstacles; may raise to stop.
+    """
+    on = y > 1e-9
+    u, v = legs[on].T
+    clusters = int(cluster.max()) + 1
+    pairs, pair = _pairs_of(np.column_stack([cluster[u], cluster[v]]), clusters)
+    row, beside = _beside(pairs, clusters)
+    found: dict[tuple[object, ...], tuple[float, Cut]] = {}
+    for size in (1, 2):
+        if len(found) >= ENOUGH:
+            break
+        if math.comb(odd.shape[1], size) > MOST_SETS:
+            break
+        for some in combinations(range(odd.shape[1]), size):
+            check()
+            side_of = _sides(odd, some)
+            flow = _flow(pair, side_of[u] ^ side_of[v], y[on], len(pairs))
+            if not flow[:, 1].any():
+                continue
+            for sides in (np.zeros(clusters, dtype=np.bool_), _along_tree(pairs, flow, clusters)):
+                cost, teeth = _cheapest(pairs, flow, row, beside, sides)
+                if cost > 1.0 - VIOLATION or not teeth.any():
+                    continue
+                inside = side_of ^ sides[cluster]
+                cut = Cut(inside, -1, tuple((int(a), int(b)) for a, b in pairs[teeth]))
+                found.setdefault((inside.tobytes(), cut.teeth), (1.0 - cost, cut))
+    best = sorted(found.values(), key=lambda f: -f[0])[:MOST_CUTS]
+    return [cut for _, cut in best]
+
+
+def _pairs_of(ends: Ints, size: int) -> tuple[Ints, Ints]:
+    """(p, 2) pairs that legs are between, and (k,) which is each leg's."""
+    g, h = np.sort(ends, axis=1).T
+    keys, pair = np.unique(g * size + h, return_inverse=True)
+    return np.column_stack([keys // size, keys % size]), pair
+
+
+def _flow(pair: Ints, odd: Bools, y: Floats, pairs: int) -> Floats:
+    """(p, 2) y of the legs of each pair that write an even, and an odd, number of letters."""
+    out = np.zeros((pairs, 2))
+    np.add.at(out, (pair, odd.astype(np.int64)), y)
+    return out
+
+
+def _sides(odd: Bools, obstacles: tuple[int, ...]) -> Bools:
+    return np.asarray(np.logical_xor.reduce(odd[:, list(obstacles)], axis=1))
+
+
+def _beside(ends: Ints, clusters: int) -> tuple[Ints, Ints]:
+    """Numbers of the pairs at each cluster: `beside[row[c] : row[c + 1]]`."""
+    at = ends.ravel()
+    order = np.argsort(at, kind="stable")
+    return np.searchsorted(at[order], np.arange(clusters + 1)).astype(np.int64), order // 2
+
+
+def _along_tree(ends: Ints, flow: Floats, clusters: int) -> Bools:
+    """(m + 1,) sides such that what is most fractional does not cross, along a spanning tree."""
+    cost = np.minimum(flow, 1.0 - flow)
+    order = np.argsort(-cost.ravel(), kind="stable")
+    root, turned = np.arange(clusters), np.zeros(clusters, dtype=bool)
+    at, costs = ends.tolist(), cost.ravel().tolist()
+    for k in order.tolist():
+        p, label = divmod(k, 2)
+        if costs[k] <= 1e-9:
+            break
+        a, b = at[p]
+        if root[a] != root[b]:
+            # that this pair does not cross: its sides differ as it writes letters or not
+            wrong = bool(turned[a] ^ turned[b]) != bool(label)
+            mine = root == root[b]
+            turned[mine] ^= wrong
+            root[mine] = root[a]
+    return turned
+
+
+@kernel
+def _cheapest(
+    ends: Ints, flow: Floats, row: Ints, beside: Ints, sides: Bools
+) -> tuple[float, Bools]:
+    """Change sides until that makes nothing cheaper; the cost, and which pairs are teeth.
+
+    Parameters
+    ----------
+    flow
+        (pairs, 2) y of the legs between two clusters that stay on one side, and that change.
+    """
+    cost, change = _cost(ends, flow, sides)
+    for _ in range(PASSES):
+        best = cost
+        for c in range(len(sides)):
+            if row[c] == row[c + 1]:
+                continue
+            sides[c] ^= True
+            now, at = _cost(ends, flow, sides)
+            if now < cost - 1e-9:
+                cost, change = now, at
+            else:
+                sides[c] ^= True
+        if cost > best - 1e-9:
+            break
+    teeth = np.zeros(len(ends), dtype=np.bool_)
+    for p in range(len(ends)):
+        teeth[p] = _across(p, ends, flow, sides) > 0.5
+    if change >= 0:
+        teeth[change] = not teeth[change]
+    return cost, teeth
+
+
+@kernel
+def _across(p: int, ends: Ints, flow: Floats, sides: Bools) -> float:
+    """What a pair of clusters has across the handle."""
+    return float(flow[p, 1] if sides[ends[p, 0]] == sides[ends[p, 1]] else flow[p, 0])
+
+
+@kernel
+def _cost(ends: Ints, flow: Floats, sides: Bools) -> tuple[float, int]:
+    """Cost of some sides, and the pair that is changed for it, -1 for none."""
+    total, odd, least, at = 0.0, False, np.inf, -1
+    for p in range(len(ends)):
+        q = _across(p, ends, flow, sides)
+        if q > 0.5:
+            total += 1.0 - q
+            odd = not odd
+        else:
+            total += q
+        if abs(1.0 - 2.0 * q) < least:
+            least, at = abs(1.0 - 2.0 * q), p
+    if odd:
+        return total, -1
+    return total + least, at
+
+
+@interprets(_cheapest)
+def _cheapest_in_numpy(
+    ends: Ints, flow: Floats, row: Ints, beside: Ints, sides: Bools
+) -> tuple[float, Bools]:
+    """Vectorise `_cheapest`: cost the moves of all clusters together, and again after each move."""
+    cost, change = _cost_in_numpy(ends, flow, sides)
+    movable = np.flatnonzero(row[:-1] != row[1:])
+    is_end = ((ends[:, :1] == movable) ^ (ends[:, 1:] == movable)).T
+    for _ in range(PASSES):
+        best, first = cost, 0
+        while first < len(movable):
+            is_whole = (sides[ends[:, 0]] == sides[ends[:, 1]]) ^ is_end[first:]
+            costs, changes = _costs_of(np.where(is_whole, flow[:, 1], flow[:, 0]))
+            cheaper = np.flatnonzero(costs < cost - 1e-9)
+            if not len(cheaper):
+                break
+            k = int(cheaper[0])
+            sides[movable[first + k]] ^= True
+            cost, change = float(costs[k]), int(changes[k])
+            first += k + 1
+        if cost > best - 1e-9:
+            break
+    is_whole = sides[ends[:, 0]] == sides[ends[:, 1]]
+    teeth = np.where(is_whole, flow[:, 1], flow[:, 0]) > 0.5
+    if change >= 0:
+        teeth[change] = not teeth[change]
+    return cost, teeth
+
+
+@interprets(_cost)
+def _cost_in_numpy(ends: Ints, flow: Floats, sides: Bools) -> tuple[float, int]:
+    """Vectorise `_cost` over all pairs."""
+    q = np.where(sides[ends[:, 0]] == sides[ends[:, 1]], flow[:, 1], flow[:, 0])
+    costs, changes = _costs_of(q[None])
+    return float(costs[0]), int(changes[0])
+
+
+def _costs_of(across: Floats) -> tuple[Floats, Ints]:
+    """Return the costs of several sets of sides, and the pairs changed for them, -1 for none.
+
+    Each row of `across` holds the values that `_across` returns for one set of sides.
+    """
+    if not across.shape[1]:
+        return np.full(len(across), np.inf), np.full(len(across), -1)
+    is_tooth = across > 0.5
+    # a cumulative sum adds in the order of the pairs, as `_cost` does
+    total = np.cumsum(np.where(is_tooth, 1.0 - across, across), axis=1)[:, -1]
+    off = np.abs(1.0 - 2.0 * across)
+    at = off.argmin(axis=1)
+    is_odd = np.count_nonzero(is_tooth, axis=1) % 2 == 1
+    return np.where(is_odd, total, total + off[np.arange(len(at)), at]), np.where(is_odd, -1, at)

@@ -1,0 +1,1 @@
+"""Validated input and output: problems, goals, solutions, random worlds."""

@@ -1,0 +1,421 @@
+"""Random worlds by the papers' recipes and others, the same on every machine.
+
+All draws come from `random.Random`, whose `random()` is guaranteed to give the same sequence for
+the same seed in every version of Python, and nothing else is drawn from numpy; what is done with
+them is adding, scaling and comparing, and square roots, which IEEE 754 rounds correctly. (Which
+goals are in reach is decided by lengths of arcs: a platform whose sine differs in the last bit
+could decide otherwise for a goal at the very end of the tether.)
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from netsp.base.errors import InputError
+from netsp.model.problem import Circle, Goal, Obstacle, Polygon, Problem
+
+Place = tuple[float, float]
+Draw = Callable[[random.Random, int, float, tuple[float, float]], list[Obstacle]]
+
+GIVE_UP = 20_000
+"""Draws after which a world is called too full."""
+
+APART = 1e-3
+"""Least gap between obstacles, times the side."""
+
+MOST = 10_000
+"""Most goals, and most obstacles."""
+
+ATTEMPTS = 50
+"""Worlds drawn for one seed before `reachable_world` gives up."""
+
+
+class DoesNotFitError(InputError):
+    """A draw that left no room for an obstacle or a goal; another draw may."""
+
+
+def icra2017(
+    draw: random.Random, count: int, side: float, radii: tuple[float, float]
+) -> list[Obstacle]:
+    """Disjoint circles anywhere, radii uniform between two limits.
+
+    Source: McCammon & Hollinger 2017, section V-A; the paper gives no radii.
+
+    Parameters
+    ----------
+    draw : random.Random
+        Of all that is random.
+    count : int
+        Number of obstacles.
+    side : float
+        Side of the square.
+    radii : tuple of float
+        Least and greatest radius.
+
+    Returns
+    -------
+    list of Obstacle
+        The obstacles.
+    """
+
+    def candidates() -> Iterator[tuple[float, float, float]]:
+        while True:
+            x, y = draw.random() * side, draw.random() * side
+            yield x, y, radii[0] + draw.random() * (radii[1] - radii[0])
+
+    return _circles(candidates(), count, side)
+
+
+def clustered(
+    draw: random.Random, count: int, side: float, radii: tuple[float, float]
+) -> list[Obstacle]:
+    """Circles around three to five centres, dense within and open water between.
+
+    Parameters
+    ----------
+    draw : random.Random
+        Of all that is random.
+    count : int
+        Number of obstacles.
+    side : float
+        Side of the square.
+    radii : tuple of float
+        Least and greatest radius.
+
+    Returns
+    -------
+    list of Obstacle
+        The obstacles.
+    """
+    centers = [
+        (side * (0.15 + 0.7 * draw.random()), side * (0.15 + 0.7 * draw.random()))
+        for _ in range(3 + int(3 * draw.random()))
+    ]
+    spread = 0.45 * side
+
+    def candidates() -> Iterator[tuple[float, float, float]]:
+        while True:
+            x, y = centers[int(len(centers) * draw.random())]
+            # three uniform draws: a bell without a logarithm, so the same on every machine
+            dx, dy = (spread * (sum(draw.random() for _ in range(3)) / 3.0 - 0.5) for _ in "xy")
+            r = radii[0] + draw.random() * (radii[1] - radii[0])
+            if 0.0 <= x + dx <= side and 0.0 <= y + dy <= side:
+                yield x + dx, y + dy, r
+
+    return _circles(candidates(), count, side)
+
+
+def array(
+    draw: random.Random, count: int, side: float, radii: tuple[float, float]
+) -> list[Obstacle]:
+    """Circles of one radius in staggered rows, each a little off its place.
+
+    So are wave-energy converters laid out (Beels et al. 2010, the layouts of the 2016 paper).
+
+    Parameters
+    ----------
+    draw : random.Random
+        Of all that is random.
+    count : int
+        Number of obstacles.
+    side : float
+        Side of the square.
+    radii : tuple of float
+        Least and greatest radius.
+
+    Returns
+    -------
+    list of Obstacle
+        The obstacles.
+    """
+    radius = radii[0] + draw.random() * (radii[1] - radii[0])
+    rows = max(1, math.isqrt(count))
+    columns = -(-count // rows)
+    pitch, row_pitch = side / (columns + 0.5), side / rows
+    wander = 0.5 * min(pitch, row_pitch) - radius - APART * side
+    if wander <= 0.0:
+        raise DoesNotFitError(
+            f"obstacles: {count} circles of radius {radius:.3g} do not fit into rows in a square "
+            f"of side {side:g}"
+        )
+    wander = min(wander, 0.15 * pitch)
+    out: list[Obstacle] = []
+    for k in range(count):
+        row, column = divmod(k, columns)
+        x = pitch * (column + 0.5 + 0.5 * (row % 2)) + wander * (2.0 * draw.random() - 1.0)
+        y = row_pitch * (row + 0.5) + wander * (2.0 * draw.random() - 1.0)
+        out.append(Circle(center=(x, y), radius=radius))
+    return out
+
+
+def harbour(
+    draw: random.Random, count: int, side: float, radii: tuple[float, float]
+) -> list[Obstacle]:
+    """Polygons: piers from the southern edge, and barges at any angle in the basin.
+
+    Parameters
+    ----------
+    draw : random.Random
+        Of all that is random.
+    count : int
+        Number of obstacles.
+    side : float
+        Side of the square.
+    radii : tuple of float
+        Least and greatest half-width of a barge.
+
+    Returns
+    -------
+    list of Obstacle
+        The obstacles.
+    """
+    piers = min(max(1, count // 4), 6)
+    out: list[Obstacle] = []
+    for k in range(min(piers, count)):
+        width = (0.02 + 0.03 * draw.random()) * side
+        length = (0.15 + 0.35 * draw.random()) * side
+        x = side * (k + 0.2 + 0.6 * draw.random()) / piers
+        x = min(max(x, 0.5 * width), side - 0.5 * width)
+        out.append(_rectangle((x, 0.5 * length), (1.0, 0.0), 0.5 * width, 0.5 * length))
+    for _ in range(GIVE_UP):
+        if len(out) >= count:
+            return out
+        place = (draw.random() * side, draw.random() * side)
+        half = radii[0] + draw.random() * (radii[1] - radii[0])
+        long = half * (1.0 + 2.0 * draw.random())
+        # a rotation by rational numbers: no sine that could differ between machines
+        t = 2.0 * draw.random() - 1.0
+        barge = _rectangle(
+            place, ((1.0 - t * t) / (1.0 + t * t), 2.0 * t / (1.0 + t * t)), long, half
+        )
+        if all(_apart(barge, other, APART * side) for other in out):
+            out.append(barge)
+    raise DoesNotFitError(f"obstacles: {count} polygons do not fit into a square of side {side:g}")
+
+
+FAMILIES: dict[str, Draw] = {
+    "icra2017": icra2017,
+    "rss2016": icra2017,
+    "clustered": clustered,
+    "array": array,
+    "harbour": harbour,
+}
+"""Name → how the obstacles are drawn. `rss2016` draws 5 to 10 obstacles and goals if it is not told
+how many (McCammon & Hollinger 2016, section IV-A)."""
+
+
+def random_world(
+    seed: int,
+    *,
+    family: str = "icra2017",
+    goals: int | None = None,
+    obstacles: int | tuple[int, int] | None = None,
+    tether_length: float = 300.0,
+    side: float = 500.0,
+    radii: tuple[float, float] = (10.0, 30.0),
+    attempt: int = 0,
+) -> Problem:
+    """A world of a family: obstacles, a random base, goals drawn among the places that the tether
+    reaches.
+
+    Parameters
+    ----------
+    seed : int
+        Of all draws.
+    family : str
+        One of `FAMILIES`.
+    goals : int, optional
+        How many; by default 20, in `rss2016` 5 to 10.
+    obstacles : int or (int, int), optional
+        How many, or least and most, both of them included, between which their number is drawn
+        uniformly; by default 20, in `rss2016` 5 to 10. The studies of the 2017 paper, which has "up
+        to 20", draw 1 to 20.
+    tether_length : float
+        Length of the tether.
+    side : float
+        Side of the square.
+    radii : tuple of float
+        Least and greatest radius of the obstacles.
+    attempt : int
+        Another world of the same seed, for when one does not fit.
+
+    Returns
+    -------
+    Problem
+        The world.
+
+    Raises
+    ------
+    InputError
+        An unknown family, numbers out of range.
+    DoesNotFitError
+        The obstacles, the base or the goals do not fit.
+    """
+    _check(family, goals, obstacles, tether_length, side, radii)
+    # text is hashed by Python into a seed of its own, the same in every version
+    draw = random.Random(seed if attempt == 0 else f"{seed}/{attempt}")
+    if family == "rss2016":
+        obstacles = (5, 10) if obstacles is None else obstacles
+    if isinstance(obstacles, tuple):
+        least, most = obstacles
+        obstacles = least + int((most - least + 1) * draw.random())
+    if family == "rss2016":
+        goals = 5 + int(6 * draw.random()) if goals is None else goals
+    goals, obstacles = 20 if goals is None else goals, 20 if obstacles is None else obstacles
+
+    def place() -> Place:
+        x = draw.random() * side
+        return x, draw.random() * side
+
+    shapes = FAMILIES[family](draw, obstacles, side, radii)
+
+    def free(x: float, y: float) -> bool:
+        return not any(_holds(shape, x, y) for shape in shapes)
+
+    base = next((p for _ in range(GIVE_UP) if free(*(p := place()))), None)
+    if base is None:
+        raise DoesNotFitError("obstacles: no room for the base")
+
+    def world(places: list[Place]) -> Problem:
+        return Problem(
+            name=f"{family}-{seed}" if family != "icra2017" else f"random-{seed}",
+            base=(*base, 0.0),
+            goals=tuple(Goal(position=(x, y, 0.0)) for x, y in places),
+            obstacles=tuple(shapes),
+            tether_length=tether_length,
+        )
+
+    found: list[Place] = []
+    for _ in range(GIVE_UP // 100):
+        drawn = [place() for _ in range(4 * goals)]
+        drawn = [p for p in drawn if free(*p) and math.dist(p, base) <= tether_length]
+        for some in (drawn[: 2 * goals], drawn[2 * goals :]):
+            if some and len(found) < goals:
+                reach = _reach(world(some))
+                found += [p for p, d in zip(some, reach, strict=True) if d <= tether_length]
+        if len(found) >= goals:
+            return world(found[:goals])
+    raise DoesNotFitError(
+        f"goals: only {len(found)} of {goals} places within reach of the tether found"
+    )
+
+
+def reachable_world(seed: int, **recipe: object) -> tuple[Problem, int]:
+    """The first world of a seed that fits.
+
+    Parameters
+    ----------
+    seed : int
+        Of all draws.
+    **recipe : object
+        As of `random_world`.
+
+    Returns
+    -------
+    world : Problem
+        The world.
+    drawn : int
+        How many were drawn in vain before it.
+
+    Raises
+    ------
+    InputError
+        None of `ATTEMPTS` worlds fits, or no draw can mend it.
+    """
+    for attempt in range(ATTEMPTS):
+        try:
+            return random_world(seed, attempt=attempt, **recipe), attempt  # type: ignore[arg-type]
+        except DoesNotFitError:
+            if attempt == ATTEMPTS - 1:
+                raise
+    raise AssertionError("unreachable")
+
+
+def _check(
+    family: str,
+    goals: int | None,
+    obstacles: int | tuple[int, int] | None,
+    tether_length: float,
+    side: float,
+    radii: tuple[float, float],
+) -> None:
+    if family not in FAMILIES:
+        raise InputError(f"family: unknown {family!r}; expected one of {', '.join(FAMILIES)}")
+    if goals is not None and not 1 <= goals <= MOST:
+        raise InputError(f"world: goals: expected 1 to {MOST}, got {goals}")
+    least, most = obstacles if isinstance(obstacles, tuple) else (obstacles or 0, obstacles or 0)
+    if not (0 <= least <= MOST and 0 <= most <= MOST):
+        raise InputError(
+            f"world: obstacles: expected 0 to {MOST}, got {most if 0 <= least <= MOST else least}"
+        )
+    if least > most:
+        raise InputError(f"world: obstacles: expected minimum <= maximum, got {least} and {most}")
+    for name, value in (("tether_length", tether_length), ("side", side), ("radii", radii[1])):
+        if not 0.0 < value <= 1e11:
+            raise InputError(f"world: {name}: expected more than 0 and at most 1e11, got {value:g}")
+    if not 0.0 < radii[0] <= radii[1]:
+        raise InputError(
+            f"world: radii: expected 0 < minimum <= maximum, got {radii[0]:g} and {radii[1]:g}"
+        )
+
+
+def _circles(
+    candidates: Iterator[tuple[float, float, float]], count: int, side: float
+) -> list[Obstacle]:
+    """The first candidates that keep apart."""
+    taken: list[tuple[float, float, float]] = []
+    for _ in range(GIVE_UP):
+        if len(taken) == count:
+            return [Circle(center=(x, y), radius=r) for x, y, r in taken]
+        x, y, r = next(candidates)
+        gap = r + APART * side
+        if all(math.hypot(x - a, y - b) > q + gap for a, b, q in taken):
+            taken.append((x, y, r))
+    raise DoesNotFitError(f"obstacles: {count} circles do not fit into a square of side {side:g}")
+
+
+def _rectangle(center: Place, along: Place, long: float, half: float) -> Polygon:
+    """The rectangle of half axes `long` and `half`, its first axis in a given direction."""
+    (x, y), (c, s) = center, along
+    corners = ((-long, -half), (long, -half), (long, half), (-long, half))
+    return Polygon(polygon=tuple((x + a * c - b * s, y + a * s + b * c) for a, b in corners))
+
+
+def _holds(shape: Obstacle, x: float, y: float) -> bool:
+    """Whether a circle or a convex polygon holds a point; its boundary counts."""
+    if isinstance(shape, Circle):
+        return math.hypot(x - shape.center[0], y - shape.center[1]) <= shape.radius
+    corners = shape.polygon
+    turns = [
+        (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])
+        for a, b in zip(corners, (*corners[1:], corners[0]), strict=True)
+    ]
+    return all(t >= 0.0 for t in turns) or all(t <= 0.0 for t in turns)
+
+
+def _apart(shape: Polygon, other: Obstacle, gap: float) -> bool:
+    """Whether two convex polygons keep a gap: an edge of one separates them."""
+    assert isinstance(other, Polygon)
+    for one, two in ((shape.polygon, other.polygon), (other.polygon, shape.polygon)):
+        for a, b in zip(one, (*one[1:], one[0]), strict=True):
+            nx, ny = b[1] - a[1], a[0] - b[0]
+            size = math.sqrt(nx * nx + ny * ny)
+            own = [nx * p[0] + ny * p[1] for p in one]
+            theirs = [nx * p[0] + ny * p[1] for p in two]
+            if min(theirs) - max(own) > gap * size or min(own) - max(theirs) > gap * size:
+                return True
+    return False
+
+
+def _reach(problem: Problem) -> list[float]:
+    """Shortest tether that reaches each goal."""
+    from netsp.roadmap.outline import build_outline
+    from netsp.roadmap.shortest import ContactGraph
+
+    planar = ContactGraph(build_outline(problem)).lengths([0])[0]
+    dz = problem.points[:, 2] - problem.points[0, 2]
+    return [float(d) for d in np.hypot(planar, dz)[1:]]

@@ -1,0 +1,479 @@
+"""The solution of a problem, and what is honestly known of it. JSON format version 1."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from pydantic import ConfigDict, Field, model_validator
+
+from netsp.base.data_frames import frame_of
+from netsp.base.files import FileModel
+from netsp.base.reprs import Drawn
+from netsp.model.bound_scope import LowerBound, Scope, above_shortest
+from netsp.model.field_types import LARGEST, Name, NonNegative, Number, PathPoint, Total
+from netsp.model.validated import Model
+
+if TYPE_CHECKING:
+    import pandas
+
+
+class Status(StrEnum):
+    """Outcome of a run, and what is proven of its tour.
+
+    Attributes
+    ----------
+    OPTIMAL
+        Proven the shortest of all admissible tours of the continuous world (of those in the given
+        order where the order was kept); of a travel graph that was given as such, the shortest of
+        its tours.
+    OPTIMAL_OF_KEPT
+        Shortest tour over the homotopy classes that the roadmap kept, where it left others out:
+        they were too many, the time was too short, or a rule excluded them.
+    OPTIMAL_OF_ROADMAP
+        Shortest tour along a sampled roadmap (PRM*), or along that of another package. Shorter
+        tours may exist beside the roadmap.
+    OPTIMAL_OF_STATES
+        Shortest tour in space along the legs that were found between the states of the tether that
+        were found. Shorter tours may exist between other states.
+    FEASIBLE
+        A tour, not proven the shortest.
+    INFEASIBLE
+        Proven: there is no tour.
+    NO_SOLUTION_FOUND
+        A limit was reached before there was a tour.
+    INVALID
+        Tour of a baseline that is blind to the tether: it entangles obstacles or overstretches the
+        tether.
+    """
+
+    OPTIMAL = "optimal"
+    OPTIMAL_OF_KEPT = "optimal_of_kept"
+    OPTIMAL_OF_ROADMAP = "optimal_of_roadmap"
+    OPTIMAL_OF_STATES = "optimal_of_states"
+    FEASIBLE = "feasible"
+    INFEASIBLE = "infeasible"
+    NO_SOLUTION_FOUND = "no_solution_found"
+    INVALID = "invalid"
+
+    @property
+    def is_optimal(self) -> bool:
+        """True if the tour is proven the shortest of the set of tours that the status names."""
+        return self.value.startswith("optimal")
+
+    @property
+    def verdict(self) -> str:
+        """Words for people, of an optimal status: which tours the tour is the shortest of."""
+        return _VERDICTS.get(self, self.value)
+
+    @classmethod
+    def optimal_of(cls, scope: Scope) -> Status:
+        """Return the status of a tour that is the shortest of a scope.
+
+        Parameters
+        ----------
+        scope : Scope
+            Tours that the closing bound holds for.
+
+        Returns
+        -------
+        Status
+            `OPTIMAL` for all tours, all tours in a given order, and all of a given travel graph.
+        """
+        return _OPTIMAL_OF.get(scope, cls.OPTIMAL)
+
+
+_OPTIMAL_OF = {
+    Scope.KEPT_CLASSES: Status.OPTIMAL_OF_KEPT,
+    Scope.KEPT_IN_ORDER: Status.OPTIMAL_OF_KEPT,
+    Scope.PART: Status.OPTIMAL_OF_KEPT,
+    Scope.ROADMAP: Status.OPTIMAL_OF_ROADMAP,
+    Scope.ROADMAP_IN_ORDER: Status.OPTIMAL_OF_ROADMAP,
+    Scope.STATES: Status.OPTIMAL_OF_STATES,
+    Scope.STATES_IN_ORDER: Status.OPTIMAL_OF_STATES,
+}
+
+_VERDICTS = {
+    Status.OPTIMAL: "proven optimal",
+    Status.OPTIMAL_OF_KEPT: "shortest over the classes kept, which are not all",
+    Status.OPTIMAL_OF_ROADMAP: "shortest along this roadmap, not of all tours",
+    Status.OPTIMAL_OF_STATES: "shortest between the states found, not of all tours",
+}
+
+
+KeptClasses = Literal["all", "non-looping", "shortest"]
+"""Which homotopy classes a roadmap held."""
+
+
+def max_turning(friction: float, max_tension_ratio: float | None) -> float:
+    """How far a tether may turn about obstacles, by the capstan's formula.
+
+    Parameters
+    ----------
+    friction : float
+        Coefficient.
+    max_tension_ratio : float, optional
+        Most that friction may multiply the tension by; None for no limit.
+
+    Returns
+    -------
+    float
+        Sum of angles, radians; inf for no limit.
+    """
+    if max_tension_ratio is None or friction == 0.0:
+        return math.inf
+    return math.log(max_tension_ratio) / friction
+
+
+MAX_FRICTION = 10.0
+"""Largest coefficient of friction of tether on obstacle that is taken; ropes have 0.1 to 1."""
+
+
+def tension_ratio(friction: float, turning: float) -> float:
+    """Return the factor by which friction multiplies a tether's tension, by the capstan's formula.
+
+    Parameters
+    ----------
+    friction : float
+        Coefficient, at least 0.
+    turning : float
+        Sum of the angles by which the tether turns about obstacles, radians, at least 0.
+
+    Returns
+    -------
+    float
+        e^(friction · turning), and 1e12 where that is more: no tether moves then.
+
+    Examples
+    --------
+    >>> round(tension_ratio(0.3, math.pi), 3)
+    2.566
+    """
+    return math.exp(min(friction * turning, math.log(LARGEST)))
+
+
+def proof(status: Status, length: float | None, bound: LowerBound | None) -> str:
+    """Say what is proven of a tour, and of which tours it is the shortest.
+
+    Parameters
+    ----------
+    status : Status
+        Of the tour.
+    length : float or None
+        Its length.
+    bound : LowerBound or None
+        Lower bound with the tours that it holds for.
+
+    Returns
+    -------
+    str
+        As in "proven optimal", "at most 3.8 % above the shortest tour", "no bound".
+    """
+    if status is Status.INVALID:
+        return "no tour for a tether: the solver is blind to it"
+    if not status.is_optimal:
+        return above_shortest(length, bound)
+    narrow = length is not None and bound is not None and not bound.proves(length)
+    if narrow and status is not Status.OPTIMAL:
+        return f"{status.verdict}; {above_shortest(length, bound)}"
+    in_order = bound is not None and bound.scope.keeps_order
+    return f"{status.verdict}, in the given order" if in_order else status.verdict
+
+
+EXACT_ROADMAPS = frozenset({"taut"})
+"""Names of roadmaps whose travel graph, with all classes, holds every admissible tour."""
+
+
+def scope_of(roadmap: str, classes: KeptClasses | None, *, kept_order: bool = False) -> Scope:
+    """Return the tours that the lower bound of a solution holds for, by what is known of its run.
+
+    Parameters
+    ----------
+    roadmap : str
+        Name of the roadmap.
+    classes : {"all", "non-looping", "shortest"} or None
+        Homotopy classes of the roadmap. With the shortest classes only, bounds include the classes
+        left out; if a rule excluded classes, they do not.
+    kept_order : bool
+        Whether the order of the goals was given.
+
+    Returns
+    -------
+    Scope
+        Scope of its bounds.
+    """
+    if roadmap not in EXACT_ROADMAPS:
+        scope = Scope.ROADMAP
+    elif classes == "non-looping":
+        scope = Scope.KEPT_CLASSES
+    else:
+        scope = Scope.ALL_TOURS
+    return scope.in_order if kept_order else scope
+
+
+class ProblemReference(Model):
+    """Which problem a solution belongs to."""
+
+    name: Annotated[Name, Field(description="of the problem")]
+    sha256: Annotated[str, Field(description="of what the answer depends on: all values but names")]
+
+
+class Visit(Model):
+    """One visit of the tour: the goal (0-based), the word of the tether there, its taut length; and
+    the goal's name and position, by which it is found again in a problem that has been edited."""
+
+    goal: Annotated[
+        Annotated[int, Field(ge=0)], Field(description="index in the problem's goals, from 0")
+    ]
+    signature: Annotated[
+        tuple[int, ...], Field(description="h-signature of the tether at the goal")
+    ]
+    tether_length: Annotated[
+        NonNegative, Field(description="of the taut tether at the goal, in the problem's units")
+    ]
+    name: Annotated[Name | None, Field(description="of the goal; null for none")] = None
+    position: Annotated[
+        PathPoint | None, Field(description="(x, y, z) of the goal, in the problem's units")
+    ] = None
+
+
+class Timings(Model):
+    """Wall-clock seconds by stage."""
+
+    roadmap_s: Annotated[NonNegative, Field(description="seconds to build the roadmap")] = 0.0
+    matrix_s: Annotated[NonNegative, Field(description="seconds to measure legs")] = 0.0
+    solve_s: Annotated[NonNegative, Field(description="seconds of the solver")] = 0.0
+    total_s: Annotated[NonNegative, Field(description="seconds of the whole call")] = 0.0
+
+
+class Solution(Drawn, FileModel):
+    """A tour with its proof status.
+
+    Lengths are in the problem's units. Without a tour, `length` and `gap` are None.
+
+    Attributes
+    ----------
+    margin : float
+        All obstacles were grown by it, besides the problem's clearance; path, tethers, bound and
+        status are those among the grown obstacles.
+    slack : float
+        Share of the taut length that may be out beyond it within the tether's length.
+    friction, max_tension_ratio : float, float or None
+        Of tether on obstacle, and most that it may multiply the tension by; at every visit.
+    kept_order : bool
+        The goals are visited in the order of the problem; bound, gap and status are those of the
+        tours of that order.
+    path : tuple of (x, y, z)
+        Closed polyline from the base to the base, or from the problem's state to the base.
+    start_tether : tuple of (x, y, z)
+        The taut tether at the start of a tour from a state.
+    lower_bound : float or None
+        Proven lower bound on the tours that `lower_bound_of` names.
+    lower_bound_of : Scope or None
+        Tours that `lower_bound` holds for; None without a bound. For older files, which lack it, it
+        follows from roadmap and classes: along `prm`, the tours of the roadmap.
+    gap : float or None
+        (length - lower_bound) / length.
+    classes : {"all", "non-looping", "shortest"} or None
+        Which homotopy classes the roadmap held; `shortest` is the shortest of every goal.
+    legs_left_out : tuple of (int, int)
+        Pairs of goals (from 0), one for each leg whose taut path was not found.
+    entangled : tuple of int
+        Obstacles (from 0) that the path is wrapped around; only an `invalid` tour has any.
+    """
+
+    picture: ClassVar[str] = "netsp.view.pictures.problem_picture:draw_solution"
+    file_kind: ClassVar[str] = "solution"
+
+    model_config = ConfigDict(title="netsp solution")
+
+    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
+    problem: Annotated[ProblemReference, Field(description="which problem is solved")]
+    solver: Annotated[Name, Field(description="name of the solver")]
+    roadmap: Annotated[Name, Field(description="name of the roadmap")]
+    classes: Annotated[
+        KeptClasses | None, Field(description="which homotopy classes the roadmap held")
+    ] = None
+    seed: Annotated[int | None, Field(description="of all that was random")] = None
+    margin: Annotated[
+        NonNegative,
+        Field(
+            description="all obstacles were grown by it, and all that is said holds among those; "
+            "in the problem's units"
+        ),
+    ] = 0.0
+    slack: Annotated[
+        Annotated[NonNegative, Field(le=1.0)],
+        Field(description="share of the taut length that may be out beyond it"),
+    ] = 0.0
+    friction: Annotated[
+        Annotated[NonNegative, Field(le=MAX_FRICTION)],
+        Field(description="coefficient of friction of tether on obstacle"),
+    ] = 0.0
+    max_tension_ratio: Annotated[
+        Annotated[Number, Field(gt=1.0, le=1e6)] | None,
+        Field(description="most that friction multiplies the tension by; null for no limit"),
+    ] = None
+    kept_order: Annotated[
+        bool,
+        Field(
+            description="the order of the goals was given: bound and status are those of its tours"
+        ),
+    ] = False
+    status: Annotated[Status, Field(description="what is proven")]
+    length: Annotated[
+        Total | None, Field(description="of the tour, in the problem's units; null without a tour")
+    ]
+    lower_bound: Annotated[
+        Total | None,
+        Field(
+            description="none of the tours that lower_bound_of names is shorter, in the problem's "
+            "units; null if nothing is known"
+        ),
+    ]
+    lower_bound_of: Annotated[
+        Scope | None,
+        Field(
+            description="tours that lower_bound holds for: all_tours, kept_classes (of those that "
+            "the roadmap kept), roadmap (along a sampled one), given_order, or both limits; null "
+            "without a bound"
+        ),
+    ] = None
+    gap: Annotated[
+        Total | None,
+        Field(description="(length - lower_bound) / length; null if either is missing"),
+    ]
+    entangled: Annotated[
+        tuple[int, ...],
+        Field(
+            description="obstacles, numbered from 0, that the path is wrapped around; "
+            "empty but for an `invalid` tour"
+        ),
+    ] = ()
+    tour: Annotated[tuple[Visit, ...], Field(description="goals in the order of their visits")] = ()
+    path: Annotated[
+        tuple[PathPoint, ...],
+        Field(description="closed polyline from base to base, in the problem's units"),
+    ] = ()
+    legs_left_out: Annotated[
+        tuple[tuple[int, int], ...],
+        Field(
+            description="pairs of goals, numbered from 0, one for each leg whose taut path was not "
+            "found: in its place stands the way back to the base and out again; lower_bound "
+            "holds for tours along such legs, too"
+        ),
+    ] = ()
+    start_tether: Annotated[
+        tuple[PathPoint, ...],
+        Field(
+            description="the tether at the start if the robot was already out, in "
+            "the problem's units"
+        ),
+    ] = ()
+    timings: Annotated[Timings, Field(description="how long it took")] = Timings()
+    versions: Annotated[
+        dict[Name, Name], Field(description="of netsp and what it used", default_factory=dict)
+    ]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _name_scope(cls, data: Any) -> Any:
+        """Fill in the scope of the bound, and the scope of `optimal`, in data of older files."""
+        if not isinstance(data, Mapping) or data.get("lower_bound") is None:
+            return data
+        if data.get("lower_bound_of") is not None:
+            return data
+        roadmap, classes = data.get("roadmap"), data.get("classes")
+        if not isinstance(roadmap, str):
+            return data  # the check of the field reports it
+        scope = scope_of(roadmap, classes, kept_order=data.get("kept_order") is True)
+        out = {**data, "lower_bound_of": scope}
+        if data.get("status") == Status.OPTIMAL:
+            out["status"] = Status.optimal_of(scope)
+        return out
+
+    def __repr__(self) -> str:
+        """In a line."""
+        length = "" if self.length is None else f", length {self.length:.6g}"
+        bound = "" if self.bound is None else f", {self.bound.says(self.length)}"
+        return (
+            f"<Solution of {self.problem.name!r} by {self.solver}: "
+            f"{self.status.value}{length}{bound}, {len(self.tour)} visits>"
+        )
+
+    __str__ = __repr__
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Return the visits as a pandas DataFrame, a row for each in the order of the tour.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``goal`` (from 0), ``name``, ``x``, ``y``, ``z``, ``signature`` and
+            ``tether_length``, in the problem's units.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        return frame_of(
+            {
+                "goal": v.goal, "name": v.name,
+                **dict(zip("xyz", v.position or (None, None, None), strict=True)),
+                "signature": v.signature, "tether_length": v.tether_length,
+            }
+            for v in self.tour
+        )  # fmt: skip
+
+    @property
+    def bound(self) -> LowerBound | None:
+        """The lower bound with the tours that it holds for; None where nothing is known."""
+        if self.lower_bound is None or self.lower_bound_of is None:
+            return None
+        return LowerBound(self.lower_bound, self.lower_bound_of)
+
+    @property
+    def max_turning(self) -> float:
+        """Sum of angles (radians) by which the tether may turn; inf where friction has no limit."""
+        return max_turning(self.friction, self.max_tension_ratio)
+
+    @property
+    def proof(self) -> str:
+        """Words for what is proven of the tour."""
+        return proof(self.status, self.length, self.bound)
+
+    def to_json(self) -> str:
+        """The solution as JSON of format version 1.
+
+        Returns
+        -------
+        str
+            Text of a solution file.
+        """
+        data = self.model_dump(mode="json")
+        path = data.pop("path")
+        for name in ("start_tether", "legs_left_out"):
+            if not data[name]:
+                del data[name]
+        if self.classes is None:
+            del data["classes"]
+        if self.lower_bound_of is None:
+            del data["lower_bound_of"]
+        if not self.margin:
+            del data["margin"]
+        for name, plain in (("kept_order", False), ("slack", 0.0), ("friction", 0.0)):
+            if data[name] == plain:
+                del data[name]
+        if self.max_tension_ratio is None:
+            del data["max_tension_ratio"]
+        for visit in data["tour"]:
+            for name in ("name", "position"):
+                if visit[name] is None:
+                    del visit[name]
+        text = json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False)
+        rows = ",\n".join("  " + json.dumps(p, allow_nan=False) for p in path)
+        return f'{text[:-2]},\n "path": [\n{rows}\n ]\n}}\n'

@@ -1,0 +1,230 @@
+"""Models from JSON text: one line of complaint for anything wrong, naming field and value."""
+
+from __future__ import annotations
+
+import inspect
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any, Self, TypeVar, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from netsp.base.errors import InputError
+
+SCHEMA_VERSION = 1
+
+
+MARKS = {
+    "problem": {"base", "tether_length"},
+    "solution": {"tour", "lower_bound"},
+    "mission": {"anchor", "waypoints"},
+    "surprise file": {"events"},
+    "scene": {"solids"},
+}
+"""What a file of each kind has and no other."""
+
+
+class Model(BaseModel):
+    """Base of all models: frozen, with no unknown fields; a call with wrong values ends in one
+    line, an `InputError`, as a file with wrong values does."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    def __init__(self, /, **data: Any) -> None:
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise InputError(f"{type(self).__name__}: {explain(error)}") from None
+
+    # nested models are then validated as if there were no `__init__` here, so that a complaint
+    # names the whole path of a field
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        """Give the class a signature with plain types, without the checks of its fields."""
+        super().__pydantic_init_subclass__(**kwargs)
+        cls.__signature__ = _signature(cls)
+
+    def __eq__(self, other: object) -> bool:
+        """By the fields: cached properties may be arrays, which are not equal or unequal."""
+        if not isinstance(other, Model) or type(self) is not type(other):
+            return NotImplemented
+        return all(getattr(self, name) == getattr(other, name) for name in type(self).model_fields)
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy without the cached properties of the original, which may not hold of it."""
+        copy = super().model_copy(update=update, deep=deep)
+        for name in copy.__dict__.keys() - type(self).model_fields.keys():
+            del copy.__dict__[name]
+        return copy
+
+
+def _signature(model: type[BaseModel]) -> inspect.Signature:
+    """Return the signature of a model's constructor for `inspect.signature` and help."""
+    types = get_type_hints(model)  # without Annotated, which holds the checks of fields
+    return inspect.Signature(
+        [
+            inspect.Parameter(
+                name, inspect.Parameter.KEYWORD_ONLY, annotation=types.get(name, field.annotation),
+                default=inspect.Parameter.empty if field.is_required() else field.get_default(
+                    call_default_factory=True, validated_data={}
+                ),
+            )
+            for name, field in model.model_fields.items()
+        ]
+    )  # fmt: skip
+
+
+M = TypeVar("M", bound=BaseModel)
+
+
+def read_model(
+    model: type[M], text: str | bytes, source: str, context: Mapping[str, Any] | None = None
+) -> M:
+    """A model of format version 1 from JSON, or `InputError` in one line; its validators get the
+    context."""
+    data = parse_json_object(text, source)
+    _check_kind(model, data, source)
+    if data.get("type") in ("FeatureCollection", "Feature"):
+        raise InputError(
+            f"{source}: this is a map (GeoJSON); expected what `netsp import` makes of it"
+        )
+    version = data.get("schema_version", None)
+    if version != SCHEMA_VERSION or isinstance(version, bool):
+        raise InputError(f"{source}: schema_version: expected {SCHEMA_VERSION}, got {version!r}")
+    try:
+        return model.model_validate(data, context=context)
+    except ValidationError as error:
+        raise InputError(f"{source}: {explain(error)}") from None
+
+
+def kind_of(data: Mapping[str, Any]) -> str | None:
+    """What a file plainly is, by its fields."""
+    return next((k for k, marks in MARKS.items() if marks <= data.keys()), None)
+
+
+def _check_kind(model: type[BaseModel], data: dict[str, Any], source: str) -> None:
+    """InputError when a file is plainly of another kind than was asked for."""
+    kind = kind_of(data)
+    own = next((k for k, marks in MARKS.items() if marks <= model.model_fields.keys()), None)
+    if kind and own and kind != own:
+        raise InputError(f"{source}: this is a {kind}; expected a {own}")
+
+
+def parse_json(text: str | bytes, source: str) -> Any:
+    """Return the value that a JSON text holds; no object in it may repeat a key.
+
+    Parameters
+    ----------
+    text : str or bytes
+        The text; bytes are UTF-8.
+    source : str
+        What messages call it, such as the name of the file.
+
+    Returns
+    -------
+    object
+        Value, as from `json.loads`.
+
+    Raises
+    ------
+    InputError
+        Not JSON, a key is repeated, a number has too many digits, or lists are nested too deeply.
+
+    Examples
+    --------
+    >>> parse_json("[1, 2.5]", "path.json")
+    [1, 2.5]
+    """
+
+    def unique(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+        out: dict[str, Any] = {}
+        for key, value in pairs:
+            if key in out:
+                raise InputError(f"{source}: field {key!r} is given twice")
+            out[key] = value
+        return out
+
+    try:
+        return json.loads(text, object_pairs_hook=unique)
+    except json.JSONDecodeError as error:
+        known = "NODE_COORD_SECTION" in str(text) or "GTSP_SET_SECTION" in str(text)
+        hint = "; `netsp gtsp` reads this format" if known else ""
+        raise InputError(
+            f"{source}: not JSON: {error.msg} at line {error.lineno}, column {error.colno}{hint}"
+        ) from None
+    except UnicodeDecodeError:
+        raise InputError(f"{source}: not text in UTF-8") from None
+    except ValueError:
+        raise InputError(
+            f"{source}: not JSON that netsp reads: a number has too many digits"
+        ) from None
+    except RecursionError:
+        raise InputError(f"{source}: not JSON that netsp reads: nested too deeply") from None
+
+
+def parse_json_object(text: str | bytes, source: str) -> dict[str, Any]:
+    """Return the object that a JSON text holds, as `parse_json`; InputError for other values."""
+    data = parse_json(text, source)
+    if not isinstance(data, dict):
+        raise InputError(f"{source}: expected a JSON object, got {type(data).__name__}")
+    return data
+
+
+def explain(error: ValidationError) -> str:
+    """The first complaint of a validation error in one line: field, complaint, value."""
+    errors = error.errors(include_url=False)
+    first = errors[0]
+    where = ""
+    for k, part in enumerate(first["loc"]):
+        if isinstance(part, int):
+            where += f"[{part}]"
+        elif not (k == 2 and first["loc"][0] == "obstacles"):  # there pydantic tells the kind
+            where += f".{part}" if where else part
+    kind, context = first["type"], first.get("ctx", {})
+    got = f"got {shown(first['input'])}"
+    if kind == "extra_forbidden":
+        message = "unknown field"
+    elif kind == "missing":
+        message = "missing"
+    elif kind in ("value_error", "obstacle"):
+        message = first["msg"].removeprefix("Value error, ")
+    elif kind == "too_short":
+        message = f"expected at least {context['min_length']}, got {context['actual_length']}"
+    elif kind == "greater_than":
+        message = f"expected a number > {context['gt']:g}, {got}"
+    elif kind == "greater_than_equal":
+        message = f"expected a number >= {context['ge']:g}, {got}"
+    elif kind == "less_than_equal":
+        message = f"expected a number <= {context['le']:g}, {got}"
+    elif kind in ("model_type", "model_attributes_type", "dict_type"):
+        message = f"expected an object, {got}"
+    else:
+        message = f"{_decapitalise(first['msg'])}, {got}"
+    # items that are wrong are missing in pydantic's count of a list, too
+    short = {e["loc"] for e in errors if e["type"] == "too_short"}
+    counted = [
+        e for e in errors
+        if e["loc"] not in short
+        or not any(o["loc"][: len(e["loc"])] == e["loc"] != o["loc"] for o in errors)
+    ]  # fmt: skip
+    extra = [e["loc"][-1] for e in errors if e["type"] == "extra_forbidden"]
+    others = len(counted) - 1
+    if kind == "missing" and extra:  # as like as not the same field, misspelt
+        message, others = f"{message}; unknown field {shown(extra[0])}", others - 1
+    more = f" (and {others} more)" if others else ""
+    return f"{where}: {message}{more}" if where else f"{message}{more}"
+
+
+def _decapitalise(text: str) -> str:
+    return text[:1].lower() + text[1:]
+
+
+def shown(value: Any) -> str:
+    """A value in a message, cut at 60 characters."""
+    try:
+        text = repr(value)
+    except Exception:  # of somebody else's class, or a number of more digits than Python writes
+        text = f"a {type(value).__name__} that cannot be shown"
+    return text if len(text) <= 60 else text[:57] + "…"

@@ -1,0 +1,71 @@
+"""Where a tether goes when an obstacle comes to stand on it: round it, on the shorter side."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from shapely.ops import substring
+
+from netsp.base.arrays import Floats
+from netsp.model.problem import Problem
+
+
+def aside(problem: Problem, nodes: Floats, by: float) -> Floats:
+    """The tether's nodes (k, 3) with every stretch inside obstacles replaced by the shorter part of
+    their outline, `by` outside of it. A robot inside one is taken back along the tether to where it
+    leaves the obstacle. Heights stay as they are along it."""
+    line = np.array(nodes)
+    solids = shapely.union_all([o.shape(problem.clearance) for o in problem.obstacles])
+    base = shapely.Point(line[0, :2])
+    for solid in getattr(solids, "geoms", [solids]):
+        core, rim = solid.buffer(-by), solid.buffer(by)
+        if core.is_empty or rim.covers(base):
+            continue
+        # what was put aside for one obstacle may come into the core again only at its own ends
+        for _ in range(20):
+            flat = shapely.LineString(line[:, :2])
+            inside = flat.intersection(core)
+            if flat.length == 0.0 or inside.is_empty:
+                break
+            first = min(
+                (p for p in getattr(inside, "geoms", [inside])),
+                key=lambda p: flat.project(shapely.Point(p.coords[0])),
+            )
+            middle = flat.project(first.interpolate(0.5, normalized=True))
+            outside = flat.difference(rim)
+            pieces = list(getattr(outside, "geoms", [outside]))
+            spans = [
+                sorted(flat.project(shapely.Point(p.coords[k])) for k in (0, -1))
+                for p in pieces
+                if not p.is_empty
+            ]
+            start = max((b for _, b in spans if b <= middle), default=0.0)
+            end = min((a for a, _ in spans if a >= middle), default=None)
+            line = _round(line, rim, start, end)
+    return line
+
+
+def _round(line: Floats, rim: shapely.Polygon, start: float, end: float | None) -> Floats:
+    """A line with its stretch from `start` to `end` (lengths in the plan) along a rim; without an
+    end, cut off at the start."""
+    s = np.r_[0.0, np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))]
+
+    def at(u: float) -> Floats:
+        return np.array([np.interp(u, s, line[:, k]) for k in range(3)])
+
+    head = np.vstack([line[s < start], at(start)])
+    if end is None:
+        return head
+    ring = rim.exterior
+    a, b = (ring.project(shapely.Point(at(u)[:2])) for u in (start, end))
+    low, high = min(a, b), max(a, b)
+    one = np.array(substring(ring, low, high).coords)
+    other = np.vstack(
+        [np.array(substring(ring, high, ring.length).coords),
+         np.array(substring(ring, 0.0, low).coords)]
+    )  # fmt: skip
+    one = one if a <= b else one[::-1]
+    other = other[::-1] if a <= b else other
+    arc = min((one, other), key=lambda w: float(np.hypot(*np.diff(w, axis=0).T).sum()))
+    z = np.linspace(at(start)[2], at(end)[2], len(arc))
+    return np.vstack([head, np.column_stack([arc, z]), at(end), line[s > end]])

@@ -1,0 +1,221 @@
+"""What may happen during a run: the surprise file, and what each event does to the problem."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
+
+from netsp.base.errors import InputError
+from netsp.base.files import FileModel
+from netsp.model.field_types import NonNegative, Point2, Point3, Positive, checked_integer, is_index
+from netsp.model.problem import WIDEST, Circle, GoalLike, Obstacle, Polygon, Problem
+from netsp.model.validated import Model, shown
+
+
+def _which(value: Any) -> Any:
+    if isinstance(value, str):
+        return value
+    try:
+        index = checked_integer(value)
+    except ValueError:
+        index = -1
+    if 0 <= index < 2**31:
+        return index
+    raise ValueError(f"expected a name or an index from 0 on, got {shown(value)}")
+
+
+Which = Annotated[Annotated[int, Field(ge=0)] | str, BeforeValidator(_which)]
+"""An obstacle or goal: its index, or its name; where it has none, `#index` as messages say."""
+
+
+SPECK = 1e-4
+"""Of the tether: what appears and is smaller, on a site that has its place on the earth, was meant
+in degrees."""
+
+
+class Move(Model):
+    """An obstacle is somewhere else from now on."""
+
+    obstacle: Annotated[Which, Field(description="name or index from 0")]
+    by: Annotated[Point2, Field(description="(x, y) to move it by, in the problem's units")]
+
+
+class Event(Model):
+    """Something that happens at a time after the start; one of the other fields says what.
+
+    Attributes
+    ----------
+    time : float
+        Seconds since the start.
+    appear : Circle, Polygon or None
+        An obstacle that is not on the map.
+    vanish : int, str or None
+        An obstacle that is not there after all.
+    move : Move or None
+        An obstacle that moves.
+    add_goal : Goal or None
+        Another goal.
+    cancel_goal : int, str or None
+        A goal that need not be visited any more.
+    push : (x, y, z) or None
+        How far the robot is carried off, in the problem's units.
+    tether_length : float or None
+        A new limit.
+    """
+
+    time: Annotated[NonNegative, Field(description="seconds after the start")]
+    appear: Annotated[
+        Obstacle | None, Field(description="an obstacle that is there from now on")
+    ] = None
+    vanish: Annotated[
+        Which | None, Field(description="name or index from 0 of an obstacle that is gone")
+    ] = None
+    move: Annotated[Move | None, Field(description="an obstacle that moves")] = None
+    add_goal: Annotated[GoalLike | None, Field(description="another goal")] = None
+    cancel_goal: Annotated[
+        Which | None, Field(description="name or index from 0 of a goal that need not be visited")
+    ] = None
+    push: Annotated[
+        Point3 | None,
+        Field(description="(x, y, z) by which the robot is displaced, in the problem's units"),
+    ] = None
+    tether_length: Annotated[
+        Positive | None, Field(description="tether length from now on, in the problem's units")
+    ] = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        given = [k for k in type(self).model_fields if k != "time" and getattr(self, k) is not None]
+        if len(given) != 1:
+            raise ValueError(
+                "expected one of appear, vanish, move, add_goal, cancel_goal, push, "
+                f"tether_length, got {', '.join(given) or 'none'}"
+            )
+        return self
+
+    @property
+    def kind(self) -> str:
+        """Which of them it is."""
+        return next(
+            k for k in type(self).model_fields if k != "time" and getattr(self, k) is not None
+        )
+
+
+class Surprises(FileModel):
+    """The surprise file.
+
+    >>> text = '{"schema_version": 1, "events": [{"time": 60, "tether_length": 40}]}'
+    >>> Surprises.from_json(text).events[0].kind
+    'tether_length'
+    """
+
+    file_kind: ClassVar[str] = "surprises"
+
+    model_config = ConfigDict(title="netsp surprises")
+
+    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
+    events: Annotated[tuple[Event, ...], Field(description="in any order")]
+
+    def check(self, problem: Problem, source: str = "") -> None:
+        """Refuse events that a problem cannot have.
+
+        Parameters
+        ----------
+        problem : Problem
+            What is carried out.
+        source : str
+            What messages call these surprises; nothing if it is empty.
+
+        Raises
+        ------
+        InputError
+            An obstacle or goal that does not exist when the event comes, or an obstacle that would
+            stand on the base or move onto it.
+        """
+        for k, event in sorted(enumerate(self.events), key=lambda e: e[1].time):
+            try:
+                problem = changed(problem, event)
+            except InputError as error:
+                where = f"{source}: " if source else ""
+                raise InputError(f"{where}events[{k}]: {error}") from None
+
+
+def changed(problem: Problem, event: Event) -> Problem:
+    """The problem after an event; goals keep their numbers, cancelled ones too, and so do the
+    obstacles but for those that vanish. Goals inside obstacles are left to the caller.
+
+    Raises
+    ------
+    InputError
+        It names something that is not there, or puts an obstacle onto the base.
+    """
+    obstacles, goals = list(problem.obstacles), list(problem.goals)
+    update: dict[str, object] = {}
+    if event.appear is not None:
+        obstacles.append(event.appear)
+    elif event.vanish is not None:
+        del obstacles[index_of(event.vanish, obstacles, "vanish")]
+    elif event.move is not None:
+        i = index_of(event.move.obstacle, obstacles, "move.obstacle")
+        obstacles[i] = moved(obstacles[i], event.move.by)
+    elif event.add_goal is not None:
+        goals.append(event.add_goal)
+    elif event.cancel_goal is not None:
+        index_of(event.cancel_goal, goals, "cancel_goal")
+    elif event.tether_length is not None:
+        update["tether_length"] = event.tether_length
+    update |= {"obstacles": tuple(obstacles), "goals": tuple(goals)}
+    out = problem.model_copy(update=update)
+    if complaint := out.size_complaint():
+        raise InputError(f"{event.kind}: {complaint}")
+    if event.appear is not None and problem.origin is not None:
+        box = event.appear.shape(0.0).bounds
+        if max(box[2] - box[0], box[3] - box[1]) < SPECK * problem.tether_length:
+            raise InputError(
+                f"appear: is {max(box[2] - box[0], box[3] - box[1]):.1g} {problem.units} across; "
+                "expected coordinates of the problem, from its base on, not degrees"
+            )
+    if event.add_goal is not None:
+        away = float(np.abs(np.array(event.add_goal.position) - np.array(problem.base)).max())
+        most = WIDEST * max(problem.tether_length, problem.scale)
+        if away > most:
+            raise InputError(
+                f"add_goal: is {away:.4g} from the base; expected at most {most:.4g}, "
+                f"{WIDEST:g} times the size of the problem"
+            )
+    base = np.array([out.base[:2]])
+    for i, o in enumerate(out.obstacles):
+        if float(o.signed_distance(base)[0]) < out.clearance - out.tolerance:
+            raise InputError(f"{event.kind}: {out.obstacle_label(i)} would stand on the base")
+    return out
+
+
+def moved(obstacle: Circle | Polygon, by: tuple[float, float]) -> Circle | Polygon:
+    """An obstacle elsewhere."""
+    try:
+        if isinstance(obstacle, Circle):
+            x, y = obstacle.center
+            centre = (x + by[0], y + by[1])
+            return Circle(center=centre, radius=obstacle.radius, name=obstacle.name)
+        corners = tuple((x + by[0], y + by[1]) for x, y in obstacle.polygon)
+        return Polygon(polygon=corners, name=obstacle.name)
+    except InputError as error:
+        raise InputError(f"move: {error}") from None
+
+
+def index_of(which: int | str, things: list, field: str) -> int:  # type: ignore[type-arg]
+    """Which of some named things is meant; InputError if none is."""
+    if isinstance(which, str):
+        found = [k for k, thing in enumerate(things) if thing.name == which]
+        if len(found) == 1:
+            return found[0]
+        unnamed = [k for k, thing in enumerate(things) if thing.name is None]
+        if not found and which in (f"#{k}" for k in unnamed):
+            return int(which[1:])
+        raise InputError(f"{field}: expected the name of one, got {which!r}, of which there are "
+                         f"{len(found)}")  # fmt: skip
+    if not is_index(which, len(things)):
+        raise InputError(f"{field}: expected a number below {len(things)}, got {which!r}")
+    return int(which)

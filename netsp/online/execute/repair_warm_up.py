@@ -1,0 +1,60 @@
+"""What a repair needs, compiled before there is one: in it that would take time from planning."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+
+from netsp.base.clock import interrupts_remembered
+from netsp.base.compiled.compile_policy import compiles, everything_compiled
+from netsp.base.compiled.kernel import runs_compiled
+from netsp.gtsp.dp.label_kernels import extend
+from netsp.model.problem import Circle, Goal, Problem, State
+from netsp.model.random_worlds import random_world
+from netsp.online.execute.tour_repair import repair
+from netsp.plan.solve_problem import solve_graph
+from netsp.roadmap.from_state import graph_from_state
+
+_SOLVERS = (("dp", None), ("mip", None), ("lns", 200), ("auto", 30))
+"""Between them, with these iteration limits, they call all that a new order may take."""
+
+
+def should_make_ready() -> bool:
+    """Return whether to call `make_ready` before a simulated tour: only where kernels are on disk.
+
+    On a machine that has compiled nothing yet, `make_ready` would take a minute, so a simulated
+    tour runs interpreted until compiling pays. Flights always call `make_ready`.
+    """
+    return runs_compiled(extend)
+
+
+@cache
+def make_ready() -> None:
+    """Have everything loaded that a repair needs, and compiled on a machine that never did.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Ctrl-C, which solvers take for the wish to have what there is.
+    """
+    if not compiles():
+        return
+    tiny = Problem(
+        base=(0.0, 0.0, 0.0),
+        goals=(Goal(position=(4.0, 0.0, 0.0)), Goal(position=(4.0, 3.0, 0.0))),
+        tether_length=9.0,
+        obstacles=(Circle(center=(2.0, 1.0), radius=0.5), Circle(center=(3.0, 2.0), radius=0.5)),
+    )  # fmt: skip
+    world = random_world(1, goals=9, tether_length=450.0)
+    begun = State(position=world.goals[0].position, signature=())
+    with interrupts_remembered() as check, everything_compiled():
+        repair(
+            tiny, np.array([4.0, 0.0, 0.0]), np.array([[0.0, 0, 0], [4, 0, 0]]), [0, 1], 1.0, "",
+            limit=math.inf,
+        )  # fmt: skip
+        graph = graph_from_state(world.model_copy(update={"state": begun}))
+        for solver, iterations in _SOLVERS:
+            check()
+            solve_graph(graph, solver, iteration_limit=iterations)

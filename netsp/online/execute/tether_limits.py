@@ -1,0 +1,159 @@
+"""Tether of a run compared with its limits: the longest under each, and the times over them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from netsp.base.arrays import Bools, Floats
+
+RESOLUTION = 1e-4
+"""Relative accuracy of the tether model; a smaller excess does not count as over the limit."""
+
+
+@dataclass(frozen=True)
+class LimitPeriod:
+    """Time in which the tether had one limit.
+
+    Attributes
+    ----------
+    begin_s
+        Start, seconds after the start of the run.
+    limit
+        Length that the tether may have, in the problem's units.
+    longest
+        Length of the longest tether in this time.
+    longest_s
+        When it was that long, seconds after the start of the run.
+    """
+
+    begin_s: float
+    limit: float
+    longest: float
+    longest_s: float
+
+
+@dataclass(frozen=True)
+class Overrun:
+    """Time in which the tether was longer than its limit.
+
+    Attributes
+    ----------
+    begin_s, end_s
+        Start and end, seconds after the start of the run.
+    longest
+        Length of the longest tether in this time, in the problem's units.
+    limit
+        Length that it may have had.
+    shortening
+        Whether the limit was lowered below the tether, which was being shortened.
+    """
+
+    begin_s: float
+    end_s: float
+    longest: float
+    limit: float
+    shortening: bool
+
+    @property
+    def seconds(self) -> float:
+        """Return the duration."""
+        return self.end_s - self.begin_s
+
+
+def limit_periods(t: Floats, tether: Floats, limit: Floats) -> list[LimitPeriod]:
+    """Return the tether beside each limit that it had in turn.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Times of the rows of a log, seconds.
+    tether : ndarray, shape (n,)
+        Length of the taut tether.
+    limit : ndarray, shape (n,)
+        Length that it may have.
+    """
+    found = []
+    for begin, end in _runs(limit):
+        k = begin + int(np.argmax(tether[begin:end]))
+        found.append(LimitPeriod(float(t[begin]), float(limit[k]), float(tether[k]), float(t[k])))
+    return found
+
+
+def overruns(t: Floats, tether: Floats, limit: Floats, shortening: Bools) -> list[Overrun]:
+    """Return the times in which the tether was over its limit.
+
+    Parameters
+    ----------
+    t, tether, limit
+        Log, as of `limit_periods`.
+    shortening : ndarray of bool, shape (n,)
+        Whether the limit was lowered below the tether, which is being shortened.
+    """
+    over = tether > limit * (1.0 + RESOLUTION)
+    # a row tells how it is from then on, until the next
+    ends = np.append(t[1:], t[-1:])
+    key = np.column_stack([np.where(over, limit, 0.0), over & shortening])
+    found = []
+    for begin, end in _runs(key):
+        if over[begin]:
+            longest = float(tether[begin:end].max())
+            found.append(
+                Overrun(
+                    float(t[begin]), float(ends[end - 1]), longest, float(limit[begin]),
+                    bool(shortening[begin]),
+                )
+            )  # fmt: skip
+    return found
+
+
+def describe_limits(periods: Sequence[LimitPeriod], over: Sequence[Overrun], units: str) -> str:
+    """Return words for the tether beside its limits, and for when it was over.
+
+    Parameters
+    ----------
+    periods : sequence of LimitPeriod
+        The limits.
+    over : sequence of Overrun
+        Times over the limit.
+    units : str
+        Units of lengths.
+    """
+    if not periods:
+        return "never out"
+    first, *later = periods
+    parts = [f"longest {first.longest:.6g} of {first.limit:g} {units}"]
+    parts += [f"from {p.begin_s:.1f} s on {p.longest:.6g} of {p.limit:g} {units}" for p in later]
+    exceeded = [o for o in over if not o.shortening]
+    total = sum(o.seconds for o in exceeded)
+    parts.append(f"over the limit for {total:.1f} s" + _times(exceeded, units))
+    lowered = [o for o in over if o.shortening]
+    if lowered:
+        total = sum(o.seconds for o in lowered)
+        parts.append(f"shortened for {total:.1f} s to a new limit" + _times(lowered, units))
+    return ", ".join(parts)
+
+
+def _times(over: Sequence[Overrun], units: str, max_times: int = 5) -> str:
+    """Return words for the first times at which the tether was over its limit; a log has all."""
+    if not over:
+        return ""
+    told = [
+        f"{o.begin_s:.1f} to {o.end_s:.1f} s: up to {o.longest:.4g} of {o.limit:g} {units}"
+        for o in over[:max_times]
+    ]
+    rest = f"; {len(over) - max_times} more" if len(over) > max_times else ""
+    return f" ({'; '.join(told)}{rest})"
+
+
+def _runs(values: Floats) -> list[tuple[int, int]]:
+    """Return first and last index, exclusive, of the stretches of equal rows."""
+    if not len(values):
+        return []
+    rows = np.asarray(values).reshape(len(values), -1)
+    changes = 1 + np.flatnonzero((rows[1:] != rows[:-1]).any(axis=1))
+    bounds = [0, *changes.tolist(), len(values)]
+    return list(pairwise(bounds))

@@ -1,0 +1,592 @@
+"""Carries out a solution step by step: vehicle, tether, events and repairs, with a log of all."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError, interrupted
+from netsp.base.geometry import polylines
+from netsp.hsignature import signature
+from netsp.judge import verify
+from netsp.model.field_types import LARGEST, checked_argument, checked_instance
+from netsp.model.problem import Problem
+from netsp.model.solution import Solution, Status
+from netsp.online.current import Water
+from netsp.online.execute.detour_around import aside
+from netsp.online.execute.events import Event, Surprises, changed, index_of
+from netsp.online.execute.execution_log import (
+    Arrival,
+    Entry,
+    Execution,
+    ExecutionOptions,
+    ExecutionRow,
+)
+from netsp.online.execute.repair_warm_up import make_ready, should_make_ready
+from netsp.online.execute.run_record import Begun, LeftOut, RunRecord, RunState
+from netsp.online.execute.tether_limits import RESOLUTION
+from netsp.online.execute.tether_reserve import ReservedLimit
+from netsp.online.execute.tour_plan import HOME, Leg, legs_of
+from netsp.online.execute.tour_repair import Repair, broken, reachable, repair, reserved_limit
+from netsp.online.vehicle import Vehicle, make_vehicle
+from netsp.world.scene.field import DistanceField, pushed_out
+from netsp.world.scene.scene import scene_of
+from netsp.world.tether import GeodesicTether, Tether
+from netsp.world.tether.resolution import coarsest_delta, suggested_delta
+
+HOLD_STEP = 0.1
+"""Seconds between two rows of the log while the robot holds its place."""
+
+LEG_ALLOWANCE = 3.0
+"""A goal is left out when its leg takes this many times as long as it should, and a minute."""
+
+
+LINKED_STEP = 0.2
+"""Seconds of a step of a vehicle that is not simulated."""
+
+
+class StopsFlightError(Exception):
+    """What a vehicle raises when a run must not go on.
+
+    Parameters
+    ----------
+    reason : str
+        Why.
+    """
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+class LiveVehicle(Vehicle, Protocol):
+    """A vehicle with a clock of its own, which goes on while we plan.
+
+    Attributes
+    ----------
+    time : float
+        Seconds since the run began.
+    """
+
+    @property
+    def time(self) -> float:
+        """s."""
+
+    def hold(self) -> None:
+        """Stay where it is, until it is told to go on."""
+
+
+@dataclass(frozen=True)
+class _Retreat:
+    """Way back along the tether, because more is out than there may be, and what is planned
+    afterwards.
+
+    Attributes
+    ----------
+    length
+        Length of tether at which the retreat ends.
+    why, left, event
+        Reason for a new plan, the goals in it and what happened, as of `_Run._mend`.
+    """
+
+    length: float
+    why: str
+    left: list[int]
+    event: str
+
+
+class _Run:
+    """A run in progress."""
+
+    def __init__(
+        self, problem: Problem, solution: Solution, options: ExecutionOptions,
+        live: LiveVehicle | None = None, begun: Begun | None = None,
+    ) -> None:  # fmt: skip
+        self.out = Execution(problem, solution, options)
+        self.problem, self.options = problem, options
+        self.legs: list[Leg] = [] if begun is not None else legs_of(problem, solution)
+        self.start = np.array(problem.base if problem.state is None else problem.state.position)
+        self.delta = options.delta or suggested_delta(problem)
+        self.now = 0.0
+        self._enter(problem)
+        if begun is not None:
+            self.start = begun.tether[-1]
+            anchor = self.model.start(begun.tether[0], begun.tether[0])
+            self.tether = self.model.refine(self.model.drive(anchor, begun.tether[1:])[0])
+        elif problem.state is None:
+            self.tether = self.model.start(problem.base, problem.base)
+        else:
+            self.tether = self.model.lay(np.array(solution.start_tether))
+        self.live = live
+        self.vehicle = live or make_vehicle(options.vehicle, self.start, options.speed)
+        self.step = 0.1 if options.vehicle != "kinematic" else self.delta / options.speed
+        if live is not None:
+            self.step = LINKED_STEP
+        self.water = Water(options.current, options.gusts, options.seed)
+        self.mode, self.fresh, self.leg_s = "tour", True, 0.0
+        self.shorten = False
+        self.retreat: _Retreat | None = None
+        if begun is None or options.reserve_policy.reserve is not None:
+            self.reserve = options.reserve_policy.of_plan(problem, solution)
+        else:
+            self.reserve = begun.reserve
+        self.out.reserve = self.reserve
+        self.unreachable: set[int] = set()
+        self.path = self.legs[0].path if self.legs else np.array([self.vehicle.position])
+
+    def _enter(self, problem: Problem) -> None:
+        """The scene of a problem."""
+        self.problem = self.out.problem = problem
+        self.out.maps.append((round(self.now, 6), problem))
+        self.scene: DistanceField = scene_of(problem).field()
+        self.model = GeodesicTether(self.scene, self.delta)
+
+    def resume(self, begun: Begun) -> None:
+        """Plan what is left of a run from where the robot is."""
+        self.out.left_out |= begun.left_out
+        self.out.cancelled |= dict.fromkeys(begun.cancelled, 0.0)
+        self._mend_within_limit(begun.why, list(begun.left), "resumed")
+
+    @property
+    def state(self) -> RunState:
+        """State that the run can be resumed from."""
+        return RunState(
+            time=max(self.now, 0.0), tether=tuple(map(tuple, self.tether.nodes.tolist())),
+            left=tuple(self.left), cancelled=tuple(sorted(self.out.cancelled)),
+            left_out=tuple(LeftOut(goal=g, reason=why) for g, why in self.out.left_out.items()),
+            reserve=self.reserve,
+        )  # fmt: skip
+
+    # a step
+
+    def note(self) -> ExecutionRow:
+        x, y, z = (float(v) for v in self.vehicle.position)
+        goal = self.left[0] if self.left else HOME
+        limit = self.problem.tether_length
+        if self.shorten and self.tether.length <= limit:
+            self.shorten = False
+        goes_back = self.shorten or self.retreat is not None
+        mode = "shorten" if goes_back and self.mode != "hold" else self.mode
+        row = ExecutionRow(
+            round(self.now, 6), x, y, z, goal, mode, self.tether.length, limit, self.shorten,
+            self._is_over_limit,
+        )  # fmt: skip
+        if len(self.out.rows) % 10 == 0:
+            self.out.tethers.append((row.time, self.tether.nodes.copy()))
+        self.out.rows.append(row)
+        return row
+
+    def go(self) -> None:
+        """One step along the path; arrives where the leg ends."""
+        points, passed = self.vehicle.go(
+            self.path, self.step, self.vehicle.yaw, self.water(self.now), self.fresh
+        )
+        self.fresh = False
+        took = self.step if self.live is None else self.live.time - self.now
+        self.now += took
+        self.leg_s += took
+        self._follow(points)
+        end = self.path[-1]
+        self.path = self.path[min(passed, len(self.path) - 1) :]
+        near = (
+            1e-9 * self.problem.scale if self.options.vehicle == "kinematic" else self.options.reach
+        )
+        is_there = (
+            len(self.path) == 1 and float(np.linalg.norm(self.vehicle.position - end)) <= near
+        )
+        is_late = self.leg_s > 60.0 + LEG_ALLOWANCE * self.legs[0].length / self.options.speed
+        if self.retreat is not None:
+            if is_there or is_late or self.tether.length <= self.retreat.length:
+                done, self.retreat = self.retreat, None
+                self._mend(done.why, done.left, done.event)
+        elif is_there:
+            self._arrive()
+        elif is_late:
+            self._leave_out(self.legs[0].goal, "not reached in time")
+
+    def _follow(self, points: Iterable[Floats]) -> None:
+        """The tether goes where the robot has been."""
+        for point in points:
+            if float(self.scene.distance(point)) < -0.2 * self.delta:
+                point = pushed_out(self.scene, point, 0.0)[0]
+                self.vehicle.stop_at(point)
+            self.out.walked += float(np.linalg.norm(point - self.tether.robot))
+            self.tether = self.model.update(self.tether, point)
+
+    def _arrive(self) -> None:
+        leg = self.legs.pop(0)
+        # a vehicle with dynamics stops near the goal: what counts is the class at the goal itself
+        line = np.vstack([self.tether.nodes, leg.path[-1]])
+        word = signature(line[:, :2], self.problem.representative_points)
+        self.out.arrivals.append(
+            Arrival(round(self.now, 6), leg.goal, word, leg.word, self.tether.length, leg.tether)
+        )
+        self._next()
+
+    def _next(self) -> None:
+        self.leg_s = 0.0
+        if self.legs:
+            self.path, self.fresh = self.legs[0].path, True
+
+    def _leave_out(self, goal: int, why: str) -> None:
+        if goal == HOME:
+            self.legs = []
+            self._enter_log("left out", "ignored", f"the base was {why}", 0.0)
+            return
+        self.out.left_out[goal] = why
+        if not self.options.repair:
+            self.legs.pop(0)
+            first = self.legs[0]
+            path = np.vstack([self.vehicle.position, first.path[1:]])
+            self.legs[0] = Leg(first.goal, path, first.word, first.tether)
+            self._enter_log("left out", "ignored", f"{self.problem.goal_label(goal)} {why}", 0.0)
+            self._next()
+            return
+        self._mend(f"{self.problem.goal_label(goal)} {why}", [g for g in self.left if g != goal])
+
+    @property
+    def left(self) -> list[int]:
+        """Goals that are planned, in their order."""
+        if self.retreat is not None:
+            return list(self.retreat.left)
+        return [leg.goal for leg in self.legs if leg.goal != HOME]
+
+    # events
+
+    def happen(self, event: Event) -> None:
+        """Let an event come about, and mend what it breaks."""
+        left, must = self.left, None if self.retreat is None else self.retreat.why
+        if event.kind == "push":
+            assert event.push is not None
+            self._push(np.array(event.push))
+            must = "pushed off its path"
+        else:
+            before = self.problem
+            self._enter_changed(event)
+            if event.kind == "add_goal":
+                new = len(before.goals)
+                left, must = [*left, new], f"{self.problem.goal_label(new)} was added"
+            elif event.cancel_goal is not None:
+                gone = index_of(event.cancel_goal, list(before.goals), "cancel_goal")
+                if gone in left:
+                    left = [g for g in left if g != gone]
+                    must = f"{before.goal_label(gone)} was cancelled"
+                if self.options.repair and (gone in self.left or gone in self.out.left_out):
+                    self.out.left_out.pop(gone, None)
+                    self.out.cancelled[gone] = self.now
+        if event.tether_length is not None and self.tether.length > event.tether_length:
+            self.shorten = True
+        back = self._in_reach_again() if self.options.repair else []
+        if back:
+            names = ", ".join(map(self.problem.goal_label, back))
+            left, must = [*left, *back], f"within reach again: {names}"
+            for goal in back:
+                del self.out.left_out[goal]
+        if self._is_over_limit and self.options.repair:
+            must = must or (
+                f"{self.tether.length:.4g} of {self.problem.tether_length:g} {self.problem.units} "
+                "of tether were out"
+            )
+        if must is None:
+            limit = self._reserved(left) if self.options.repair else None
+            must, legs = broken(self.problem, self.tether.nodes, self._from_here(), limit)
+            if must is None:
+                self.legs = legs
+                self.path, self.leg_s = self.legs[0].path[1:], 0.0
+        if must is None:
+            self._enter_log(event.kind, "kept", "the rest of the plan still holds", 0.0)
+        elif not self.options.repair:
+            self._enter_log(event.kind, "ignored", must, 0.0)
+            for goal in set(left) - set(self.left):
+                self.out.left_out[goal] = "was added, and plans are not repaired"
+        else:
+            self._mend_within_limit(must, left, event.kind)
+
+    def asked(self, event: Event) -> None:
+        """An event that nobody could check before."""
+        try:
+            if event.kind == "push" and self.live is not None:
+                raise InputError("push: a real vehicle says itself where it is")
+            changed(self.problem, event)
+        except InputError as error:
+            self._enter_log(event.kind, "ignored", f"cannot be: {error}", 0.0)
+            return
+        if self.legs:
+            self.happen(event)
+
+    def _in_reach_again(self) -> list[int]:
+        """Goals that no tether reached, and one does now."""
+        away = [g for g in self.unreachable if g in self.out.left_out]
+        back = reachable(self.problem, away)[0] if away else []
+        self.unreachable -= set(back)
+        return back
+
+    def too_late(self, event: Event) -> None:
+        """An event after the end."""
+        self._enter_log(event.kind, "ignored", f"came at {event.time:g} s, after the end", 0.0)
+        if event.add_goal is not None:
+            problem = changed(self.problem, event)
+            self.problem = self.out.problem = problem
+            self.out.left_out[len(problem.goals) - 1] = "was added after the end"
+
+    def _from_here(self) -> list[Leg]:
+        first = self.legs[0]
+        path = np.vstack([self.vehicle.position, self.path])
+        return [Leg(first.goal, path, first.word, first.tether), *self.legs[1:]]
+
+    def _enter_changed(self, event: Event) -> None:
+        """The world after an event: what has come to stand on the tether or the robot has pushed
+        them aside, to the nearer side; what is gone lets the tether go."""
+        problem = changed(self.problem, event)
+        self._enter(problem)
+        if event.kind not in ("appear", "vanish", "move"):
+            return
+        line = aside(problem, self.tether.nodes, 1e-2 * self.delta)
+        if not np.array_equal(line[-1], self.vehicle.position):
+            self.vehicle.stop_at(line[-1])
+        anchor = self.model.start(line[0], line[0])
+        self.tether = self.model.refine(self.model.drive(anchor, line[1:])[0])
+        if self.tether.length > problem.tether_length:
+            self.shorten = True  # pushed aside it is longer, whoever is to blame
+
+    def _push(self, by: Floats) -> None:
+        """Carry the robot off, as far as there is water."""
+        start = self.vehicle.position
+        # farther than the tether goes there and back nothing is carried
+        far = 2.0 * max(self.problem.tether_length, self.tether.length) + self.delta
+        by = by * min(1.0, far / max(float(np.linalg.norm(by)), 1e-300))
+        points = polylines.dense(np.array([start, start + by]), 0.5 * self.delta)
+        for point in points:
+            if float(self.scene.distance(point)) < 0.0:
+                break
+            tether = self.model.update(self.tether, point)
+            if tether.length > max(self.problem.tether_length, self.tether.length):
+                break  # held by its tether
+            self.tether = tether
+            self.vehicle.stop_at(point)
+
+    @property
+    def _is_over_limit(self) -> bool:
+        return self.tether.length > self.problem.tether_length * (1.0 + RESOLUTION)
+
+    def _reserved(self, goals: list[int]) -> ReservedLimit:
+        """Return the length of tether that a plan through goals may use."""
+        return reserved_limit(self.problem, goals, self.reserve)
+
+    def _mend_within_limit(self, why: str, left: list[int], event: str) -> None:
+        """Plan anew, after going back along the tether if too much of it is out.
+
+        The tether gets shorter nowhere faster than along itself. While the limit is kept, only one
+        that was lowered below what is out and the reserve is a reason to go back: towards goals
+        that leave the reserve, tethers get shorter by themselves.
+        """
+        if self.live is not None and self._is_over_limit:
+            self.live.hold()  # it would go on outward while we think
+        limit = self._reserved(left).length
+        has_room = self.tether.length <= (limit if event == "tether_length" else np.inf)
+        if has_room and not self._is_over_limit:
+            self.retreat = None
+            self._mend(why, left, event)
+            return
+        out = self.tether.length
+        # a vehicle with dynamics ends somewhere within its reach of where it is sent
+        near = 0.0 if self.options.vehicle == "kinematic" else self.options.reach
+        length = max(min(limit, self.problem.tether_length - near), 0.0)
+        back = np.ascontiguousarray(self.tether.nodes[::-1])
+        self.retreat = _Retreat(length, why, left, event)
+        # the way to the base, left half-way: to a place nearby a vehicle slows down before it
+        self.legs = [Leg(HOME, back, (), 0.0)]
+        self.path, self.fresh, self.leg_s = back[1:], True, 0.0
+        units = self.problem.units
+        self._enter_log(
+            event, "shorten",
+            f"{out:.4g} of {self.problem.tether_length:g} {units} of tether are out: back along it "
+            f"to {length:.4g} {units}", 0.0,
+        )  # fmt: skip
+
+    def _mend(self, why: str, left: list[int], event: str = "left out") -> None:
+        if self.live is not None:
+            # it has gone on since its tether was last looked at, perhaps past an obstacle
+            self.live.hold()
+            way = np.array([self.tether.robot, self.vehicle.position])
+            self._follow(polylines.dense(way, 0.5 * self.delta)[1:])
+        begin = time.perf_counter()
+        try:
+            made = repair(
+                self.problem, self.vehicle.position, self.tether.nodes, left, self.options.speed,
+                why, self.options.seed, self.options.planning_limit, self.reserve,
+            )  # fmt: skip
+        except Exception as error:
+            if interrupted(error):
+                raise KeyboardInterrupt from error
+            # The robot must come home whatever is wrong with us; that something is, is logged and
+            # counted, and the command says so by its exit code. What is always possible: back
+            # along the tether.
+            home = Leg(HOME, np.ascontiguousarray(self.tether.nodes[::-1]), (), 0.0)
+            what = f"{type(error).__name__}: {error}"
+            left_out = tuple((g, f"a defect of netsp ended planning ({what})") for g in left)
+            reason = f"{why}; a defect of netsp ended planning ({what})"
+            spent = time.perf_counter() - begin
+            made = Repair("defect", reason, [home], left_out, home.length, spent)
+        self._enter_log(event, made.kind, made.reason, made.planning_s)
+        self._hold(self.options.planning_limit)
+        self.legs = made.legs
+        for goal, reason in made.left_out:
+            self.out.left_out[goal] = reason
+        if made.kind != "defect":
+            self.unreachable |= {goal for goal, _ in made.left_out}
+        self._next()
+
+    def _hold(self, seconds: float) -> None:
+        """Stay where the robot is while a plan is made: until the plan is due, however soon it was
+        ready, so that the same seed gives the same run."""
+        if self.live is not None:
+            self.now = max(self.now, self.live.time)  # it has held its place meanwhile
+            return
+        mode, self.mode = self.mode, "hold"
+        until = self.now + seconds
+        while self.now < until:
+            self.note()
+            self.now = min(self.now + HOLD_STEP, until)
+        self.mode = mode
+
+    def _enter_log(self, event: str, response: str, reason: str, spent: float) -> None:
+        self.out.entries.append(Entry(round(self.now, 6), event, response, reason, spent))
+
+
+def execute(
+    problem: Problem,
+    solution: Solution,
+    options: ExecutionOptions | None = None,
+    *,
+    surprises: Surprises | None = None,
+    on_step: Callable[[ExecutionRow], None] | None = None,
+    vehicle: LiveVehicle | None = None,
+    incoming: Callable[[], list[Event]] | None = None,
+    record: RunRecord | None = None,
+    begun: Begun | None = None,
+) -> Execution:
+    """Carry out a solution in the scene of its problem.
+
+    The obstacles stand from the sea floor to the surface, the tether is anchored at the base.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was solved.
+    solution : Solution
+        The plan.
+    options : ExecutionOptions, optional
+        How it is carried out.
+    surprises : Surprises, optional
+        What happens on the way.
+    on_step : callable, optional
+        Called with every row; a KeyboardInterrupt ends the run, and what was done till then is
+        returned.
+    vehicle : LiveVehicle, optional
+        One that is not simulated; `StopsFlightError` of it ends the run as well.
+    incoming : callable, optional
+        Asked at every step for events that have come since.
+    record : RunRecord, optional
+        Takes every row, and the state, as the run goes on.
+    begun : Begun, optional
+        Beginning elsewhere than at the start of the solution: what is left is planned from there.
+
+    Returns
+    -------
+    Execution
+        What came of it.
+
+    Raises
+    ------
+    InputError
+        The solution does not belong to the problem, fails its checks or is a baseline's that
+        entangles; bad options or surprises.
+    """
+    options = options or ExecutionOptions()
+    surprises = surprises or Surprises(events=())
+    checked_instance("problem", problem, Problem)
+    checked_instance("solution", solution, Solution)
+    checked_instance("options", options, ExecutionOptions)
+    checked_instance("surprises", surprises, Surprises)
+    for name in ("planning_limit", "speed", "reach"):
+        if not checked_argument(name, getattr(options, name), 0.0):
+            raise InputError(f"{name}: expected a positive number, got 0")
+    checked_argument("gusts", options.gusts, 0.0)
+    if not isinstance(options.current, Sequence | np.ndarray) or len(options.current) != 3:
+        raise InputError(f"current: expected three numbers, got {options.current!r}"[:200])
+    for value in options.current:
+        checked_argument("current", value, -LARGEST)
+    if not isinstance(options.seed, int | np.integer) or options.seed < 0:
+        raise InputError(f"seed: expected a whole number from 0 on, got {options.seed!r}")
+    if solution.status is Status.INVALID or solution.length is None:
+        raise InputError(f"solution: has status {solution.status.value}; expected a tour that fits")
+    judged = verify(problem, solution) if begun is None else None
+    if judged is not None and not judged:
+        failed = next(c for c in judged.checks if not c.passed)
+        raise InputError(f"solution: fails its check {failed.name!r}: {failed.detail}")
+    surprises.check(problem)
+    coarsest = coarsest_delta(problem)
+    if (
+        options.delta is not None
+        and not 0.0 < checked_argument("delta", options.delta, 0.0) <= coarsest
+    ):
+        raise InputError(
+            f"delta: expected at most {coarsest:.4g}, or the tether would slip through the "
+            f"thinnest obstacle, got {options.delta!r}"
+        )
+    is_live = incoming is not None or begun is not None
+    if options.repair and (is_live or (surprises.events and should_make_ready())):
+        make_ready()
+    begin = time.perf_counter()
+    run = _Run(problem, solution, options, vehicle, begun)
+
+    def note() -> ExecutionRow:
+        row = run.note()
+        if record is not None:
+            record.take(row, run.problem, lambda: run.state)
+        return row
+
+    coming = sorted(surprises.events, key=lambda e: e.time)
+    try:
+        if begun is not None:
+            run.resume(begun)
+        while run.legs:
+            while coming and coming[0].time <= run.now:
+                run.happen(coming.pop(0))
+            for event in incoming() if incoming is not None else ():
+                run.asked(event)
+            row = note()
+            if on_step is not None:
+                on_step(row)
+            run.go()
+        note()
+        for event in coming:
+            run.too_late(event)
+    except KeyboardInterrupt:
+        run.out.interrupted = True
+    except StopsFlightError as stop:
+        run.out.stopped = stop.reason
+        note()
+    except Exception:
+        if record is not None and run.out.rows:
+            with contextlib.suppress(Exception):  # the first exception is raised, not a second one
+                record.keep(run.problem, run.state)
+        raise
+    run.out.tethers.append((round(run.now, 6), run.tether.nodes.copy()))
+    # a corner may have held it back for the few rounds of an update
+    run.out.free = tether_is_free(run.model.refine(run.tether), run.delta)
+    run.out.wall_s = time.perf_counter() - begin
+    return run.out
+
+
+def tether_is_free(tether: Tether, delta: float) -> bool:
+    """Whether a tether can be recovered: straight to the robot, resting on nothing."""
+    straight = float(np.linalg.norm(tether.robot - tether.anchor))
+    return len(tether.nodes) == 2 and tether.length - straight <= 1e-6 * delta

@@ -1,0 +1,402 @@
+"""What is broken of a plan, and how it is mended.
+
+The robot is at a state of the covering space: its position and the word of its tether. What is left
+of the plan is whole if its paths are free, its tethers fit and the tether comes home free;
+otherwise the remaining NE-TSP is solved from that state. First the order of the goals is kept and
+only their classes are chosen afresh (a local repair, exact for that order and quick); the tour is
+planned anew when that promises to save more time than planning takes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from netsp.base.arrays import Floats
+from netsp.base.clock import Clock, until_interrupt
+from netsp.base.errors import LimitReachedError, NetspError
+from netsp.base.geometry import polylines
+from netsp.gtsp.travel.result import Result
+from netsp.hsignature import concatenate, crossings, signature
+from netsp.model.problem import Circle, Goal, Problem, State
+from netsp.model.solution import Status
+from netsp.online.execute.tether_reserve import ReservedLimit
+from netsp.online.execute.tour_plan import HOME, Leg, legs_of
+from netsp.plan.answer import to_solution
+from netsp.plan.solve_problem import solve_graph
+from netsp.roadmap.explain_unreachable import explain_unreached
+from netsp.roadmap.from_state import FAR, GraphFromState, graph_from_state
+from netsp.roadmap.paths import TautPaths, UnknownPathError
+
+REPLAN_S = 2.0
+"""Seconds that planning the rest of a tour may take; the robot holds its place meanwhile."""
+
+MOST_CLASSES = 4_000
+"""Most classes that a repair looks at; of more, the shortest of every goal."""
+
+
+@dataclass(frozen=True)
+class Repair:
+    """A new plan.
+
+    Attributes
+    ----------
+    kind
+        Kept, local, replan or home.
+    reason
+        For the log.
+    left_out
+        Goals that cannot be reached any more, with the reason.
+    length
+        Metres to go.
+    planning_s
+        What it took.
+    limit
+        Length of tether that the plan may use at its goals; None where it visits none.
+    """
+
+    kind: str
+    reason: str
+    legs: list[Leg]
+    left_out: tuple[tuple[int, str], ...]
+    length: float
+    planning_s: float
+    limit: ReservedLimit | None = None
+
+
+def broken(
+    problem: Problem, tether: Floats, legs: list[Leg], limit: ReservedLimit | None = None
+) -> tuple[str | None, list[Leg]]:
+    """What is wrong with what is left of a plan, None if nothing is; and the legs with the words
+    and tethers that they have among the obstacles that there are now.
+
+    Parameters
+    ----------
+    tether
+        (k, 3) the taut tether now. The paths of the legs follow on each other, the first starts at
+        the robot.
+    limit
+        Length of tether that the plan may use; by default all there is.
+    """
+    longest = problem.tether_length if limit is None else limit.length
+    rays = problem.representative_points
+    word = signature(tether[:, :2], rays)
+    left = [leg.goal for leg in legs if leg.goal != HOME]
+    for leg in legs:
+        obstacle = _in_the_way(problem, leg.path)
+        if obstacle is not None:
+            label = problem.obstacle_label(obstacle)
+            return f"{label} blocks the path to {_label(problem, leg)}", legs
+    rest = problem.model_copy(update={"goals": tuple(problem.goals[g] for g in left)})
+    tethers = TautPaths(rest, FAR * max(problem.tether_length, polylines.length(tether)))
+    now: list[Leg] = []
+    for k, leg in enumerate(legs):
+        word = concatenate(word, crossings(leg.path[:, :2], rays))
+        if leg.goal == HOME:
+            now.append(leg)
+            break
+        try:
+            needs = tethers.length(0, k + 1, word)
+        except NetspError:
+            return f"no tether of the planned class reaches {_label(problem, leg)}", legs
+        if needs > longest + tethers.margin:
+            what = "be over the limit"
+            if needs <= problem.tether_length + tethers.margin and limit is not None:
+                what = f"leave less than {limit.reserve:.4g} {problem.units} in reserve"
+            return (
+                f"the tether would {what} at {_label(problem, leg)}: {needs:.6g} of "
+                f"{problem.tether_length:g} {problem.units}"
+            ), legs
+        now.append(Leg(leg.goal, leg.path, word, needs))
+    return ("the tether would not be free at the base", legs) if word else (None, now)
+
+
+def _label(problem: Problem, leg: Leg) -> str:
+    return "the base" if leg.goal == HOME else problem.goal_label(leg.goal)
+
+
+def _in_the_way(problem: Problem, path: Floats) -> int | None:
+    """An obstacle, grown by the clearance, that a path enters."""
+    line = shapely.LineString(path[:, :2]) if len(path) > 1 else shapely.Point(path[0, :2])
+    place = 1e-6 * problem.scale
+    for i, o in enumerate(problem.obstacles):
+        if isinstance(o, Circle):
+            room = line.distance(shapely.Point(o.center)) - o.radius
+        else:
+            shape = shapely.Polygon(o.polygon)
+            room = line.distance(shape)
+            if shape.buffer(-place, join_style="mitre").intersects(line):
+                room = -np.inf
+        if room < problem.clearance - place:
+            return i
+    return None
+
+
+def repair(
+    problem: Problem, robot: Floats, tether: Floats, left: list[int], speed: float, why: str,
+    seed: int = 0, limit: float = REPLAN_S, reserve: float = 0.0,
+) -> Repair:  # fmt: skip
+    """Return a plan from the present state through the goals `left` (numbers in the problem, in
+    their order) and home. Goals that cannot be reached are left out, with the reason.
+
+    Parameters
+    ----------
+    limit
+        Seconds that all of it may take.
+    reserve
+        Length of tether to keep in reserve. No goal is left out for it: where one needs more, less
+        is kept.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Ctrl-C, which solvers take for the wish to have what there is.
+    """
+    with until_interrupt(limit) as clock:
+        try:
+            made = _repaired(problem, robot, tether, left, speed, why, seed, clock, reserve)
+        except NetspError:
+            if clock.stopped:
+                raise KeyboardInterrupt from None
+            raise
+        if clock.stopped:
+            raise KeyboardInterrupt
+        return made
+
+
+def _repaired(
+    problem: Problem, robot: Floats, tether: Floats, left: list[int], speed: float, why: str,
+    seed: int, clock: Clock, reserve: float,
+) -> Repair:  # fmt: skip
+    """Return a plan as `repair` does, with what the clock leaves time for."""
+    word = signature(tether[:, :2], problem.representative_points)
+    state = State(position=outside(problem, robot), signature=word)
+    order, left_out = reachable(problem, left)
+    if not order:
+        home, reason = _home(problem, state, tether, why)
+        return Repair("home", reason, [home], tuple(left_out), home.length, clock.elapsed)
+    reserved = reserved_limit(problem, order, reserve)
+    rest = _rest(problem, order, state, reserved.length)
+    graph = graph_from_state(
+        rest, max_classes=MOST_CLASSES, time_limit=clock, limits_paths=False
+    )  # fmt: skip
+    with graph.within.on_clock(clock):
+        local = _keeping_order(graph, len(order))
+    assert local.length is not None
+    hurried = clock.left <= 0.0
+    # with a short time left a new plan has less of it to pay for itself
+    replan_s = max(clock.left, 0.0)
+    chosen, kind = local, "local"
+    reason = f"{why}; {local.length:.4g} {problem.units} to go in the same order"
+    saving = (local.length - _least(graph, len(order), clock)) / speed
+    if saving > replan_s > 0.0:
+        found = solve_graph(graph, "auto", time_limit=clock, seed=seed, warm_start=local.tour)
+        worthwhile = local.length - speed * replan_s
+        if found.length is not None and found.length < worthwhile:
+            chosen, kind = found, "replan"
+            reason += f", {found.length:.4g} {problem.units} in a new one"
+        elif found.status is Status.OPTIMAL or (found.lower_bound or 0.0) >= worthwhile:
+            reason += ", a new order would not save enough"
+        else:
+            reason += (
+                ", no new order that saves enough was found within the time limit of planning; a "
+                "longer limit (--planning-limit) may find one"
+            )
+    elif hurried:
+        reason += (
+            ", as far as planning came within its time limit; no new order was tried, and a longer "
+            "limit (--planning-limit) may find a shorter way"
+        )
+    else:
+        reason += f", a new order could save at most {max(saving, 0.0):.1f} s"
+    if kept := reserved.describe(problem):
+        reason += f"; {kept}"
+    solution = to_solution(rest, graph, chosen, "auto", seed)
+    legs = legs_of(rest, solution, order)
+    return Repair(
+        kind, reason, legs, tuple(left_out), float(chosen.length or 0.0), clock.elapsed, reserved
+    )
+
+
+def reserved_limit(problem: Problem, goals: list[int], reserve: float) -> ReservedLimit:
+    """Return the length of tether that a plan may use which keeps a reserve, or as much of it as it
+    can without leaving out a goal.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    goals
+        Goals to be visited; those that no tether reaches do not count.
+    reserve
+        Length to be kept in reserve.
+    """
+    all_of_it = ReservedLimit(problem.tether_length, 0.0, reserve)
+    if reserve <= 0.0:
+        return all_of_it
+    goals = _in_free_water(problem, goals)[0]
+    if not goals:
+        return all_of_it
+    paths, needs = _shortest_tethers(problem, goals)
+    within = [k for k in range(len(goals)) if needs[k] <= problem.tether_length + paths.margin]
+    far = max(within, key=lambda k: float(needs[k]), default=None)
+    length = problem.tether_length - reserve
+    if length > paths.margin and (far is None or needs[far] <= length + paths.margin):
+        return ReservedLimit(length, reserve, reserve)
+    if far is None:
+        return all_of_it
+    length = min(float(needs[far]), problem.tether_length)
+    return ReservedLimit(length, problem.tether_length - length, reserve, goals[far])
+
+
+def _shortest_tethers(problem: Problem, goals: list[int]) -> tuple[TautPaths, Floats]:
+    """Return the paths of a problem with some of its goals, and the length of the shortest tether
+    to each, inf where there is none."""
+    chosen = tuple(problem.goals[g] for g in goals)
+    plain = problem.model_copy(update={"goals": chosen, "state": None})
+    paths = TautPaths(plain)
+    planar = paths.contacts.lengths([0])[0][1:]
+    return paths, np.hypot(planar, plain.points[1:, 2] - plain.points[0, 2])
+
+
+def reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple[int, str]]]:
+    """The goals that a taut tether within the limit reaches, in their order, and the others with
+    the reason."""
+    order, left_out = _in_free_water(problem, left)
+    if not order:
+        return order, left_out
+    paths, needs = _shortest_tethers(problem, order)
+    plain = paths.problem
+    beyond = [k for k in range(len(order)) if needs[k] > problem.tether_length + paths.margin]
+    for k in beyond:
+        why = explain_unreached(plain, paths.outline, [k + 1])
+        left_out.append((order[k], why.removeprefix(f"{plain.goal_label(k)} ")))
+    return [g for k, g in enumerate(order) if k not in beyond], left_out
+
+
+def outside(problem: Problem, robot: Floats) -> tuple[float, float, float]:
+    """The robot's place, moved out of what the tether model's resolution has let it enter."""
+    place = np.array(robot, dtype=float)
+    for _ in range(10):
+        depth = [problem.clearance - float(o.signed_distance(place[:2])) for o in problem.obstacles]
+        i = int(np.argmax(depth)) if depth else -1
+        if i < 0 or depth[i] <= 0.0:
+            break
+        obstacle, here = problem.obstacles[i], place[:2].copy()
+        rim = obstacle.shape(problem.clearance).exterior
+        near = np.array(rim.interpolate(rim.project(shapely.Point(here))).coords[0])
+        if isinstance(obstacle, Circle):
+            # a circle's rim is drawn as a polygon inside of it
+            away = here - obstacle.center
+            size = float(np.hypot(*away))
+            reach = obstacle.radius + problem.clearance
+            near = obstacle.center + away * (reach / size) if size else near
+        away = near - here
+        size = float(np.hypot(*away))
+        place[:2] = near + (away / size if size else 0.0) * 1e-7 * problem.scale
+    x, y, z = place.tolist()
+    return (x, y, z)
+
+
+def _rest(problem: Problem, order: list[int], state: State, limit: float) -> Problem:
+    goals = tuple(problem.goals[g] for g in order)
+    return problem.model_copy(update={"goals": goals, "state": state, "tether_length": limit})
+
+
+def _in_free_water(problem: Problem, order: list[int]) -> tuple[list[int], list[tuple[int, str]]]:
+    """Goals that no obstacle has come to stand on, and those that one has."""
+    kept: list[int] = []
+    gone: list[tuple[int, str]] = []
+    for g in order:
+        xy = np.array(problem.goals[g].position[:2])
+        on = [
+            i for i, o in enumerate(problem.obstacles)
+            if float(o.signed_distance(xy)) < problem.clearance - problem.tolerance
+        ]  # fmt: skip
+        if on:
+            gone.append((g, f"{problem.obstacle_label(on[0])} stands on it"))
+        else:
+            kept.append(g)
+    return kept, gone
+
+
+def _home(problem: Problem, state: State, tether: Floats, why: str) -> tuple[Leg, str]:
+    """Return the leg back along the taut tether to the base, and the reason for the log.
+
+    Where the taut path is not found, the leg follows the tether as it lies.
+    """
+    placed = problem.model_copy(update={"goals": (Goal(position=state.position),), "state": None})
+    longest = FAR * max(problem.tether_length, polylines.length(tether))
+    try:
+        back = TautPaths(placed, longest).path(0, 1, state.signature)[::-1]
+    except UnknownPathError:
+        back = tether[::-1]
+        why += "; no taut path of the tether was found, so back along the tether as it lies"
+    return Leg(HOME, np.ascontiguousarray(back), (), 0.0), why
+
+
+def _keeping_order(graph: GraphFromState, goals: int) -> Result:
+    """The shortest path through the goals in their order: classes by dynamic programming. When the
+    time is up, the other goals are taken in the class of least tether."""
+    start = graph.start
+    assert start is not None
+    at = np.array([start])
+    reach = np.zeros(1)
+    layers: list[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]] = []
+    for c in range(1, goals + 1):
+        members = graph.members(c)
+        both = np.concatenate([at, members])
+        asked = np.zeros((len(both), len(both)), dtype=bool)
+        asked[: len(at), len(at) :] = asked[len(at) :, : len(at)] = True
+        try:
+            legs = graph.within.costs_among(both, asked)
+        except LimitReachedError:
+            best_so_far, shortest = int(reach.argmin()), int(graph.tethers[members].argmin())
+            members = members[[shortest]]
+            with graph.within.on_clock(None):
+                d = graph.within.costs_among([at[best_so_far], members[0]])[0, 1]
+            layers.append((members, np.array([best_so_far])))
+            reach, at = reach[[best_so_far]] + d, members
+            continue
+        total = reach[:, None] + legs[: len(at), len(at) :]
+        best = total.argmin(axis=0)
+        layers.append((members, best))
+        reach, at = total[best, np.arange(len(members))], members
+    home = reach + graph.within.costs_to_base[at]
+    k = int(home.argmin())
+    length = float(home[k])
+    tour: list[int] = []
+    for members, best in reversed(layers):
+        tour.append(int(members[k]))
+        k = int(best[k])
+    full = (0, start, *reversed(tour))
+    # walked from the state on: the path to there is behind the robot
+    return Result(full, length, None, Status.FEASIBLE, walk=(*full[1:], 0))
+
+
+def _least(graph: GraphFromState, goals: int, clock: Clock) -> float:
+    """A quick lower bound on every path: half the two cheapest legs at each goal, and one at each
+    end; 0 if the time does not suffice."""
+    vertices = np.arange(len(graph))
+    try:
+        with graph.within.on_clock(clock):
+            bounds = graph.within.lower_bounds(vertices)
+    except LimitReachedError:
+        return 0.0
+    cluster = graph.cluster
+    ends, total = [0, int(cluster[graph.start])], 0.0
+    for c in range(goals + 2):
+        own = cluster == c
+        if not own.any():
+            continue
+        nearest = [
+            float(bounds[np.ix_(own, cluster == other)].min())
+            for other in range(goals + 2)
+            if other != c and (cluster == other).any() and {c, other} != set(ends)
+        ]
+        nearest.sort()
+        total += sum(nearest[: 1 if c in ends else 2])
+    return 0.5 * total

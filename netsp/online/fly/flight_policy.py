@@ -1,0 +1,113 @@
+"""Limits of a flight: when it stops, what is sent, and how it ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from netsp.base.number_ranges import check_positive
+
+
+@dataclass(frozen=True)
+class FlightPolicy:
+    """Policy of a flight over MAVLink. All numbers are positive.
+
+    Attributes
+    ----------
+    max_silence_s
+        Longest time without a heartbeat, s of the vehicle; then the link is lost.
+    max_position_age_s
+        Longest time without a position, s of the vehicle, of ten that come in each second.
+    min_source_loss_s
+        Time for which a source of the position estimate (GPS, DVL, innovations of the filter) must
+        be bad until the flight is stopped, s. The estimate drifts meanwhile.
+    max_gps_age_s
+        Longest time without a message of a GPS, s; three of its usual intervals if they are longer.
+    max_frozen_s
+        Time for which the position may stay the same to the last bit while the vehicle moves or is
+        commanded to, s. Positions of a moving vehicle change within half a second.
+    min_frozen_speed
+        Reported speed from which on the position must change, m/s; the same in depth.
+    min_plan_share
+        Share of the distance to the target that is horizontal, above which the place in the plan
+        must change: on a steeper leg a vehicle may stay beside its target while it dives.
+    max_clock_stall_s
+        Longest time for which the vehicle's clock may stand still while messages come, s of ours.
+    max_unaided_hold_s
+        Time for which a vehicle without a source holds its place by its estimate, s, before it is
+        put into ALT_HOLD: long enough to stop, and short of where the estimate leads it away.
+    max_path_error
+        Largest distance in the plan from the way to the target, metres: from the straight leg, and
+        after a bend from the triangle of the leg and the point where the vehicle came to a stop.
+        ArduSub keeps within 0.2; a larger distance means that the vehicle was carried off, or that
+        its estimate was reset.
+    max_depth_error
+        Largest distance above or below the depths between which the leg runs, metres. A vehicle
+        that lags in depth on a sloping leg is between them, and is not stopped.
+    stopping_s
+        Longest way in which a vehicle comes to a stop when its target changes, over its speed, s.
+        ArduSub takes 1 s of its speed in still water (1 / PSC_POSXY_P), and nearly 2 in a current
+        of 0.8 m/s.
+    min_return
+        Way back towards the leg after which the vehicle has stopped beyond a bend, metres.
+    max_speed
+        Largest reported speed that counts when the target changes, m/s; higher ones are capped.
+    resend_s
+        Time after which a target is sent again if the vehicle echoes another one, or neither echoes
+        any nor moves towards it, s. A target that is sent again is planned for anew: the vehicle
+        falls behind in depth.
+    max_resends
+        Maximum number of times a target is resent to a vehicle that echoes another one.
+    max_echo_error
+        Largest distance between a target and its echo, metres.
+    min_approach
+        Way towards a target that a vehicle which echoes nothing makes in `resend_s` if it has it,
+        metres.
+    max_depth_step
+        Largest change of depth up to the next target on a leg that slopes, metres. From target to
+        target a vehicle may lag in depth, at each it is on the leg.
+    max_unwatched_way
+        Longest straight way from where a vehicle was last to where it is when its flight is
+        resumed, metres: on a longer one it may have gone round an obstacle.
+    min_class_odds
+        Minimum ratio of the likelihoods of the likeliest and the next class in the state file of a
+        guard.
+    retry_s
+        Time after which a question without an answer, or a mode that the vehicle does not have
+        yet, is asked for again, s.
+    notice_s
+        Mean time from a position within reach of a vertex to the next target, s: positions come
+        ten times a second and are read 20 times a second. Counts in predicted times only.
+    max_answer_s
+        Longest wait for the answer to a question, such as the value of a parameter, s.
+    max_standby_silence_s
+        Time without a heartbeat after which standby ends, once the flight has ended, s.
+    """
+
+    max_silence_s: float = 3.0
+    max_position_age_s: float = 2.0
+    min_source_loss_s: float = 0.6
+    max_gps_age_s: float = 1.2
+    max_frozen_s: float = 1.5
+    min_frozen_speed: float = 0.1
+    min_plan_share: float = 0.5
+    max_clock_stall_s: float = 3.0
+    max_unaided_hold_s: float = 2.0
+    max_path_error: float = 1.0
+    max_depth_error: float = 1.0
+    stopping_s: float = 2.0
+    min_return: float = 0.2
+    max_speed: float = 3.0
+    resend_s: float = 2.0
+    max_resends: int = 3
+    max_echo_error: float = 0.15
+    min_approach: float = 0.1
+    max_depth_step: float = 2.0
+    max_unwatched_way: float = 10.0
+    min_class_odds: float = 100.0
+    retry_s: float = 0.5
+    notice_s: float = 0.1
+    max_answer_s: float = 2.0
+    max_standby_silence_s: float = 60.0
+
+    def __post_init__(self) -> None:
+        check_positive(self)

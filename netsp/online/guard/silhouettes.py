@@ -1,0 +1,75 @@
+"""What solids look like from above."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import shapely
+
+from netsp.base.arrays import Floats
+from netsp.world.scene.shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    Post,
+    Prism,
+    Sphere,
+    Torus,
+)
+
+ROUND = 12
+"""Segments of a quarter of a circle."""
+
+
+def silhouette(shape: Any) -> list[Floats]:
+    """The rims of a solid from above.
+
+    Parameters
+    ----------
+    shape : Shape
+        Of the solid.
+
+    Returns
+    -------
+    list of ndarray of shape (k, 2)
+        Metres; none for what has no end. A hole in the middle is not shown.
+    """
+    area = _area(shape)
+    if area is None or area.is_empty:
+        return []
+    parts = area.geoms if hasattr(area, "geoms") else [area]
+    return [np.asarray(part.exterior.coords)[:, :2] for part in parts]
+
+
+def _area(shape: Any) -> Any:
+    if isinstance(shape, Sphere | Post):
+        return shapely.Point(shape.center[:2]).buffer(shape.radius, ROUND)
+    if isinstance(shape, Capsule):
+        return shapely.LineString([shape.a[:2], shape.b[:2]]).buffer(shape.radius, ROUND)
+    if isinstance(shape, Cylinder):
+        return shapely.MultiPoint(_rims(shape)).convex_hull
+    if isinstance(shape, Box):
+        half = 0.5 * np.array(shape.size)
+        corners = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * half
+        return shapely.MultiPoint(
+            (np.array(shape.center) + corners @ shape.axes())[:, :2]
+        ).convex_hull
+    if isinstance(shape, Torus):
+        return shapely.LineString(shape.centreline()[:, :2]).buffer(shape.minor_radius, ROUND)
+    if isinstance(shape, Prism):
+        return shapely.Polygon(shape.polygon).buffer(shape.grow, ROUND)
+    return None
+
+
+def _rims(shape: Cylinder) -> Floats:
+    """(k, 2) points of the edges of its faces."""
+    a, b = np.array(shape.a), np.array(shape.b)
+    axis = (b - a) / np.linalg.norm(b - a)
+    u = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    u /= np.linalg.norm(u)
+    v = np.cross(axis, u)
+    angle = np.linspace(0.0, 2.0 * np.pi, 4 * ROUND, endpoint=False)[:, None]
+    rim = shape.radius * (np.cos(angle) * u + np.sin(angle) * v)
+    return np.vstack([a + rim, b + rim])[:, :2]

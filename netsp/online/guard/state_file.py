@@ -1,0 +1,219 @@
+"""What a guard must not forget: the class, from one run to the next."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import ConfigDict, Field
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.base.files import FileModel, write_text
+from netsp.hsignature import Word
+from netsp.model.field_types import Point3
+from netsp.model.validated import Model
+from netsp.online.guard.site import LONGER, ROUNDS, Site
+from netsp.online.guard.tether_guard import Guard
+from netsp.world.tether import Tether
+
+MAX_LETTERS = 10_000
+"""Largest number of letters of a word in a state file. A damaged file may hold a longer word, which
+would take hours to process."""
+
+LONGEST_S = 600.0
+"""Seconds without us after which the robot may be anywhere: then the memory is of no use."""
+
+
+class KnownClass(Model):
+    """A class that was believed."""
+
+    word: Annotated[
+        tuple[int, ...],
+        Field(description="its h-signature, at the position", max_length=MAX_LETTERS),
+    ]
+    cost: Annotated[
+        float, Field(description="negative logarithm of its likelihood", ge=0.0, le=1e6)
+    ]  # fmt: skip
+    tether: Annotated[
+        Annotated[tuple[Point3, ...], Field(min_length=2, max_length=100_000)] | None,
+        Field(description="(x, y, z) along the taut tether, from where it is fixed on, m"),
+    ] = None
+
+
+class GuardState(FileModel):
+    """The state file of `netsp guard`."""
+
+    file_kind: ClassVar[str] = "guard state"
+
+    model_config = ConfigDict(title="netsp guard state")
+
+    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
+    site: Annotated[str, Field(description="sha256 of the site")]
+    saved: Annotated[
+        float, Field(description="seconds since 1970", ge=0.0, le=1e11, allow_inf_nan=False)
+    ]
+    position: Annotated[Point3, Field(description="of the robot, in the site's frame")]
+    classes: Annotated[
+        tuple[KnownClass, ...], Field(description="the likeliest first", min_length=1)
+    ]  # fmt: skip
+
+    def words(self, site: Site) -> dict[Word, float]:
+        """Classes and their costs.
+
+        Parameters
+        ----------
+        site : Site
+            Where.
+
+        Returns
+        -------
+        dict of Word to float
+            As `Guard.remember` takes them.
+
+        Raises
+        ------
+        InputError
+            The state is of another site.
+        """
+        if self.site != site.identity:
+            raise InputError("--state: is of another site; expected one of this, or a new file")
+        for known in self.classes:
+            try:
+                site.check_word(known.word)
+            except InputError as error:
+                raise InputError(f"--state: classes: {error}") from None
+        reach = LONGER * site.tether_length
+        if (far := float(np.linalg.norm(self.place - site.anchor))) > reach:
+            raise InputError(
+                f"--state: position: expected at most {reach:.6g} {site.units} from where the "
+                f"tether is fixed, twice its length, got {far:.6g}"
+            )
+        if self.saved > time.time() + LONGEST_S:
+            raise InputError("--state: saved: lies in the future; is the clock right?")
+        return {c.word: c.cost for c in self.classes}
+
+    def tethers(self, site: Site) -> dict[Word, Tether]:
+        """How the tether hangs in each class, as far as it was written down.
+
+        Parameters
+        ----------
+        site : Site
+            Where.
+
+        Returns
+        -------
+        dict of Word to Tether
+            Pulled taut.
+
+        Raises
+        ------
+        InputError
+            One does not begin where the tether is fixed, or is of another class.
+        """
+        out = {}
+        for k, known in enumerate(self.classes):
+            if known.tether is None:
+                continue
+            nodes = np.array(known.tether, dtype=float)
+            apart = float(np.linalg.norm(nodes[0] - site.anchor))
+            tether = site.model.relaxed(np.vstack([site.anchor, nodes[1:]]), ROUNDS)
+            if apart > site.model.delta or site.word_of(tether.nodes) not in (known.word, None):
+                raise InputError(f"--state: classes[{k}].tether: is not of this site and class")
+            out[known.word] = tether
+        return out
+
+    @property
+    def age(self) -> float:
+        """Seconds since it was saved."""
+        return max(0.0, time.time() - self.saved)
+
+    @property
+    def place(self) -> Floats:
+        """(3,) the position."""
+        return np.array(self.position, dtype=float)
+
+
+def save(guard: Guard, file: str | Path) -> None:
+    """Write down what a guard believes; nothing while it does not know where the robot is.
+
+    Parameters
+    ----------
+    guard : Guard
+        The guard.
+    file : str or Path
+        Is replaced in one step.
+    """
+    if not guard.strands.all:
+        return
+    position = guard.strands.all[0].tether.robot
+    data = {
+        "schema_version": 1, "site": guard.site.identity, "saved": round(time.time(), 3),
+        "position": position.tolist(), "classes": _classes(guard, position),
+    }  # fmt: skip
+    write_text(file, json.dumps(data, allow_nan=False) + "\n")
+
+
+def _classes(guard: Guard, position: Floats) -> list[dict[str, Any]]:
+    """As at one place: with each class goes another one where the robot is, and words are those of
+    ways to there."""
+    site = guard.site
+    likely: dict[Word, float] = {}
+    hangs: dict[Word, Floats] = {}
+    for strand in guard.strands.all:  # the likeliest first
+        nodes = strand.tether.nodes
+        there = strand.tether.robot
+        (step,) = site.letters.written(there[None], position[None])
+        if step is None:
+            continue
+        word = site.letters.join(strand.word, step)
+        likely[word] = likely.get(word, 0.0) + strand.likely
+        if np.array_equal(there, position):
+            hangs[word] = nodes
+        elif site.field.line_of_sight(there, position):
+            hangs.setdefault(word, np.vstack([nodes, position]))
+    out: list[dict[str, Any]] = []
+    for word, share in likely.items():
+        cost = max(0.0, -math.log(max(share, 1e-9)))
+        known: dict[str, Any] = {"word": list(word), "cost": round(cost, 6)}
+        if word in hangs:
+            known["tether"] = [[round(float(v), 6) for v in p] for p in hangs[word]]
+        out.append(known)
+    return out
+
+
+def restore(guard: Guard, file: str | Path) -> GuardState | None:
+    """Have a guard go on from what was saved; None where nothing was.
+
+    Parameters
+    ----------
+    guard : Guard
+        A new one.
+    file : str or Path
+        The state file.
+
+    Returns
+    -------
+    GuardState or None
+        What was saved.
+
+    Raises
+    ------
+    InputError
+        The file is damaged, of another site, or too old.
+    """
+    if not Path(file).exists():
+        return None
+    state = GuardState.load(file)
+    words = state.words(guard.site)
+    if state.age > LONGEST_S:
+        raise InputError(
+            f"--state: {file}: is {state.age / 60.0:.0f} minutes old, and the robot may have gone "
+            "anywhere since; delete it if the tether is free, and correct the class if it is not"
+        )
+    guard.remember(words, state.place, state.age, state.tethers(guard.site))
+    return state

@@ -1,0 +1,89 @@
+"""A path beside a tether: off the surfaces that the tether rests on, and in its class."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from netsp.base.arrays import Bools, Floats
+from netsp.base.compiled.interpretation import interprets
+from netsp.base.compiled.kernel import kernel
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.sampling import Field, lowest_along, lowest_along_each
+
+CLIMB, STENCIL, SWEEPS = 1 / 6, 1 / 3, 80
+"""Of the clearance, what a point goes at once, and over what the distance's rise is taken; and how
+often."""
+
+LEAST = 0.05
+"""Metres of clearance that steps are as long as for where there is less, or none."""
+
+GAIN = 0.02
+"""A step that brings less than this share of its length is not taken."""
+
+
+def beside(field: DistanceField, line: Floats, clearance: float) -> Floats:
+    """A line moved off surfaces, as far as its class allows.
+
+    All points climb the distance to the surfaces in small steps, a deformation in free water: a
+    step after which neighbours no longer see one another is taken back. The rise is taken over a
+    stencil, so that in the crotch between two solids points climb along its middle, out to where
+    there is room, instead of leaping to one side.
+
+    Parameters
+    ----------
+    field : DistanceField
+        The scene.
+    line : ndarray, shape (n, 3)
+        Free or on surfaces, its points no farther apart than what it must not pass is wide, metres.
+    clearance : float
+        Distance to be kept where there is room, metres.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        The path, metres; its ends are those of the line.
+    """
+    path, scale = np.array(line, dtype=float), max(clearance, LEAST)
+    arms = STENCIL * scale * np.vstack([np.eye(3), -np.eye(3)])
+    for _ in range(SWEEPS):
+        d = field.distance(path)
+        short = d < clearance - 1e-6
+        short[[0, -1]] = False
+        if not short.any():
+            break
+        around = field.distance((path[short, None] + arms).reshape(-1, 3)).reshape(-1, 6)
+        rise = around[:, :3] - around[:, 3:]
+        rise /= np.maximum(np.linalg.norm(rise, axis=1), 1e-12)[:, None]
+        step = np.minimum(CLIMB * scale, clearance - d[short])
+        moved = path.copy()
+        moved[short] += step[:, None] * rise
+        better = field.distance(moved[short]) >= d[short] + GAIN * step
+        moved[short] = np.where(better[:, None], moved[short], path[short])
+        blocked = ~sees(field.arrays, moved[:-1], moved[1:], 1e-2)
+        blocked &= sees(field.arrays, path[:-1], path[1:], 1e-2)
+        back = np.zeros(len(path), dtype=bool)
+        back[:-1] |= blocked
+        back[1:] |= blocked
+        moved[back] = path[back]
+        if np.array_equal(moved, path):
+            break
+        path = moved
+    return path
+
+
+@kernel
+def sees(field: Field, a: Floats, b: Floats, depth: float) -> Bools:
+    """Which of the points a[k] and b[k] (n, 3) see one another, but for `depth`."""
+    out = np.empty(len(a), dtype=np.bool_)
+    for k in range(len(a)):
+        low, _ = lowest_along(
+            field, a[k, 0], a[k, 1], a[k, 2], b[k, 0], b[k, 1], b[k, 2], 0.5 * depth
+        )  # fmt: skip
+        out[k] = low > -depth
+    return out
+
+
+@interprets(sees)
+def _sees_in_numpy(field: Field, a: Floats, b: Floats, depth: float) -> Bools:
+    """Vectorise `sees` over all points."""
+    return np.asarray(lowest_along_each(field, a, b, 0.5 * depth) > -depth)

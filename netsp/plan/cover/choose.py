@@ -1,0 +1,231 @@
+"""The fewest viewpoints that see a share of the surface: a set cover, in part and weighted.
+
+Greedy first: the viewpoint that shows most of what is not seen yet (within a factor of 1 + ln n of
+the fewest; Chvátal 1979, for part of it Slavík 1997). Then an integer program, whose relaxation
+gives a bound on every choice among these viewpoints:
+
+    minimise   sum of x_c
+    subject to y_p <= sum of x_c over the viewpoints c that see patch p,
+               sum of area_p y_p >= share of what any of them sees, 0 <= y <= 1, x in {0, 1}.
+
+Patches that the same viewpoints see count as one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from netsp.base.arrays import Bools, ComparesArrays, Floats, Ints
+from netsp.base.clock import Clock
+
+LARGEST = 4_000_000
+"""Entries of the matrix that the integer program is given; of more there is no bound but the
+simplest."""
+
+
+@dataclass(frozen=True, eq=False)
+class Choice(ComparesArrays):
+    """Viewpoints that were chosen.
+
+    Parameters
+    ----------
+    chosen : ndarray of int
+        Their numbers, ascending.
+    bound : int
+        No choice that sees as much has fewer.
+    """
+
+    chosen: Ints
+    bound: int
+
+
+def choose(sees: Bools, areas: Floats, share: float, clock: Clock) -> Choice:
+    """Choose viewpoints.
+
+    Parameters
+    ----------
+    sees : ndarray of bool, shape (n, m)
+        Which patches are seen from which viewpoint.
+    areas : ndarray, shape (m,)
+        Of the patches.
+    share : float
+        Of what any of them sees, by area.
+    clock : Clock
+        When it is up, the integer program ends with what it has.
+
+    Returns
+    -------
+    Choice
+        As few as were found.
+    """
+    matrix, weights = merged(sees, areas)
+    needed = share * float(weights.sum())
+    taken = pruned(matrix, weights, greedy(matrix, weights, needed), needed)
+    bound = simple_bound(matrix, weights, needed)
+    if matrix.sum() <= LARGEST and not clock.up and bound < len(taken):
+        better, proven = by_program(matrix, weights, needed, clock)
+        bound = max(bound, proven)
+        if better is not None and len(better) < len(taken):
+            taken = pruned(matrix, weights, better, needed)
+    return Choice(np.sort(taken), min(bound, len(taken)))
+
+
+def merged(sees: Bools, areas: Floats) -> tuple[Bools, Floats]:
+    """Patches that the same viewpoints see as one; those that none sees are left out.
+
+    Parameters
+    ----------
+    sees : ndarray of bool, shape (n, m)
+        Which patches are seen from which viewpoint.
+    areas : ndarray, shape (m,)
+        Of the patches.
+
+    Returns
+    -------
+    matrix : ndarray of bool, shape (n, k)
+        Which of these are seen from which viewpoint.
+    weights : ndarray, shape (k,)
+        Their areas.
+    """
+    some = sees.any(axis=0) & (areas > 0.0)
+    packed = np.packbits(sees[:, some], axis=0)
+    _, first, which = np.unique(packed, axis=1, return_index=True, return_inverse=True)
+    weights: Floats = np.bincount(which.ravel(), areas[some], len(first)).astype(float)
+    return sees[:, some][:, first], weights
+
+
+def greedy(matrix: Bools, weights: Floats, needed: float) -> Ints:
+    """The viewpoint that shows most of what is not seen yet, again and again.
+
+    Parameters
+    ----------
+    matrix : ndarray of bool, shape (n, k)
+        Which patches are seen from which viewpoint.
+    weights : ndarray, shape (k,)
+        Areas.
+    needed : float
+        That are to be seen.
+
+    Returns
+    -------
+    ndarray of int
+        Viewpoints.
+    """
+    left, seen, taken = weights.copy(), 0.0, []
+    numbers = matrix.astype(float)
+    while seen < needed * (1.0 - 1e-12):
+        gains = numbers @ left
+        k = int(gains.argmax())
+        if gains[k] <= 0.0:
+            break
+        taken.append(k)
+        seen += float(gains[k])
+        left[matrix[k]] = 0.0
+    return np.array(taken, dtype=np.int64)
+
+
+def pruned(matrix: Bools, weights: Floats, taken: Ints, needed: float) -> Ints:
+    """Without those that are not needed beside the others.
+
+    Parameters
+    ----------
+    matrix : ndarray of bool, shape (n, k)
+        Which patches are seen from which viewpoint.
+    weights : ndarray, shape (k,)
+        Areas.
+    taken : ndarray of int
+        Viewpoints.
+    needed : float
+        Area that is to be seen.
+
+    Returns
+    -------
+    ndarray of int
+        Viewpoints.
+    """
+    kept = list(taken)
+    times = matrix[kept].sum(axis=0)
+    seen = float(weights[times > 0].sum())
+    while kept:
+        alone = [float(weights[matrix[k] & (times == 1)].sum()) for k in kept]
+        least = int(np.argmin(alone))
+        if seen - alone[least] < needed * (1.0 - 1e-12):
+            break
+        seen -= alone[least]
+        times = times - matrix[kept.pop(least)]
+    return np.array(kept, dtype=np.int64)
+
+
+def simple_bound(matrix: Bools, weights: Floats, needed: float) -> int:
+    """So many of those that show most, each for itself, would be needed if none showed twice.
+
+    Parameters
+    ----------
+    matrix : ndarray of bool, shape (n, k)
+        Which patches are seen from which viewpoint.
+    weights : ndarray, shape (k,)
+        Areas.
+    needed : float
+        Area that is to be seen.
+
+    Returns
+    -------
+    int
+        A number of viewpoints.
+    """
+    if needed <= 0.0:
+        return 0
+    shown = np.sort(matrix.astype(float) @ weights)[::-1]
+    return int(np.searchsorted(np.cumsum(shown), needed * (1.0 - 1e-9))) + 1
+
+
+def by_program(
+    matrix: Bools, weights: Floats, needed: float, clock: Clock
+) -> tuple[Ints | None, int]:
+    """The integer program, as far as time allows.
+
+    Parameters
+    ----------
+    matrix : ndarray of bool, shape (n, k)
+        Which patches are seen from which viewpoint.
+    weights : ndarray, shape (k,)
+        Areas.
+    needed : float
+        That are to be seen.
+    clock : Clock
+        When it is up, the program ends.
+
+    Returns
+    -------
+    chosen : ndarray of int or None
+        Viewpoints; None if there was no time for any.
+    bound : int
+        No choice has fewer.
+    """
+    from scipy import sparse
+    from scipy.optimize import Bounds, LinearConstraint, milp
+
+    n, k = matrix.shape
+    links = sparse.hstack([sparse.csr_matrix(matrix.T.astype(float)), -sparse.eye(k)])
+    area = sparse.hstack([sparse.csr_matrix((1, n)), sparse.csr_matrix(weights / needed)])
+    options = {} if clock.limit is None else {"time_limit": max(clock.left, 0.1)}
+    found = milp(
+        np.r_[np.ones(n), np.zeros(k)],
+        integrality=np.r_[np.ones(n), np.zeros(k)],
+        bounds=Bounds(0.0, 1.0),
+        constraints=[
+            LinearConstraint(links, 0.0, np.inf),
+            LinearConstraint(area, 1.0 - 1e-9, np.inf),
+        ],
+        options=options,
+    )
+    proven = getattr(found, "mip_dual_bound", None)
+    bound = 0 if proven is None or not math.isfinite(proven) else math.ceil(proven - 1e-6)
+    if found.x is None:
+        return None, bound
+    chosen = np.flatnonzero(found.x[:n] > 0.5)
+    seen = float(weights[matrix[chosen].any(axis=0)].sum())
+    return (chosen if seen >= needed * (1.0 - 1e-6) else None), bound

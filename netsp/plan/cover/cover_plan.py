@@ -1,0 +1,308 @@
+"""From a scene to a mission: few waypoints with headings that see what can be seen of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from netsp.base.arrays import Bools, ComparesArrays, Floats
+from netsp.base.clock import TimeLimit, until_interrupt
+from netsp.base.errors import InputError
+from netsp.base.geometry import polylines
+from netsp.model.field_types import Point3, checked_argument
+from netsp.online.coverage import Patches, patches_of
+from netsp.online.equipment import Camera
+from netsp.online.mission import Mission, MissionWaypoint, Viewpoint
+from netsp.online.mission_limits import check_bounds
+from netsp.online.mission_run import grid_of
+from netsp.online.paths.tree import Grid, ShortestTree, taut
+from netsp.plan.cover.choose import Choice, choose
+from netsp.plan.cover.viewpoint_swaps import alternatives
+from netsp.plan.cover.viewpoints import Viewer, Viewpoints, coarser, viewpoints_of
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.scene import Scene
+from netsp.world.scene.surfaces import extent
+
+LOOKING = 0.6
+"""Of the time left, what the search for viewpoints may take; the rest is for choosing."""
+
+LONGER, MORE = 1.1, 0.2
+"""A tether whose length is not given is so many times the longest of the shortest tethers to the
+waypoints, and so many metres more."""
+
+ENDLESS = 1e6
+"""Metres of tether, until it is known how many are needed."""
+
+SHARE = 0.99
+"""Of the tether that may be needed to stand at a viewpoint, as planners allow."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cover(ComparesArrays):
+    """Waypoints that see a structure.
+
+    Parameters
+    ----------
+    mission : Mission
+        With the waypoints and the camera.
+    viewpoints : Viewpoints
+        Those that were chosen.
+    patches : Patches
+        What is to be seen.
+    candidates : int
+        How many viewpoints there were to choose from.
+    bound : int
+        No choice among these that sees as much has fewer.
+    seen : float
+        Share of the whole surface that is seen from the waypoints.
+    visible : float
+        Share of it that is seen from any of the candidates.
+    visible_patches : ndarray of bool, shape (m,)
+        Patches that are seen from any of the candidates.
+    """
+
+    mission: Mission
+    viewpoints: Viewpoints
+    patches: Patches
+    candidates: int
+    bound: int
+    seen: float
+    visible: float
+    visible_patches: Bools
+
+    def __repr__(self) -> str:
+        """In a line."""
+        return (
+            f"<Cover: {len(self.viewpoints)} viewpoints (no fewer than {self.bound}) see "
+            f"{100 * self.seen:.1f} % of the surface, all {self.candidates} see "
+            f"{100 * self.visible:.1f} %>"
+        )
+
+
+def cover(
+    scene: Scene,
+    *,
+    anchor: Point3,
+    start: Point3 | None = None,
+    camera: Camera | None = None,
+    standoff: float | None = None,
+    tether_length: float | None = None,
+    clearance: float = 0.3,
+    share: float = 0.99,
+    incidence: float = 75.0,
+    farthest: float | None = None,
+    inspect: tuple[str, ...] | None = None,
+    time_limit: TimeLimit = 60.0,
+    seed: int = 0,
+    on_progress: Callable[[str], None] | None = None,
+) -> Cover:
+    """Place waypoints around the solids, meshes and clouds of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is to be seen.
+    anchor : (x, y, z)
+        Where the tether is fixed, metres.
+    start : (x, y, z), optional
+        Where the robot starts; the anchor by default, metres.
+    camera : Camera, optional
+        That it is seen with.
+    standoff : float, optional
+        Metres from the surface; half the camera's range by default.
+    tether_length : float, optional
+        Metres; waypoints need no more. By default a tenth more than they need.
+    clearance : float
+        Metres that the robot keeps from all solids.
+    share : float
+        Of the surface that can be seen at all, by area.
+    incidence : float
+        Most that a line of sight is off the normal, degrees.
+    farthest : float, optional
+        Metres that a patch may be away; the camera's range by default.
+    inspect : tuple of str, optional
+        Names of the solids to be seen; all but half spaces and the sea floor by default.
+    time_limit : float or Clock, optional
+        Seconds; when they are up, the best by then is returned.
+    seed : int
+        Of all that is random.
+    on_progress : callable, optional
+        Called with a line of text now and then.
+
+    Returns
+    -------
+    Cover
+        The waypoints, as a mission for `netsp.plan.space.mission_solver.solve_mission`, whose order
+        says nothing.
+
+    Raises
+    ------
+    InputError
+        Values out of their ranges; an anchor in a solid; nothing that can be seen.
+    """
+    camera = camera or Camera()
+    tell = on_progress or (lambda _: None)
+    with until_interrupt(time_limit) as clock:
+        standoff = 0.5 * camera.range if standoff is None else standoff
+        farthest = camera.range if farthest is None else min(farthest, camera.range)
+        _check(standoff, farthest, clearance, share, incidence, tether_length)
+        check_bounds(
+            Mission(
+                scene="-", anchor=anchor, start=start or anchor, tether_length=ENDLESS,
+                waypoints=(MissionWaypoint(position=anchor),),
+            ),
+            scene,
+        )  # fmt: skip
+        field = clock.bounded("measuring distances in the scene", scene.field)
+        base = field.free_point(anchor, "anchor")
+        first = base if start is None else field.free_point(start, "start")
+        tell("surface of the scene")
+        fine = clock.bounded(
+            "covering the surface with patches",
+            lambda: patches_of(scene, field, camera.patch, np.array([anchor]), inspect),
+        )
+        patches = coarser(fine, camera.patch)
+        mission = Mission(
+            scene="-", name=scene.name, anchor=anchor, start=tuple(first.tolist()),
+            waypoints=(MissionWaypoint(position=anchor),), clearance=clearance, camera=camera,
+            inspect=inspect, tether_length=tether_length or ENDLESS,
+        )  # fmt: skip
+        reach = clock.bounded(
+            "finding where the robot gets to",
+            lambda: _Reach.of(mission, scene, field, patches, standoff),
+        )
+        viewer = Viewer(
+            field, patches, camera, standoff, clearance, math.radians(incidence), farthest,
+            reach.allowed,
+        )  # fmt: skip
+        looking = clock.part(LOOKING)
+        found = viewpoints_of(viewer, np.random.default_rng(seed), looking, tell)
+        if not len(found) or not found.sees.any():
+            raise InputError(
+                "inspect: nothing of the surface can be seen from where the robot gets to; "
+                "expected a shorter stand-off or clearance, or a longer tether"
+            )
+        tell(f"choosing among {len(found)} viewpoints")
+        choice = choose(found.sees, patches.areas, share, clock)
+        return _made(mission, scene, patches, found, choice, reach, share)
+
+
+def _check(
+    standoff: float, farthest: float, clearance: float, share: float, incidence: float,
+    tether_length: float | None,
+) -> None:  # fmt: skip
+    positive = {"standoff": standoff, "farthest": farthest, "share": share, "incidence": incidence}
+    if tether_length is not None:
+        positive["tether_length"] = tether_length
+    for name, value in positive.items():
+        checked_argument(name, value, 0.0)
+        if not value > 0.0:
+            raise InputError(f"{name}: expected more than 0, got {value:g}")
+    checked_argument("clearance", clearance, 0.0)
+    if share > 1.0:
+        raise InputError(f"share: expected a share up to 1, got {share:g}")
+    if incidence >= 90.0:
+        raise InputError(f"incidence: expected less than 90 degrees, got {incidence:g}")
+    if standoff < clearance:
+        raise InputError(
+            f"standoff: {standoff:g} is nearer than the clearance {clearance:g}; expected no less"
+        )
+    if standoff > farthest:
+        raise InputError(
+            f"standoff: {standoff:g} is farther than the camera sees, {farthest:g}; expected no "
+            "more"
+        )
+
+
+@dataclass
+class _Reach:
+    """Where the robot gets to on its tether."""
+
+    mission: Mission
+    field: DistanceField
+    grid: Grid
+    bounds: tuple[Floats, Floats] | None
+
+    @classmethod
+    def of(
+        cls, mission: Mission, scene: Scene, field: DistanceField, patches: Patches, standoff: float
+    ) -> _Reach:
+        """With a grid about everything that viewpoints may be at."""
+        low, high = extent(scene, np.vstack([patches.centres, mission.every_place]))
+        room = 2.0 * standoff
+        corners = np.array([low - room, high + room])
+        there = mission.model_copy(
+            update={
+                "waypoints": tuple(
+                    MissionWaypoint(position=(x, y, z)) for x, y, z in corners.tolist()
+                )
+            }
+        )
+        bounds = None
+        if scene.bounds is not None:
+            bounds = np.array(scene.bounds[:3]), np.array(scene.bounds[3:])
+        return cls(mission, field, grid_of(there, scene, field), bounds)
+
+    def allowed(self, places: Floats) -> Bools:
+        """Which of some places (n, 3) the robot gets to, within the bounds."""
+        good = np.ones(len(places), dtype=bool)
+        if self.bounds is not None:
+            good &= (places >= self.bounds[0]).all(axis=1) & (places <= self.bounds[1]).all(axis=1)
+        anchor = np.array(self.mission.anchor)
+        limit = SHARE * self.mission.tether_length
+        good &= np.linalg.norm(places - anchor, axis=1) <= limit
+        inside = np.flatnonzero(good)
+        if len(inside):
+            lengths = self.tethers(places[inside])
+            good[inside] = lengths <= limit
+        return good
+
+    def tethers(self, places: Floats) -> Floats:
+        """(n,) the shortest tethers to places (n, 3), metres; infinite where there is none."""
+        anchor = np.array(self.mission.anchor)
+        tree = ShortestTree(self.grid, anchor, places)
+        out = np.full(len(places), np.inf)
+        for k in range(len(places)):
+            path = tree.path(k)
+            if path is not None:
+                out[k] = polylines.length(path)
+                if out[k] > SHARE * self.mission.tether_length:
+                    out[k] = polylines.length(taut(self.field, path, 0.0, self.mission.delta))
+        return out
+
+
+def _made(
+    mission: Mission, scene: Scene, patches: Patches, found: Viewpoints, choice: Choice,
+    reach: _Reach, share: float,
+) -> Cover:  # fmt: skip
+    chosen = found.only(choice.chosen)
+    length = mission.tether_length
+    if length == ENDLESS:
+        longest = float(reach.tethers(chosen.places).max())
+        length = round(LONGER * longest + MORE, 2)
+    needed = share * float(patches.areas[found.sees.any(axis=0)].sum())
+    others_of = alternatives(found, choice.chosen, patches.areas, needed)
+    own = [_viewpoint(found, k) for k in choice.chosen]
+    waypoints = tuple(
+        MissionWaypoint(
+            position=v.position, heading=v.heading,
+            alternatives=tuple(_viewpoint(found, k) for k in others),
+        )
+        for v, others in zip(own, others_of, strict=True)
+    )  # fmt: skip
+    areas = patches.areas
+    visible: Bools = np.asarray(found.sees.any(axis=0))
+    return Cover(
+        mission.model_copy(update={"waypoints": waypoints, "tether_length": length}), chosen,
+        patches, len(found), choice.bound,
+        float(areas[chosen.sees.any(axis=0)].sum() / areas.sum()),
+        float(areas[visible].sum() / areas.sum()), visible,
+    )  # fmt: skip
+
+
+def _viewpoint(found: Viewpoints, k: int) -> Viewpoint:
+    x, y, z = found.places[k].round(4).tolist()
+    return Viewpoint(position=(x, y, z), heading=round(math.degrees(found.headings[k]), 1))

@@ -1,0 +1,68 @@
+"""Viewpoints that may take the place of those chosen, one for one, in any combination."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from netsp.base.arrays import Floats, Ints
+from netsp.plan.cover.viewpoints import Viewpoints
+
+MOST, MOST_PLACES = 2, 150
+"""Alternatives of a viewpoint; and places in all, for a tour chooses among them."""
+
+
+def alternatives(found: Viewpoints, chosen: Ints, areas: Floats, needed: float) -> list[list[int]]:
+    """Alternatives of each chosen viewpoint.
+
+    Every patch that is seen gets one owner among the chosen. Who takes a viewpoint's place loses
+    what that owns and itself does not see; whichever are taken, no more is lost than is seen beyond
+    what is needed. Only places nearer to some other chosen viewpoint count, for they make tours
+    shorter.
+
+    Parameters
+    ----------
+    found : Viewpoints
+        All candidates.
+    chosen : ndarray of int
+        Numbers of those chosen.
+    areas : ndarray, shape (m,)
+        Of the patches.
+    needed : float
+        Area that is to be seen.
+
+    Returns
+    -------
+    list of list of int
+        Numbers of the alternatives of each.
+    """
+    out: list[list[int]] = [[] for _ in chosen]
+    most = min(MOST, MOST_PLACES // max(len(chosen), 1) - 1)
+    if most <= 0 or len(chosen) < 2:
+        return out
+    sees = found.sees[chosen]
+    spare = float(areas[sees.any(axis=0)].sum()) - needed
+    owner = _owners(sees)
+    pairs = []
+    for k, own in enumerate(chosen):
+        others = found.places[np.delete(chosen, k)]
+        apart = np.linalg.norm(found.places[:, None] - others[None], axis=2).min(axis=1)
+        lost = ~found.sees[:, owner == k] @ areas[owner == k]
+        able = np.flatnonzero((lost <= spare) & (apart < apart[own]))
+        pairs += [(float(lost[c]), float(apart[c]), k, int(c)) for c in able if c not in chosen]
+    given = np.zeros(len(chosen))
+    for lost, _, k, c in sorted(pairs):
+        if len(out[k]) < most and lost - given[k] <= spare:
+            spare -= max(0.0, lost - given[k])
+            given[k] = max(given[k], lost)
+            out[k].append(c)
+    return out
+
+
+def _owners(sees: np.ndarray) -> Ints:
+    """(m,) one of the viewpoints that see a patch, -1 for none. Who must see much anyway takes the
+    rest of what it sees, so that others are freer."""
+    alone = sees & (sees.sum(axis=0) == 1)
+    owner = np.full(sees.shape[1], -1)
+    for k in np.argsort(-alone.sum(axis=1), kind="stable"):
+        owner[sees[k] & (owner < 0)] = k
+    return owner

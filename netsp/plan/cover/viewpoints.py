@@ -1,0 +1,316 @@
+"""Places to look at a structure from, and what is seen from each.
+
+A viewpoint is a place and a heading; how far the camera is tilted follows as on a flight, where it
+has the nearest patch in the middle as far as its tilt allows (`netsp.online.coverage`), so that
+what is planned is what `netsp simulate` counts. Patches are spread evenly, and before each the
+robot stands off along the normal; where that place is taken or does not show it, at other angles
+and distances.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from netsp.base.arrays import Bools, ComparesArrays, Floats, Ints
+from netsp.base.clock import Clock
+from netsp.online.coverage import Coverage, Patches
+from netsp.online.equipment import Camera
+from netsp.world.scene.field import DistanceField
+
+SPACING = 0.25
+"""Of the width that the camera sees at the stand-off: from one patch that is stood before to the
+next."""
+
+TRIES = 24
+"""Places at other angles and distances for a patch that is not seen yet."""
+
+AT_ONCE = 100
+"""Patches not seen yet, for which places are sought together."""
+
+NEARER = 0.4
+"""Of the stand-off: as near as that the robot goes where there is no other place."""
+
+
+@dataclass(frozen=True, eq=False)
+class Viewpoints(ComparesArrays):
+    """Places to look from.
+
+    Parameters
+    ----------
+    places : ndarray, shape (n, 3)
+        Metres.
+    headings : ndarray, shape (n,)
+        Radians from the x axis towards y.
+    sees : ndarray of bool, shape (n, m)
+        Which patches are seen from each.
+    """
+
+    places: Floats
+    headings: Floats
+    sees: Bools
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def only(self, chosen: Ints | Bools) -> Viewpoints:
+        """Some of them.
+
+        Parameters
+        ----------
+        chosen : ndarray
+            Numbers, or whether.
+
+        Returns
+        -------
+        Viewpoints
+            Those.
+        """
+        return Viewpoints(self.places[chosen], self.headings[chosen], self.sees[chosen])
+
+
+@dataclass
+class Viewer:
+    """What is asked of viewpoints.
+
+    Parameters
+    ----------
+    field : DistanceField
+        The scene.
+    patches : Patches
+        What is to be seen.
+    camera : Camera
+        That it is seen with.
+    standoff : float
+        Metres from the surface.
+    clearance : float
+        Metres that the robot keeps from all solids.
+    incidence : float
+        Most that a line of sight is off the normal, radians.
+    farthest : float
+        Metres that a patch may be away.
+    allowed : callable
+        Which of some places (n, 3) the robot gets to.
+    """
+
+    field: DistanceField
+    patches: Patches
+    camera: Camera
+    standoff: float
+    clearance: float
+    incidence: float
+    farthest: float
+    allowed: Callable[[Floats], Bools]
+
+    def seen_from(self, place: Floats, heading: float) -> Bools:
+        """Which patches are seen.
+
+        Parameters
+        ----------
+        place : ndarray, shape (3,)
+            Metres.
+        heading : float
+            Radians.
+
+        Returns
+        -------
+        ndarray of bool, shape (m,)
+            Whether each is.
+        """
+        patches = self.patches
+        look = Coverage(patches, self.field, self.camera)
+        look.look(place, heading)
+        there = np.flatnonzero(look.seen)
+        sight = place - patches.centres[there]
+        far = np.linalg.norm(sight, axis=1)
+        square = np.einsum("ij,ij->i", sight, patches.normals[there])
+        good = (far <= self.farthest) & (square >= math.cos(self.incidence) * far - 1e-12)
+        seen = np.zeros(len(patches.areas), dtype=bool)
+        seen[there[good]] = True
+        if len(patches.sides):
+            # either side of a sheet shows it, from wherever it is looked at
+            a, b = patches.sides.T
+            seen[a] = seen[b] = seen[a] | seen[b]
+        return seen
+
+    def before(self, targets: Ints, offsets: Floats, far: Floats) -> tuple[Floats, Ints]:
+        """Free places before patches.
+
+        Parameters
+        ----------
+        targets : ndarray of int, shape (n,)
+            The patches.
+        offsets : ndarray, shape (n, 3)
+            Added to their normals: other angles.
+        far : ndarray, shape (n,)
+            How far from each, metres.
+
+        Returns
+        -------
+        places : ndarray, shape (k, 3)
+            Metres.
+        targets : ndarray of int, shape (k,)
+            Of those, the patches.
+        """
+        toward = self.patches.normals[targets] + offsets
+        toward /= np.linalg.norm(toward, axis=1)[:, None]
+        places = self.patches.centres[targets] + far[:, None] * toward
+        good = self.field.distance(places) >= self.clearance
+        places, targets = places[good], targets[good]
+        if len(places):
+            good = self.allowed(places)
+            places, targets = places[good], targets[good]
+        return places, targets
+
+    def looks(self, places: Floats, targets: Ints) -> Viewpoints:
+        """Viewpoints at places, looking at patches.
+
+        Parameters
+        ----------
+        places : ndarray, shape (n, 3)
+            Metres.
+        targets : ndarray of int, shape (n,)
+            The patches.
+
+        Returns
+        -------
+        Viewpoints
+            One of each.
+        """
+        toward = self.patches.centres[targets] - places
+        headings = np.arctan2(toward[:, 1], toward[:, 0])
+        level = np.hypot(toward[:, 0], toward[:, 1]) > 0.2 * np.linalg.norm(toward, axis=1)
+        headings = np.where(level, headings, 0.0)
+        sees = [self.seen_from(p, float(h)) for p, h in zip(places, headings, strict=True)]
+        return Viewpoints(
+            places,
+            headings,
+            np.array(sees, dtype=bool).reshape(len(places), len(self.patches.areas)),
+        )
+
+
+def viewpoints_of(
+    viewer: Viewer, rng: np.random.Generator, clock: Clock, tell: Callable[[str], None]
+) -> Viewpoints:
+    """Places before the whole structure.
+
+    Parameters
+    ----------
+    viewer : Viewer
+        What is asked of them.
+    rng : numpy.random.Generator
+        For other angles and distances.
+    clock : Clock
+        When it is up, those found by then are returned.
+    tell : callable
+        Called with a line of text now and then.
+
+    Returns
+    -------
+    Viewpoints
+        Many more than are needed; patches that none of them sees count as hidden.
+    """
+    patches, camera = viewer.patches, viewer.camera
+    width = 2.0 * viewer.standoff * math.tan(math.radians(0.5 * camera.field_of_view))
+    targets = spread(patches.centres, SPACING * width)
+    tell(f"looking at the structure from before {len(targets)} of {len(patches.areas)} patches")
+    straight = np.zeros((len(targets), 3))
+    places, before = viewer.before(targets, straight, np.full(len(targets), viewer.standoff))
+    found = [viewer.looks(places, before)]
+    seen: Bools = np.asarray(found[0].sees.any(axis=0))
+    hidden = np.flatnonzero(~seen)
+    rng.shuffle(hidden)
+    # one after the other, for a place that shows one often shows its neighbours
+    for part in np.array_split(hidden, max(1, math.ceil(len(hidden) / AT_ONCE))):
+        left = part[~seen[part]]
+        if clock.up or not len(left):
+            continue
+        tell(f"looking for what is hidden, {int((~seen).sum())} patches left")
+        for place, patch in zip(*viewer.before(*_around(viewer, left, rng)), strict=True):
+            if seen[patch] or clock.up:
+                continue
+            view = viewer.looks(place[None], np.array([patch]))
+            if view.sees[0, patch]:
+                found.append(view)
+                seen |= view.sees[0]
+    return Viewpoints(
+        np.vstack([f.places for f in found]),
+        np.concatenate([f.headings for f in found]),
+        np.vstack([f.sees for f in found]),
+    )
+
+
+def _around(viewer: Viewer, patches: Ints, rng: np.random.Generator) -> tuple[Ints, Floats, Floats]:
+    """For each patch, other angles and distances to look at it from; straight first."""
+    many = np.repeat(patches, TRIES)
+    off = rng.normal(size=(len(many), 3)) * rng.uniform(0.0, 1.2, len(many))[:, None]
+    least, most = NEARER * viewer.standoff, min(viewer.farthest, 2.0 * viewer.standoff)
+    far = rng.uniform(min(least, most), most, len(many))
+    far[np.arange(len(many)) % TRIES < TRIES // 2] = viewer.standoff
+    off[::TRIES] = 0.0
+    return many, off, far
+
+
+def coarser(patches: Patches, size: float) -> Patches:
+    """Patches of one cube of space that face the same of six ways as one: tubes are drawn by
+    slivers, of which a view shows hundreds. Its place is that of the patch in their middle.
+
+    Parameters
+    ----------
+    patches : Patches
+        Of a scene.
+    size : float
+        Of the cubes, metres.
+
+    Returns
+    -------
+    Patches
+        Of the same area.
+    """
+    count = len(patches.areas)
+    normals = patches.normals
+    axis = np.abs(normals).argmax(axis=1)
+    facing = 2 * axis + (normals[np.arange(count), axis] > 0.0)
+    cells = np.floor(patches.centres / size).astype(np.int64)
+    _, which = np.unique(np.column_stack([cells, facing]), axis=0, return_inverse=True)
+    which = which.ravel()
+    size_of = np.bincount(which)
+    middle = np.column_stack([np.bincount(which, c) for c in patches.centres.T]) / size_of[:, None]
+    off = np.linalg.norm(patches.centres - middle[which], axis=1)
+    order = np.lexsort((off, which))
+    first = order[np.r_[True, np.diff(which[order]) > 0]]
+    areas: Floats = np.bincount(which, patches.areas).astype(float)
+    sides = patches.sides
+    if len(sides):
+        sides = np.unique(which[sides], axis=0)
+        sides = sides[sides[:, 0] != sides[:, 1]]
+    return Patches(patches.centres[first], normals[first], areas, sides)
+
+
+def spread(points: Floats, apart: float) -> Ints:
+    """Points so far apart that balls about them hold all others: each is the one farthest from
+    those taken before (Gonzalez 1985).
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        The points.
+    apart : float
+        Radius of the balls.
+
+    Returns
+    -------
+    ndarray of int, shape (k,)
+        Their numbers.
+    """
+    taken = [0]
+    far = np.linalg.norm(points - points[0], axis=1)
+    while True:
+        k = int(far.argmax())
+        if far[k] <= apart:
+            return np.array(taken)
+        taken.append(k)
+        far = np.minimum(far, np.linalg.norm(points - points[k], axis=1))

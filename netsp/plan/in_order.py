@@ -1,0 +1,66 @@
+"""The goals in the order given: only their classes are chosen, by a shortest path through layers.
+
+A layer holds the classes of one goal; legs join neighbouring layers only, and only those legs are
+measured. What it finds is the shortest tour of that order, with proof.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from netsp.base.clock import Clock
+from netsp.base.errors import InputError
+from netsp.gtsp.search.layers import Instance, best_classes
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.result import OnProgress, Progress, Result
+from netsp.model.arrangement import keeps
+from netsp.model.bound_scope import LowerBound
+from netsp.model.solution import Status
+
+
+def solve_in_order(graph: TravelGraph, clock: Clock, on_progress: OnProgress | None) -> Result:
+    """The shortest tour that visits the goals in the order of their numbers.
+
+    Parameters
+    ----------
+    graph : TravelGraph
+        From a problem without a state.
+    clock : Clock
+        Of the run.
+    on_progress : callable, optional
+        Called once.
+
+    Returns
+    -------
+    Result
+        Optimal among the tours of that order.
+
+    Raises
+    ------
+    InputError
+        The tour starts at a state, or the order breaks the precedences.
+    LimitReachedError
+        The time was up before the legs were measured.
+    """
+    if graph.start is not None:
+        raise InputError("keep_order: a tour from a state is planned afresh; expected none")
+    if not keeps(range(1, graph.goal_count + 1), graph.before):
+        raise InputError(
+            "keep_order: the order of the file breaks an 'after' of its goals; expected one that "
+            "keeps them all"
+        )
+    every = np.arange(len(graph))
+    ahead = graph.cluster[:, None] - graph.cluster[None, :]
+    last = graph.goal_count
+    asked = (np.abs(ahead) == 1) | (np.abs(ahead) == last)
+    with graph.on_clock(clock):
+        instance = Instance(graph.cluster, graph.costs_among(every, asked))
+    order = np.arange(1, last + 1, dtype=np.int64)
+    length, tour = best_classes(order, instance.start, instance.costs)
+    found = instance.original(tour)
+    bound = LowerBound(float(length), graph.scope.in_order)
+    if on_progress is not None:
+        on_progress(Progress(clock.elapsed, "in order", bound.length, bound, tour=found))
+    return Result(
+        found, bound.length, bound.length, Status.OPTIMAL, lower_bound_of=bound.scope
+    )  # fmt: skip

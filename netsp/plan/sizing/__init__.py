@@ -1,0 +1,17 @@
+"""What is asked about a tour before it is flown: how long a tether, where to stand, what margin."""
+
+from netsp.plan.sizing.base_placement import BaseSearch, Candidate, best_base
+from netsp.plan.sizing.tether_margins import Margins, StopMargin, margins
+from netsp.plan.sizing.tether_sizing import Step, TetherCurve, tether_curve
+
+__all__ = [
+    "BaseSearch",
+    "Candidate",
+    "Margins",
+    "Step",
+    "StopMargin",
+    "TetherCurve",
+    "best_base",
+    "margins",
+    "tether_curve",
+]

@@ -1,0 +1,466 @@
+"""Where to stand: the base, among candidates, from which the tour is shortest, with proof.
+
+For every candidate the shortest sufficient tether is the length of the shortest path to the goal
+farthest from it, and those lengths, for all candidates and goals, come from one graph of tangents.
+So does a bound on the tour: the travelling salesperson's over the shortest paths between goals and
+candidate in any class. Candidates are solved in the order of their bounds, until the best tour is
+no longer than the bound of the next: the others need no solve to be proven worse.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.arrays import Floats
+from netsp.base.clock import Clock, TimeLimit, until_interrupt
+from netsp.base.data_frames import frame_of
+from netsp.base.errors import InfeasibleError, InputError, LimitReachedError
+from netsp.base.files import cell, write_text
+from netsp.base.reprs import Drawn
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.mip.goal_relaxation import ROUNDING
+from netsp.model.bound_scope import OPTIMALITY_TOLERANCE, LowerBound, Scope, strongest
+from netsp.model.problem import Problem
+from netsp.model.solution import Solution, Status
+from netsp.plan.solve_problem import solve, solve_graph
+from netsp.roadmap.outline import build_outline
+from netsp.roadmap.shortest import ContactGraph
+
+if TYPE_CHECKING:
+    import pandas
+
+MOST_CANDIDATES = 10_000
+
+HAIR = 1e-9
+"""Relative rounding of distances."""
+
+HEAD = (
+    "rank", "name", "x", "y", "z", "shortest_tether", "lower_bound", "lower_bound_of",
+    "length", "status", "why",
+)  # fmt: skip
+"""Columns of a ranking."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A place for the base.
+
+    Parameters
+    ----------
+    position : tuple of float
+        (x, y, z), in the problem's units.
+    name : str
+        For people; its number where it has none.
+    shortest_tether : float
+        With less, some goal cannot be reached from here; inf where a goal is cut off.
+    lower_bound : float
+        No tour from here is shorter; inf where there is none.
+    length : float or None
+        Of the best tour found from here; None where it was not sought.
+    status : Status or None
+        What is proven of that tour; `infeasible` where there is none; None where it was not sought.
+    why : str
+        Why there is no tour from here.
+    """
+
+    position: tuple[float, float, float]
+    name: str
+    shortest_tether: float
+    lower_bound: float
+    length: float | None = None
+    status: Status | None = None
+    why: str = ""
+
+    @property
+    def possible(self) -> bool:
+        """Whether there may be a tour from here."""
+        return not self.why
+
+    @property
+    def bound(self) -> LowerBound:
+        """The lower bound, on all tours from here."""
+        return LowerBound(self.lower_bound, Scope.ALL_TOURS)
+
+
+@dataclass(frozen=True)
+class BaseSearch(Drawn):
+    """Candidates for the base, the best first.
+
+    Parameters
+    ----------
+    problem : Problem
+        With the base that it came with.
+    candidates : tuple of Candidate
+        Those with a tour by its length, then those that have a bound only, then those without.
+    solution : Solution or None
+        The tour from the best of them; None if no candidate has one.
+    proven : bool
+        Whether no other candidate has a shorter tour.
+    """
+
+    picture: ClassVar[str] = "netsp.view.pictures.sizing:draw_base_search"
+
+    problem: Problem
+    candidates: tuple[Candidate, ...]
+    solution: Solution | None
+    proven: bool
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Return the ranking as a pandas DataFrame, a column per field of `Candidate`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            The best candidate first.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        return frame_of(self.candidates)
+
+    @property
+    def best(self) -> Candidate | None:
+        """The candidate with the shortest tour."""
+        first = self.candidates[0]
+        return first if first.length is not None else None
+
+    @property
+    def best_problem(self) -> Problem | None:
+        """The problem with its base at the best candidate."""
+        return None if self.best is None else _at(self.problem, self.best.position)
+
+    def to_json(self) -> str:
+        """The ranking as JSON.
+
+        Returns
+        -------
+        str
+            Object with the candidates in a list.
+        """
+        rows = [
+            {
+                "name": c.name, "position": list(c.position),
+                "shortest_tether": _finite(c.shortest_tether),
+                "lower_bound": _finite(c.bound.length), "lower_bound_of": c.bound.scope.value,
+                "length": c.length,
+                "status": None if c.status is None else c.status.value, "why": c.why or None,
+            }
+            for c in self.candidates
+        ]  # fmt: skip
+        data = {"problem": self.problem.name, "units": self.problem.units, "proven": self.proven,
+                "candidates": rows}  # fmt: skip
+        return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+    def to_csv(self) -> str:
+        """The ranking as a table.
+
+        Returns
+        -------
+        str
+            A row for every candidate.
+        """
+        text = io.StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(HEAD)
+        for k, c in enumerate(self.candidates, 1):
+            table.writerow(
+                [k, cell(c.name), *(f"{v:.9g}" for v in c.position), f"{c.shortest_tether:.9g}",
+                 f"{c.bound.length:.9g}", c.bound.scope.value,
+                 "" if c.length is None else f"{c.length:.9g}",
+                 "" if c.status is None else c.status.value, c.why]
+            )  # fmt: skip
+        return text.getvalue()
+
+    def save(self, file: str | Path) -> None:
+        """Write the ranking: a table if the name ends in ``.csv``, else JSON.
+
+        Parameters
+        ----------
+        file : str or Path
+            The file.
+
+        Raises
+        ------
+        InputError
+            It cannot be written.
+        """
+        write_text(file, self.to_csv() if Path(file).suffix.lower() == ".csv" else self.to_json())
+
+
+def best_base(
+    problem: Problem,
+    candidates: npt.ArrayLike,
+    *,
+    names: Sequence[str | None] | None = None,
+    every: bool = False,
+    time_limit: TimeLimit = None,
+    seed: int = 0,
+    on_candidate: Callable[[Candidate, int], None] | None = None,
+) -> BaseSearch:
+    """The base, among candidates, from which the tour of a problem is shortest.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its own base does not count.
+    candidates : array_like, shape (k, 2) or (k, 3)
+        Places, in the problem's units; without z at the height of the problem's base.
+    names : sequence of str, optional
+        Of the candidates.
+    every : bool
+        Solve from every candidate, also where its bound proves it worse.
+    time_limit : float or Clock, optional
+        Seconds for all; the best known by then, or at Ctrl-C, is returned.
+    seed : int
+        Of all that is random.
+    on_candidate : callable, optional
+        Called with every candidate that was solved, and how many may still be better.
+
+    Returns
+    -------
+    BaseSearch
+        The ranking, and the best tour.
+
+    Raises
+    ------
+    InputError
+        Bad candidates, or a problem whose robot is already out.
+    """
+    if problem.state is not None:
+        raise InputError("state: a base is chosen before the robot is out; expected none")
+    places = _places(problem, candidates)
+    _check_crop(problem, places, names)
+    with until_interrupt(time_limit) as clock:
+        rated = _rated(problem, places, names, clock, seed)
+        return _solved(problem, rated, clock, every=every, seed=seed, on_candidate=on_candidate)
+
+
+def _solved(
+    problem: Problem, rated: list[Candidate], clock: Clock, *, every: bool, seed: int,
+    on_candidate: Callable[[Candidate, int], None] | None,
+) -> BaseSearch:  # fmt: skip
+    """Solve from the candidates, the most promising first, until none can be better."""
+    order = sorted(range(len(rated)), key=lambda k: (rated[k].lower_bound, k))
+    best: Solution | None = None
+    for n, k in enumerate(order):
+        candidate = rated[k]
+        if not candidate.possible:
+            break
+        if clock.up or (best is not None and not every and _worse(candidate, best)):
+            continue
+        try:
+            found = solve(_at(problem, candidate.position), time_limit=clock, seed=seed)
+        except InfeasibleError as error:
+            rated[k] = replace(candidate, status=Status.INFEASIBLE, why=str(error))
+            continue
+        except LimitReachedError:
+            continue
+        bound = strongest(candidate.bound, found.bound) or candidate.bound
+        if found.length is not None:
+            bound = bound.at_most(found.length)
+        rated[k] = replace(
+            candidate, length=found.length, lower_bound=bound.length, status=found.status
+        )
+        if found.length is not None and (
+            best is None or best.length is None or found.length < best.length
+        ):
+            best = found
+        if on_candidate is not None:
+            on_candidate(rated[k], sum(not _worse(rated[j], best) for j in order[n + 1 :]))
+    ranking = sorted(
+        rated, key=lambda c: (not c.possible, c.length is None, c.length or c.lower_bound)
+    )
+    proven = best is not None and all(
+        _worse(c, best) for c in ranking if c.possible and c.length != best.length
+    ) and ranking[0].status is Status.OPTIMAL  # fmt: skip
+    return BaseSearch(problem, tuple(ranking), best, proven)
+
+
+def _worse(candidate: Candidate, best: Solution | None) -> bool:
+    """Whether a candidate is proven to have no shorter tour."""
+    length = None if best is None else best.length
+    if length is None:
+        return not candidate.possible
+    return not candidate.possible or candidate.lower_bound >= length * (1.0 - OPTIMALITY_TOLERANCE)
+
+
+def _at(problem: Problem, position: Sequence[float]) -> Problem:
+    """The problem from another base. What its origin says holds of the old base only."""
+    data = problem.model_dump(exclude={"origin"})
+    return Problem.model_validate({**data, "base": tuple(position)})
+
+
+def _places(problem: Problem, candidates: npt.ArrayLike) -> Floats:
+    """(k, 3) finite places."""
+    try:
+        given = np.atleast_2d(np.asarray(candidates, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError("candidates: expected rows of x, y or x, y, z") from None
+    if given.ndim != 2 or given.shape[1] not in (2, 3) or not len(given):
+        raise InputError(f"candidates: expected rows of x, y or x, y, z, got shape {given.shape}")
+    if not np.isfinite(given).all():
+        raise InputError("candidates: expected finite coordinates")
+    if len(given) > MOST_CANDIDATES:
+        raise InputError(f"candidates: {len(given):,}; expected at most {MOST_CANDIDATES:,}")
+    if given.shape[1] == 2:
+        given = np.column_stack([given, np.full(len(given), problem.base[2])])
+    return given
+
+
+def _check_crop(problem: Problem, places: Floats, names: Sequence[str | None] | None) -> None:
+    """Raise an `InputError` where a tether would leave the part of the map that was imported."""
+    circle = None if problem.site is None else problem.site.cropped
+    if circle is None:
+        return
+    away = np.hypot(*(places[:, :2] - np.array(circle.center)).T)
+    beyond = np.flatnonzero(
+        away + problem.tether_length + problem.clearance > circle.radius * (1.0 + HAIR)
+    )
+    if len(beyond):
+        first = int(beyond[0])
+        called = (names[first] if names is not None else None) or f"#{first}"
+        more = f" and {len(beyond) - 1} more" if len(beyond) > 1 else ""
+        raise InputError(
+            f"candidates: {called}{more}: the tether reaches beyond the part of the map that was "
+            "imported; expected places that were given to netsp import (--candidates)"
+        )
+
+
+def _rated(
+    problem: Problem, places: Floats, names: Sequence[str | None] | None, clock: Clock, seed: int
+) -> list[Candidate]:
+    """Candidates with their shortest tethers and bounds."""
+    blocked = [_blocked(problem, p) for p in places]
+    free = [k for k, why in enumerate(blocked) if not why]
+    tethers, between = shortest_paths(problem, places[free])
+    labels = [names[k] if names is not None else None for k in range(len(places))]
+    out: list[Candidate] = []
+    for k, place in enumerate(places):
+        position = (float(place[0]), float(place[1]), float(place[2]))
+        name = labels[k] or f"#{k}"
+        if blocked[k]:
+            out.append(Candidate(position, name, np.inf, np.inf, why=blocked[k]))
+            continue
+        to = tethers[free.index(k)]
+        farthest = _hardest(problem, to)
+        shortest = float(to[farthest])
+        if shortest > problem.tether_length * (1.0 + 1e-12):
+            goal = problem.goal_label(farthest)
+            why = (
+                f"{goal} cannot be reached" if np.isinf(shortest)
+                else f"{goal} needs a tether of {shortest:.6g}"
+            )  # fmt: skip
+            out.append(Candidate(position, name, shortest, np.inf, why=why))
+            continue
+        bound = _tour_bound(problem, to, between, clock, seed)
+        out.append(Candidate(position, name, shortest, bound))
+    return out
+
+
+def _blocked(problem: Problem, place: Floats) -> str:
+    """Why no base can be at a place."""
+    if problem.bounds is not None:
+        low, high = np.array(problem.bounds[:2]), np.array(problem.bounds[2:])
+        if (place[:2] < low - problem.tolerance).any() or (
+            place[:2] > high + problem.tolerance
+        ).any():
+            return "lies outside of the bounds"
+    for i, o in enumerate(problem.obstacles):
+        if float(o.signed_distance(place[:2])) < problem.clearance - problem.tolerance:
+            return f"lies inside {problem.obstacle_label(i)}" + (
+                " grown by the clearance" if problem.clearance else ""
+            )
+    return ""
+
+
+def shortest_paths(problem: Problem, places: Floats) -> tuple[Floats, Floats]:
+    """Shortest paths in any class.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its base and tether do not count.
+    places : ndarray, shape (k, 3)
+        In the problem's units.
+
+    Returns
+    -------
+    from_places : ndarray, shape (k, goals)
+        Lengths in 3D from places to goals, infinite where there is no path.
+    between : ndarray, shape (goals, goals)
+        The same between goals.
+
+    Raises
+    ------
+    InputError
+        Places so far apart that obstacles between them are too small to be told apart.
+    """
+    goals = problem.points[1:]
+    if not len(places):
+        return np.zeros((0, len(goals))), np.zeros((len(goals), len(goals)))
+    # one point for all places and goals at the same spot in the plane
+    every = np.vstack([goals, places])
+    flat, which = np.unique(every[:, :2], axis=0, return_inverse=True)
+    which = np.asarray(which).reshape(-1)
+    data: dict[str, Any] = problem.model_dump(exclude={"origin", "state", "bounds", "site"})
+    reach = 10.0 * float(np.ptp(flat, axis=0).max() + problem.tether_length)
+    plain = Problem(
+        **{
+            **data, "base": tuple(flat[0]), "tether_length": reach,
+            "goals": [tuple(p) for p in flat[1:]] or [tuple(flat[0] + 1e-3 * reach)],
+            "bounds": problem.bounds,
+        }
+    )  # fmt: skip
+    sources = sorted(set(which[: len(goals)].tolist()))
+    found = ContactGraph(build_outline(plain)).lengths(sources)
+    row = {s: k for k, s in enumerate(sources)}
+    planar = np.array([found[row[int(g)]][which] for g in which[: len(goals)]])
+    rise = np.abs(goals[:, 2][:, None] - every[:, 2][None, :])
+    lengths = np.hypot(planar, rise)
+    return lengths[:, len(goals) :].T.copy(), lengths[:, : len(goals)].copy()
+
+
+def _hardest(problem: Problem, to: Floats) -> int:
+    """The goal that asks for the longest tether, where of every choice the nearest is taken."""
+    nearest = [
+        members[np.argmin(to[members])]
+        for c in range(1, problem.visits + 1)
+        for members in (np.flatnonzero(problem.clusters == c),)
+    ]
+    return int(max(nearest, key=lambda k: to[k]))
+
+
+def _tour_bound(
+    problem: Problem, to: Floats, between: Floats, clock: Clock, seed: int
+) -> float:  # fmt: skip
+    """No tour from a place is shorter than the travelling salesperson's over shortest paths, one
+    goal of each choice, in any order."""
+    within = np.flatnonzero(np.isfinite(to))
+    to, between = to[within], between[np.ix_(within, within)]
+    n = len(to)
+    costs = np.zeros((n + 1, n + 1))
+    costs[0, 1:] = costs[1:, 0] = to
+    costs[1:, 1:] = np.minimum(between, between.T)
+    np.fill_diagonal(costs, 0.0)
+    choices = problem.clusters[within]
+    over = TravelGraph.from_costs(costs, [0, *choices.tolist()])
+    least = 2.0 * max(float(to[choices == c].min()) for c in np.unique(choices))  # there and back
+    if clock.up:
+        return least
+    bound = solve_graph(over, time_limit=clock, seed=seed).lower_bound or 0.0
+    return max(least, bound) * (1.0 - ROUNDING)
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None

@@ -1,0 +1,245 @@
+"""With what margin: how far the world may be off before a tour does not fit any more.
+
+Say that every obstacle is moved or grown so that none of its points comes to lie farther than r
+from where the obstacle was said to be. Then the one whose obstacles are all grown by r holds that
+world: what is free among grown obstacles is free in it, and paths there have the same class in it.
+So the taut tether of a class is no longer than among the grown obstacles, and the tour, pulled taut
+in its own classes, is free. Tethers never get shorter as r grows: the largest r for which all of a
+tour fit is found by bisection, and what is stated is an r for which all were measured.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.data_frames import frame_of
+from netsp.base.errors import InputError, NetspError
+from netsp.model.field_types import checked_argument
+from netsp.model.problem import Circle, Problem
+from netsp.model.solution import MAX_FRICTION, Solution, tension_ratio
+from netsp.roadmap.paths import TautPaths
+
+if TYPE_CHECKING:
+    import pandas
+
+STEPS = 40
+"""Of a bisection: to 1e-12 of where it began."""
+
+
+@dataclass(frozen=True)
+class StopMargin:
+    """What is left at one visit.
+
+    Parameters
+    ----------
+    goal : int
+        Index of the goal, from 0.
+    name : str
+        Of the goal.
+    tether : float
+        Length of the taut tether.
+    slack : float
+        What may be lost of the tether before this goal is out of reach in its class.
+    turning : float
+        Sum of the angles by which the tether bends, radians, in the plane.
+    tension_ratio : float
+        Tension at the far end over that at the robot, by the capstan's formula.
+    clearance : float
+        From the tether or the goal to the nearest obstacle, as drawn.
+    """
+
+    goal: int
+    name: str
+    tether: float
+    slack: float
+    turning: float
+    tension_ratio: float
+    clearance: float
+
+
+@dataclass(frozen=True)
+class Margins:
+    """How far the world may be off before a tour does not fit any more; lengths in problem's units.
+
+    Parameters
+    ----------
+    obstacles : float
+        Every obstacle may be off by so much, moved or grown.
+    limited_by : str
+        What ends that.
+    tether : float
+        So much of the tether may be lost before a goal is.
+    cross_track : float
+        The robot may be so far beside its path without leaving its class or outstretching the
+        tether; what its body needs beyond its centre is in the problem's clearance.
+    friction : float
+        Coefficient that the tension ratios are for.
+    stops : tuple of StopMargin
+        In the order of the visits.
+    """
+
+    obstacles: float
+    limited_by: str
+    tether: float
+    cross_track: float
+    friction: float
+    stops: tuple[StopMargin, ...]
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Return the visits as a pandas DataFrame, a column per field of `StopMargin`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            In the order of the visits.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        return frame_of(self.stops)
+
+    def to_json(self) -> str:
+        """The margins as JSON.
+
+        Returns
+        -------
+        str
+            Object with the stops in a list; null stands for a margin without limit, as there is
+            where a problem has no obstacles.
+        """
+        data = asdict(self)
+        for part in (data, *data["stops"]):
+            part.update({k: None for k, v in part.items() if v == math.inf})
+        return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def margins(problem: Problem, solution: Solution, friction: float = 0.0) -> Margins:
+    """The margins of a tour.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was solved.
+    solution : Solution
+        With a tour that fits.
+    friction : float
+        Coefficient of friction of the tether on obstacles, 0 to 10.
+
+    Returns
+    -------
+    Margins
+        For the classes of the tour, whatever margin it was planned with.
+
+    Raises
+    ------
+    InputError
+        Friction out of range; no tour, one of another problem, one that starts with the robot
+        out, or that does not fit.
+    """
+    friction = checked_argument("friction", friction, 0.0, MAX_FRICTION)
+    if solution.problem.sha256 != problem.sha256:
+        raise InputError("solution: is for another problem (sha256 differs)")
+    if not solution.tour:
+        raise InputError("solution: has no tour")
+    if problem.state is not None:
+        raise InputError("state: margins are those of a tour from the base; expected none")
+    paths = TautPaths(problem)
+    stops = tuple(_stop(problem, paths, v.goal, v.signature, friction) for v in solution.tour)
+    slack = min(s.slack for s in stops)
+    if slack < -problem.tolerance:
+        raise InputError(f"solution: its tether is {-slack:.6g} too short; expected one that fits")
+    least, limited_by = _obstacles(problem, solution)
+    beside = _nearest(problem, np.array(solution.path))
+    return Margins(
+        least, limited_by, max(slack, 0.0), max(min(beside, slack), 0.0), friction, stops
+    )
+
+
+def _stop(
+    problem: Problem, paths: TautPaths, goal: int, word: tuple[int, ...], friction: float
+) -> StopMargin:
+    tether = paths.tether(goal, word)
+    length = paths.length(0, goal + 1, word)
+    turning = _turning(tether[:, :2])
+    return StopMargin(
+        goal, problem.goal_name(goal), length, problem.tether_length - length, turning,
+        tension_ratio(friction, turning), _nearest(problem, tether),
+    )  # fmt: skip
+
+
+def _turning(xy: Floats) -> float:
+    """Sum of the angles of a polyline; circumscribed arcs turn as far as the arcs themselves."""
+    steps = np.diff(xy, axis=0)
+    steps = steps[np.hypot(*steps.T) > 0.0]
+    if len(steps) < 2:
+        return 0.0
+    a, b = steps[:-1], steps[1:]
+    turns = np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(1))
+    return float(np.abs(turns).sum())
+
+
+def _nearest(problem: Problem, path: Floats) -> float:
+    """Least distance from a polyline to an obstacle, without the clearance; inf without any."""
+    import shapely
+
+    line = shapely.LineString(path[:, :2]) if len(path) > 1 else shapely.Point(path[0, :2])
+    out = np.inf
+    for o in problem.obstacles:
+        if isinstance(o, Circle):
+            gap = line.distance(shapely.Point(o.center)) - o.radius
+        else:
+            gap = line.distance(o.shape())
+        out = min(out, float(gap))
+    return out
+
+
+def _obstacles(problem: Problem, solution: Solution) -> tuple[float, str]:
+    """The largest growth for which all tethers were measured to fit, and what ends it."""
+    if not problem.obstacles:
+        return math.inf, "there are no obstacles"
+    xy = problem.points[:, :2]
+    gaps = np.array([o.signed_distance(xy) for o in problem.obstacles]) - problem.clearance
+    low, high = 0.0, max(float(gaps.min()), 0.0)
+    i, k = np.unravel_index(int(np.argmin(gaps)), gaps.shape)
+    place = "the base" if k == 0 else problem.goal_label(int(k) - 1)
+    nearer = "would be nearer than the clearance to" if problem.clearance else "would lie in"
+    reason = f"{place} {nearer} {problem.obstacle_label(int(i))}"
+    high *= 1.0 - 1e-9
+    if high <= 0.0:
+        return 0.0, reason
+    why = _complaint(problem, solution, high)
+    if why is None:
+        return high, reason
+    for _ in range(STEPS):
+        middle = 0.5 * (low + high)
+        found = _complaint(problem, solution, middle)
+        if found is None:
+            low = middle
+        else:
+            high, why = middle, found
+    return low, why
+
+
+def _complaint(problem: Problem, solution: Solution, growth: float) -> str | None:
+    """What does not fit among obstacles grown by so much; None if all does."""
+    try:
+        paths = TautPaths(problem.grown(growth), problem.tether_length * (1.0 + 1e-9))
+    except InputError as error:
+        return str(error)
+    for visit in solution.tour:
+        label = problem.goal_label(visit.goal)
+        try:
+            length = paths.length(0, visit.goal + 1, visit.signature)
+        except NetspError:
+            return f"{label}: no tether of its class fits any more, or its way is closed"
+        if length > problem.tether_length * (1.0 + 1e-12):
+            return f"{label}: its tether does not fit any more"
+    return None

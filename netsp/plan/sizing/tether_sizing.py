@@ -1,0 +1,352 @@
+"""How long a tether: the shortest tour as a function of the tether's length.
+
+A taut tether is longest at the ends of a leg: unrolled class by class, the plane without its
+obstacles is a space (its universal cover, which is CAT(0)) in which the length of the shortest path
+from the base is convex along shortest paths. So a tour's longest tether is that of one of its
+vertices, the shortest tour f(L) with a tether of length L is the shortest over the vertices whose
+tether is at most L, and f is a staircase that falls.
+
+Its steps are found from above: the shortest tour with the longest tether stays the shortest down to
+the longest tether t that it needs; below t, the vertices with tethers of t and more are gone, and
+what is the shortest then is the next step. Every step takes one solve, and the last ends at the
+shortest sufficient tether, below which some goal is out of reach. Tethers beyond half of a known
+tour never matter (`_useful`), however long a tether is asked about.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.clock import Clock, TimeLimit, until_interrupt
+from netsp.base.data_frames import frame_of
+from netsp.base.errors import InputError, LimitReachedError
+from netsp.base.files import write_text
+from netsp.base.reprs import Drawn
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.kept import with_classes_left_out
+from netsp.gtsp.travel.result import Result
+from netsp.model.bound_scope import LowerBound, Scope
+from netsp.model.field_types import checked_argument
+from netsp.model.problem import Problem
+from netsp.model.solution import Status
+from netsp.plan.solve_problem import solve_graph, travel_graph
+from netsp.roadmap.explain_unreachable import shortest_tethers
+
+if TYPE_CHECKING:
+    import pandas
+
+MEASURED = 1500
+"""Vertices among which all legs are measured at once, for all steps together."""
+
+ROOM = 1e-7
+"""Share that is added to the tethers of which a roadmap is asked."""
+
+SAME = 1e-9
+"""Share by which lengths of tours and of tethers may differ and be the same."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of the staircase.
+
+    Parameters
+    ----------
+    tether : float
+        The least tether length that allows this tour.
+    until : float
+        Tether length from which on another tour is shorter; of the last step the longest asked for.
+    length : float
+        Of the tour.
+    lower_bound : float
+        No tour with a tether shorter than `until` is shorter.
+    status : Status
+        What is proven of it.
+    order : tuple of int
+        Goals (from 0) in the order of their visits.
+    """
+
+    tether: float
+    until: float
+    length: float
+    lower_bound: float
+    status: Status
+    order: tuple[int, ...]
+
+    @property
+    def bound(self) -> LowerBound:
+        """The lower bound, on all tours with such a tether."""
+        return LowerBound(self.lower_bound, Scope.ALL_TOURS)
+
+    @property
+    def gap(self) -> float:
+        """(length - lower_bound) / length."""
+        return self.bound.gap(self.length)
+
+
+@dataclass(frozen=True)
+class TetherCurve(Drawn):
+    """The shortest tour for every tether length up to the longest asked for.
+
+    Parameters
+    ----------
+    name : str
+        Of the problem.
+    units : str
+        Of length.
+    steps : tuple of Step
+        From the shortest tether up.
+    shortest : float
+        The shortest sufficient tether: with less, some goal cannot be reached.
+    needs : int
+        The goal (from 0) that needs it.
+    whole : bool
+        Whether the staircase goes down to the shortest sufficient tether; else time ran out.
+    """
+
+    picture: ClassVar[str] = "netsp.view.pictures.sizing:draw_tether_curve"
+
+    name: str
+    units: str
+    steps: tuple[Step, ...]
+    shortest: float
+    needs: int
+    whole: bool
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Return the staircase as a pandas DataFrame, a column per field of `Step`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            From the shortest tether up.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        return frame_of(self.steps)
+
+    @property
+    def proven(self) -> bool:
+        """Whether every step is the shortest tour of its tether lengths."""
+        return self.whole and all(s.status is Status.OPTIMAL for s in self.steps)
+
+    def length_at(self, tether: float) -> float:
+        """The shortest tour with a tether of some length.
+
+        Parameters
+        ----------
+        tether : float
+            Length of the tether, in the problem's units.
+
+        Returns
+        -------
+        float
+            Its length; inf where no tour is known.
+        """
+        fits = [s.length for s in self.steps if s.tether <= tether * (1.0 + SAME)]
+        return min(fits, default=np.inf)
+
+    def to_json(self) -> str:
+        """The curve as JSON.
+
+        Returns
+        -------
+        str
+            Object with the steps in a list.
+        """
+        steps = [
+            {**vars(s), "lower_bound_of": s.bound.scope.value, "status": s.status.value,
+             "order": list(s.order)}
+            for s in self.steps
+        ]  # fmt: skip
+        data = {
+            "problem": self.name, "units": self.units, "shortest_tether": self.shortest,
+            "needed_by_goal": self.needs, "whole": self.whole, "steps": steps,
+        }  # fmt: skip
+        return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+    def to_csv(self) -> str:
+        """The curve as a table.
+
+        Returns
+        -------
+        str
+            A row for every step.
+        """
+        text = io.StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(
+            ["tether", "until", "length", "lower_bound", "lower_bound_of", "status", "order"]
+        )
+        for s in self.steps:
+            table.writerow(
+                [f"{s.tether:.9g}", f"{s.until:.9g}", f"{s.length:.9g}",
+                 f"{s.bound.length:.9g}", s.bound.scope.value, s.status.value,
+                 " ".join(map(str, s.order))]
+            )  # fmt: skip
+        return text.getvalue()
+
+    def save(self, file: str | Path) -> None:
+        """Write the curve: a table if the name ends in ``.csv``, else JSON.
+
+        Parameters
+        ----------
+        file : str or Path
+            The file.
+
+        Raises
+        ------
+        InputError
+            It cannot be written.
+        """
+        write_text(file, self.to_csv() if Path(file).suffix.lower() == ".csv" else self.to_json())
+
+
+def tether_curve(
+    problem: Problem,
+    longest: float | None = None,
+    *,
+    solver: str = "auto",
+    time_limit: TimeLimit = None,
+    seed: int = 0,
+    on_step: Callable[[Step], None] | None = None,
+) -> TetherCurve:
+    """The shortest tour of a problem as a function of its tether's length.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to solve; its tether length is the longest unless another is given.
+    longest : float, optional
+        Longest tether, in the problem's units.
+    solver : str
+        Solves every step.
+    time_limit : float or Clock, optional
+        Seconds for all; the steps found so far are returned when it is up, or at Ctrl-C.
+    seed : int
+        Of all that is random.
+    on_step : callable, optional
+        Called with every step, from the longest tether down.
+
+    Returns
+    -------
+    TetherCurve
+        The staircase.
+
+    Raises
+    ------
+    InputError
+        Bad arguments, or a problem whose robot is already out.
+    InfeasibleError
+        Some goal is out of the longest tether's reach.
+    """
+    if problem.state is not None:
+        raise InputError(
+            "state: a tether's length is chosen before the robot is out; expected none"
+        )
+    if longest is not None:
+        longest = checked_argument("longest", longest, 1e-9)
+        is_cropped = problem.site is not None and problem.site.cropped is not None
+        if is_cropped and longest > problem.tether_length:
+            raise InputError(
+                f"longest: expected at most {problem.tether_length:g}, the tether that the map was "
+                f"imported for, got {longest:g}"
+            )
+        problem = problem.model_copy(update={"tether_length": longest})
+    with until_interrupt(time_limit) as clock:
+        return _staircase(problem, solver, clock, seed, on_step)
+
+
+def _staircase(
+    problem: Problem, solver: str, clock: Clock, seed: int, on_step: Callable[[Step], None] | None
+) -> TetherCurve:
+    """Solve for shorter and shorter tethers, until the time is up or no tour is left."""
+    shortest = _of_choices(problem, shortest_tethers(problem))
+    useful = _useful(problem, float(shortest.max()), solver, clock, seed)
+    graph = travel_graph(problem.model_copy(update={"tether_length": useful}), time_limit=clock)
+    curve: list[Step] = []
+    limit, bound, whole = problem.tether_length, 0.0, False
+    if len(graph) <= MEASURED:
+        with graph.on_clock(clock):
+            _ = graph.costs
+    while True:
+        first = not curve
+        fits = graph.tethers <= limit if first else graph.tethers < limit * (1.0 - SAME)
+        fits[0] = True
+        if len(np.unique(graph.cluster[fits])) <= graph.goal_count:
+            whole = True
+            break
+        if clock.up:
+            break
+        try:
+            result, vertices = _shortest(graph, fits, solver, clock, seed, limit)
+        except LimitReachedError:
+            break
+        if result.tour is None or result.length is None:
+            break
+        tour = vertices[list(result.tour)]
+        needs = float(graph.tethers[tour].max())
+        # a longer tether never makes the shortest tour longer
+        bound = min(max(bound, result.lower_bound or 0.0), result.length)
+        step = Step(needs, limit, result.length, bound, result.status,
+                    tuple(int(g) - 1 for g in graph.goal[tour[1:]]))  # fmt: skip
+        limit = needs
+        if curve and step.length <= curve[-1].length * (1.0 + SAME):
+            before = curve.pop()
+            step = Step(needs, before.until, before.length, before.lower_bound, before.status,
+                        step.order)  # fmt: skip
+        curve.append(step)
+        if on_step is not None:
+            on_step(step)
+    k = int(np.argmax(shortest))
+    steps = tuple(reversed(curve))
+    return TetherCurve(problem.name, problem.units, steps, float(shortest[k]), k, whole)
+
+
+def _of_choices(problem: Problem, tethers: Floats) -> Floats:
+    """0 for every goal with an alternative that is nearer."""
+    out = tethers.copy()
+    for c in range(1, problem.visits + 1):
+        members = np.flatnonzero(problem.clusters == c)
+        out[np.setdiff1d(members, members[np.argmin(tethers[members])])] = 0.0
+    return out
+
+
+def _useful(problem: Problem, shortest: float, solver: str, clock: Clock, seed: int) -> float:
+    """The longest tether that can matter. A tour goes out to its longest tether and back, so that
+    one with a tether longer than half of a known tour is longer than that tour; and a tour is known
+    from the shortest sufficient tether."""
+    if not shortest < problem.tether_length:
+        return problem.tether_length  # out of reach, which will be said; or no choice
+    least = min(shortest * (1.0 + ROOM), problem.tether_length)
+    graph = travel_graph(problem.model_copy(update={"tether_length": least}), time_limit=clock)
+    with graph.on_clock(clock):
+        known = solve_graph(graph, solver, time_limit=clock, seed=seed).length
+    if known is None:
+        return problem.tether_length
+    return min(max(0.5 * known * (1.0 + ROOM), least), problem.tether_length)
+
+
+def _shortest(
+    graph: TravelGraph, fits: np.ndarray, solver: str, clock: Clock, seed: int, limit: float
+) -> tuple[Result, np.ndarray]:
+    """The shortest tour over some vertices, with what holds for all classes of such tethers."""
+    vertices = np.flatnonzero(fits)
+    with graph.on_clock(clock):
+        result = solve_graph(graph.subgraph(vertices), solver, time_limit=clock, seed=seed)
+    left_out = graph.least_left_out
+    least = graph.least_by_way_of(left_out) if left_out <= limit else math.inf
+    because = "a tour by way of a class left out goes along its tether and back"
+    return with_classes_left_out(result, least, Scope.ALL_TOURS, because), vertices

@@ -1,0 +1,559 @@
+"""Names of roadmaps and solvers, and the one call that takes a problem to a solution."""
+
+from __future__ import annotations
+
+import contextlib
+import inspect
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from netsp.base.clock import Clock, TimeLimit, until_interrupt
+from netsp.base.errors import InputError, LimitReachedError
+from netsp.base.registry import foreign, load
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.params import NoParams, read_params
+from netsp.gtsp.travel.baseless import BaselessGraph
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.result import OnProgress, Progress, Result
+from netsp.model.bound_scope import Scope
+from netsp.model.field_types import checked_argument
+from netsp.model.problem import Problem
+from netsp.model.solution import MAX_FRICTION, ProblemReference, Solution, Timings, max_turning
+from netsp.model.validated import shown
+from netsp.plan import without_base
+from netsp.plan.answer import to_solution
+from netsp.plan.custom import call, read_options, whole_numbers
+from netsp.plan.in_order import solve_in_order
+from netsp.plan.solver_table import ROADMAPS, SOLVERS
+from netsp.plan.tether_carry_columns import OnGraph, with_carried
+from netsp.plan.warm_start import old_tour, tour_from, with_old_classes
+
+SolverLike = str | Callable[..., Any]
+"""A solver's name, or a callable that takes a travel graph (`netsp.plan.custom`)."""
+
+LARGEST_SEED = 2**62
+
+LONGEST_S = 1e9
+"""Of a time limit; some thirty years."""
+
+SPARE = 0.4
+"""Of a time limit, what is kept for drawing the tour when a roadmap was cut short; a second at
+most."""
+
+CARRIED = ("auto", "lns")
+"""Solvers for which a roadmap that had to leave classes out gets those along good tours."""
+
+DEFAULT_SOLVER = "auto"
+DEFAULT_ROADMAP = "taut"
+
+
+def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: Any) -> Any:
+    """The named roadmap over a problem.
+
+    Raises InputError for an unknown roadmap or option, InfeasibleError if a goal cannot be reached.
+    """
+    if not isinstance(problem, Problem):
+        raise InputError(f"problem: expected a Problem, got {problem!r}")
+    record = ROADMAPS.named(roadmap)
+    if record.ours:
+        return _built(problem, roadmap, load(record.build), options)
+    with foreign(f"roadmap {roadmap!r} failed"):
+        return _built(problem, roadmap, load(record.build), options)
+
+
+def _built(problem: Problem, roadmap: str, build: Any, options: dict[str, Any]) -> Any:
+    known = {k for k, p in inspect.signature(build).parameters.items() if p.kind == p.KEYWORD_ONLY}
+    if isinstance(options.get("time_limit"), Clock) and "time_limit" not in known:
+        del options["time_limit"]  # of another package, which cannot be hurried
+    unknown = sorted(set(options) - known)
+    if unknown:
+        raise InputError(
+            f"roadmap {roadmap!r}: unknown option {unknown[0]!r}; expected one of "
+            f"{', '.join(sorted(known))}"
+        )
+    return build(problem, **options)
+
+
+def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: Any) -> TravelGraph:
+    """The travel graph of a problem by the named roadmap.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to build it for.
+    roadmap : str
+        Name of the roadmap.
+    **options : Any
+        As `roadmap_options` of `solve`.
+
+    Returns
+    -------
+    TravelGraph
+        Augmented goals with the costs of the legs between them.
+
+    Raises
+    ------
+    InputError
+        Unknown names, bad options.
+    InfeasibleError
+        Some goal is out of the tether's reach.
+    """
+    if not isinstance(problem, Problem):
+        raise InputError(f"problem: expected a Problem, got {problem!r}")
+    if problem.visits < len(problem.goals):
+        from netsp.roadmap.class_alternatives import graph_of_choices
+
+        return graph_of_choices(problem, lambda p: travel_graph(p, roadmap, **options))
+    return _graph_of_places(problem, roadmap, options)
+
+
+def _graph_of_places(problem: Problem, roadmap: str, options: dict[str, Any]) -> TravelGraph:
+    """The travel graph whose goals are the problem's."""
+    if problem.state is not None:
+        if roadmap != "taut":
+            raise InputError(f"state: needs roadmap 'taut', got {roadmap!r}")
+        from netsp.roadmap.from_state import graph_from_state
+
+        return graph_from_state(problem, **options)
+    built = build_roadmap(problem, roadmap, **options)
+    if ROADMAPS.named(roadmap).ours:
+        graph: TravelGraph = built.to_travel_graph()
+    else:
+        with foreign(f"roadmap {roadmap!r} failed"):
+            graph = built.to_travel_graph()
+        if not isinstance(graph, TravelGraph):
+            raise InputError(
+                f"roadmap {roadmap!r}: expected a TravelGraph from it, got {shown(graph)}"
+            )
+        graph.declared_scope = Scope.ROADMAP  # netsp cannot check that it holds all tours
+    graph.before = problem.precedences
+    return graph
+
+
+def solve_graph(
+    graph: TravelGraph,
+    solver: SolverLike = DEFAULT_SOLVER,
+    *,
+    time_limit: TimeLimit = None,
+    iteration_limit: int | None = None,
+    seed: int = 0,
+    params: Mapping[str, Any] | None = None,
+    warm_start: Sequence[int] | None = None,
+    on_progress: OnProgress | None = None,
+) -> Result:
+    """Run a solver on a travel graph, from a roadmap or from `TravelGraph.from_costs`.
+
+    Parameters
+    ----------
+    graph : TravelGraph
+        From a roadmap or from `TravelGraph.from_costs`.
+    solver : str or callable
+        A name, or a callable `f(graph) -> tour`; it may ask for `params`, `limits`, `rng` and more
+        by name (`netsp.plan.custom.call`).
+    time_limit : float or Clock, optional
+        Seconds, or the clock of a run that this one is a part of; the best tour so far is returned
+        when it is up.
+    iteration_limit : int, optional
+        Iterations of the solver; each says what one is. Under an iteration limit alone, the same
+        seed gives the same answer.
+    seed : int
+        Feeds the solver's random generator.
+    params : mapping, optional
+        The solver's options by name.
+    warm_start : sequence of int, optional
+        A tour to start from, as vertices from 0 on.
+    on_progress : callable, optional
+        Called with a `netsp.gtsp.travel.result.Progress` now and then.
+
+    Returns
+    -------
+    Result
+        The best tour found, and what is proven of it.
+
+    Raises
+    ------
+    InputError
+        Unknown names, bad limits, a warm start that is no tour of the graph, and a solver that
+        needs geometry (`geometric` in `netsp.plan.solver_table`) on a graph that has none.
+
+    Examples
+    --------
+    >>> from netsp import TravelGraph, solve_graph
+    >>> costs = [[0, 1, 5, 4], [1, 0, 2, 9], [5, 2, 0, 2], [4, 9, 2, 0]]
+    >>> solve_graph(TravelGraph.from_costs(costs, clusters=[0, 1, 2, 2])).length
+    8.0
+    """
+    check_solver(solver, params)
+    _check_limits(time_limit, iteration_limit)
+    if not isinstance(graph, TravelGraph):
+        raise InputError(f"graph: expected a TravelGraph, got {graph!r}")
+    tour = None if warm_start is None else _as_tour(warm_start, graph)
+    rng = np.random.default_rng(_seed(seed))
+    clock = Clock.of(time_limit)
+    with graph.on_clock(clock):
+        limits = Limits(clock, iteration_limit, rng, tour, graph.progress_listener(on_progress))
+        if isinstance(graph, BaselessGraph):
+            proves = isinstance(solver, str) and SOLVERS.named(solver).proves
+            return without_base.solve(
+                graph, lambda g, limits: _run(g, solver, params, limits), limits, proves=proves
+            )
+        result = _run(graph, solver, params, limits)
+    return graph.as_asked(result)
+
+
+def _run(
+    graph: TravelGraph, solver: SolverLike, params: Mapping[str, Any] | None, limits: Limits
+) -> Result:
+    """Call a solver: ours with its options read and checked, others' with what they ask for."""
+    if callable(solver):
+        return call(solver, name_of(solver), graph, params, limits)
+    record = SOLVERS.named(solver)
+    if len(graph.before) and record.ours and not record.ordered:
+        able = ", ".join(r.name for r in SOLVERS.values() if r.ordered)
+        raise InputError(
+            f"solver {solver!r}: cannot keep the order that goals ask for with 'after'; expected "
+            f"one of {able}"
+        )
+    if record.ours:
+        kind = load(record.params) if record.params else NoParams
+        run: Callable[..., Result] = load(record.function)
+        return run(graph, read_params(kind, solver, params), limits)
+    function = load(record.function)
+    with foreign(f"solver {solver!r} failed"):
+        return call(function, solver, graph, params, limits)
+
+
+def name_of(solver: SolverLike) -> str:
+    """What a solution file calls its solver."""
+    return solver if isinstance(solver, str) else getattr(solver, "__name__", "custom")
+
+
+def solve(
+    problem: Problem,
+    solver: SolverLike = DEFAULT_SOLVER,
+    *,
+    roadmap: str = DEFAULT_ROADMAP,
+    roadmap_options: Mapping[str, Any] | None = None,
+    time_limit: TimeLimit = None,
+    iteration_limit: int | None = None,
+    seed: int = 0,
+    params: Mapping[str, Any] | None = None,
+    warm_start: Solution | None = None,
+    margin: float = 0.0,
+    slack: float = 0.0,
+    friction: float = 0.0,
+    max_tension_ratio: float | None = None,
+    keep_order: bool = False,
+    on_progress: OnProgress | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> Solution:
+    """Find the shortest non-entangling tour of a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to solve.
+    solver : str or callable
+        As of `solve_graph`.
+    roadmap : str
+        Name of the roadmap: `taut` (exact), `prm`, or another package's.
+    roadmap_options : mapping, optional
+        For ``taut``: ``classes``, ``max_classes``; for ``prm``: ``samples``, ``shortcut``.
+    time_limit : float or Clock, optional
+        Seconds for the whole call, or the clock of a run that this one is a part of; the best tour
+        so far is returned when it is up.
+    iteration_limit : int, optional
+        Iterations of the solver; each says what one is.
+    seed : int
+        Feeds the solver's random generator, and the sampling of a roadmap that samples.
+    params : mapping, optional
+        The solver's options by name.
+    warm_start : Solution, optional
+        A solution of the problem, or of an older version of it, to start from, by whatever solver
+        (`netsp.plan.warm_start`).
+    margin : float
+        The tour is to bear obstacles that are off by so much (`netsp.plan.sizing.tether_margins`):
+        all are grown by it, in the problem's units.
+    slack : float
+        Share of the taut length that is to fit within the tether's length beyond it, up to 1.
+    friction : float
+        Coefficient of friction of tether on obstacle.
+    max_tension_ratio : float, optional
+        Most that friction may multiply the tension by, anywhere on the tour; None for no limit.
+    keep_order : bool
+        The goals are visited in the problem's order, and only their classes are chosen; with proof,
+        whatever the solver.
+    on_progress : callable, optional
+        Called with a `netsp.gtsp.travel.result.Progress` now and then.
+    should_stop : callable, optional
+        Asked every 20 ms in a thread of its own; once it says so, the run ends as at its time
+        limit, with the best tour so far.
+
+    Returns
+    -------
+    Solution
+        The best tour found, and what is proven of it.
+
+    Raises
+    ------
+    InputError
+        Unknown names, bad limits, a warm start without any goal of the problem.
+    InfeasibleError
+        Some goal is out of the tether's reach; says which and by how much.
+    LimitReachedError
+        The time was up before the travel graph was complete.
+
+    Examples
+    --------
+    >>> from netsp import Problem, solve
+    >>> problem = Problem(base=(0, 0), goals=[(3, 4)], obstacles=[], tether_length=6)
+    >>> solve(problem).length
+    10.0
+    """
+    if not isinstance(problem, Problem):
+        raise InputError(f"problem: expected a Problem, got {problem!r}")
+    if warm_start is not None and not isinstance(warm_start, Solution):
+        raise InputError(f"warm_start: expected a Solution, got {warm_start!r}")
+    _seed(seed)
+    _check_limits(time_limit, iteration_limit)
+    if warm_start is not None:
+        old_tour(problem, warm_start)
+    check_solver(solver, params)  # before the long work
+    if margin or slack:
+        grown = problem.grown(margin, slack)
+        found = solve(
+            grown, solver, roadmap=roadmap, roadmap_options=roadmap_options,
+            time_limit=time_limit, iteration_limit=iteration_limit, seed=seed, params=params,
+            warm_start=None if warm_start is None else _for_grown(warm_start, problem, grown),
+            friction=friction, max_tension_ratio=max_tension_ratio, keep_order=keep_order,
+            on_progress=on_progress, should_stop=should_stop,
+        )  # fmt: skip
+        own = ProblemReference(name=problem.name, sha256=problem.sha256)
+        return found.model_copy(
+            update={"problem": own, "margin": float(margin), "slack": float(slack)}
+        )
+    if problem.visits < len(problem.goals) and _walks_between_places(solver):
+        return _over_nearest_places(
+            problem, solver, roadmap=roadmap, roadmap_options=roadmap_options,
+            time_limit=time_limit, iteration_limit=iteration_limit, seed=seed, params=params,
+            on_progress=on_progress, should_stop=should_stop,
+        )  # fmt: skip
+    limits = {
+        "friction": checked_argument("friction", friction, 0.0, MAX_FRICTION),
+        "max_tension_ratio": _tension_ratio(max_tension_ratio, friction),
+    }
+    seconds, within = (None, time_limit) if isinstance(time_limit, Clock) else (time_limit, None)
+    clock = Clock(seconds, within=within, should_stop=should_stop)
+    with contextlib.closing(clock):
+        options: dict[str, Any] = dict(roadmap_options or {})
+        if ROADMAPS.named(roadmap).seeded:
+            options.setdefault("seed", seed)
+        most = max_turning(friction, max_tension_ratio)
+        with until_interrupt(clock) as rest:
+            try:
+                graph = rest.bounded(
+                    "making the roadmap",
+                    lambda: _within_turning(
+                        problem,
+                        travel_graph(problem, roadmap, **{"time_limit": rest, **options}),
+                        most,
+                        rest,
+                    ),
+                    winds_down=True,
+                )
+            except LimitReachedError:
+                if rest.stopped and not clock.up:  # by Ctrl-C
+                    raise KeyboardInterrupt from None
+                raise
+        rest = rest if rest.stopped else clock
+        built = clock.elapsed
+        if keep_order:
+            listener = graph.progress_listener(on_progress)
+            result = graph.as_asked(solve_in_order(graph, rest, listener))
+            found = to_solution(problem, graph, result, "in-order", seed)
+            return found.model_copy(
+                update={"kept_order": True, "timings": _timings(clock, built, graph), **limits}
+            )
+        graph, result = solve_over(
+            problem, graph, solver, rest, iteration_limit=iteration_limit, seed=seed,
+            params=params, warm_start=warm_start, on_progress=on_progress,
+        )  # fmt: skip
+        timings = _timings(clock, built, graph)
+        found = to_solution(problem, graph, result, name_of(solver), seed, timings)
+        return found.model_copy(update=limits) if friction else found
+
+
+def solve_over(
+    problem: Problem,
+    graph: TravelGraph,
+    solver: SolverLike,
+    clock: Clock,
+    *,
+    iteration_limit: int | None = None,
+    seed: int = 0,
+    params: Mapping[str, Any] | None = None,
+    warm_start: Solution | None = None,
+    on_progress: OnProgress | None = None,
+    on_graph: OnGraph | None = None,
+) -> tuple[TravelGraph, Result]:
+    """Solve a problem over its travel graph, as `solve` does.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    graph : TravelGraph
+        Travel graph of the problem.
+    solver : str or callable
+        Solver, as in `solve_graph`.
+    clock : Clock
+        Clock of the run.
+    iteration_limit, seed, params, warm_start : int, int, mapping, Solution
+        As in `solve`.
+    on_progress : callable, optional
+        Called with a `netsp.gtsp.travel.result.Progress` at each report of the solver.
+    on_graph : callable, optional
+        Called with each new graph; tours of later progress rows refer to it.
+
+    Returns
+    -------
+    graph : TravelGraph
+        The graph, with more classes if the roadmap left some out.
+    result : Result
+        Result whose tour refers to the returned graph.
+    """
+    # keep time to draw a tour of a problem that is too large for its limit
+    spare = 0.0 if graph.complete else min(SPARE * (clock.limit or 0.0), 1.0)
+    start: Sequence[int] | None = None
+    if warm_start is not None:
+        graph = with_old_classes(problem, warm_start, graph, clock)
+        start = tour_from(problem, warm_start, graph)
+        if on_graph is not None:
+            on_graph(graph)
+        if on_progress is not None and start is not None:
+            length = graph.tour_length(start)
+            on_progress(Progress(clock.elapsed, "edited", length, tour=tuple(start)))
+    if solver in CARRIED:
+        rng = np.random.default_rng(seed)
+        with until_interrupt(clock) as stoppable:
+            carried = with_carried(graph, stoppable, rng, on_progress, on_graph, start)
+        graph, start = carried.graph, carried.tour
+        clock = stoppable if stoppable.stopped else clock
+    if on_graph is not None:
+        on_graph(graph)
+    result = solve_graph(
+        graph,
+        solver,
+        time_limit=Clock(clock.left - spare, within=clock) if spare else clock,
+        iteration_limit=iteration_limit,
+        seed=seed,
+        params=params,
+        warm_start=start,
+        on_progress=on_progress,
+    )
+    return graph, result
+
+
+def _walks_between_places(solver: SolverLike) -> bool:
+    return isinstance(solver, str) and SOLVERS.named(solver).geometric
+
+
+def _over_nearest_places(problem: Problem, solver: SolverLike, **more: Any) -> Solution:
+    """The solution over one place of every goal with alternatives. What it proves is of these."""
+    from netsp.roadmap.class_alternatives import nearest_places
+
+    chosen = nearest_places(problem)
+    goals = tuple(problem.goals[k].model_copy(update={"choice": None}) for k in chosen)
+    found = solve(problem.model_copy(update={"goals": goals}), solver, **more)
+    visits = tuple(v.model_copy(update={"goal": chosen[v.goal]}) for v in found.tour)
+    own = ProblemReference(name=problem.name, sha256=problem.sha256)
+    none = {"lower_bound": None, "lower_bound_of": None, "gap": None}
+    return found.model_copy(update={"problem": own, "tour": visits, **none})
+
+
+def _tension_ratio(value: float | None, friction: float) -> float | None:
+    if value is None:
+        return None
+    if not friction:
+        raise InputError("max_tension_ratio: expected friction > 0 with it, got none")
+    return checked_argument("max_tension_ratio", value, 1.0 + 1e-9, 1e6)
+
+
+def _within_turning(problem: Problem, graph: TravelGraph, most: float, clock: Clock) -> TravelGraph:
+    if math.isinf(most):
+        return graph
+    if graph.start is not None:
+        raise InputError("max_tension_ratio: a tour from a state has no such limit; expected none")
+    from netsp.roadmap.turning import within_turning
+
+    with graph.on_clock(clock):
+        return within_turning(problem, graph, most)
+
+
+def _timings(clock: Clock, built: float, graph: TravelGraph) -> Timings:
+    total = clock.elapsed
+    return Timings(
+        roadmap_s=round(built, 6),
+        matrix_s=round(graph.legs_s, 6),
+        solve_s=round(max(total - built - graph.legs_s, 0.0), 6),
+        total_s=round(total, 6),
+    )
+
+
+def _for_grown(warm: Solution, problem: Problem, grown: Problem) -> Solution:
+    """A solution to start from as one of the problem with its obstacles grown."""
+    if warm.problem.sha256 != problem.sha256:
+        return warm
+    own = ProblemReference(name=grown.name, sha256=grown.sha256)
+    return warm.model_copy(update={"problem": own})
+
+
+def check_solver(solver: SolverLike, params: Mapping[str, Any] | None) -> None:
+    """InputError if there is no such solver, or an option of it is unknown or out of range."""
+    if callable(solver):
+        read_options(solver, name_of(solver), params)
+        return
+    record = SOLVERS.named(solver)
+    if record.ours:
+        read_params(load(record.params) if record.params else NoParams, solver, params)
+    else:
+        function = load(record.function)
+        with foreign(f"solver {solver!r} failed"):
+            read_options(function, solver, params)
+
+
+def _check_limits(time_limit: TimeLimit, iteration_limit: int | None) -> None:
+    if time_limit is not None and not isinstance(time_limit, Clock):
+        number = isinstance(time_limit, (int, float, np.number)) and time_limit is not True
+        if not (number and (0 < time_limit <= LONGEST_S or time_limit == np.inf)):
+            raise InputError(
+                f"time_limit: expected a positive number of seconds, got {shown(time_limit)}"
+            )
+    if iteration_limit is not None:
+        whole = isinstance(iteration_limit, (int, np.integer)) and iteration_limit is not True
+        if not (whole and 1 <= iteration_limit < 2**62):
+            raise InputError(
+                f"iteration_limit: expected a whole number from 1 on, got {shown(iteration_limit)}"
+            )
+
+
+def _seed(seed: int) -> int:
+    whole = isinstance(seed, (int, np.integer)) and seed is not True
+    if not (whole and 0 <= seed <= LARGEST_SEED):
+        raise InputError(
+            f"seed: expected a whole number from 0 to {LARGEST_SEED}, got {shown(seed)}"
+        )
+    return int(seed)
+
+
+def _as_tour(vertices: Sequence[int], graph: TravelGraph) -> tuple[int, ...]:
+    tour = whole_numbers(vertices)
+    if not tour or not graph.is_tour(tour):
+        raise InputError(
+            "warm_start: expected vertices from 0 on, one of every cluster, got "
+            f"{str(vertices)[:80]}"
+        )
+    return tour

@@ -1,0 +1,125 @@
+"""The solvers and roadmaps there are, one record each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from netsp.base.registry import Registry
+
+
+@dataclass(frozen=True)
+class Solver:
+    """A solver by name.
+
+    Parameters
+    ----------
+    name : str
+        What it is called on the command line, in files and in messages.
+    function : str
+        ``module:attribute`` of `(graph, params, limits) -> Result`, or of any callable that
+        `netsp.plan.custom` can call.
+    params : str, optional
+        ``module:attribute`` of the dataclass of its options; None if it takes none.
+    geometric : bool
+        Needs the paths beneath a travel graph, so no graph made from costs will do.
+    blind : bool
+        A baseline blind to the tether, whose tours may be `invalid`.
+    ordered : bool
+        Keeps precedences (`TravelGraph.before`).
+    proves : bool
+        Looks for a proof.
+    """
+
+    name: str
+    function: str
+    params: str | None = None
+    geometric: bool = False
+    blind: bool = False
+    ordered: bool = False
+    proves: bool = False
+
+    @property
+    def ours(self) -> bool:
+        """Whether it takes `(graph, params, limits)`."""
+        return self.function.startswith("netsp.")
+
+
+@dataclass(frozen=True)
+class RoadmapKind:
+    """A roadmap by name.
+
+    Parameters
+    ----------
+    name : str
+        What it is called on the command line, in files and in messages.
+    build : str
+        ``module:attribute`` of a class over a problem with `to_travel_graph()`.
+    seeded : bool
+        Its samples are drawn with the run's seed.
+    """
+
+    name: str
+    build: str
+    seeded: bool = False
+
+    @property
+    def ours(self) -> bool:
+        """Whether what it raises is a defect of ours."""
+        return self.build.startswith("netsp.")
+
+
+SOLVERS: Registry[Solver] = Registry(
+    "solver",
+    "netsp.solvers",
+    {
+        s.name: s
+        for s in (
+            Solver(
+                "auto", "netsp.plan.auto:solve", "netsp.plan.auto:Params", ordered=True,
+                proves=True,
+            ),
+            Solver("mip", "netsp.mip.mip_solver:solve", "netsp.mip.mip_solver:Params", proves=True),
+            Solver(
+                "dp", "netsp.gtsp.dp.dp_solver:solve", "netsp.gtsp.dp.dp_solver:Params",
+                ordered=True, proves=True
+            ),
+            Solver("reduced-mip", "netsp.mip.reduced:solve", "netsp.mip.reduced:ReducedParams"),
+            Solver(
+                "mip-2017", "netsp.mip.published_program:solve",
+                "netsp.mip.published_program:Params",
+            ),
+            Solver(
+                "lns", "netsp.gtsp.search.lns_solver:solve",
+                "netsp.gtsp.search.lns_solver:Params", ordered=True,
+            ),
+            Solver("anneal", "netsp.anneal.icra2017:solve", "netsp.anneal.icra2017:Params"),
+            Solver(
+                "anneal-2016", "netsp.anneal.rss2016:solve", "netsp.anneal.rss2016:Params",
+                geometric=True,
+            ),
+            Solver(
+                "greedy", "netsp.gtsp.greedy.backtracking:solve",
+                "netsp.gtsp.greedy.backtracking:Params"
+            ),
+            Solver(
+                "greedy-2016", "netsp.gtsp.greedy.backtracking:solve_2016",
+                "netsp.gtsp.greedy.backtracking:Params2016",
+            ),
+            Solver("greedy-tsp", "netsp.gtsp.greedy.blind:solve", geometric=True, blind=True),
+        )
+    },
+    lambda name, where: Solver(name, where),
+)  # fmt: skip
+
+ROADMAPS: Registry[RoadmapKind] = Registry(
+    "roadmap",
+    "netsp.roadmaps",
+    {
+        r.name: r
+        for r in (
+            RoadmapKind("taut", "netsp.roadmap.taut:TautRoadmap"),
+            RoadmapKind("prm", "netsp.roadmap.prm:PrmRoadmap", seeded=True),
+        )
+    },
+    lambda name, where: RoadmapKind(name, where),
+)

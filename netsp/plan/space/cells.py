@@ -1,0 +1,224 @@
+"""A scene's free water as cells, edges and squares: a cubical complex that lies within it.
+
+Edges and squares count only if balls cover them within which no solid is: the field's distances
+overstate nowhere, so whatever path runs over edges that count is free, and whatever loop shrinks
+over squares that count is contractible. Without that, rings thinner than a cell would be passed
+through. Gaps narrower than a cell may close.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.arrays import Floats, Ints
+from netsp.base.clock import Flag, abandoned, end_if_abandoned
+from netsp.base.compiled.dynamic_array import write_ints
+from netsp.base.compiled.kernel import kernel
+from netsp.base.errors import InputError
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.sampling import Field, distance
+
+LEAST_ROOM = 0.3
+"""Share of a cell's size that its centre must be from all solids."""
+
+MOST_CELLS = 6_000_000
+"""So many take about 0.4 GiB with their labels."""
+
+HALVINGS = 4
+"""Of an edge or a square that one ball does not cover."""
+
+FREE, OPEN = 1, 2
+"""Bits of a cell: its centre is free; so are all edges and squares of its 26 neighbours."""
+
+EDGE, SQUARE = 4, 32
+"""First of three bits each: of the edge along x, y, z; of the squares along yz, zx, xy."""
+
+
+@dataclass(frozen=True)
+class Cells:
+    """The complex.
+
+    Parameters
+    ----------
+    field : DistanceField
+        The scene.
+    low : ndarray, shape (3,)
+        Corner of the box, metres.
+    cell : float
+        Size of a cell, metres.
+    flags : ndarray of uint8, shape (nx, ny, nz)
+        Bits FREE, OPEN, EDGE …, SQUARE …; edges and squares belong to their lowest corner.
+    """
+
+    field: DistanceField
+    low: Floats
+    cell: float
+    flags: npt.NDArray[np.uint8]
+
+    @classmethod
+    def of(
+        cls, field: DistanceField, low: npt.ArrayLike, high: npt.ArrayLike, cell: float
+    ) -> Cells:
+        """The complex of a box in a scene.
+
+        Parameters
+        ----------
+        field : DistanceField
+            The scene.
+        low : array_like, shape (3,)
+            Corner of the box, metres.
+        high : array_like, shape (3,)
+            The other corner, metres.
+        cell : float
+            Size of a cell, metres.
+
+        Returns
+        -------
+        Cells
+            The complex.
+
+        Raises
+        ------
+        InputError
+            A box without size, or more cells than go into memory.
+        """
+        low = np.asarray(low, dtype=float)
+        size = np.asarray(high, dtype=float) - low
+        if not (size > 0.0).all():
+            raise InputError(f"bounds: expected a box, got sides {size.tolist()}")
+        shape = np.maximum(1.0, np.ceil(size / cell))
+        if float(np.prod(shape)) > MOST_CELLS:
+            better = cell * (float(np.prod(shape)) / MOST_CELLS) ** (1.0 / 3.0)
+            raise InputError(
+                f"cell: {cell:g} makes {np.prod(shape):.2g} cells, which would take "
+                f"{np.prod(shape) * 7e-8:.2g} GiB; expected {better:.2g} or more"
+            )
+        nx, ny, nz = (int(n) for n in shape)
+        flags = complex_of(field.arrays, low, cell, (nx, ny, nz), abandoned())
+        end_if_abandoned()
+        return cls(field, low, cell, flags)
+
+    @property
+    def free_count(self) -> int:
+        """Number of free cells."""
+        return int(np.count_nonzero(self.flags & FREE))
+
+    def centre(self, cells: npt.ArrayLike) -> Floats:
+        """Centres (..., 3) of cells (..., 3), metres."""
+        return np.asarray(self.low + (np.asarray(cells) + 0.5) * self.cell)
+
+    def index(self, points: npt.ArrayLike) -> Ints:
+        """Cells (..., 3) that points (..., 3) are in, the nearest within the box."""
+        at = np.floor((np.asarray(points, dtype=float) - self.low) / self.cell).astype(np.int64)
+        return np.asarray(np.clip(at, 0, np.array(self.flags.shape) - 1))
+
+
+@kernel
+def complex_of(
+    field: Field, low: Floats, cell: float, shape: tuple[int, int, int], stop: Flag
+) -> npt.NDArray[np.uint8]:
+    """Return the flags of all cells. Ends early once `stop` is set."""
+    nx, ny, nz = shape
+    flags = np.zeros(shape, dtype=np.uint8)
+    room = np.empty(shape, dtype=np.float32)
+    for i in range(nx):
+        if stop[0] != 0:
+            break
+        for j in range(ny):
+            for k in range(nz):
+                d = distance(
+                    field, low[0] + (i + 0.5) * cell, low[1] + (j + 0.5) * cell,
+                    low[2] + (k + 0.5) * cell,
+                )  # fmt: skip
+                room[i, j, k] = d
+                if d >= LEAST_ROOM * cell:
+                    flags[i, j, k] = FREE
+    last = np.array([nx, ny, nz]) - 1
+    at, to, centre = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64), np.empty(3)
+    for i in range(nx):
+        if stop[0] != 0:
+            break
+        for j in range(ny):
+            for k in range(nz):
+                if flags[i, j, k] == 0:
+                    continue
+                if room[i, j, k] >= 1.75 * cell:
+                    flags[i, j, k] |= OPEN
+                wide = room[i, j, k] >= 1.4143 * cell
+                at[0], at[1], at[2] = i, j, k
+                for axis in range(3):
+                    if at[axis] == last[axis]:
+                        continue
+                    write_ints(to, at, 3)
+                    to[axis] += 1
+                    if not flags[to[0], to[1], to[2]] & FREE:
+                        continue
+                    if not wide:
+                        for c in range(3):
+                            centre[c] = low[c] + (0.5 * (at[c] + to[c]) + 0.5) * cell
+                        if room[i, j, k] + room[to[0], to[1], to[2]] < 1.0001 * cell and (
+                            not covered(field, centre, cell, axis, -1, HALVINGS)
+                        ):
+                            continue
+                    flags[i, j, k] |= EDGE << axis
+    for i in range(nx):
+        if stop[0] != 0:
+            break
+        for j in range(ny):
+            for k in range(nz):
+                if flags[i, j, k] == 0:
+                    continue
+                wide = room[i, j, k] >= 1.4143 * cell
+                at[0], at[1], at[2] = i, j, k
+                for axis in range(3):
+                    a, b = (axis + 1) % 3, (axis + 2) % 3
+                    if at[a] == last[a] or at[b] == last[b]:
+                        continue
+                    if not (flags[i, j, k] & (EDGE << a) and flags[i, j, k] & (EDGE << b)):
+                        continue
+                    write_ints(to, at, 3)
+                    to[a] += 1
+                    if not flags[to[0], to[1], to[2]] & (EDGE << b):
+                        continue
+                    write_ints(to, at, 3)
+                    to[b] += 1
+                    if not flags[to[0], to[1], to[2]] & (EDGE << a):
+                        continue
+                    if not wide:
+                        for c in range(3):
+                            centre[c] = low[c] + (at[c] + 0.5) * cell
+                        centre[a] += 0.5 * cell
+                        centre[b] += 0.5 * cell
+                        if not covered(field, centre, cell, a, b, HALVINGS):
+                            continue
+                    flags[i, j, k] |= SQUARE << axis
+    return flags
+
+
+@kernel
+def covered(field: Field, centre: Floats, size: float, a: int, b: int, halvings: int) -> bool:
+    """Whether balls without solids cover an edge along axis a (b < 0) or a square along a and b."""
+    # (centre, half a side, halvings left) of the parts that are to be covered
+    parts, left = np.empty((4 * HALVINGS + 8, 5)), 1
+    parts[0, 0], parts[0, 1], parts[0, 2] = centre[0], centre[1], centre[2]
+    parts[0, 3], parts[0, 4] = 0.5 * size, halvings
+    while left > 0:
+        left -= 1
+        x, y, z, half, more = parts[left]
+        d = distance(field, x, y, z)
+        if d >= 1.0001 * (half if b < 0 else half * math.sqrt(2.0)):
+            continue
+        if more == 0.0 or d <= 0.0:
+            return False
+        for k in range(2 if b < 0 else 4):
+            parts[left, 0], parts[left, 1], parts[left, 2] = x, y, z
+            parts[left, a] += 0.5 * half if k % 2 else -0.5 * half
+            if b >= 0:
+                parts[left, b] += 0.5 * half if k // 2 else -0.5 * half
+            parts[left, 3], parts[left, 4] = 0.5 * half, more - 1.0
+            left += 1
+    return True

@@ -1,0 +1,119 @@
+"""Ways that pass bodies with free ends on their other sides.
+
+Such bodies give no letters, so that a search by words finds one way where there are several that
+are locally shortest: over a mooring line, and under it. On which side the robot passes decides
+where its tether will hang. So ways are bent outwards to all sides, and pulled taut again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.plan.space.planning_context import Water, along, has_room
+
+SIDES = 12
+"""Directions in which a way is bent, evenly around it."""
+
+BENDS = (0.35, 0.8)
+"""How far, as shares of what the length allows."""
+
+MOST = 4
+"""Ways on other sides that are kept, the shortest."""
+
+LOOKS = 6
+"""Places along a way from which the bent one is looked at: seen from all of them, it is the same
+once it is pulled taut."""
+
+
+def ways_beside(water: Water, known: list[Floats], farthest: float) -> list[Floats]:
+    """Locally shortest ways between the same ends as others.
+
+    Parameters
+    ----------
+    water : Water
+        Where they are.
+    known : list of ndarray of shape (k, 3)
+        Taut ways that are known, at least one, shortest first, metres.
+    farthest : float
+        Metres that they may be long.
+
+    Returns
+    -------
+    list of ndarray of shape (m, 3)
+        Taut ways that are like none of those, shortest first.
+    """
+    begin, end = known[0][0], known[0][-1]
+    found: list[Floats] = []
+    delta = water.mission.delta
+    for bent in _bent(begin, end, farthest):
+        if not _free(water, bent) or any(_seen_from(water, way, bent) for way in known + found):
+            continue
+        path = water.taut(bent)
+        if along(path) > farthest or not has_room(water.field, path, water.mission):
+            continue
+        if all(not _alike(path, other, delta) for other in known + found):
+            found.append(path)
+    found.sort(key=along)
+    return found[:MOST]
+
+
+def _bent(begin: Floats, end: Floats, farthest: float) -> Iterator[Floats]:
+    """Ways with one bend or two, out from the straight one."""
+    step = end - begin
+    far = float(np.linalg.norm(step))
+    if far < 1e-9 or farthest <= far:
+        return
+    u, v = across(step)
+    out = 0.5 * math.sqrt(farthest**2 - far**2)
+    for share in BENDS:
+        for angle in np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False):
+            away = share * out * (math.cos(angle) * u + math.sin(angle) * v)
+            yield np.array([begin, begin + 0.5 * step + away, end])
+
+
+def across(step: Floats) -> tuple[Floats, Floats]:
+    """Two directions at right angles to one and to each other.
+
+    Parameters
+    ----------
+    step : ndarray, shape (3,)
+        The direction, of any length but 0.
+
+    Returns
+    -------
+    tuple of ndarray, shape (3,)
+        Of length 1.
+    """
+    ahead = step / np.linalg.norm(step)
+    u = np.cross(ahead, np.eye(3)[int(np.argmin(np.abs(ahead)))])
+    u /= np.linalg.norm(u)
+    return u, np.cross(ahead, u)
+
+
+def _free(water: Water, path: Floats) -> bool:
+    return all(water.field.line_of_sight(a, b) for a, b in pairwise(path))
+
+
+def _seen_from(water: Water, way: Floats, bent: Floats) -> bool:
+    """Whether one can be pulled into the other, straight across."""
+    shares = np.linspace(0.0, 1.0, LOOKS + 2)[1:-1]
+    one, other = _at(way, shares), _at(bent, shares)
+    return all(water.field.line_of_sight(a, b) for a, b in zip(one, other, strict=True))
+
+
+def _alike(a: Floats, b: Floats, delta: float) -> bool:
+    if abs(along(a) - along(b)) > delta:
+        return False
+    shares = np.array([0.25, 0.5, 0.75])
+    return bool(np.linalg.norm(_at(a, shares) - _at(b, shares), axis=1).max() < 2.0 * delta)
+
+
+def _at(path: Floats, shares: Floats) -> Floats:
+    """(k, 3) the points at shares of a path's length."""
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    return np.column_stack([np.interp(shares * lengths[-1], lengths, path[:, k]) for k in range(3)])

@@ -1,0 +1,94 @@
+"""Tours in an order of waypoints: that of the mission file, the first incumbent, or another.
+
+The planner `predictive` plans at the waypoints only, and the tether is driven along its paths. The
+tour is that of a simulated flight, without the time that a simulation takes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from netsp.base.clock import Clock
+from netsp.base.geometry import polylines
+from netsp.online.planner import PlannerOptions
+from netsp.online.planner.planner import DONE
+from netsp.online.planner.predictive import PredictivePlanner
+from netsp.plan.space.board import Driven
+from netsp.plan.space.driven_legs import LegTo, drive_legs
+from netsp.plan.space.planning_context import Water
+
+MAX_PATHS = 8
+"""Largest number of paths of the planner per waypoint; a planner that needs more makes no
+progress."""
+
+
+def drive_given_order(water: Water) -> Driven | None:
+    """Drive a mission in the order of its file, whatever the time.
+
+    Parameters
+    ----------
+    water : Water
+        Water of the mission; if the mission has a tour, the legs of that tour are driven.
+
+    Returns
+    -------
+    Driven or None
+        The tour; None if the robot does not come home with a free tether, exceeds the limit of the
+        tether, or comes too near to solids.
+    """
+    mission = water.mission
+    if mission.tour is not None:
+        paths = [np.array(stop.path) for stop in mission.tour.stops]
+        legs = [LegTo(k, 0, path) for k, path in enumerate(paths)]
+        return drive_legs(water, legs, np.array(mission.tour.home))
+    return drive_order(water, [(k, 0) for k in range(len(mission.waypoints))], Clock())
+
+
+def drive_order(water: Water, order: Sequence[tuple[int, int]], clock: Clock) -> Driven | None:
+    """Drive a mission in some order of its waypoints.
+
+    Parameters
+    ----------
+    water : Water
+        Water of the mission.
+    order : sequence of (int, int)
+        Number of each waypoint, and of its alternative, from 1 on; 0 for the waypoint's position.
+    clock : Clock
+        Clock of the run; when it is up, there is no tour.
+
+    Returns
+    -------
+    Driven or None
+        The tour; None if the robot does not come home with a free tether, exceeds the limit of the
+        tether, or comes too near to solids.
+    """
+    mission = water.mission
+    waypoints = tuple(mission.waypoints[n].at(choice) for n, choice in order)
+    ordered = mission.model_copy(update={"waypoints": waypoints, "tour": None})
+    planner = PredictivePlanner(
+        ordered, water.field, water.model, water.grid, PlannerOptions(prepared=False)
+    )
+    planner.laid = water.laid
+    robot, tether = np.array(mission.begin), water.present
+    walked, legs = [robot], []
+    for _ in range(MAX_PATHS * (2 + len(order))):
+        if clock.up:
+            return None
+        before = len(planner.reached)
+        command = planner.step(robot, tether)
+        for k in planner.reached[before:]:
+            path = np.array(walked if len(walked) > 1 else [robot, robot])
+            legs.append(LegTo(*order[k], path))
+            walked = [robot]
+        if command.mode == DONE:
+            break
+        path = np.vstack([robot, command.path])
+        tether = water.model.drive(tether, polylines.dense(path, mission.delta))[0]
+        walked += list(command.path)
+        robot = command.path[-1]
+        planner.passed(len(command.path))
+    if not planner.home:
+        return None
+    return drive_legs(water, legs, np.array(walked if len(walked) > 1 else [robot, robot]))

@@ -1,0 +1,323 @@
+"""The judge of a planned mission: asks again what its tour says, and imports no solver.
+
+The tether is driven along the whole tour by the same model at half the resolution, which is another
+discretisation but not another model; benchmarks compare the model with strings of beads. Words are
+those of the mission's own cells, for letters have no meaning beyond them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError, counted
+from netsp.base.geometry import polylines
+from netsp.gtsp.travel.result import relative_gap
+from netsp.judge import Check, Verification
+from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
+from netsp.model.solution import Status
+from netsp.online.mission import Mission
+from netsp.online.mission_limits import check_bounds, check_size
+from netsp.online.paths.tree import ShortestTree
+from netsp.online.planned_tour import PlannedTour
+from netsp.online.planner.planner import FREE
+from netsp.plan.space.planning_context import Water, has_room, least_room
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.scene import Scene
+from netsp.world.tether import GeodesicTether
+
+FINER = 0.5
+"""Times the mission's resolution at which the tether is driven again."""
+
+LENGTH_TOLERANCE = 0.01
+"""Share of a stated tether length, beside the mission's resolution, by which the length at another
+resolution may differ: three times the worst drives against finer ones (docs/tether.md)."""
+
+REACH = 0.99
+"""Of the tether that a plan may need at a waypoint (`netsp.plan.space.planning_context.SHARE`)."""
+
+ROUNDING = 1e-6
+"""Metres, and share of a length, that stated figures may be off."""
+
+
+def verify_mission(
+    mission: Mission, *, scene: Scene | None = None, field: DistanceField | None = None,
+    water: Water | None = None,
+) -> Verification:  # fmt: skip
+    """Judge a planned mission.
+
+    Checks that the tour leads from the start through the first waypoints and home, clear of solids;
+    that the tether's word at every stop is the stated one and empty at the end; that the tether,
+    driven along it once more, keeps to its limit, has the stated lengths and is free at home; and
+    that length, bounds, gaps and status are consistent.
+
+    Parameters
+    ----------
+    mission : Mission
+        A mission with a tour.
+    scene : Scene, optional
+        Its scene, when it is at hand.
+    field : DistanceField, optional
+        The scene's field, when it is at hand.
+    water : Water, optional
+        Water of the mission, if it is already computed; its words depend on field, box and cell
+        only.
+
+    Returns
+    -------
+    Verification
+        All checks, in order.
+
+    Raises
+    ------
+    InputError
+        A mission without a tour, or with a moving anchor.
+    """
+    if mission.tour is None:
+        raise InputError("tour: the mission has none; expected one that `netsp solve` has planned")
+    if mission.track:
+        raise InputError("track: a tour is for a fixed anchor; expected a mission without")
+    check_size(mission)
+    if water is None:
+        scene = scene or mission.load_scene()
+        check_bounds(mission, scene)
+        water = Water.of(mission, scene, field or scene.field())
+    finer = GeodesicTether(water.field, FINER * mission.delta)
+    water = replace(water, mission=mission, model=finer)
+    return Verification(tuple(_Judge(mission, mission.tour, water).run()))
+
+
+def checked_mission(mission: Mission, scene: Scene, field: DistanceField) -> None:
+    """Refuse a mission whose tour fails a check, as before it is flown.
+
+    Parameters
+    ----------
+    mission : Mission
+        A mission with a tour.
+    scene : Scene
+        Its scene.
+    field : DistanceField
+        The scene's field.
+
+    Raises
+    ------
+    InputError
+        As of `verify_mission`; the tour fails a check.
+    """
+    failed = [c for c in verify_mission(mission, scene=scene, field=field).checks if not c.passed]
+    if failed:
+        raise InputError(f"tour: fails its check {failed[0].name!r}: {failed[0].detail}")
+
+
+def _proven(gap: float | None) -> bool:
+    return gap is not None and gap <= OPTIMALITY_TOLERANCE
+
+
+def _shown(point: Floats) -> str:
+    return f"({', '.join(f'{v:.4g}' for v in point)})"
+
+
+@dataclass
+class _Judge:
+    mission: Mission
+    tour: PlannedTour
+    water: Water
+
+    @property
+    def field(self) -> DistanceField:
+        """Return the scene's field."""
+        return self.water.field
+
+    def run(self) -> list[Check]:
+        within = self._within()
+        if not within.passed:  # nothing is known of the water there
+            return [self._joined(), within, self._length(), self._bounds()]
+        return [
+            self._joined(), within, self._left_out(), self._clear(), *self._words(),
+            *self._tethers(),
+            self._length(), self._bounds(),
+        ]  # fmt: skip
+
+    @cached_property
+    def legs(self) -> list[Floats]:
+        """(k, 3) each; the last is the way home."""
+        return [*(np.array(s.path) for s in self.tour.stops), np.array(self.tour.home)]
+
+    def _name(self, leg: int) -> str:
+        return "the way home" if leg == len(self.tour.stops) else f"the way to stop {leg}"
+
+    def _within(self) -> Check:
+        """No path leads where the scene ends, nor farther than any tether."""
+        line, mission, name = self.tour.line, self.mission, "within the scene and the tether"
+        if self.water.bounds is not None:
+            low, high = np.array(self.water.bounds[:3]), np.array(self.water.bounds[3:])
+            out = np.flatnonzero(((line < low) | (line > high)).any(axis=1))
+            if len(out):
+                return Check(name, False, f"{_shown(line[out[0]])} is out of the scene's bounds")
+        far = np.linalg.norm(line - np.array(mission.anchor), axis=1)
+        k = int(far.argmax())
+        if far[k] > mission.tether_length * (1.0 + ROUNDING):
+            told = f"{_shown(line[k])} is {far[k]:.4g} m from the anchor"
+            return Check(name, False, f"{told}, the tether {mission.tether_length:g} long")
+        return Check(name, True, "all paths")
+
+    def _joined(self) -> Check:
+        """Validation asks the ends of each path; that one goes on where the other ended, here."""
+        gaps = [float(np.linalg.norm(b[0] - a[-1])) for a, b in pairwise(self.legs)]
+        off = max(gaps, default=0.0)
+        left = len(self.mission.waypoints) - len(self.tour.stops)
+        told = counted(len(self.tour.stops), "stop")
+        told += f", {counted(left, 'waypoint')} left out" if left else ""
+        good = off <= self.mission.reach
+        given = [stop.given_as for stop in self.tour.stops if stop.given_as is not None]
+        if len(set(given)) < len(given):
+            twice = next(n for n in given if given.count(n) > 1)
+            return Check(
+                "leads through the waypoints and home", False,
+                f"two stops say that they are waypoint #{twice} of the file",
+            )  # fmt: skip
+        return Check(
+            "leads through the waypoints and home", good,
+            told if good else f"a leg begins {off:.3g} m from where the one before it ended",
+        )  # fmt: skip
+
+    def _left_out(self) -> Check:
+        """Only waypoints that no tether reaches within what plans may use may be missing; where the
+        robot has room along a shortest path from the start, the tether follows it."""
+        mission, left = self.mission, range(len(self.tour.stops), len(self.mission.waypoints))
+        name = "leaves out only what is out of reach"
+        if not left:
+            return Check(name, True, "no waypoint")
+        water = self.water
+        tree = ShortestTree(water.grid, np.array(mission.start), mission.places[list(left)])
+        limit = REACH * mission.tether_length - mission.delta
+        for n, k in enumerate(left):
+            path = tree.path(n)
+            if path is None:
+                continue
+            line = np.vstack([water.laid.nodes, path[::-1]])
+            tether, longest = water.driven(water.laid, line[len(water.laid.nodes) - 1 :])
+            if longest <= limit:
+                return Check(name, False, f"waypoint #{k}, which takes {tether.length:.3f} m")
+        return Check(name, True, f"{len(left)} of {len(mission.waypoints)} waypoints")
+
+    def _clear(self) -> Check:
+        line, mission = self.tour.line, self.mission
+        room = least_room(self.field, line)
+        tight = [k for k, leg in enumerate(self.legs) if not has_room(self.field, leg, mission)]
+        free = all(self.field.line_of_sight(a, b, depth=1e-3) for a, b in pairwise(line))
+        told = f"{room:.3g} m from the nearest, clearance {mission.clearance:g}"
+        if room < mission.clearance and not tight:
+            near = float(self.field.distance(np.vstack([mission.places, self.legs[0][:1]])).min())
+            told += (
+                f"; a waypoint or the start is {near:.3g} m from it" if near < mission.clearance
+                else f"; pulled taut, corners may be half of delta ({mission.delta:g}) nearer"
+            )  # fmt: skip
+        if tight:
+            told += f", which {self._name(tight[0])} does not keep within half of delta"
+        return Check(
+            "keeps clear of solids", free and not tight, told if free else "passes through a solid"
+        )
+
+    def _words(self) -> list[Check]:
+        mission, words = self.mission, self.water.words
+        walked, wrong = self.water.present.nodes, []
+        for k, (stop, leg) in enumerate(zip(self.tour.stops, self.legs, strict=False)):
+            walked = np.vstack([walked, leg])
+            word, broken = words.word_until(np.vstack([walked, mission.places[k]]))
+            if broken is not None or word != stop.signature:
+                found = "no word" if broken is not None else f"the word {list(word)}"
+                wrong.append(f"stop {k} has {found}, stated {list(stop.signature)}")
+        word, broken = words.word_until(
+            np.vstack([walked, self.legs[-1], self.water.laid.nodes[::-1]])
+        )
+        if words.exact != self.tour.exact:
+            wrong.append(f"words are{'' if words.exact else ' not'} exact, stated otherwise")
+        certain = "" if words.exact else "; other words may be of the same class, too"
+        return [
+            Check(
+                "words at the stops", not wrong,
+                f"all as stated{certain}" if not wrong else
+                f"{wrong[0]}" + (f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""),
+            ),
+            Check(
+                "empty word at the end", broken is None and word == (),
+                "contractible" if broken is None and word == () else
+                "no word" if broken is not None else f"{list(word)}",
+            ),
+        ]  # fmt: skip
+
+    def _tethers(self) -> list[Check]:
+        model, laid = self.water.model, self.water.laid
+        tether, longest, where, off = self.water.present, 0.0, 0, []
+        for k, leg in enumerate(self.legs):
+            tether, most = self.water.driven(tether, leg, fine=True)
+            if most > longest:
+                longest, where = most, k
+            if k < len(self.tour.stops):
+                stop = self.tour.stops[k]
+                for length, stated, where_ in (
+                    (tether.length, stop.tether_length, "at"),
+                    (most, stop.longest_tether, "on the way to"),
+                ):
+                    allowed = self.mission.delta + LENGTH_TOLERANCE * stated
+                    if abs(length - stated) > allowed:
+                        off.append(f"{where_} stop {k}: {length:.3f} m, stated {stated:.3f}")
+        # as at the start, but to where the tour ends, which may be its reach away
+        as_laid = model.update(laid, tether.robot)
+        left = model.refine(tether).length - model.refine(as_laid).length
+        limit = self.mission.tether_length
+        name = "home" if where == len(self.tour.stops) else f"stop {where}"
+        return [
+            Check(
+                "within the tether's length", longest <= limit * (1.0 + ROUNDING),
+                f"longest {longest:.3f} of {limit:g} m, on the way to {name}",
+            ),
+            Check(
+                "tethers as long as stated", not off,
+                "all" if not off else
+                f"{off[0]}" + (f", and {len(off) - 1} more" if len(off) > 1 else ""),
+            ),
+            Check(
+                "free at home", left <= FREE * self.mission.delta,
+                f"{max(left, 0.0):.3f} m longer than at the start",
+            ),
+        ]  # fmt: skip
+
+    def _length(self) -> Check:
+        length = sum(float(polylines.length(leg)) for leg in self.legs)
+        stated = self.tour.length
+        good = abs(length - stated) <= ROUNDING * (1.0 + stated)
+        return Check(
+            "length as stated", good,
+            f"{stated:.6g} m" if good else f"the path is {length:.6g} m long, stated {stated:.6g}",
+        )  # fmt: skip
+
+    def _bounds(self) -> Check:
+        tour, faults = self.tour, []
+        for name, bound, gap in (
+            ("lower_bound", tour.lower_bound, tour.gap),
+            ("bound_of_all", tour.bound_of_all, tour.gap_to_all),
+        ):
+            slack = ROUNDING * tour.length
+            if bound is not None and bound > tour.length + slack:
+                faults.append(f"{name} {bound:.6g} is above the length")
+            right = relative_gap(tour.length, bound)
+            if (right is None) != (gap is None) or abs((right or 0.0) - (gap or 0.0)) > 1e-6:
+                faults.append(f"the gap of {name} is {right}, stated {gap}")
+        left = len(self.mission.waypoints) - len(tour.stops)
+        if tour.status is Status.OPTIMAL and not _proven(tour.gap_to_all):
+            faults.append(f"status optimal with a gap of {tour.gap_to_all} to all tours")
+        elif tour.status is Status.OPTIMAL and left:
+            faults.append(f"status optimal with {counted(left, 'waypoint')} left out")
+        elif tour.status is Status.OPTIMAL_OF_STATES and not _proven(tour.gap):
+            faults.append(f"status optimal_of_states with a gap of {tour.gap}")
+        elif tour.status not in (Status.OPTIMAL, Status.OPTIMAL_OF_STATES, Status.FEASIBLE):
+            faults.append(
+                f"status {tour.status.value}; expected optimal, optimal_of_states or feasible"
+            )
+        return Check("bounds and status", not faults, faults[0] if faults else tour.status.value)

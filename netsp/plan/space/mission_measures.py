@@ -1,0 +1,104 @@
+"""Measures of entanglement of any path in any scene: its word, and how often it winds about what.
+
+Winding numbers are the word's class in the abelianisation of the scene's group. About rings and
+closed bars they are linking numbers: how often a loop goes through each of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.errors import InputError
+from netsp.base.geometry import polylines
+from netsp.hsignature import Word
+from netsp.plan.space.cells import MOST_CELLS
+from netsp.plan.space.space_signature import SpaceSignature
+from netsp.world.scene.scene import Scene
+from netsp.world.scene.surfaces import extent
+
+CELL, ROOM = 0.2, 5.0
+"""Metres of a cell, where there are not too many of them, and cells about everything."""
+
+
+@dataclass(frozen=True)
+class SpaceMeasures:
+    """Of a path in a scene.
+
+    Parameters
+    ----------
+    length : float
+        Metres.
+    closed : bool
+        Whether it was taken for a loop; else each end counts as joined to where the path begins by
+        the shortest way.
+    signature : Word
+        Empty if the path can be pulled straight without passing through anything.
+    windings : tuple of int
+        How often it winds about what there is, with signs.
+    exact : bool
+        Whether words that differ are of different classes.
+    cell : float
+        Metres: gaps narrower than that may count as closed.
+    """
+
+    length: float
+    closed: bool
+    signature: Word
+    windings: tuple[int, ...]
+    exact: bool
+    cell: float
+
+
+def measure_path(
+    scene: Scene, path: npt.ArrayLike, *, closed: bool | None = None, cell: float | None = None
+) -> SpaceMeasures:
+    """Measure a path.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    path : array_like, shape (k, 3)
+        Metres.
+    closed : bool, optional
+        Whether its end is joined to its beginning; by default if they are one point.
+    cell : float, optional
+        Metres of a cell; by default 0.2, or more where the scene is large.
+
+    Returns
+    -------
+    SpaceMeasures
+        The measures.
+
+    Raises
+    ------
+    InputError
+        Less than two points; a path that runs through a solid or a gap narrower than a cell, says
+        where; too many cells for the memory.
+
+    Examples
+    --------
+    >>> ring = {"center": [0, 0, 0], "axis": [0, 0, 1], "major_radius": 2, "minor_radius": 0.1}
+    >>> loop = [[0, 0, 2], [0, 0, -2], [4, 0, -2], [4, 0, 2], [0, 0, 2]]
+    >>> abs(measure_path(Scene(solids=[{"torus": ring}]), loop).windings[0])
+    1
+    """
+    line = np.asarray(path, dtype=float).reshape(-1, 3)
+    if len(line) < 2:
+        raise InputError(f"path: expected two points or more, got {len(line)}")
+    if closed is None:
+        closed = bool(np.linalg.norm(line[0] - line[-1]) < 1e-9)
+    low, high = extent(scene, line)
+    if cell is None:
+        room = np.prod(high - low + 2.0 * ROOM * CELL)
+        cell = max(CELL, 1.05 * float(room / MOST_CELLS) ** (1.0 / 3.0))
+    low, high = low - ROOM * cell, high + ROOM * cell
+    words = SpaceSignature.of(scene.field(), low, high, cell, line[0])
+    word = words.word(line, closed=closed)
+    length = float(polylines.length(line))
+    if closed:
+        length += float(np.linalg.norm(line[0] - line[-1]))
+    return SpaceMeasures(length, closed, word, words.windings(word), words.exact, cell)

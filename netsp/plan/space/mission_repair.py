@@ -1,0 +1,386 @@
+"""`repair`: flies the tour that was planned, and plans what is left of it anew when the map changes
+so that it no longer holds.
+
+As in the plane (`netsp.online.execute.tour_repair`): what is left is whole if its paths keep off
+solids, the tether fits on them and comes home free. Otherwise the order is kept, and shortest ways
+are sought round what blocks it. The rest is planned anew, from where the robot is and with its
+tether as it lies by then, where that is not enough, or takes longer than planning does: the robot
+holds its place meanwhile.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError, LimitReachedError, interrupted
+from netsp.base.geometry import polylines
+from netsp.model.field_types import Point3
+from netsp.online.mission import Mission, MissionState, MissionWaypoint
+from netsp.online.paths.tree import ShortestTree
+from netsp.online.planned_tour import PlannedStop, PlannedTour, in_file
+from netsp.online.planner.planner import HOLD, Command, Tethers
+from netsp.online.planner.predictive import PredictivePlanner
+from netsp.plan.space.planning_context import DIP, stride
+from netsp.plan.space.space_plan import SpacePlan, plan
+from netsp.world.scene.field import DistanceField, pushed_out
+from netsp.world.tether import Tether
+
+KEPT, LOCAL, REPLANNED, BY_LEGS = "kept", "local", "replan", "legs"
+"""What became of the rest of a tour: kept; kept but for legs round what blocks it; planned anew; or
+left to be found leg by leg."""
+
+
+@dataclass(frozen=True)
+class Repair:
+    """What was done when the map had changed.
+
+    Parameters
+    ----------
+    time : float
+        Seconds since the start.
+    waypoint : int
+        The one that was next.
+    response : {"kept", "local", "replan", "legs"}
+        What became of the rest of the tour.
+    reason : str
+        Why.
+    length : float
+        Metres to go, as planned; 0 where no tour was found.
+    planning_s : float
+        Seconds that it took.
+    """
+
+    time: float
+    waypoint: int
+    response: str
+    reason: str
+    length: float
+    planning_s: float
+
+
+def _gaps_named(found: SpacePlan) -> str:
+    """Return words for the gaps that the grid of a plan does not show."""
+    gaps = found.water.unresolved_gaps
+    if not gaps:
+        return ""
+    named = ", ".join(str(gap) for gap in gaps)
+    return f"; no tour through gaps that the cells do not show was considered: {named}"
+
+
+@dataclass
+class _Rest:
+    """What is left of a tour: its legs with the tether's length at their ends, the way home last;
+    waypoints that it goes to, and those that solids stand on; whether all legs are there; how long
+    it was as planned, and what does not hold of that."""
+
+    legs: list[tuple[Floats, float]] = field(default_factory=list)
+    kept: list[int] = field(default_factory=list)
+    lost: list[int] = field(default_factory=list)
+    whole: bool = True
+    old: float = 0.0
+    reason: str | None = None
+
+    @property
+    def length(self) -> float:
+        """Metres."""
+        return float(sum(polylines.length(leg) for leg, _ in self.legs))
+
+
+@dataclass
+class RepairPlanner(PredictivePlanner):
+    """`PredictivePlanner` that plans the rest of a tour as a whole."""
+
+    repairs: list[Repair] = field(default_factory=list)
+    _asked_for: bool = False
+    _until: float = -np.inf
+    _walked: list[Floats] = field(default_factory=list)
+    _first: tuple[int, Floats] | None = None
+    _added: bool = False
+    _as_given: Mission | None = None
+
+    name = "repair"
+
+    def __post_init__(self) -> None:
+        """See `Planner`."""
+        super().__post_init__()
+        self._as_given = self.mission
+
+    def take_map(
+        self, scene: DistanceField, tethers: Tethers, box: Floats, robot: Floats, tether: Tether
+    ) -> None:
+        """See `Planner`."""
+        super().take_map(scene, tethers, box, robot, tether)
+        self._asked_for = self.mission.tour is not None
+
+    def step(self, robot: Floats, tether: Tether) -> Command:
+        """See `Planner`; holds its place until a plan is due, however soon it was ready, so that
+        the same seed gives the same flight."""
+        self._walked.append(np.array(robot))
+        if self._asked_for and not self.done and self._shortened(tether) is None:
+            self._asked_for = False
+            begin = time.process_time()
+            try:
+                self._mend(robot, tether)
+            except Exception as error:  # a vehicle in the water must not be left without a command
+                if interrupted(error):
+                    raise KeyboardInterrupt from error
+                return self._hold(robot, error, time.process_time() - begin)
+            spent = time.process_time() - begin
+            if self.now < self._until:
+                return Command(robot[None], HOLD, spent)
+        if self.now < self._until:
+            return Command(robot[None], HOLD)
+        return super().step(robot, tether)
+
+    def add_waypoint(self, waypoint: MissionWaypoint) -> None:
+        """See `Planner`."""
+        super().add_waypoint(waypoint)
+        self._asked_for = self._added = self.mission.tour is not None
+
+    def _without_stop(self, k: int) -> None:
+        """The tour goes from the stop before to the one after, pulled taut in its class."""
+        tour = self.mission.tour
+        if tour is None or k >= len(tour.stops):
+            return
+        stops, path = list(tour.stops), np.array(tour.stops[k].path)
+        if self._first is not None and self._first[0] == k:
+            path = self._first[1]
+        del stops[k]
+        onward = tour.home if k == len(stops) else stops[k].path
+        leg = in_file(self.pulled(np.vstack([path, np.array(onward)])))
+        self._first = (k, np.array(leg)) if k == self.index else self._first
+        home = tour.home
+        if k == len(stops):
+            home = leg
+        else:
+            stops[k] = stops[k].model_copy(update={"path": leg})
+        self.mission = self.mission.model_copy(
+            update={"tour": tour.model_copy(update={"stops": tuple(stops), "home": home})}
+        )
+        self._asked_for = True
+
+    def take_limit(self, limit: float) -> None:
+        """See `Planner`."""
+        super().take_limit(limit)
+        self._asked_for = self.mission.tour is not None
+
+    def carried_off(self) -> None:
+        """See `Planner`."""
+        super().carried_off()
+        self._asked_for, self._planned = self.mission.tour is not None, -1
+
+    def _next(self) -> None:
+        super()._next()
+        self._walked = self._walked[-1:]
+
+    def _mend(self, robot: Floats, tether: Tether) -> None:
+        """See what is left of the tour, and mend it if it no longer holds."""
+        begin = time.process_time()
+        rest = self._rest(robot, tether)
+        if rest is None:
+            return
+        if self._added:
+            rest.reason = f"waypoint #{max(self.given)} was added"
+        if rest.reason is None:
+            self._note(KEPT, "the rest of the tour still holds", rest.length, begin)
+            return
+        worth = rest.old + self.options.planning_limit * self.mission.speed
+        found, added = None, self._added
+        self._added = False
+        if not self.homeward and (added or not rest.whole or rest.length > worth):
+            found = self._planned_anew(robot, tether, rest, added)
+        if found is not None:
+            self._take(found)
+            self._note(REPLANNED, f"{rest.reason}{_gaps_named(found)}", found.length, begin)
+        elif rest.whole:
+            self._go_on_along(rest)
+            self._note(LOCAL, rest.reason, rest.length, begin)
+        else:
+            self._note(BY_LEGS, f"{rest.reason}, and no tour was found", 0.0, begin)
+
+    def _note(self, response: str, reason: str, length: float, begin: float) -> None:
+        spent = time.process_time() - begin
+        self.repairs.append(Repair(self.now, self.index, response, reason, length, spent))
+
+    def _rest(self, robot: Floats, tether: Tether) -> _Rest | None:
+        """What is left of the tour by the map, with ways round what blocks it."""
+        tour = self.mission.tour
+        assert tour is not None
+        if self.index > len(tour.stops):
+            return None  # beyond the tour there are only waypoints that it does not reach
+        rest, here = _Rest(), robot
+        for k in range(self.index, len(tour.stops) + 1):
+            home = k == len(tour.stops)
+            name = "the way home" if home else f"the way to waypoint #{k}"
+            planned = np.array(tour.home if home else tour.stops[k].path)
+            rest.old += polylines.length(planned)
+            if not home and self._is_lost(k):
+                rest.reason = rest.reason or f"a solid stands on waypoint #{k}"
+                rest.lost.append(k)
+                continue
+            leg: Floats | None = np.vstack([here, planned])
+            if k == self.index:
+                leg = np.vstack([robot, self.path]) if len(self.path) else self._leg(robot, tether)
+            there, why = self._along(tether, leg, name)
+            if there is None:
+                rest.reason = rest.reason or why
+                leg = self._way_round(here, planned[-1])
+                there, _ = self._along(tether, leg, name)
+            if there is not None and home and not self._is_free(there):
+                rest.reason = rest.reason or "the tether would not be free at home"
+                leg = self.pulled(self.back_along(tether))
+                there, _ = self._along(tether, leg, name)
+                if there is not None and not self._is_free(there):
+                    there = None
+            if there is None or leg is None:
+                rest.whole = False
+                break
+            tether, here = there, leg[-1]
+            rest.legs.append((leg, tether.length))
+            rest.kept += [] if home else [k]
+        return rest
+
+    def _way_round(self, here: Floats, there: Floats) -> Floats | None:
+        """The shortest way by the map, pulled taut."""
+        path = ShortestTree(self.grid, there, here[None]).path(0)
+        return None if path is None else self.pulled(path)
+
+    def _along(self, tether: Tether, leg: Floats | None, name: str) -> tuple[Tether | None, str]:
+        """The tether at the end of a leg; None, and why, where the robot cannot go along it."""
+        if leg is None or not self.keeps_off(leg):
+            return None, f"{name} is blocked"
+        step = stride(self.mission)
+        there, lengths = self._model.drive(tether, polylines.dense(leg, step))
+        most = float(lengths.max(initial=0.0))
+        if most > self.limit:
+            return None, (
+                f"on {name} {most:.2f} m of tether would be out, of {self.mission.tether_length:g}"
+            )
+        return there, ""
+
+    def _planned_anew(
+        self, robot: Floats, tether: Tether, rest: _Rest, added: bool
+    ) -> SpacePlan | None:
+        """A tour from here, if one is found that goes to more waypoints or is shorter than what
+        there is."""
+        self._until = self.now + self.options.planning_limit
+        if all(self._is_lost(k) for k in self._left):
+            return None
+        try:
+            found = self._rest_of_tour(robot, tether)
+        except (InputError, LimitReachedError):
+            return None
+        more = added and len(found.order) > len(rest.kept)
+        return None if rest.whole and rest.length <= found.length and not more else found
+
+    def _rest_of_tour(self, robot: Floats, tether: Tether) -> SpacePlan:
+        """A tour from here through the waypoints that are left, by the map."""
+        mission = self.mission
+        here = pushed_out(self.scene, robot[None], 1e-3)[0] if self._inside(robot) else robot
+        line = np.vstack([tether.nodes[:-1], here])
+        state = MissionState(position=in_file(here[None])[0], tether=in_file(line))
+        rest = mission.model_copy(
+            update={
+                "state": state, "tour": None,
+                "waypoints": tuple(
+                    mission.waypoints[k] for k in self._left if not self._is_lost(k)
+                ),
+                "tether_length": self.limit,
+            }
+        )  # fmt: skip
+        return plan(
+            rest, field=self.scene, grid=self.grid, time_limit=self.options.planning_limit,
+            seed=self.options.seed,
+        )  # fmt: skip
+
+    def _inside(self, place: Floats) -> bool:
+        return float(self.scene.distance(place)) < DIP * self.mission.delta
+
+    @property
+    def _left(self) -> range:
+        """Waypoints that are left."""
+        return range(self.index, len(self.mission.waypoints))
+
+    def _is_lost(self, k: int) -> bool:
+        """Whether a solid stands on a waypoint."""
+        return self._inside(self.mission.places[k])
+
+    def _take(self, found: SpacePlan) -> None:
+        """Go on along a new tour: the waypoints that are left come in its order from now on."""
+        rest = found.planned(seed=self.options.seed)
+        assert rest.tour is not None
+        good = [k for k in self._left if not self._is_lost(k)]
+        lost = [k for k in self._left if self._is_lost(k)]
+        left = [*(good[n] for n in found.every_waypoint), *lost]
+        waypoints = (*rest.waypoints, *(self.mission.waypoints[k] for k in lost))
+        self._splice(rest.tour, rest.tour.stops, rest.tour.home, waypoints, left)
+
+    def _go_on_along(self, rest: _Rest) -> None:
+        """Go on along the same tour, round what blocks it."""
+        tour = self.mission.tour
+        assert tour is not None
+        stops = tuple(
+            tour.stops[k].model_copy(update={"path": in_file(path), "tether_length": length})
+            for k, (path, length) in zip(rest.kept, rest.legs, strict=False)
+        )
+        beyond = range(max(self.index, len(tour.stops)), len(self.mission.waypoints))
+        left = [*rest.kept, *rest.lost, *beyond]
+        waypoints = tuple(self.mission.waypoints[k] for k in left)
+        self._splice(tour, stops, in_file(rest.legs[-1][0]), waypoints, left)
+
+    def _splice(
+        self, tour: PlannedTour, stops: tuple[PlannedStop, ...], home: tuple[Point3, ...],
+        waypoints: tuple[MissionWaypoint, ...], left: list[int],
+    ) -> None:  # fmt: skip
+        """Take stops and waypoints for those that are left, whose numbers were `left`. The file of
+        the tour has the first of them begin at the stop before."""
+        old, n = self.mission.tour, self.index
+        file = self._as_given
+        assert file is not None
+        assert file.tour is not None
+        numbers = dict(enumerate(stop.given_as for stop in file.tour.stops))
+        self.given = [*self.given[:n], *(self.given[k] for k in left)]
+        assert old is not None
+        stops = tuple(
+            stop.model_copy(update={"given_as": numbers.get(self.given[n + k])})
+            for k, stop in enumerate(stops)
+        )
+        self._first = (n, np.array(stops[0].path if stops else home))
+        walked = in_file(np.vstack([np.array(self._walked), self._first[1]]))
+        if stops:
+            stops = (stops[0].model_copy(update={"path": walked}), *stops[1:])
+        else:
+            home = walked
+        self.mission = self.mission.model_copy(
+            update={
+                "waypoints": (*self.mission.waypoints[:n], *waypoints),
+                "tour": tour.model_copy(update={"stops": (*old.stops[:n], *stops), "home": home}),
+            }
+        )
+        self.path, self._planned = self.path[:0], -1
+
+    def _planned_leg(self) -> tuple[Floats | None, float | None]:
+        if self._first is not None and self._first[0] == self.index:
+            return self._first[1], None
+        return super()._planned_leg()
+
+    def told(self) -> dict[str, Any]:
+        """See `Planner`: what was done when the map had changed."""
+        return {"repairs": [asdict(r) for r in self.repairs], "given_as": self.given}
+
+    @property
+    def flown(self) -> Mission:
+        """See `Planner`: without a tour that the waypoints do not lie on, as when some were left
+        out before it was planned anew."""
+        m = self.mission if self.mission.waypoints else self._as_given
+        assert m is not None
+        if m.tour is not None and m.tour.against(m.begin, m.start, m.places, m.reach):
+            return m.model_copy(update={"tour": None})
+        if m.tour is not None and self.repairs and self._first is not None:
+            return m.model_copy(update={"tour": m.tour.mended()})
+        return m

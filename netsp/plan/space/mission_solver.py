@@ -1,0 +1,790 @@
+"""From a mission to the same mission planned: order, legs, and a flight that proves them.
+
+The order of the mission file is driven and judged first, before any search, and is the first
+incumbent. Searches follow: tours of the plane if all solids are upright prisms
+(`netsp.plan.space.prisms`), else tours in short orders (`netsp.plan.space.short_orders`); tours
+along states and legs (`netsp.plan.space.space_plan`); and the order by going straight on
+(`netsp.plan.space.visit_order`), which is better for some bodies with many free ends. Tours are
+compared by the time until the robot is home, in a flight by `predictive`, or by length if there is
+no time to fly. All tours go through `_Incumbents`, which accepts none that the judge refuses.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from netsp.base.clock import Clock, TimeLimit, end_if_abandoned, until_interrupt
+from netsp.base.errors import InputError, LimitReachedError
+from netsp.gtsp.travel.result import relative_gap
+from netsp.model.bound_scope import LowerBound, Scope
+from netsp.model.solution import Status
+from netsp.online.mission import Mission
+from netsp.online.mission_limits import check_tether
+from netsp.online.mission_run import simulate
+from netsp.online.planned_tour import PlannedStop, PlannedTour, in_file
+from netsp.online.planner import PlannerOptions
+from netsp.online.run_log import LogRow, Run
+from netsp.plan.solve_problem import SolverLike
+from netsp.plan.space.judge import verify_mission
+from netsp.plan.space.non_taut_moves import SAVED
+from netsp.plan.space.passages import Resolved
+from netsp.plan.space.path_bound import bound_of_all
+from netsp.plan.space.planning_context import SHARE, Water, along, has_room
+from netsp.plan.space.potential import PotentialParams
+from netsp.plan.space.space_plan import (
+    AS_GIVEN,
+    OUT_AND_BACK,
+    PLANE,
+    ROUNDING,
+    SHORT_ORDER,
+    TAUT_LEGS,
+    SpacePlan,
+    check_plannable,
+    given_plan,
+    plans,
+    water_of,
+)
+from netsp.plan.space.upright import bound_of_upright
+from netsp.plan.space.visit_order import order_by_going_on
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.scene import Scene
+
+GOING_ON = "going-straight-on"
+"""Value of `solver` in tours that were found by going straight on."""
+
+
+@dataclass(frozen=True)
+class MissionPolicy:
+    """Division of the time of `solve_mission` among its stages.
+
+    Parameters
+    ----------
+    given_share : float
+        Share of the time for the flight in the order of the file, before the search. If it is too
+        short, that order is compared by its length and flown last.
+    planning_share : float
+        Share of the remaining time for tours of the plane and along states and legs.
+    bound_share : float
+        Share of the remaining time for the bound on all tours.
+    going_on_share : float
+        Share of the remaining time for the order by going straight on.
+    min_saving : float
+        Share of the time until home that a flight by going straight on must save to replace a tour
+        with a bound. Stopping within reach of the start saves less than the default.
+    first_tour_s : float
+        CPU seconds, at least 0, up to which netsp works on the first tour, even if the time limit
+        is shorter: the tour in the order of the file or, if that cannot be driven, another. A
+        smaller number leaves more missions without any tour when the limit is short; with a larger
+        one, very large missions end later.
+    potential : PotentialParams
+        Effort of the bound on each leg.
+    """
+
+    given_share: float = 0.25
+    planning_share: float = 0.7
+    bound_share: float = 0.3
+    going_on_share: float = 0.3
+    min_saving: float = 0.005
+    first_tour_s: float = 15.0
+    potential: PotentialParams = field(default_factory=PotentialParams)
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if isinstance(value, PotentialParams):  # checks itself
+                continue
+            top = math.inf if item.name.endswith("_s") else 1.0
+            if not 0.0 <= value <= top:
+                expected = "0 or more" if top > 1.0 else "a number from 0 to 1"
+                raise InputError(f"{item.name}: expected {expected}, got {value:g}")
+
+
+@dataclass(frozen=True)
+class SolvedMission:
+    """Planned mission, whose tour has passed the judge.
+
+    Parameters
+    ----------
+    mission : Mission
+        With its waypoints in the order of the tour, and the tour.
+    order : tuple of int
+        Old numbers of the waypoints in the new order; those that are left out come last.
+    run : Run or None
+        The planned mission, flown; None when there was no time left.
+    given : Run or None
+        The mission as it was given, flown; None when there was no time left.
+    plan : SpacePlan or None
+        The tour of states and legs, whether it was kept or not; None where none was found.
+    interrupted : bool
+        Whether Ctrl-C ended it.
+    cells : Resolved, optional
+        Cell size of the plan, and the gaps that its grid shows and does not show.
+    """
+
+    mission: Mission
+    order: tuple[int, ...]
+    run: Run | None
+    given: Run | None
+    plan: SpacePlan | None
+    interrupted: bool = False
+    cells: Resolved | None = None
+
+    @property
+    def tour(self) -> PlannedTour:
+        """Of the mission."""
+        assert self.mission.tour is not None
+        return self.mission.tour
+
+    @property
+    def left_out(self) -> tuple[int, ...]:
+        """Old numbers of the waypoints that the tour does not go to."""
+        return self.order[len(self.tour.stops) :]
+
+
+@dataclass
+class _Flights:
+    """Flights of one mission in several orders, until the time is up."""
+
+    mission: Mission
+    scene: Scene
+    water: Water
+    clock: Clock
+    tell: Callable[[str], None]
+    policy: MissionPolicy
+
+    def fly(
+        self, mission: Mission, name: str, worth: float = np.inf, clock: Clock | None = None
+    ) -> tuple[Run | None, bool]:
+        """Fly a mission to its end.
+
+        Parameters
+        ----------
+        mission : Mission
+            The mission.
+        name : str
+            Name of the tour in progress messages.
+        worth : float
+            Seconds after which the flight is cut short, because a better one is known.
+        clock : Clock, optional
+            Clock of the flight; when it is up, the flight is cut short. By default that of the run.
+
+        Returns
+        -------
+        run : Run or None
+            The flight; None if it was cut short.
+        slower : bool
+            True if it was cut short because it took longer than `worth`.
+        """
+        clock = clock or self.clock
+        if clock.up:
+            return None, False
+        self.tell(f"flying {name}")
+        slower = False
+
+        def watch(row: LogRow, _: object) -> None:
+            nonlocal slower
+            slower = row.time > worth
+            if slower or clock.up:
+                raise KeyboardInterrupt  # it ends a flight
+
+        if all(w.heading is None for w in mission.waypoints):
+            # what is seen takes most of the time of a flight, and changes nothing else of it
+            mission = mission.model_copy(update={"camera": None})
+        try:
+            run = self.clock.bounded(
+                f"flying {name}",
+                lambda: simulate(
+                    mission,
+                    scene=self.scene, field=self.water.field, on_step=watch,
+                    options=PlannerOptions(prepared=False, clock=clock),
+                ),
+            )  # fmt: skip
+        except LimitReachedError:
+            return None, False
+        return (None, slower) if run.summary["status"] == "interrupted" else (run, False)
+
+    def judged(self, mission: Mission) -> bool:
+        """Return whether a tour passes the judge.
+
+        Raises
+        ------
+        LimitReachedError
+            The time was up before it was judged.
+        """
+        self.tell("judging the tour")
+        return self.clock.bounded(
+            "judging the tour",
+            lambda: bool(verify_mission(mission, scene=self.scene, water=self.water)),
+        )
+
+
+@dataclass
+class _Incumbents:
+    """Incumbent of a run. It accepts no tour that the judge refuses.
+
+    Parameters
+    ----------
+    flights : _Flights
+        Flights of the mission.
+    first : SolvedMission or None
+        Tour in the order of the file, if it passes the judge. A tour that is longer, or home later,
+        is not accepted.
+    given : Run or None
+        Flight of the mission as it was given.
+    best : SolvedMission or None
+        The incumbent.
+    """
+
+    flights: _Flights
+    first: SolvedMission | None = None
+    given: Run | None = None
+    best: SolvedMission | None = None
+
+    def take_first(self, found: SolvedMission) -> bool:
+        """Accept the order of the file if it passes the judge; return whether it does."""
+        if not self.flights.judged(found.mission):
+            return False
+        self.first = self.best = found
+        return True
+
+    def take_given(self, run: Run | None) -> None:
+        """Keep the flight of the mission as it was given, unless it was cut short."""
+        self.given = run or self.given
+
+    def offer(self, found: SolvedMission, name: str) -> None:
+        """Accept a tour if it passes the judge and is better than the incumbent."""
+        best = self.best
+        if best is not None and (
+            len(found.tour.stops) < len(best.tour.stops)
+            or (len(found.tour.stops) == len(best.tour.stops) and not self._may_be_better(found))
+        ):
+            return
+        try:
+            if not self.flights.judged(found.mission):
+                return
+        except LimitReachedError:
+            if best is None:
+                raise
+            return
+        run, slower = self.flights.fly(found.mission, name, self._worth())
+        found = replace(found, run=run)
+        if self._needs_flight(found) and (found.run is None or not _good(found.run)):
+            return
+        if best is None or (not slower and self._is_better(found, best)):
+            self.best = found
+
+    def _needs_flight(self, found: SolvedMission) -> bool:
+        """Return whether a tour counts only with a flight: it needs the part of the tether that
+        plans reserve for steering."""
+        limit = SHARE * self.flights.mission.tether_length
+        in_plane = found.plan is not None and found.plan.kind == PLANE
+        return in_plane and found.tour.longest_tether > limit
+
+    def fly_best(self) -> None:
+        """Fly the incumbent as it will be written, if it has not been flown."""
+        best = self.best
+        if best is not None and best.run is None:
+            run, _ = self.flights.fly(best.mission, "it as it will be written")
+            self.best = replace(best, run=run)
+            self.first = self.best if best is self.first else self.first
+
+    def _seconds(self, found: SolvedMission) -> float | None:
+        """Return the seconds until home of a tour, None if it was not flown. For the order of the
+        file, the flight as given counts."""
+        if found.run is not None:
+            return seconds_until_home(found.run)
+        if found is self.first and self.given is not None and _good(self.given):
+            return seconds_until_home(self.given)
+        return None
+
+    def _worth(self) -> float:
+        """Return the seconds after which a flight cannot replace the incumbent."""
+        seconds = None if self.best is None else self._seconds(self.best)
+        return np.inf if seconds is None else (1.0 + SAVED) * seconds
+
+    def _may_be_better(self, found: SolvedMission) -> bool:
+        """Return whether a tour through as many waypoints may be better than the incumbent."""
+        assert self.best is not None
+        seconds, mission = self._seconds(self.best), self.flights.mission
+        if seconds is None:
+            return found.tour.length < self.best.tour.length * self._allowed(found, self.best)
+        # a flight turns back within reach of each stop, and is faster by no more than that
+        saved = 2.0 * mission.reach * (1 + len(found.tour.stops))
+        return (found.tour.length - saved) / mission.speed < (1.0 + SAVED) * seconds
+
+    def _allowed(self, found: SolvedMission, best: SolvedMission) -> float:
+        """Return the largest ratio of a tour to the incumbent at which it is accepted: a little
+        more than 1 for a tour along states and legs, because it has a bound, and less than 1 for
+        one by going straight on."""
+        without_bound = (GOING_ON, AS_GIVEN, SHORT_ORDER)
+        if found.tour.solver == GOING_ON and best.tour.solver not in without_bound:
+            return 1.0 - self.flights.policy.min_saving
+        known = found.plan is not None and found.plan.kind == TAUT_LEGS
+        return 1.0 + SAVED if known and best.tour.solver == PLANE else 1.0
+
+    def _is_better(self, found: SolvedMission, best: SolvedMission) -> bool:
+        """Return whether a tour that passed the judge replaces the incumbent."""
+        if found.run is not None and not _good(found.run):
+            return False
+        if len(found.tour.stops) > len(best.tour.stops):
+            return True
+        if self.first is not None and not self._no_worse(found, self.first):
+            return False
+        allowed = self._allowed(found, best)
+        seconds, of_best = self._seconds(found), self._seconds(best)
+        if seconds is not None and of_best is not None:
+            return seconds < allowed * of_best
+        return found.tour.length < allowed * best.tour.length
+
+    def _no_worse(self, found: SolvedMission, first: SolvedMission) -> bool:
+        """Return whether a tour is neither longer than the order of the file nor home later."""
+        if len(found.tour.stops) > len(first.tour.stops):
+            return True
+        if found.tour.length > first.tour.length * (1.0 + ROUNDING):
+            return False
+        seconds, of_first = self._seconds(found), self._seconds(first)
+        return seconds is None or of_first is None or seconds <= of_first * (1.0 + ROUNDING)
+
+
+def solve_mission(
+    mission: Mission,
+    *,
+    scene: Scene | None = None,
+    field: DistanceField | None = None,
+    solver: SolverLike = "auto",
+    params: Mapping[str, Any] | None = None,
+    time_limit: TimeLimit = 60.0,
+    iteration_limit: int | None = None,
+    seed: int = 0,
+    on_progress: Callable[[str], None] | None = None,
+    policy: MissionPolicy | None = None,
+) -> SolvedMission:
+    """Plan a mission: the shortest tour through its waypoints that leaves the tether free.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission.
+    scene : Scene, optional
+        Its scene, when it is at hand.
+    field : DistanceField, optional
+        The scene's field, when it is at hand.
+    solver : str or callable
+        As of `netsp.plan.solve_problem.solve_graph`.
+    params : mapping, optional
+        Options of the solver.
+    time_limit : float or Clock, optional
+        Seconds for all; when they are up, the best by then is returned
+        (`netsp.plan.space.space_plan.plan`).
+    iteration_limit : int, optional
+        Iterations of the solver.
+    seed : int
+        Of the solver.
+    on_progress : callable, optional
+        Called with a line of text now and then.
+    policy : MissionPolicy, optional
+        Division of the time among the stages.
+
+    Returns
+    -------
+    SolvedMission
+        The planned mission and its flight. At Ctrl-C, the best by then.
+
+    Raises
+    ------
+    InputError
+        As of `netsp.plan.space.space_plan.plan` and `simulate`.
+    LimitReachedError
+        No tour was found on which the tether stays within its limit.
+    """
+    policy = policy or MissionPolicy()
+
+    def tell(text: str) -> None:
+        end_if_abandoned()
+        if on_progress is not None:
+            on_progress(text)
+
+    name = solver if isinstance(solver, str) else getattr(solver, "__name__", "solver")
+    with until_interrupt(time_limit) as clock:
+        check_plannable(mission, solver, params, seed)
+        try:
+            with clock.at_least(policy.first_tour_s):
+                scene = scene or clock.bounded("reading the scene", mission.load_scene)
+                water = water_of(mission, clock, scene=scene, field=field, tell=tell)
+                mission, cells = water.mission, water.cells
+                laid = clock.bounded("laying the tether", lambda: water.present)
+                check_tether(mission, laid.length)
+                flights = _Flights(mission, scene, water, clock, tell, policy)
+                found = _Incumbents(flights)
+                _begin_as_given(found, clock.part(policy.given_share), seed)
+        except LimitReachedError:
+            if clock.stopped and not (isinstance(time_limit, Clock) and time_limit.up):
+                raise KeyboardInterrupt from None
+            raise
+        searched = _search(found, clock, name, solver, params, iteration_limit, seed)
+        planned = searched.plan
+        if found.given is None:
+            given, _ = flights.fly(mission, "the order as given")
+            found.take_given(given)
+            _offer_given_flight(found, seed)
+        _offer_going_on(found, seed)
+        if found.best is None:
+            raise searched.failure or LimitReachedError(
+                "waypoints: no tour was found whose tether stays within the limit all along"
+            )
+        found.fly_best()
+        _offer_given_flight(found, seed)
+        best = _with_bound(found.best, searched.bounds)
+        best = replace(best, mission=with_gaps(best.mission, water))
+        return replace(
+            best, given=found.given, plan=planned, interrupted=clock.stopped, cells=cells
+        )
+
+
+def with_gaps(mission: Mission, water: Water) -> Mission:
+    """Return a planned mission whose tour names the gaps that its cells do not show.
+
+    Parameters
+    ----------
+    mission : Mission
+        Mission with a tour.
+    water : Water
+        Water with the gaps.
+
+    Returns
+    -------
+    Mission
+        The mission with `tour.unresolved_gaps`.
+    """
+    assert mission.tour is not None
+    gaps = {"unresolved_gaps": water.unresolved_gaps}
+    return mission.model_copy(update={"tour": mission.tour.model_copy(update=gaps)})
+
+
+@dataclass
+class _Searched:
+    """Result of the search.
+
+    Parameters
+    ----------
+    plan : SpacePlan or None
+        The plan; None if there is none.
+    bounds : dict
+        Bounds on all tours through a set of waypoints, metres, by the set.
+    failure : InputError, LimitReachedError or None
+        Error that ended the search.
+    has_all_bounds : bool
+        Whether all kinds of bounds have been computed.
+    """
+
+    plan: SpacePlan | None = None
+    bounds: dict[frozenset[int], float] = field(default_factory=dict)
+    failure: InputError | LimitReachedError | None = None
+    has_all_bounds: bool = False
+
+
+def _begin_as_given(found: _Incumbents, flying: Clock, seed: int) -> None:
+    """Accept the mission as it was given, whatever the time: its tour if that passes the judge,
+    else the tour in its order. Then fly it as long as the clock allows."""
+    flights = found.flights
+    mission, tell = flights.mission, flights.tell
+    order = tuple(range(len(mission.waypoints)))
+    tell("the order as given")
+    taken = mission.tour is not None and found.take_first(
+        SolvedMission(mission, order, None, None, None)
+    )
+    if not taken:
+        water = replace(flights.water, mission=mission.model_copy(update={"tour": None}))
+        driven = flights.clock.bounded("driving the order as given", lambda: given_plan(water))
+        if driven is not None and driven.stops:
+            found.take_first(_of_plan(driven, AS_GIVEN, seed))
+    given, _ = flights.fly(mission, "the order as given", clock=flying)
+    found.take_given(given)
+    _offer_given_flight(found, seed)
+
+
+def _offer_given_flight(found: _Incumbents, seed: int) -> None:
+    """Offer the flight of the mission as it was given as a tour, if it is home earlier than the
+    incumbent."""
+    given, best, mission = found.given, found.best, found.flights.mission
+    if given is None or not _good(given) or (best is not None and best.run is None):
+        return
+    worth = np.inf if best is None or best.run is None else seconds_until_home(best.run)
+    if seconds_until_home(given) >= worth or found.flights.clock.is_overdue:
+        return
+    order = tuple(range(len(mission.waypoints)))
+    water = found.flights.water
+    kept = tour_of_flight(mission, order, given, water.field, water, None, seed, AS_GIVEN)
+    if kept is None or not kept.tour.stops:
+        return
+    if best is None:
+        found.take_first(kept)
+    else:
+        found.offer(kept, "it as it will be written")
+
+
+def _search(
+    found: _Incumbents, clock: Clock, name: str, solver: SolverLike,
+    params: Mapping[str, Any] | None, iteration_limit: int | None, seed: int,
+) -> _Searched:  # fmt: skip
+    """Offer the tours of the plane and along states and legs."""
+    flights, out = found.flights, _Searched()
+    if clock.up and found.best is not None:
+        return out  # the stages before the first plan would overrun the limit
+    candidates = plans(
+        flights.mission, scene=flights.scene, water=flights.water, solver=solver, params=params,
+        clock=clock.part(flights.policy.planning_share), iteration_limit=iteration_limit, seed=seed,
+        whole_tether=True, on_progress=flights.tell,
+    )  # fmt: skip
+
+    def next_plan() -> SpacePlan | None:
+        return clock.bounded("looking for tours", lambda: next(candidates, None), winds_down=True)
+
+    # where the order of the file cannot be driven, the first tour is found here
+    needs_tour = found.best is None
+    first_tour_s = flights.policy.first_tour_s if needs_tour else 0.0
+    try:
+        with clock.at_least(first_tour_s):
+            while (plan := next_plan()) is not None:
+                best = found.best
+                if plan.kind == PLANE and best is not None and best.tour.solver == PLANE:
+                    continue  # the accepted tour, for the whole tether, is at most as long
+                clock.bounded(
+                    "bounding all tours", partial(_raise_bound, out, plan, flights, clock, seed)
+                )
+                out.plan = out.plan if out.plan is not None and plan.kind == OUT_AND_BACK else plan
+                found.offer(_of_plan(plan, name, seed), f"the tour ({plan.kind})")
+                has_tour = found.best is not None
+                if has_tour and (plan.kind == TAUT_LEGS or (needs_tour and clock.up)):
+                    break
+    except (InputError, LimitReachedError) as error:
+        if found.best is None or not found.best.tour.stops:
+            raise
+        out.failure = error
+    return out
+
+
+def _raise_bound(
+    out: _Searched, plan: SpacePlan, flights: _Flights, clock: Clock, seed: int
+) -> None:
+    """Bound all tours to the waypoints of a plan: at the first plans by the upright solids alone,
+    which takes little time, and once paths between waypoints are known by all bounds."""
+    visited, part = frozenset(plan.order), clock.part(flights.policy.bound_share)
+    before = out.bounds.get(visited)
+    if plan.kind in (PLANE, SHORT_ORDER) and before is None:
+        flights.tell("bound on all tours by upright solids")
+        places = plan.ways.places
+        some = [n for n in range(len(places)) if places.waypoint[n] in visited]
+        bound = bound_of_upright(flights.mission, flights.water, some, places, part)
+    elif plan.kind not in (PLANE, SHORT_ORDER) and not out.has_all_bounds:
+        flights.tell("bound on all tours")
+        bound = bound_of_all(
+            plan.ways, sorted(visited), part, seed, params=flights.policy.potential
+        )
+        out.has_all_bounds = True
+    else:
+        return
+    if bound is not None:
+        out.bounds[visited] = max(bound, before or 0.0)
+
+
+def _of_plan(planned: SpacePlan, solver: str, seed: int) -> SolvedMission:
+    mission = planned.planned(solver, seed)
+    return SolvedMission(mission, planned.every_waypoint, None, None, planned)
+
+
+def _with_bound(best: SolvedMission, bounds: Mapping[frozenset[int], float]) -> SolvedMission:
+    """Return a tour with the bound on all tours to the same waypoints, if there is one.
+
+    A robot may turn back before it is at a waypoint. So the bound is reduced by twice the distance
+    that remains at each waypoint, and once at home.
+    """
+    bound = bounds.get(frozenset(best.order[: len(best.tour.stops)]))
+    if bound is None:
+        return best
+    tour, mission = best.tour, best.mission
+    off = sum(
+        float(np.linalg.norm(np.subtract(stop.path[-1], place)))
+        for stop, place in zip(tour.stops, mission.places, strict=False)
+    )
+    off = 2.0 * off + float(np.linalg.norm(np.subtract(tour.home[-1], mission.start)))
+    bound = min(tour.length, max(0.0, bound - (off if off > ROUNDING else 0.0)))
+    whole = len(tour.stops) == len(mission.waypoints)
+    proven = whole and LowerBound(bound, Scope.ALL_TOURS).proves(tour.length)
+    tour = tour.model_copy(
+        update={
+            "bound_of_all": bound, "gap_to_all": relative_gap(tour.length, bound),
+            "status": Status.OPTIMAL if proven else tour.status,
+        }
+    )  # fmt: skip
+    return replace(best, mission=mission.model_copy(update={"tour": tour}))
+
+
+def _offer_going_on(found: _Incumbents, seed: int) -> None:
+    """Offer the order by going straight on, in both directions."""
+    flights = found.flights
+    mission, clock = flights.mission.model_copy(update={"tour": None}), flights.clock
+    if clock.up or mission.state is not None:
+        return  # going straight on begins at the start
+    flights.tell("order by going straight on")
+    water = flights.water
+    try:
+        tour = clock.bounded(
+            "ordering the waypoints by going straight on",
+            lambda: order_by_going_on(
+                mission, water.field, water.grid,
+                clock=clock.part(flights.policy.going_on_share), seed=seed,
+            ),
+        )  # fmt: skip
+    except (InputError, LimitReachedError):
+        return
+    rest = tuple(n for n in range(len(mission.waypoints)) if n not in tour)
+    for direction, there in (("forward", tour), ("in reverse", tour[::-1])):
+        order = (*there, *rest)
+        waypoints = tuple(mission.waypoints[n] for n in order)
+        ordered = mission.model_copy(update={"waypoints": waypoints})
+        run, slower = flights.fly(ordered, f"that order {direction}", found._worth())
+        if slower:
+            continue
+        if run is None or clock.is_overdue:
+            break
+        kept = tour_of_flight(ordered, order, run, water.field, water, None, seed)
+        if kept is not None:
+            found.offer(kept, "it as it will be written")
+
+
+def _good(run: Run) -> bool:
+    """Whether a flight came home free, and never exceeded the limit."""
+    return bool(run.summary["home"]["tether_free"]) and run.summary["exceedance_s"] == 0.0
+
+
+def tour_of_flight(
+    mission: Mission, order: tuple[int, ...], run: Run, field: DistanceField,
+    water: Water | None = None, bound: float | None = None, seed: int = 0, name: str = GOING_ON,
+) -> SolvedMission | None:  # fmt: skip
+    """Where a robot was on a flight, made the tour of its mission.
+
+    Parameters
+    ----------
+    mission : Mission
+        What was flown.
+    order : tuple of int
+        Numbers of its waypoints in the mission that it came of.
+    run : Run
+        The flight.
+    field : DistanceField
+        Of the scene.
+    water : Water, optional
+        Whose words the stops get, when it is at hand.
+    bound : float, optional
+        Of all tours through the waypoints, metres. A robot that turns back a bit before them goes
+        less, by twice as much as it stays away, and once at home.
+    seed : int
+        Of what found the order.
+    name : str
+        Random seed of the search.
+
+    Returns
+    -------
+    SolvedMission or None
+        The mission with the tour. None if the robot did not come home free, went through a gap that
+        the grid does not show, lost its clearance, or the tether was over the limit.
+    """
+    if not _good(run):
+        return None
+    stops = run.summary["stops"]
+    visited = [int(stop["waypoint"]) for stop in stops]
+    left = [k for k in range(len(order)) if k not in visited]
+    parts = _parts(run.log, visited)
+    legs = [np.array([[r.x, r.y, r.z] for r in part]) for part in parts]
+    path = np.vstack([legs[0][:1], *(leg[1:] for leg in legs)])
+    if not all(has_room(field, leg, mission) for leg in legs):
+        return None
+    water = water or Water.of(mission, mission.load_scene(), field)
+    planned_stops = []
+    for k, stop in enumerate(stops):
+        way = np.vstack([water.present.nodes, *legs[: k + 1]])
+        word, broken = water.words.word_until(way)
+        if broken is not None:
+            return None
+        planned_stops.append(
+            PlannedStop(
+                path=in_file(legs[k]), signature=word, tether_length=stop["tether"],
+                longest_tether=max(r.tether for r in parts[k]),
+                given_as=order[visited[k]],
+            )
+        )  # fmt: skip
+    length = along(path)
+    if bound is not None:
+        ends = np.array([leg[-1] for leg in legs[:-1]]).reshape(-1, 3)
+        off = np.linalg.norm(ends - mission.places[visited].reshape(-1, 3), axis=1)
+        short_of_home = float(np.linalg.norm(legs[-1][-1] - np.array(mission.start)))
+        bound = min(length, max(0.0, bound - 2.0 * float(off.sum()) - short_of_home))
+    tour = PlannedTour(
+        stops=tuple(planned_stops), home=in_file(legs[-1]), status=Status.FEASIBLE, solver=name,
+        seed=seed, length=length, bound_of_all=bound, gap_to_all=relative_gap(length, bound),
+        states=len(visited), legs=len(legs),
+        exact=water.words.exact, unresolved_gaps=water.unresolved_gaps,
+    )  # fmt: skip
+    chosen = [*visited, *left]
+    there = mission.model_copy(
+        update={"waypoints": tuple(mission.waypoints[k] for k in chosen), "tour": tour}
+    )
+    return SolvedMission(there, tuple(order[k] for k in chosen), None, None, None)
+
+
+def _parts(log: tuple[LogRow, ...], visited: list[int]) -> list[tuple[LogRow, ...]]:
+    """A log from each waypoint that was visited to the next, and home; two rows at least."""
+    next_one = np.array([r.waypoint for r in log])
+    ends = [int(np.argmax(next_one > k)) for k in visited]
+    cuts = [0, *ends, len(log) - 1]
+    return [log[a : b + 1] if b > a else (log[a], log[a]) for a, b in pairwise(cuts)]
+
+
+def better(run: Run, than: Run) -> bool:
+    """Whether a flight is better than another of the same mission.
+
+    Parameters
+    ----------
+    run : Run
+        A flight.
+    than : Run
+        The other.
+
+    Returns
+    -------
+    bool
+        It visits as many waypoints, is not longer over the limit, comes home as free, and is home
+        earlier.
+    """
+    a, b = run.summary, than.summary
+    return bool(
+        a["visited"] >= b["visited"]
+        and a["exceedance_s"] <= b["exceedance_s"]
+        and a["home"]["tether_free"] >= b["home"]["tether_free"]
+        and seconds_until_home(run) < seconds_until_home(than)
+    )
+
+
+def seconds_until_home(run: Run) -> float:
+    """Of a flight.
+
+    Parameters
+    ----------
+    run : Run
+        The flight.
+
+    Returns
+    -------
+    float
+        Seconds of inspection and way home.
+    """
+    return float(run.summary["inspection_s"] + run.summary["home"]["seconds"])

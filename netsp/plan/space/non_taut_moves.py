@@ -1,0 +1,402 @@
+"""Tours with detours: legs a little longer than need be, so that the tether comes down on the right
+side of what it would hang on.
+
+A robot that passes half a metre farther out may leave its tether on the other side of a bar with a
+free end. Pulled taut, such a leg is the straight one again, so no search for taut ways finds it,
+and no word tells the two apart. In a frame of eleven bars, detours free a tour that is 3 % shorter
+than all of those along taut ways (benchmarks/space.py, frame 1).
+
+An order is driven leg by leg along taut ways and detours, and of the tethers that hang differently
+after each leg, those of the shortest paths are kept (beam search). Orders are the best one so far,
+that of the shortest tour without a tether, and what moves of pieces make of the best.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise, product
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.clock import Clock
+from netsp.base.errors import InputError
+from netsp.base.geometry import polylines
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.plan.solve_problem import solve_graph
+from netsp.plan.space.board import Board, Driven, Stop
+from netsp.plan.space.detour_variants import across
+from netsp.plan.space.planning_context import along, has_room, straight
+from netsp.plan.space.space_legs import Ways
+from netsp.plan.space.states import alike
+from netsp.roadmap.from_state import from_state
+from netsp.world.tether import Tether
+
+HOMES = 4
+"""Ways from the start to a place, along tethers of so many of its states."""
+
+PIECES = (1, 2, 3, 4, 6, 8)
+"""Stops of a piece that is moved elsewhere in the order."""
+
+MOST_ORDERS = 400
+"""Orders that are driven."""
+
+ORDERING = 0.2
+"""Of the time left, what the order without a tether may take."""
+
+SAVED = 1e-3
+"""Share of its length that a tour must be shorter to be taken: more is known of one without
+detours."""
+
+OFF, STEPS = 0.15, (0.03, 0.02, 0.01)
+"""Metres that a robot may be off at the bends of a path, and of its steps: what a tether slips off
+in steps of a decimetre, it may stay on in finer ones. It must come to hang alike in all."""
+
+FAR = 2.0
+"""Metres: on longer legs steps are longer, too."""
+
+HOME = -1
+"""In place of a place's number: the start."""
+
+
+@dataclass(frozen=True)
+class _Line:
+    """The beginning of a tour: how far it goes, the tether at its end, the same of a robot that is
+    not as exact, and the number of its word; and the last leg: where to, along which path, and the
+    longest tether on it."""
+
+    length: float
+    tether: Tether
+    flown: Tether
+    word: int
+    before: _Line | None = None
+    place: int = HOME
+    path: Floats | None = None
+    most: float = 0.0
+
+    @property
+    def legs(self) -> list[_Line]:
+        """All of its legs, in order."""
+        out, line = [], self
+        while line.before is not None:
+            out.append(line)
+            line = line.before
+        return out[::-1]
+
+
+@dataclass
+class Detours:
+    """Legs of a mission with their detours.
+
+    Parameters
+    ----------
+    board : Board
+        States, and the ways from the start to them.
+    ways : Ways
+        The robot's ways between waypoints.
+    """
+
+    board: Board
+    ways: Ways
+    _legs: dict[tuple[int, int], list[tuple[Floats, int]]] = field(default_factory=dict)
+
+    def shortened(
+        self, best: Driven | None, clock: Clock, tell: Callable[[str], None], seed: int = 0
+    ) -> Driven | None:
+        """A tour that is shorter than the best so far.
+
+        Parameters
+        ----------
+        best : Driven, optional
+            That tour.
+        clock : Clock
+            When it is up, no more orders are driven.
+        tell : callable
+            Called with a line of text now and then.
+        seed : int
+            Of the solver that orders the waypoints as if there were no tether.
+
+        Returns
+        -------
+        Driven or None
+            None where none was found.
+        """
+        if clock.up and best is not None:
+            return None
+        states = self.board.states
+        shortest = self._shortest(clock)
+        first = [] if best is None else [[states.all[v].point for v in best.tour]]
+        free = self._without_tether(shortest, clock.part(ORDERING), seed)
+        first += [] if free is None else [free]
+        found: list[list[_Line]] = []
+        below = np.inf if best is None else (1.0 - SAVED) * best.length
+        for order in first:
+            for there in (order, order[::-1]):
+                if clock.up or (there != order and states.begin is not None):
+                    continue
+                tell(f"detours along {len(order)} legs")
+                levels = self._driven(there, below, clock)
+                if levels is not None:
+                    found, below = levels, (1.0 - SAVED) * levels[-1][0].length
+        if not found and best is None:
+            return None
+        current = first[0] if not found else [leg.place for leg in found[-1][0].legs[:-1]]
+        seen: set[tuple[int, ...]] = set()
+        moved = True
+        while moved:
+            moved = False
+            for order in self._moves(current, shortest, below):
+                if clock.up or len(seen) >= MOST_ORDERS:
+                    break
+                if tuple(order) in seen:
+                    continue
+                seen.add(tuple(order))
+                tell(f"detours, {len(seen)} orders, {below:.1f} m")
+                levels = self._driven(order, below, clock, current, found)
+                if levels is not None:
+                    found, below = levels, (1.0 - SAVED) * levels[-1][0].length
+                    current, moved = order, True
+                    break
+        return self._as_driven(found[-1][0]) if found else None
+
+    def _of(self, n: int, m: int) -> list[tuple[Floats, int]]:
+        """Paths from a place to another and their words, shortest first."""
+        if (n, m) in self._legs:
+            return self._legs[n, m]
+        if m == HOME or (n != HOME and n > m):
+            number = self.ways.water.number
+            back = [(path[::-1], number(path[::-1])) for path, _ in self._of(m, n)]
+            self._legs[n, m] = [(path, word) for path, word in back if word is not None]
+            return self._legs[n, m]
+        water, mission = self.ways.water, self.ways.water.mission
+        begin, end = self._place(n), self._place(m)
+        some = self._taut(n, m)
+        for path in self._aside(begin, end):
+            if all(straight(water.field, a, b, mission.clearance) for a, b in pairwise(path)):
+                some.append(path)
+        numbered = [(path, water.number(path)) for path in sorted(some, key=along)]
+        self._legs[n, m] = [(path, word) for path, word in numbered if word is not None]
+        return self._legs[n, m]
+
+    def _taut(self, n: int, m: int) -> list[Floats]:
+        """Paths without detours."""
+        water, mission = self.ways.water, self.ways.water.mission
+        begin, end = self._place(n), self._place(m)
+        some = [] if n == HOME else [path for _, path in self.ways.known(n, m)]
+        if n == HOME:
+            states = self.board.states.of.get(m, ())
+            out = (self.board.way_out(v) for v in states[:HOMES])
+            some = [path for path in out if path is not None]
+        if not any(len(path) == 2 for path in some) and straight(
+            water.field, begin, end, mission.clearance
+        ):
+            some.append(np.array([begin, end]))
+        return [path for path in some if has_room(water.field, path, mission)]
+
+    def _aside(self, begin: Floats, end: Floats) -> Iterator[Floats]:
+        """Paths with one bend, out to all sides from the middle of the straight one."""
+        effort, step = self.ways.effort, end - begin
+        far = float(np.linalg.norm(step))
+        if far < 1e-9:
+            return
+        u, v = across(step)
+        for extra in effort.detours:
+            out = 0.5 * far * math.sqrt((1.0 + extra) ** 2 - 1.0)
+            for angle in np.linspace(0.0, 2.0 * math.pi, effort.sides, endpoint=False):
+                away = out * (math.cos(angle) * u + math.sin(angle) * v)
+                yield np.array([begin, begin + 0.5 * step + away, end])
+
+    def _place(self, n: int) -> Floats:
+        """(3,) where it is, metres."""
+        return self.ways.water.laid.robot if n == HOME else self.ways.points[n]
+
+    def _shortest(self, clock: Clock) -> Floats:
+        """(n + 1, n + 1) metres between places, the last of which is the start; infinite where no
+        way is known, or there is no time to look whether places far apart see each other."""
+        count = len(self.ways.points)
+        looking = clock.part(ORDERING)
+        out = np.full((count + 1, count + 1), np.inf)
+        for m in range(count):
+            for n in (HOME, *range(m)):
+                known = self.ways.known(n, m) if n != HOME else []
+                far = along(known[0][1]) if known else np.inf
+                if not known and not looking.up:
+                    far = min(map(along, self._taut(n, m)), default=np.inf)
+                out[n, m] = out[m, n] = far
+        return out
+
+    def _without_tether(self, shortest: Floats, clock: Clock, seed: int) -> list[int] | None:
+        """Places in the order of the shortest tour without a tether."""
+        places, reached = self.ways.places, self.board.reached
+        some = [n for n in range(len(places)) if n == places.begin or places.waypoint[n] in reached]
+        rows = np.array([HOME, *some])
+        cluster = np.r_[0, 1 + np.unique(places.waypoint[some], return_inverse=True)[1]]
+        costs = shortest[np.ix_(rows, rows)].copy()
+        np.fill_diagonal(costs, 0.0)
+        try:
+            graph = TravelGraph.from_costs(costs, cluster)
+        except InputError:  # some waypoint is joined to nothing
+            return None
+        first = 1
+        if places.begin is not None:
+            graph = from_state(graph, 1 + some.index(places.begin))
+            first = 2
+        result = solve_graph(graph, "auto", time_limit=clock, seed=seed)
+        return None if result.tour is None else [int(rows[v]) for v in result.tour[first:]]
+
+    def _moves(self, order: Sequence[int], shortest: Floats, below: float) -> Iterator[list[int]]:
+        """Orders that a piece moved, or turned round, makes of one, shortest first without a
+        tether."""
+        begin = HOME if self.ways.places.begin is None else self.ways.places.begin
+        found: set[tuple[float, tuple[int, ...]]] = set()
+        for there in _moved(list(order)):
+            ends = np.array([begin, *there, HOME])
+            far = float(shortest[ends[:-1], ends[1:]].sum())
+            if far < below:
+                found.add((far, tuple(there)))
+        for _, some in sorted(found):
+            yield list(some)
+
+    def _driven(
+        self, order: Sequence[int], below: float, clock: Clock,
+        like: Sequence[int] = (), known: Sequence[list[_Line]] = (),
+    ) -> list[list[_Line]] | None:  # fmt: skip
+        """What is kept after each leg of an order, the tour itself at the end; None where none was
+        found that is shorter than so many metres. Of an order that begins like one that was driven,
+        what was kept by there is taken."""
+        water, states, places = self.ways.water, self.board.states, self.ways.places
+        begin = HOME if places.begin is None else places.begin
+        ends = [begin, *order, HOME]
+        legs = [self._of(n, m) for n, m in pairwise(ends)]
+        if not all(legs):
+            return None
+        rest = np.cumsum([0.0, *(along(leg[0][0]) for leg in legs[::-1])])[::-1]
+        word = water.number(water.present.nodes)
+        if word is None or rest[0] >= below:
+            return None
+        levels = [[_Line(0.0, water.present, water.present, word)]]
+        shared = 0
+        while known and shared < len(order) and order[shared] == like[shared]:
+            shared += 1
+            levels.append(known[shared])
+        for k in range(shared, len(legs)):
+            last = k + 1 == len(legs)
+            ahead = sorted(
+                (line.length + along(path), i, j)
+                for i, line in enumerate(levels[k]) for j, (path, _) in enumerate(legs[k])
+                if line.length + along(path) + rest[k + 1] < below
+            )  # fmt: skip
+            kept: list[_Line] = []
+            for far, i, j in ahead:
+                if clock.up or len(kept) >= (1 if last else self.ways.effort.tethers):
+                    break
+                line, (path, writes) = levels[k][i], legs[k][j]
+                word = water.words.times(line.word, writes)
+                tether, most = water.driven(line.tether, path)
+                if most > states.limit or any(self._same(other, tether, word) for other in kept):
+                    continue
+                if last and not self._is_free(tether, word):
+                    continue
+                flown = self._as_flown(line, path, tether)
+                if flown is None:
+                    continue
+                kept.append(_Line(far, tether, flown, word, line, ends[k + 1], path, most))
+            if not kept:
+                return None
+            levels.append(kept)
+        return levels
+
+    def _as_flown(self, line: _Line, path: Floats, after: Tether) -> Tether | None:
+        """The tether of a robot that goes in fine steps and turns back within reach of each stop,
+        as flights do; None where it does not come to hang as it should. Where it slips off
+        something on the way, it must do so in steps of all sizes, and with bends that are farther
+        out, or less far."""
+        shares = np.linspace(0.0, 1.0, len(path))[1:-1, None]
+        away = path[1:-1] - (path[0] + shares * (path[-1] - path[0]))
+        aside = OFF * away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+        flown, slips = None, False
+        for before in (line.tether, line.flown):
+            flown, slipped = self._fine(before, path, after, STEPS[0])
+            if flown is None:
+                return None
+            slips = slips or slipped
+        if not slips:
+            return flown
+        for step, off in product(
+            STEPS, (0.0 * aside, aside, -aside) if len(path) > 2 else (aside,)
+        ):
+            other = np.vstack([path[:1], path[1:-1] + off, path[-1:]])
+            for before in (line.tether, line.flown):
+                if self._fine(before, other, after, step)[0] is None:
+                    return None
+        return flown
+
+    def _fine(
+        self, before: Tether, path: Floats, after: Tether, step: float
+    ) -> tuple[Tether | None, bool]:
+        """A tether, driven in steps along a path to within reach of its end, and whether it slipped
+        off something; None in its place where it is not like another at the end."""
+        water = self.ways.water
+        way = np.vstack([before.robot[None], path[1:]])
+        short = _cut(way, water.mission.reach)
+        step *= max(1.0, along(path) / FAR)
+        there, lengths = water.model.drive(before, polylines.dense(short, step))
+        end, most = water.driven(there, np.vstack([short[-1:], path[-1:]]))
+        longest = max(most, float(lengths.max(initial=0.0)))
+        delta = water.mission.delta
+        if longest > self.board.states.limit or not alike(end, after, delta):
+            return None, False
+        drops = -np.diff(lengths, prepend=before.length)
+        return there, bool((drops > step + delta).any())
+
+    def _same(self, line: _Line, tether: Tether, word: int) -> bool:
+        delta = self.ways.water.mission.delta
+        return line.word == word and alike(line.tether, tether, 0.25 * delta)
+
+    def _is_free(self, tether: Tether, word: int) -> bool:
+        water = self.ways.water
+        same = not water.words.exact or word == water.number(water.laid.nodes)
+        return same and alike(tether, water.laid, water.mission.delta)
+
+    def _as_driven(self, line: _Line) -> Driven:
+        *legs, home = line.legs
+        places, letters = self.ways.places, self.ways.water.words.letters
+        stops = [
+            Stop(
+                int(places.waypoint[leg.place]), int(places.choice[leg.place]), letters(leg.word),
+                leg.tether.length, _path(leg), leg.most,
+            )
+            for leg in legs
+        ]  # fmt: skip
+        return Driven([], stops, _path(home), line.length, True, None)
+
+
+def _cut(path: Floats, short: float) -> Floats:
+    """A path, less its last metres, or half of it where it is no longer than twice that."""
+    length = along(path)
+    keep = max(length - short, 0.5 * length)
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    last = int(np.searchsorted(lengths, keep, side="left"))
+    share = (keep - lengths[last - 1]) / (lengths[last] - lengths[last - 1])
+    return np.vstack([path[:last], path[last - 1] + share * (path[last] - path[last - 1])])
+
+
+def _path(leg: _Line) -> Floats:
+    assert leg.path is not None
+    return leg.path
+
+
+def _moved(order: list[int]) -> Iterator[list[int]]:
+    """An order with a piece of it elsewhere, either way round, or turned round where it is."""
+    count = len(order)
+    for size in PIECES:
+        for i in range(count - size + 1):
+            piece, others = order[i : i + size], order[:i] + order[i + size :]
+            for j in range(len(others) + 1):
+                yield others[:j] + piece + others[j:]
+                yield others[:j] + piece[::-1] + others[j:]
+    for i in range(count):
+        for j in range(i + 2, count + 1):
+            yield order[:i] + order[i:j][::-1] + order[j:]

@@ -1,0 +1,632 @@
+"""Gaps that the cells of a grid do not show: find them, and the cell size that shows them.
+
+A cell is free if its middle has enough room, so a slot that is wide enough for the robot may be
+closed on the grid. The search samples finer points between free cells. A gap lies where two
+neighbouring points have enough room but their nearest free cells are not connected nearby.
+Every plan of a mission begins with this search (`netsp.plan.space.space_plan.water_of`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.clock import Clock, end_if_abandoned
+from netsp.base.errors import InputError, LimitReachedError
+from netsp.online.mission import Mission
+from netsp.online.mission_run import grid_box
+from netsp.online.paths.tree import Grid
+from netsp.online.planned_tour import UnresolvedGap
+from netsp.plan.space.cells import LEAST_ROOM
+from netsp.plan.space.potential import possibly_free, steepness
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class GapParams:
+    """Effort of the search for gaps, and of the choice of a cell size that shows them.
+
+    Attributes
+    ----------
+    max_points : int
+        Largest number of fine points; the more cells may hold a gap, the fewer points each gets.
+    finest : int
+        Largest number of fine points along a side of a cell.
+    around : int
+        Cells around a gap in which its two sides may be connected; a gap with a connection that
+        close is ignored, because it saves no distance.
+    max_gaps : int
+        Largest number of gaps returned; the widest are kept.
+    max_pairs : int
+        Largest number of pairs of free cells whose connection is checked.
+    max_cells : int
+        Largest number of cells of a finer grid; the time to plan grows in proportion.
+    smallest : float
+        Smallest finer cell size, as a share of the cell size before.
+    step : float
+        Ratio of successive cell sizes that are tried.
+    time_share : float
+        Share of the remaining time for the search, more than 0 and at most 1.
+    """
+
+    max_points: int = 4_000_000
+    finest: int = 8
+    around: int = 3
+    max_gaps: int = 5
+    max_pairs: int = 2_000
+    max_cells: int = 1_000_000
+    smallest: float = 0.25
+    step: float = 0.985
+    time_share: float = 0.5
+
+    def __post_init__(self) -> None:
+        for name in ("max_points", "finest", "around", "max_gaps", "max_pairs", "max_cells"):
+            if getattr(self, name) < 1:
+                raise InputError(f"{name}: {getattr(self, name)}; expected 1 or more")
+        for name in ("smallest", "step"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise InputError(f"{name}: {getattr(self, name)}; expected between 0 and 1")
+        if not 0.0 < self.time_share <= 1.0:
+            raise InputError(f"time_share: {self.time_share}; expected more than 0 and at most 1")
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A passage that the cells of a grid do not show.
+
+    Parameters
+    ----------
+    place : ndarray, shape (3,)
+        Middle of the gap, metres.
+    width : float
+        Twice the distance of `place` from solids, metres.
+    sides : ndarray, shape (2, 3)
+        Middles of one free cell on each side, metres.
+    """
+
+    place: Floats
+    width: float
+    sides: Floats
+
+    def __str__(self) -> str:
+        """Return width and place, as in "0.24 m at (0, 1.5, -2)"."""
+        return f"{self.width:.2g} m at ({', '.join(f'{v:.3g}' for v in self.place)})"
+
+
+@dataclass(frozen=True)
+class GapGrid:
+    """Grid whose cells are free or not by the distance of their middles from solids.
+
+    Parameters
+    ----------
+    field : DistanceField
+        The scene.
+    low, high : ndarray, shape (3,)
+        Corners of the box, metres.
+    cell : float
+        Cell size, metres.
+    clearance : float
+        Clearance of the robot, metres.
+    """
+
+    field: DistanceField
+    low: Floats
+    high: Floats
+    cell: float
+    clearance: float
+
+    @classmethod
+    def of(
+        cls, field: DistanceField, box: tuple[Floats, Floats, float], clearance: float
+    ) -> GapGrid:
+        """Return the cells of a grid (`netsp.online.mission_run.grid_box`).
+
+        Parameters
+        ----------
+        field : DistanceField
+            The scene.
+        box : tuple of (ndarray, ndarray, float)
+            Corners of the box and cell size, metres.
+        clearance : float
+            Clearance of the robot, metres.
+
+        Returns
+        -------
+        GapGrid
+            The cells.
+        """
+        low, high, cell = box
+        counts = np.maximum(1.0, np.round((high - low) / cell))  # as `Grid` counts
+        return cls(field, low, low + cell * counts, cell, clearance)
+
+    @classmethod
+    def of_grid(cls, grid: Grid, clearance: float) -> GapGrid:
+        """Return the cells of a grid for paths.
+
+        Parameters
+        ----------
+        grid : Grid
+            The grid.
+        clearance : float
+            Clearance of the robot, metres.
+
+        Returns
+        -------
+        GapGrid
+            The cells.
+        """
+        high = grid.low + grid.cell * np.array(grid.free.shape)
+        return cls(grid.field, grid.low, high, grid.cell, clearance)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Numbers of cells along x, y and z, as `netsp.plan.space.cells.Cells` counts them."""
+        nx, ny, nz = (max(1, int(n)) for n in np.ceil((self.high - self.low) / self.cell - 1e-9))
+        return nx, ny, nz
+
+    @property
+    def least(self) -> float:
+        """Least distance of the middle of a free cell from solids, metres."""
+        return max(self.clearance, LEAST_ROOM * self.cell)
+
+    def free(self, first: Ints, shape: tuple[int, ...]) -> Bools:
+        """Return the mask of free cells in a block of cells.
+
+        Parameters
+        ----------
+        first : ndarray of int, shape (3,)
+            First cell of the block.
+        shape : tuple of int
+            Numbers of cells of the block along x, y and z.
+
+        Returns
+        -------
+        ndarray of bool
+            Mask of the given shape.
+        """
+        axes = [self.low[k] + (first[k] + np.arange(shape[k]) + 0.5) * self.cell for k in range(3)]
+        points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        return np.asarray(self.field.distance(points) >= self.least)
+
+    def joins(self, gap: Gap, around: int) -> bool:
+        """Say whether free cells join the two sides of a gap near it.
+
+        Parameters
+        ----------
+        gap : Gap
+            The gap.
+        around : int
+            Number of cells around the gap in which the sides may be connected.
+
+        Returns
+        -------
+        bool
+            True if they are connected.
+        """
+        from scipy.ndimage import label
+
+        at = np.floor((gap.sides - self.low) / self.cell).astype(np.int64)
+        at = np.clip(at, 0, np.array(self.shape) - 1)
+        first = np.maximum(at.min(0) - around, 0)
+        last = np.minimum(at.max(0) + around, np.array(self.shape) - 1)
+        free = self.free(first, tuple(last - first + 1))
+        parts, _ = label(free, np.ones((3, 3, 3)))
+        one, other = (_near(parts, place - first) for place in at)
+        return bool(one & other)
+
+
+SEARCHING = "searching for gaps that the cells do not show"
+"""Name of the search in messages."""
+
+
+def _near(parts: Ints, at: Ints) -> set[int]:
+    """Return the labels of the connected parts at a cell and its neighbours."""
+    box = tuple(slice(max(0, k - 1), k + 2) for k in at)
+    return set(np.unique(parts[box]).tolist()) - {0}
+
+
+def unresolved_gaps(
+    grid: GapGrid, params: GapParams | None = None, clock: Clock | None = None
+) -> list[Gap]:
+    """Return the gaps that have room for the robot but no free cells through them.
+
+    Parameters
+    ----------
+    grid : GapGrid
+        The cells.
+    params : GapParams, optional
+        Effort.
+    clock : Clock, optional
+        Clock of the search.
+
+    Returns
+    -------
+    list of Gap
+        At most `params.max_gaps` gaps, the widest first.
+
+    Raises
+    ------
+    LimitReachedError
+        The time was up before the search was complete.
+    """
+    from scipy.ndimage import binary_dilation
+
+    params, clock = params or GapParams(), clock or Clock()
+    shape = grid.shape
+    free = grid.free(np.zeros(3, dtype=np.int64), shape)
+    if free.all() or not free.any():
+        return []
+    middle, whole = 0.5 * (grid.low + grid.high), float(np.linalg.norm(grid.high - grid.low))
+    clock.check(SEARCHING)
+    flag, steep = clock.flag, steepness(grid.field)
+    possible = clock.interruptible(lambda: possibly_free(
+        grid.field.arrays, grid.low, grid.high, grid.cell, shape, grid.clearance,
+        steep, middle, middle, 4.0 * whole, middle, 2.0 * whole, 2, flag,
+    ))  # fmt: skip
+    gaps = _gaps_between(grid, free, free, possible, params, clock)
+    layers = _single_layers(free) & possible
+    if layers.any():
+        # the free cells on both sides of a single layer are only two cells apart, so leave them out
+        apart = free & ~binary_dilation(layers, np.ones((3, 3, 3)))
+        far = 2.0 * grid.cell
+        gaps += [
+            gap for gap in _gaps_between(grid, free, apart, possible, params, clock)
+            if all(np.linalg.norm(gap.place - known.place) > far for known in gaps)
+            and _is_open(grid, gap, params)
+        ]  # fmt: skip
+    gaps.sort(key=lambda gap: -gap.width)
+    return gaps[: params.max_gaps]
+
+
+def _single_layers(free: Bools) -> Bools:
+    """Return the mask of blocked cells between two free cells along an axis."""
+    out = np.zeros(free.shape, dtype=np.bool_)
+    for axis in range(3):
+        rows, found = np.moveaxis(free, axis, 0), np.moveaxis(out, axis, 0)
+        found[1:-1] |= rows[:-2] & ~rows[1:-1] & rows[2:]
+    return out
+
+
+def _gaps_between(
+    grid: GapGrid, free: Bools, ends_of: Bools, possible: Bools, params: GapParams, clock: Clock
+) -> list[Gap]:
+    """Return the gaps between the free cells `ends_of`."""
+    from scipy.ndimage import distance_transform_edt
+
+    clock.check(SEARCHING)
+    if not ends_of.any():
+        return []
+    nearest = np.moveaxis(
+        distance_transform_edt(~ends_of, return_distances=False, return_indices=True), 0, -1
+    )
+    cells = np.argwhere(_parting(possible & ~ends_of, nearest))
+    if not len(cells):
+        return []
+    side = int(np.clip((params.max_points / len(cells)) ** (1.0 / 3.0), 2, params.finest))
+    ends, places, room = _links(grid, cells, nearest, side)
+    ends, places, room = _not_joined(free, ends, places, room, params, clock)
+    return _grouped(grid, ends, places, room, params)
+
+
+def _is_open(grid: GapGrid, gap: Gap, params: GapParams) -> bool:
+    """Return whether fine points with room for the robot join the two sides of a gap."""
+    from scipy.ndimage import label
+
+    low = np.maximum(gap.sides.min(axis=0) - grid.cell, grid.low)
+    high = np.minimum(gap.sides.max(axis=0) + grid.cell, grid.high)
+    spacing = grid.cell / params.finest
+    counts = np.maximum(2, np.ceil((high - low) / spacing).astype(np.int64) + 1)
+    axes = [np.linspace(low[k], high[k], counts[k]) for k in range(3)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    parts, _ = label(grid.field.distance(points) >= grid.clearance - 0.5 * spacing)
+    at = np.rint((gap.sides - low) / (high - low) * (counts - 1)).astype(np.int64)
+    one, other = (_near(parts, place) for place in at)
+    return bool(one & other)
+
+
+def _parting(between: Bools, nearest: Ints) -> Bools:
+    """Return the mask of cells in `between` that have a neighbour in `between` whose nearest free
+    cell is three or more cells away from their own."""
+    out = np.zeros(between.shape, dtype=np.bool_)
+    for step in _HALF_STEPS:
+        end_if_abandoned()
+        here, there = _shifted(between.shape, step)
+        apart = np.abs(nearest[here] - nearest[there]).max(axis=-1) >= 3
+        found = between[here] & between[there] & apart
+        out[here] |= found
+        out[there] |= found
+    return out
+
+
+_HALF_STEPS = [s for s in np.ndindex(3, 3, 3) if s > (1, 1, 1)]
+"""Steps to 13 of the 26 neighbours, one of each opposite pair; 1 along an axis means no step."""
+
+
+def _shifted(
+    shape: tuple[int, ...], step: tuple[int, ...]
+) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+    """Return the slices of cells and of their neighbours by a step."""
+    here, there = [], []
+    for n, s in zip(shape, step, strict=True):
+        d = s - 1
+        here.append(slice(max(0, -d), n - max(0, d)))
+        there.append(slice(max(0, d), n - max(0, -d)))
+    return tuple(here), tuple(there)
+
+
+def _links(grid: GapGrid, cells: Ints, nearest: Ints, side: int) -> tuple[Ints, Floats, Floats]:
+    """Return the links across possible gaps.
+
+    A link joins two neighbouring fine points that have enough room, and whose nearest free cells
+    are three or more cells apart. Returned are these pairs (n, 2, 3) of free cells, the places
+    (n, 3) of the links, and their distances (n,) from solids.
+    """
+    spacing = grid.cell / side
+    inner = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    fine = (side * cells[:, None] + inner[None]).reshape(-1, 3)
+    points = grid.low + (fine + 0.5) * spacing
+    room = grid.field.distance(points)
+    wide = (room >= grid.clearance - 0.5 * spacing) & (points <= grid.high).all(axis=1)
+    fine, points, room = fine[wide], points[wide], room[wide]
+    extent = side * np.array(grid.shape, dtype=np.int64) + 2
+    key = (fine[:, 0] * extent[1] + fine[:, 1]) * extent[2] + fine[:, 2]
+    order = np.argsort(key)
+    fine, points, room, key = fine[order], points[order], room[order], key[order]
+    ends, places, rooms = [], [], []
+    for axis in range(3):
+        end_if_abandoned()
+        step = (extent[1] * extent[2], extent[2], 1)[axis]
+        at = np.searchsorted(key, key + step)
+        known = at < len(key)
+        known[known] = key[at[known]] == key[known] + step
+        one, other = np.flatnonzero(known), at[known]
+        pair = np.stack([nearest[tuple((fine[k] // side).T)] for k in (one, other)], axis=1)
+        far = np.abs(pair[:, 0] - pair[:, 1]).max(axis=1) >= 3
+        ends.append(pair[far])
+        places.append(0.5 * (points[one] + points[other])[far])
+        rooms.append(np.minimum(room[one], room[other])[far])
+    return np.concatenate(ends), np.concatenate(places), np.concatenate(rooms)
+
+
+def _not_joined(
+    free: Bools, ends: Ints, places: Floats, room: Floats, params: GapParams, clock: Clock
+) -> tuple[Ints, Floats, Floats]:
+    """Return the links whose two free cells are not connected nearby."""
+    from scipy.ndimage import label
+
+    order = np.argsort(-room, kind="stable")
+    ends, places, room = ends[order], places[order], room[order]
+    is_apart: dict[tuple[int, ...], bool] = {}
+    keep = np.zeros(len(ends), dtype=np.bool_)
+    for n, pair in enumerate(ends):
+        end_if_abandoned()
+        name = tuple(pair.ravel().tolist())
+        if name not in is_apart:
+            if len(is_apart) >= params.max_pairs:
+                continue
+            clock.check(SEARCHING)
+            first = np.maximum(pair.min(0) - params.around, 0)
+            last = pair.max(0) + params.around + 1
+            box = tuple(slice(a, b) for a, b in zip(first, last, strict=True))
+            parts, _ = label(free[box], np.ones((3, 3, 3)))
+            is_apart[name] = bool(parts[tuple(pair[0] - first)] != parts[tuple(pair[1] - first)])
+        keep[n] = is_apart[name]
+    return ends[keep], places[keep], room[keep]
+
+
+def _grouped(
+    grid: GapGrid, ends: Ints, places: Floats, room: Floats, params: GapParams
+) -> list[Gap]:
+    """Return one gap for each group of links near one another, at the place with the most room."""
+    from scipy.ndimage import label
+
+    if not len(places):
+        return []
+    at = np.clip(((places - grid.low) / grid.cell).astype(np.int64), 0, np.array(grid.shape) - 1)
+    first = at.min(0)
+    marked = np.zeros(tuple((at.max(0) - first) // 2 + 1), dtype=np.bool_)
+    coarse = (at - first) // 2  # cells of twice the size, so that links one cell apart form a group
+    marked[tuple(coarse.T)] = True
+    parts, count = label(marked, np.ones((3, 3, 3)))
+    group = parts[tuple(coarse.T)]
+    gaps = []
+    for part in range(1, count + 1):
+        members = np.flatnonzero(group == part)
+        widest = members[room[members] >= room[members].max() - 1e-9]
+        middle = places[widest].mean(axis=0)
+        n = widest[int(np.linalg.norm(places[widest] - middle, axis=1).argmin())]
+        sides = grid.low + (ends[n] + 0.5) * grid.cell
+        through = sides[1] - sides[0]
+        along = (0.5 * (sides[0] + sides[1]) - places[n]) @ through / (through @ through)
+        for start in (places[n] + along * through, places[n]):  # halfway through, if that is free
+            place = _widest(grid, start, through)
+            width = 2.0 * float(grid.field.distance(place))
+            if width >= 2.0 * grid.clearance:
+                gaps.append(Gap(np.round(place, 3) + 0.0, width, sides))
+                break
+    return gaps
+
+
+def _widest(grid: GapGrid, place: Floats, through: Floats) -> Floats:
+    """Return the place with the most room within half a cell of a place, across the passage."""
+    along = through / max(float(np.linalg.norm(through)), 1e-300)
+    _, _, across = np.linalg.svd(along[None])
+    reach = 0.5 * grid.cell
+    while reach > 1e-3 * grid.cell:
+        u, v = np.meshgrid(np.linspace(-reach, reach, 7), np.linspace(-reach, reach, 7))
+        points = place + u.reshape(-1, 1) * across[1] + v.reshape(-1, 1) * across[2]
+        points = np.clip(points, grid.low, grid.high)
+        room = grid.field.distance(points)
+        # move only to a point with more room than `place`, which is the 25th of the 49 points
+        best = int(room.argmax())
+        if room[best] > room[24] + 1e-9:
+            place = points[best]
+        reach *= 0.4
+    return place
+
+
+def resolving_cell(
+    grid: GapGrid, gaps: list[Gap], box_of: Callable[[float], tuple[Floats, Floats, float]],
+    params: GapParams | None = None, clock: Clock | None = None,
+) -> float | None:  # fmt: skip
+    """Return the largest cell size whose grid shows as many of the gaps as possible.
+
+    Parameters
+    ----------
+    grid : GapGrid
+        Grid that shows none of the gaps.
+    gaps : list of Gap
+        Gaps from `unresolved_gaps`.
+    box_of : callable
+        Takes a cell size; returns the corners of the box of such a grid and the cell size, metres.
+    params : GapParams, optional
+        Limits of the cell size.
+    clock : Clock, optional
+        Clock of the search.
+
+    Returns
+    -------
+    float or None
+        Cell size, metres; None if no size within the limits shows a gap.
+
+    Raises
+    ------
+    LimitReachedError
+        The time was up before a cell size was found.
+    """
+    params, clock = params or GapParams(), clock or Clock()
+    best, shown, cell = None, 0, grid.cell
+    limit = max(params.max_cells, 1.1 * float(np.prod(grid.shape)))
+    while shown < len(gaps) and cell * params.step >= params.smallest * grid.cell:
+        clock.check(SEARCHING)
+        cell *= params.step
+        finer = GapGrid.of(grid.field, box_of(cell), grid.clearance)
+        if float(np.prod(finer.shape)) > limit:
+            break
+        around = int(np.ceil(params.around * grid.cell / cell))
+        count = sum(finer.joins(gap, around) for gap in gaps)
+        if count > shown:
+            best, shown = cell, count
+    return best
+
+
+@dataclass(frozen=True)
+class Resolved:
+    """Mission with the cell size that shows the gaps of its scene, as far as possible.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission, with a finer cell if that shows more gaps.
+    cell : float
+        Cell size of its grid, metres.
+    shown : tuple of Gap
+        Gaps that only the finer cell shows.
+    left : tuple of Gap or None
+        Gaps that stay hidden; None if the time was up before they were found.
+    """
+
+    mission: Mission
+    cell: float
+    shown: tuple[Gap, ...] = ()
+    left: tuple[Gap, ...] | None = ()
+
+    @property
+    def in_file(self) -> tuple[UnresolvedGap, ...] | None:
+        """Return the gaps that stay hidden, as in a tour's `unresolved_gaps`."""
+        if self.left is None:
+            return None
+        return tuple(
+            UnresolvedGap(position=(x, y, z), width=gap.width)
+            for gap in self.left
+            for x, y, z in [gap.place.tolist()]
+        )
+
+
+def resolved_on(
+    mission: Mission, grid: Grid, params: GapParams | None = None, clock: Clock | None = None
+) -> Resolved:
+    """Find the gaps that a given grid does not show. Its cell size is kept.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission.
+    grid : Grid
+        Grid for paths.
+    params : GapParams, optional
+        Effort.
+    clock : Clock, optional
+        Clock of the run.
+
+    Returns
+    -------
+    Resolved
+        The mission, unchanged, the cell size and the gaps.
+    """
+    params, clock = params or GapParams(), clock or Clock()
+    try:
+        gaps = unresolved_gaps(
+            GapGrid.of_grid(grid, mission.clearance), params, clock.part(params.time_share)
+        )
+    except LimitReachedError:
+        return Resolved(mission, grid.cell, (), None)
+    return Resolved(mission, grid.cell, (), tuple(gaps))
+
+
+def resolved(
+    mission: Mission, scene: Scene, field: DistanceField, params: GapParams | None = None,
+    clock: Clock | None = None,
+) -> Resolved:  # fmt: skip
+    """Return a mission whose cells show the gaps of its scene, as far as possible.
+
+    A cell size that the mission states is kept, and its gaps are only reported. The same holds for
+    a mission with a tour, because the words of the tour refer to its cells.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission.
+    scene : Scene
+        Its scene.
+    field : DistanceField
+        The scene's field.
+    params : GapParams, optional
+        Effort.
+    clock : Clock, optional
+        Clock of the run.
+
+    Returns
+    -------
+    Resolved
+        Mission, cell size and gaps.
+    """
+    params = params or GapParams()
+    searching = (clock or Clock()).part(params.time_share)
+
+    def box_of(cell: float) -> tuple[Floats, Floats, float]:
+        return grid_box(mission.model_copy(update={"cell": cell}), scene)
+
+    box = grid_box(mission, scene)
+    grid = GapGrid.of(field, box, mission.clearance)
+    try:
+        gaps = unresolved_gaps(grid, params, searching)
+    except LimitReachedError:
+        return Resolved(mission, box[2], (), None)
+    if not gaps or mission.cell is not None or mission.tour is not None:
+        return Resolved(mission, box[2], (), tuple(gaps))
+    try:
+        cell = resolving_cell(grid, gaps, box_of, params, searching)
+        if cell is None:
+            return Resolved(mission, box[2], (), tuple(gaps))
+        finer = GapGrid.of(field, box_of(cell), mission.clearance)
+        left = unresolved_gaps(finer, params, searching)
+    except LimitReachedError:
+        return Resolved(mission, box[2], (), tuple(gaps))
+    far = 2.0 * grid.cell
+    shown = [g for g in gaps if all(np.linalg.norm(g.place - k.place) > far for k in left)]
+    return Resolved(mission.model_copy(update={"cell": cell}), cell, tuple(shown), tuple(left))

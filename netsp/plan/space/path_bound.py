@@ -1,0 +1,255 @@
+"""A certified lower bound on every tour of a mission's waypoints.
+
+Each leg gets a certified least length: the straight distance, which is exact between places in
+sight of one another, or the bound of a potential over all cells that are not certain to be blocked
+(`netsp.plan.space.potential`). The shortest tour by these lengths is a lower bound on every tour.
+The length of a path that was found, pulled taut or not, only says how far to look: a path found on
+a grid is no bound on other paths.
+
+These lengths ignore the tether. Where a scene has upright solids, the plane's proof over all
+homotopy classes of the tether around them is a second bound (`netsp.plan.space.upright`). The
+result is the larger of the two bounds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.clock import Clock
+from netsp.base.errors import InputError
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.plan.solve_problem import solve_graph
+from netsp.plan.space.planning_context import DEEPEST, ROOM_STEP, along, straight
+from netsp.plan.space.potential import PotentialParams, Region, cells_of, path_bound
+from netsp.plan.space.space_legs import Ways
+from netsp.plan.space.upright import bound_of_upright
+from netsp.roadmap.from_state import from_state
+
+
+@dataclass(frozen=True)
+class BoundPolicy:
+    """Time and accuracy of a bound on all tours in space.
+
+    Attributes
+    ----------
+    upright_share : float
+        Share of the remaining time for the bound among upright solids, from 0 to 1.
+    max_detour_ratio : float
+        Longest path considered where no path is known, as a multiple of the straight distance;
+        more than 1.
+    max_leg_gap : float
+        Relative gap between the bound of a leg and its known length at which the bound is final,
+        from 0 to 1.
+    min_solve_s : float
+        Seconds for the solver if the time is up; more than 0, so that there is always a bound.
+    cell_s : float
+        Expected CPU seconds per cell of a potential; a grid that would exceed the remaining time is
+        skipped. At least 0.
+    """
+
+    upright_share: float = 0.4
+    max_detour_ratio: float = 2.2
+    max_leg_gap: float = 2e-3
+    min_solve_s: float = 0.3
+    cell_s: float = 8e-6
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        for name in ("upright_share", "max_leg_gap"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise InputError(f"{name}: {getattr(self, name)}; expected a number from 0 to 1")
+        if not self.max_detour_ratio > 1.0:
+            raise InputError(f"max_detour_ratio: {self.max_detour_ratio}; expected more than 1")
+        if not self.min_solve_s > 0.0:
+            raise InputError(f"min_solve_s: {self.min_solve_s}; expected more than 0")
+        if not self.cell_s >= 0.0:
+            raise InputError(f"cell_s: {self.cell_s}; expected 0 or more")
+
+
+def bound_of_all(
+    ways: Ways, reached: list[int], clock: Clock | None, seed: int = 0,
+    params: PotentialParams | None = None, policy: BoundPolicy | None = None,
+) -> float | None:  # fmt: skip
+    """Return a lower bound on the length of every tour through some waypoints.
+
+    The bound holds for tours that go to the waypoints themselves, keep the mission's clearance as
+    the judge checks it (corners may be half of `delta` nearer), stay within the scene's bounds and
+    within the tether's length of the anchor.
+
+    Parameters
+    ----------
+    ways : Ways
+        Known paths between waypoints; their lengths only say how far to look.
+    reached : list of int
+        Numbers of the waypoints that the tours visit.
+    clock : Clock, optional
+        Clock of the run; when it is up, the bound proven so far is returned.
+    seed : int
+        Random seed of the solver.
+    params : PotentialParams, optional
+        Effort for each leg.
+    policy : BoundPolicy, optional
+        Time and accuracy.
+
+    Returns
+    -------
+    float or None
+        Lower bound, metres; None if there was no time for one, or no waypoint besides the start.
+    """
+    clock, policy = clock or Clock(), policy or BoundPolicy()
+    places, visited = ways.places, set(reached)
+    some = [n for n in range(len(places)) if n == places.begin or places.waypoint[n] in visited]
+    if not some:
+        return None
+    upright = bound_of_upright(
+        ways.water.mission, ways.water, some, places, clock.part(policy.upright_share)
+    )
+    legs = LegBounds(ways, some, params or PotentialParams(), policy)
+    of_robot = _of_robot(legs, clock, seed)
+    return max(of_robot or 0.0, upright or 0.0) or None
+
+
+@dataclass
+class LegBounds:
+    """Certified least lengths of legs between the start and some places.
+
+    Parameters
+    ----------
+    ways : Ways
+        Known paths between waypoints.
+    some : list of int
+        Numbers of the places, as in `ways.places`.
+    params : PotentialParams
+        Effort for each leg.
+    policy : BoundPolicy
+        Time and accuracy.
+
+    Attributes
+    ----------
+    points : ndarray, shape (v, 3)
+        The start, then the places, metres.
+    costs : ndarray, shape (v, v)
+        Lower bound on the length of each leg, metres.
+    final : ndarray of bool, shape (v, v)
+        True where more effort cannot raise the bound.
+    """
+
+    ways: Ways
+    some: list[int]
+    params: PotentialParams
+    policy: BoundPolicy = field(default_factory=BoundPolicy)
+    points: Floats = field(init=False)
+    costs: Floats = field(init=False)
+    final: Bools = field(init=False)
+    _level: Ints = field(init=False)
+    _looked: Bools = field(init=False)
+    _room: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        water = self.ways.water
+        self.points = np.vstack([water.mission.start, self.ways.places.points[self.some]])
+        self.costs = np.linalg.norm(self.points[:, None] - self.points[None], axis=2)
+        self.final = np.eye(len(self.points), dtype=np.bool_)
+        self._level = np.zeros(self.costs.shape, dtype=np.int64)
+        self._looked = self.final.copy()
+        self._room = water.field.distance(self.points)
+
+    def raised(self, u: int, v: int, clock: Clock) -> bool:
+        """Raise the bound of a leg on a finer grid.
+
+        Parameters
+        ----------
+        u : int
+            Begin of the leg, as in `points`.
+        v : int
+            End of the leg.
+        clock : Clock
+            Clock of the run; a grid that would take longer than it allows is skipped.
+
+        Returns
+        -------
+        bool
+            True if the bound has grown.
+        """
+        if self.final[u, v]:
+            return False
+        a, b, before = self.points[u], self.points[v], self.costs[u, v]
+        water = self.ways.water
+        if not self._looked[u, v]:
+            self._looked[u, v] = self._looked[v, u] = True
+            if straight(water.field, a, b, water.mission.clearance):
+                self.final[u, v] = self.final[v, u] = True
+                return False
+        known = self._known(u, v)
+        farthest = self.policy.max_detour_ratio * float(np.linalg.norm(b - a))
+        longest = known if math.isfinite(known) else farthest
+        level = int(self._level[u, v]) + 1
+        cells = cells_of(level, self.params)
+        if self.policy.cell_s * cells > clock.left:
+            self.final[u, v] = self.final[v, u] = True
+            return False
+        length = path_bound(
+            water.field, a, b, self._region(u, v), longest, cells, self.params, clock
+        )
+        self.costs[u, v] = self.costs[v, u] = max(before, length)
+        self._level[u, v] = self._level[v, u] = level
+        if cells >= self.params.max_cells or length >= (1.0 - self.policy.max_leg_gap) * longest:
+            self.final[u, v] = self.final[v, u] = True
+        return bool(self.costs[u, v] > before * (1.0 + 1e-9) + 1e-9)
+
+    def _region(self, u: int, v: int) -> Region:
+        """Return the region of all legs that the judge accepts
+        (`netsp.plan.space.planning_context.has_room`)."""
+        mission, water = self.ways.water.mission, self.ways.water
+        room = min(mission.clearance, float(self._room[u]), float(self._room[v]))
+        # between two samples of a path the distance from solids may be half a step less
+        room = max(room - 0.5 * mission.delta - 2.0 * ROOM_STEP, -2.0 * DEEPEST)
+        bounds = np.array([[-np.inf] * 3, [np.inf] * 3])
+        if water.bounds is not None:
+            bounds = np.array(water.bounds).reshape(2, 3)
+        anchor = np.asarray(mission.anchor, dtype=float)
+        return Region(room, bounds, anchor, mission.tether_length * (1.0 + 1e-6))
+
+    def _known(self, u: int, v: int) -> float:
+        """Return the length of the shortest path found so far; infinite where there is none."""
+        ways = self.ways
+        if u == 0 or v == 0:
+            n, laid = self.some[max(u, v) - 1], along(ways.water.laid.nodes)
+            return min((laid + along(t) for t in ways.tethers.get(n, ())), default=math.inf)
+        known = ways.known(self.some[u - 1], self.some[v - 1])
+        return min((along(path) for _, path in known), default=math.inf)
+
+
+def _of_robot(legs: LegBounds, clock: Clock, seed: int) -> float | None:
+    """Return the bound that the least lengths of legs prove.
+
+    Solve for the shortest tour by these lengths, raise the bounds of its legs, and solve again,
+    until no bound of a leg can be raised or the time is up.
+    """
+    places, best = legs.ways.places, 0.0
+    point = np.array(legs.some)
+    cluster: Ints = np.r_[0, 1 + np.unique(places.waypoint[point], return_inverse=True)[1]]
+    begin = None if places.begin is None else 1 + int(np.flatnonzero(point == places.begin)[0])
+    while True:
+        graph = TravelGraph.from_costs(legs.costs, cluster)
+        if begin is not None:
+            graph = from_state(graph, begin)
+        # straight lengths alone give a bound, however little time there is
+        solving = Clock(legs.policy.min_solve_s) if clock.up else clock
+        result = solve_graph(graph, "auto", time_limit=solving, seed=seed)
+        best = max(best, result.lower_bound or 0.0)
+        if clock.up or result.tour is None:
+            return best or None
+        tour, grown = list(pairwise((*result.tour, 0))), False
+        while not grown and not all(legs.final[u, v] for u, v in tour):
+            for u, v in tour:
+                if clock.up:
+                    return best or None
+                grown = legs.raised(u, v, clock) or grown
+        if not grown:
+            return best or None

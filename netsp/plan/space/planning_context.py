@@ -1,0 +1,503 @@
+"""A mission's water: its words, where the robot fits, and the tether's model, in one place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from netsp.base.arrays import Bools, Floats
+from netsp.base.clock import NEVER, Flag, end_if_abandoned
+from netsp.base.geometry import polylines
+from netsp.online.laid import first_tether, present_tether
+from netsp.online.mission import Mission
+from netsp.online.mission_run import grid_of
+from netsp.online.paths.standoff import beside
+from netsp.online.paths.tree import OPEN as ALL_FREE
+from netsp.online.paths.tree import Grid, free_cells, states_of, taut
+from netsp.online.planned_tour import UnresolvedGap
+from netsp.plan.space.cells import FREE, OPEN
+from netsp.plan.space.passages import Resolved
+from netsp.plan.space.space_signature import SpaceSignature
+from netsp.plan.space.word_search import NONE, Found, shortest_words, way_back
+from netsp.world.scene.field import DistanceField, pushed_out
+from netsp.world.scene.scene import Scene
+from netsp.world.tether import GeodesicTether, Tether
+from netsp.world.tether.resolution import THINNEST
+
+SHARE = 0.99
+"""Of the tether that states and legs may need: the rest is for how the robot is steered, and for
+what is not seen between two steps along a leg."""
+
+LONGER = 1.35
+"""Of paths along cells beside those pulled taut: 26 directions make 1.09, and round bodies more."""
+
+ROOM_STEP = 0.01
+"""Metres that the room along a path may be overstated by."""
+
+DEEPEST = 1e-3
+"""Metres that a path may be inside a solid: as the judge has it."""
+
+LIFTS = 12
+"""Times that corners are led around the outside of what they cut off."""
+
+DIP = 0.15
+"""Of delta: a tether's edges dip into a surface by an eighth of it (docs/tether.md)."""
+
+
+@dataclass(frozen=True)
+class Water:
+    """What planning asks of a scene.
+
+    Parameters
+    ----------
+    mission : Mission
+        What is to be visited.
+    field : DistanceField
+        The scene.
+    grid : Grid
+        Of `netsp.online.mission_run.grid_of`: the box and the size of cells.
+    words : SpaceSignature
+        Its classes of paths, in the tether's water.
+    model : GeodesicTether
+        The tether.
+    bounds : tuple of float, optional
+        Bounds (xmin, ymin, zmin, xmax, ymax, zmax) of the scene, metres; None if it has none or is
+        not known.
+    cells : Resolved, optional
+        Cell size, and the gaps that the grid does not show; None if they were not searched for.
+    """
+
+    mission: Mission
+    field: DistanceField
+    grid: Grid
+    words: SpaceSignature
+    model: GeodesicTether
+    bounds: tuple[float, ...] | None = None
+    cells: Resolved | None = None
+
+    @classmethod
+    def of(cls, mission: Mission, scene: Scene, field: DistanceField) -> Water:
+        """The water of a mission.
+
+        Parameters
+        ----------
+        mission : Mission
+            The mission.
+        scene : Scene
+            Its scene.
+        field : DistanceField
+            The scene's field.
+
+        Returns
+        -------
+        Water
+            The same.
+
+        Raises
+        ------
+        InputError
+            As of `netsp.plan.space.space_signature.SpaceSignature.of`.
+        """
+        return cls.within(mission, field, grid_of(mission, scene, field), scene.bounds)
+
+    @classmethod
+    def within(
+        cls, mission: Mission, field: DistanceField, grid: Grid,
+        bounds: tuple[float, ...] | None = None,
+    ) -> Water:  # fmt: skip
+        """The same where a grid is at hand.
+
+        Parameters
+        ----------
+        mission : Mission
+            The mission.
+        field : DistanceField
+            Its scene's field.
+        grid : Grid
+            The box and the size of cells.
+        bounds : tuple of float, optional
+            Bounds of the scene, if known, metres.
+
+        Returns
+        -------
+        Water
+            The same.
+
+        Raises
+        ------
+        InputError
+            As of `netsp.plan.space.space_signature.SpaceSignature.of`.
+        """
+        high = grid.low + grid.cell * np.array(grid.free.shape)
+        words = SpaceSignature.of(
+            field, grid.low, high, grid.cell, mission.anchor, tolerance=DIP * mission.delta
+        )
+        return cls(mission, field, grid, words, GeodesicTether(field, mission.delta), bounds)
+
+    @property
+    def unresolved_gaps(self) -> tuple[UnresolvedGap, ...] | None:
+        """Return the gaps that the grid does not show, as in a tour; None if not searched for."""
+        return None if self.cells is None else self.cells.in_file
+
+    @cached_property
+    def laid(self) -> Tether:
+        """The tether with the robot at the start."""
+        return first_tether(self.mission, self.field, self.model, self.grid)
+
+    @cached_property
+    def present(self) -> Tether:
+        """The tether when the mission begins."""
+        return present_tether(self.mission, self.field, self.model, self.grid)
+
+    @cached_property
+    def room(self) -> Bools:
+        """(nx, ny, nz) cells that keep the robot's clearance."""
+        c = self.words.cells
+        nx, ny, nz = c.flags.shape
+        return np.asarray(
+            free_cells(
+                c.field.arrays, c.low, c.cell, (nx, ny, nz), self.mission.clearance, NEVER
+            )
+        )  # fmt: skip
+
+    @cached_property
+    def everywhere(self) -> Bools:
+        """(nx, ny, nz) all cells: the tether's water."""
+        return np.ones(self.words.cells.flags.shape, dtype=np.bool_)
+
+    @cached_property
+    def open(self) -> tuple[Bools, Bools]:
+        """(nx, ny, nz) cells about which all are free and of one class, for the tether and for the
+        robot."""
+        flags = self.words.cells.flags
+        free = (flags & FREE) != 0
+        both = []
+        for mask in (free, free & self.room):
+            inner = states_of(mask)[1:-1, 1:-1, 1:-1] == ALL_FREE
+            both.append(inner & ((flags & OPEN) != 0))
+        return both[0], both[1]
+
+    def search(
+        self, robot: bool, cell: int, most: int, within: float | Mapping[int, float],
+        stop: Flag = NEVER,
+    ) -> Found:  # fmt: skip
+        """The soonest words of cells, from one of them on.
+
+        Parameters
+        ----------
+        robot : bool
+            Whether the robot's clearance is kept.
+        cell : int
+            Number of the first.
+        most : int
+            Words of a cell.
+        within : float or mapping of int to float
+            Metres: all cells that paths no longer than that lead to when pulled taut; or the cells
+            that are sought, and how long the paths to each may be.
+        stop : ndarray
+            Flag of a clock; once it is set, only the soonest word of a cell is sought.
+
+        Returns
+        -------
+        Found
+            The words, by their numbers in the table.
+        """
+        end_if_abandoned()
+        words, cells = self.words, self.words.cells
+        shape = np.array(cells.flags.shape)
+        root = np.array(np.unravel_index(cell, cells.flags.shape), dtype=np.int64)
+        first, last = np.zeros(3, dtype=np.int64), shape - 1
+        targets, scale = np.empty((0, 3), dtype=np.int64), 100.0 * LONGER / cells.cell
+        if isinstance(within, float):
+            limits = np.array([scale * within], dtype=np.int64)
+        else:
+            targets = np.column_stack(np.unravel_index(list(within), cells.flags.shape))
+            limits = np.array([scale * v for v in within.values()], dtype=np.int64)
+            # a path is no farther from where it begins than half its length and what it leads to
+            apart = 100.0 * np.abs(targets - root)
+            reach = np.ceil(0.005 * (limits[:, None] + apart).max(0)).astype(np.int64) + 1
+            first, last = np.maximum(root - reach, 0), np.minimum(root + reach, shape - 1)
+        room = self.room if robot else self.everywhere
+        found, table = shortest_words(
+            cells.flags, room, self.open[robot], words.labels, words.table, words.rules, root,
+            first, last, most, targets, limits, stop,
+        )  # fmt: skip
+        words.keep(table)
+        return Found(*found)
+
+    def ways(self, found: Found, cell: int) -> list[tuple[int, Floats]]:
+        """Words and paths that a search has found to a cell.
+
+        Parameters
+        ----------
+        found : Found
+            Of `search`.
+        cell : int
+            Number of the cell.
+
+        Returns
+        -------
+        list of (int, ndarray of shape (m, 3))
+            Number of the word, centres of the cells from the first on; shortest first.
+        """
+        c = self.words.cells
+        at = np.array(np.unravel_index(cell, c.flags.shape), dtype=np.int64)
+        place = tuple(at - found.first)
+        if min(place) < 0 or any(p >= n for p, n in zip(place, found.word.shape, strict=False)):
+            return []
+        words, far = found.word[place], found.far[place]
+        return [
+            (int(words[s]), c.centre(way_back(found, at, int(s))))
+            for s in np.argsort(far, kind="stable")
+            if words[s] != NONE
+        ]
+
+    def taut(self, path: Floats) -> Floats:
+        """A path of the robot pulled taut in its class, at its clearance.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            Metres.
+
+        Returns
+        -------
+        ndarray, shape (m, 3)
+            Metres.
+        """
+        mission = self.mission
+        line = taut(self.field, path, mission.clearance, mission.delta)
+        if mission.clearance >= 0.5 * mission.delta:
+            return line
+        return lifted(self.field, line, min(mission.clearance, room_at_ends(self.field, path)))
+
+    def taut_beside(self, line: Floats) -> Floats | None:
+        """Pull a tether's line taut as a path of the robot, in the line's class.
+
+        A tether rests on surfaces, so its line is nearer to them than the clearance, and has no
+        class among solids grown by the clearance. Pulling it there may move it across a bar. So a
+        path with another word is rejected; the line is then moved off the surfaces and pulled
+        again.
+
+        Parameters
+        ----------
+        line : ndarray, shape (k, 3)
+            Line that is free or lies on surfaces, metres.
+
+        Returns
+        -------
+        ndarray, shape (m, 3), or None
+            The path, metres; None if no path with room was found in the line's class.
+        """
+        word = self.number(line)
+        if word is None:
+            return None
+        path = self.taut(line)
+        if self.number(path) == word and has_room(self.field, path, self.mission):
+            return path
+        step = min(self.grid.cell, 0.5 * THINNEST * self.mission.delta)
+        clear = beside(self.field, polylines.points_along(line, step), self.mission.clearance)
+        if self.number(clear) != word:
+            return None
+        for path in (self.taut(clear), clear):
+            if self.number(path) == word and has_room(self.field, path, self.mission):
+                return path
+        return None
+
+    def driven(self, tether: Tether, path: Floats, *, fine: bool = False) -> tuple[Tether, float]:
+        """A tether, once the robot has gone a path.
+
+        About solids in space its length is not convex along a straight leg, as it is in the plane
+        (docs/theory.md, fact 2): it may be longer there than at both ends. So it is asked for in
+        steps (`stride`).
+
+        Parameters
+        ----------
+        tether : Tether
+            Before.
+        path : ndarray, shape (k, 3)
+            From the robot on, metres.
+        fine : bool
+            In steps of delta.
+
+        Returns
+        -------
+        tether : Tether
+            At the end.
+        longest : float
+            Metres of it on the way, as far as the steps tell: between two of them it is longer by
+            half a step at most, because it gets longer by no more than the robot goes.
+        """
+        step = self.mission.delta if fine else stride(self.mission)
+        after, lengths = self.model.drive(tether, polylines.dense(path, step))
+        return after, float(lengths.max(initial=tether.length))
+
+    def number(self, path: Floats) -> int | None:
+        """Number of a path's word; None where it has none.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            Metres.
+
+        Returns
+        -------
+        int or None
+            Its number in the table.
+        """
+        return self.words.number(path)[0]
+
+
+def along(path: Floats) -> float:
+    """Length of a path, metres.
+
+    Parameters
+    ----------
+    path : ndarray, shape (k, 3)
+        Metres.
+
+    Returns
+    -------
+    float
+        Metres.
+    """
+    return float(polylines.length(path))
+
+
+def has_room(field: DistanceField, path: Floats, mission: Mission) -> bool:
+    """Whether a path keeps the clearance, or what its ends have of it; corners that were pulled
+    taut dip below it by half of delta at most.
+
+    Parameters
+    ----------
+    field : DistanceField
+        The scene.
+    path : ndarray, shape (k, 3)
+        Metres.
+    mission : Mission
+        Its clearance and delta count.
+
+    Returns
+    -------
+    bool
+        Whether it does.
+    """
+    return least_room(field, path) >= max(
+        min(mission.clearance, room_at_ends(field, path)) - 0.5 * mission.delta, -DEEPEST
+    )
+
+
+def room_at_ends(field: DistanceField, path: Floats) -> float:
+    """How near the ends of a path are to solids.
+
+    Parameters
+    ----------
+    field : DistanceField
+        The scene.
+    path : ndarray, shape (k, 3)
+        Metres.
+
+    Returns
+    -------
+    float
+        Metres.
+    """
+    return float(field.distance(path[[0, -1]]).min())
+
+
+def lifted(field: DistanceField, path: Floats, room: float) -> Floats:
+    """A taut path whose corners dip below a clearance, led around the outside of them.
+
+    Parameters
+    ----------
+    field : DistanceField
+        The scene.
+    path : ndarray, shape (k, 3)
+        Metres.
+    room : float
+        Clearance that it is to keep, metres; its ends have it.
+
+    Returns
+    -------
+    ndarray, shape (m, 3)
+        The same class, longer by what arcs are longer than their chords.
+    """
+    for _ in range(LIFTS):
+        out, low = [path[0]], False
+        for a, b in pairwise(path):
+            between = polylines.dense(np.array([a, b]), ROOM_STEP)[:-1]
+            depth = field.distance(between) if len(between) else np.empty(0)
+            if len(depth) and depth.min() < room - 0.5 * DEEPEST:
+                lowest = between[int(depth.argmin())][None]
+                out.append(pushed_out(field, lowest, room + 0.1 * DEEPEST)[0])
+                low = True
+            out.append(b)
+        path = np.array(out)
+        path[1:-1] = pushed_out(field, path[1:-1], room + 0.1 * DEEPEST)
+        if not low:
+            break
+    return path
+
+
+def least_room(field: DistanceField, path: Floats) -> float:
+    """How near a path comes to solids.
+
+    Parameters
+    ----------
+    field : DistanceField
+        The scene.
+    path : ndarray, shape (k, 3)
+        Metres.
+
+    Returns
+    -------
+    float
+        Metres, right to a hundredth of one, or to a millionth of the path's length.
+    """
+    step = max(2.0 * ROOM_STEP, along(path) / 1e6)
+    return float(field.distance(np.vstack([path[:1], polylines.dense(path, step)])).min())
+
+
+def stride(mission: Mission) -> float:
+    """Metres after which the tether's length is asked for on a leg: so many that it can be longer
+    in between by no more than what is spared of the tether.
+
+    Parameters
+    ----------
+    mission : Mission
+        Whose tether counts.
+
+    Returns
+    -------
+    float
+        At least its delta.
+    """
+    return max(mission.delta, 2.0 * (1.0 - SHARE) * mission.tether_length)
+
+
+def straight(field: DistanceField, a: Floats, b: Floats, clearance: float) -> bool:
+    """Whether a straight path keeps the clearance, or what its ends have of it.
+
+    Parameters
+    ----------
+    field : DistanceField
+        The scene.
+    a : ndarray, shape (3,)
+        Where it begins, metres.
+    b : ndarray, shape (3,)
+        Where it ends, metres.
+    clearance : float
+        Metres.
+
+    Returns
+    -------
+    bool
+        Whether it does.
+    """
+    ends = float(field.distance(np.array([a, b])).min())
+    room = max(0.0, min(clearance, ends) - 1e-3)
+    return field.grown(room).line_of_sight(a, b, depth=1e-3)

@@ -1,0 +1,405 @@
+"""Tours of scenes whose solids are all upright prisms, from the exact roadmap of the plane.
+
+Among upright prisms the water is the product of a plane and an interval, so the homotopy classes of
+paths are those of the plane (docs/theory.md, fact 4). The taut roadmap therefore knows all classes
+of such a scene, and the solvers find the shortest tour over them. This tour is a candidate: it is
+driven and judged in space like any other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from netsp.base.arrays import Floats, Ints
+from netsp.base.clock import Clock
+from netsp.base.errors import InfeasibleError, InputError, LimitReachedError
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.hsignature.rays import signature
+from netsp.model.problem import Circle, Goal, Polygon, Problem
+from netsp.model.solution import Status
+from netsp.online.mission import Mission
+from netsp.plan.solve_problem import solve_graph
+from netsp.plan.space.board import Driven
+from netsp.plan.space.driven_legs import LegTo, drive_legs
+from netsp.plan.space.places import Places
+from netsp.plan.space.planning_context import SHARE, Water
+from netsp.roadmap.explain_unreachable import shortest_tethers
+from netsp.roadmap.from_state import from_state
+from netsp.roadmap.taut import TautRoadmap
+from netsp.world.scene.scene import Scene
+from netsp.world.scene.shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Post,
+    Prism,
+    Shape,
+)
+
+UPRIGHT_TOLERANCE = 1e-9
+"""Largest difference from 1 of the cosine between an upright axis and the vertical. The tolerance
+covers rounding in files."""
+
+CORNER_SEGMENTS = 4
+"""Segments of a quarter circle around the corners of a prism that grows by more than the others."""
+
+Corner = tuple[float, float]
+
+WALL_RATIO = 4.0
+"""Half width and depth of the polygon that stands for a half-space, in tether lengths. No tour gets
+around a polygon of more than one tether length."""
+
+
+@dataclass(frozen=True)
+class PlaneParams:
+    """Budget of the tours of the plane.
+
+    Parameters
+    ----------
+    max_classes : int
+        Largest number of augmented goals, at least 1; if there are more, those with the shortest
+        tethers are kept.
+    max_s : float
+        Seconds for each tour, more than 0; the limit also holds for runs without a time limit.
+    time_share : float
+        Share of the remaining time for all tours of the plane, from 0 to 1.
+    """
+
+    max_classes: int = 1000
+    max_s: float = 15.0
+    time_share: float = 0.6
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        if self.max_classes < 1:
+            raise InputError(f"max_classes: expected 1 or more, got {self.max_classes}")
+        if not self.max_s > 0.0:
+            raise InputError(f"max_s: expected more than 0, got {self.max_s:g}")
+        if not 0.0 <= self.time_share <= 1.0:
+            raise InputError(f"time_share: expected a number from 0 to 1, got {self.time_share:g}")
+
+
+@dataclass(frozen=True)
+class FloorPlan:
+    """Floor plan of a scene of upright prisms.
+
+    Parameters
+    ----------
+    circles : tuple of ((x, y), radius)
+        Round solids, metres.
+    polygons : tuple of (corners, growth)
+        Corners (x, y) of each polygon, and the distance by which it grows, metres.
+    """
+
+    circles: tuple[tuple[Corner, float], ...]
+    polygons: tuple[tuple[tuple[Corner, ...], float], ...]
+
+    def obstacles(self) -> tuple[tuple[Circle | Polygon, ...], float]:
+        """Return obstacles of a problem, and the clearance that grows them to the solids.
+
+        Returns
+        -------
+        obstacles : tuple of Circle or Polygon
+            Obstacles, smaller than the solids by the clearance.
+        clearance : float
+            Least growth of a solid, metres.
+        """
+        growth = min((g for _, g in self.polygons), default=0.0)
+        growth = min([growth, *(0.5 * r for _, r in self.circles)])
+        out: list[Circle | Polygon] = [
+            Circle(center=center, radius=radius - growth) for center, radius in self.circles
+        ]
+        for corners, polygon_growth in self.polygons:
+            polygon = Polygon(polygon=corners)
+            more = polygon_growth - growth
+            if more > 0.0:
+                import shapely
+
+                # chords of a somewhat larger circle, so that none cuts the corner short
+                more /= math.cos(math.pi / (4 * CORNER_SEGMENTS))
+                grown = shapely.Polygon(corners).buffer(more, quad_segs=CORNER_SEGMENTS)
+                polygon = Polygon(polygon=tuple(grown.exterior.coords[:-1]))
+            out.append(polygon)
+        return tuple(out), growth
+
+
+def floor_plan(scene: Scene, mission: Mission) -> FloorPlan | None:
+    """Return the floor plan of a scene if every solid in reach of the tether is an upright prism
+    that spans all depths in its reach.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    mission : Mission
+        Mission with the anchor and the tether.
+
+    Returns
+    -------
+    FloorPlan or None
+        The plan; None for other scenes.
+    """
+    if scene.mesh is not None or scene.cloud is not None or scene.floor is not None:
+        return None
+    anchor, far = np.array(mission.anchor), mission.tether_length
+    low, high = anchor - far, anchor + far
+    if scene.bounds is not None:
+        low = np.maximum(low, scene.bounds[:3])
+        high = np.minimum(high, scene.bounds[3:])
+    shapes = [solid.shape for solid in scene.all_solids()]
+    for shape in shapes:
+        if isinstance(shape, HalfSpace) and _along_z(shape.normal):
+            if shape.normal[2] > 0.0:
+                low[2] = max(low[2], shape.point[2])
+            else:
+                high[2] = min(high[2], shape.point[2])
+    circles: list[tuple[Corner, float]] = []
+    polygons: list[tuple[tuple[Corner, ...], float]] = []
+    for shape in shapes:
+        if isinstance(shape, HalfSpace):
+            if _along_z(shape.normal):
+                continue
+            if abs(shape.normal[2]) > UPRIGHT_TOLERANCE * math.hypot(*shape.normal):
+                return None
+            normal = np.array(shape.normal[:2]) / math.hypot(*shape.normal[:2])
+            wall = wall_corners(np.array(shape.point[:2]), normal, anchor, far)
+            polygons.append((wall, scene.tether_radius))
+            continue
+        if not isinstance(shape, Post | Prism):
+            box = np.asarray(shape.box()) + scene.tether_radius * np.array([[-1.0], [1.0]])
+            if (box[0] >= high).any() or (box[1] <= low).any():
+                continue  # no tour meets it
+        circle, polygon = _circle_of(shape, low[2], high[2]), _polygon_of(shape, low[2], high[2])
+        if circle is not None:
+            circles.append((circle[0], circle[1] + scene.tether_radius))
+        elif polygon is not None:
+            polygons.append((polygon[0], polygon[1] + scene.tether_radius))
+        else:
+            return None
+    return FloorPlan(tuple(circles), tuple(polygons))
+
+
+def _along_z(direction: tuple[float, float, float]) -> bool:
+    """Return whether a direction is vertical."""
+    return abs(direction[2]) >= (1.0 - UPRIGHT_TOLERANCE) * math.hypot(*direction)
+
+
+def _circle_of(shape: Shape, low: float, high: float) -> tuple[Corner, float] | None:
+    """Return centre and radius of an upright round solid that spans the depths from low to high."""
+    if isinstance(shape, Post):
+        return shape.center, shape.radius
+    if isinstance(shape, Cylinder | Capsule):
+        a, b = shape.a, shape.b
+        axis = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+        through = min(a[2], b[2]) <= low and max(a[2], b[2]) >= high
+        if through and math.hypot(*axis) > 0.0 and _along_z(axis):
+            return (a[0], a[1]), shape.radius
+    return None
+
+
+def _polygon_of(shape: Shape, low: float, high: float) -> tuple[tuple[Corner, ...], float] | None:
+    """Return corners and growth of an upright prism that spans the depths from low to high."""
+    if isinstance(shape, Prism):
+        return shape.polygon, shape.grow
+    if isinstance(shape, Box):
+        axes = shape.axes()
+        up = int(np.abs(axes[:, 2]).argmax())
+        half = 0.5 * np.array(shape.size)
+        through = shape.center[2] - half[up] <= low and shape.center[2] + half[up] >= high
+        if through and abs(axes[up, 2]) >= 1.0 - UPRIGHT_TOLERANCE:
+            a, b = (axes[k, :2] * half[k] for k in range(3) if k != up)
+            middle = np.array(shape.center[:2])
+            corners = (middle + a + b, middle - a + b, middle - a - b, middle + a - b)
+            return tuple((float(x), float(y)) for x, y in corners), 0.0
+    return None
+
+
+def wall_corners(point: Floats, normal: Floats, anchor: Floats, far: float) -> tuple[Corner, ...]:
+    """Return the corners of a rectangle that stands for an upright half-space within the reach of
+    the tether.
+
+    Parameters
+    ----------
+    point : ndarray, shape (2,)
+        Point on the face, metres.
+    normal : ndarray, shape (2,)
+        Unit normal out of the solid.
+    anchor : ndarray, shape (2,) or (3,)
+        Anchor of the tether, metres.
+    far : float
+        Length of the tether, metres.
+
+    Returns
+    -------
+    tuple of (x, y)
+        Corners, metres.
+    """
+    along = np.array([-normal[1], normal[0]])
+    foot = point + ((anchor[:2] - point) @ along) * along
+    wide, deep = WALL_RATIO * far * along, WALL_RATIO * far * normal
+    corners = (foot + wide, foot - wide, foot - wide - deep, foot + wide - deep)
+    return tuple((float(x), float(y)) for x, y in corners)
+
+
+def tours_of_plan(
+    water: Water, scene: Scene, places: Places, clock: Clock, seed: int = 0,
+    params: PlaneParams | None = None, whole_tether: bool = False,
+) -> Iterator[Driven]:  # fmt: skip
+    """Drive the shortest tours of the plane in a scene of upright prisms.
+
+    Parameters
+    ----------
+    water : Water
+        Water of the mission.
+    scene : Scene
+        Scene of the mission.
+    places : Places
+        Places of the waypoints.
+    clock : Clock
+        Clock of the run; when it is up, the best tours so far are driven.
+    seed : int
+        Random seed of the solver.
+    params : PlaneParams, optional
+        Budget.
+    whole_tether : bool
+        Whether tours may need the whole tether, for a caller that flies them.
+
+    Yields
+    ------
+    Driven
+        First, if `whole_tether`, the shortest tour for the whole tether; then the shortest tour for
+        the share of the tether that plans may use. Nothing in other scenes. A tour is skipped if
+        the tether in space exceeds its limit.
+    """
+    plan, params = floor_plan(scene, water.mission), params or PlaneParams()
+    if plan is None:
+        return
+    plane = _PlaneTour(water, scene, places, plan, params)
+    for share in (1.0, SHARE) if whole_tether else (SHARE,):
+        if clock.up:
+            return
+        try:
+            found = plane.shortest_legs(share, Clock(params.max_s, within=clock.part(0.5)), seed)
+        except (InputError, InfeasibleError, LimitReachedError):
+            continue
+        if found is not None:
+            legs, home, is_optimal = found
+            driven = drive_legs(water, legs, home)
+            if driven is not None:
+                yield driven
+                longest = max(stop.most for stop in driven.stops)
+                if is_optimal and longest <= SHARE * water.mission.tether_length:
+                    return
+
+
+@dataclass(frozen=True)
+class _PlaneTour:
+    """Mission among upright prisms, as a problem of the plane."""
+
+    water: Water
+    scene: Scene
+    places: Places
+    plan: FloorPlan
+    params: PlaneParams
+
+    def shortest_legs(
+        self, share: float, clock: Clock, seed: int
+    ) -> tuple[list[LegTo], Floats, bool] | None:
+        """Return the legs of the shortest tour for a share of the tether, the path home, and True
+        if the solver proved that it is the shortest of the plane."""
+        water, places = self.water, self.places
+        mission = water.mission
+        start = len(places)  # number of the goal at the start, used if the start is not the anchor
+        points = np.vstack([places.points, mission.start])
+        away = math.dist(mission.start, mission.anchor) > UPRIGHT_TOLERANCE
+        goals = np.arange(len(points) if away else start)
+        goals = goals[self._in_reach(points, goals, share)]
+        needed = {places.begin} if places.begin is not None else set()
+        needed |= {start} if away else set()
+        if not needed <= set(goals.tolist()) or not set(goals.tolist()) - needed:
+            return None
+        roadmap = TautRoadmap(
+            self._problem(points[goals], share), max_classes=self.params.max_classes,
+            time_limit=clock.part(0.5),
+        )  # fmt: skip
+        graph = roadmap.to_travel_graph()
+        place = np.r_[-1, goals][graph.cluster]
+        home = self._vertex(roadmap, graph, place == start, water.laid.nodes) if away else 0
+        begin = None
+        if places.begin is not None:
+            begin = self._vertex(roadmap, graph, place == places.begin, water.present.nodes)
+        if home is None or (places.begin is not None and begin is None):
+            return None
+        found = _solved(graph, place, self.places, home, begin, clock, seed)
+        if found is None:
+            return None
+        tour, is_optimal = found
+        ends = [home if begin is None else begin, *tour, home]
+        paths = [graph.path(u, v) for u, v in pairwise(ends)]
+        legs = [
+            LegTo(int(places.waypoint[place[v]]), int(places.choice[place[v]]), path)
+            for v, path in zip(tour, paths, strict=False)
+        ]
+        return legs, paths[-1], is_optimal
+
+    def _problem(self, goals: Floats, share: float) -> Problem:
+        """Return the problem of the plane through some goals."""
+        mission, (obstacles, growth) = self.water.mission, self.plan.obstacles()
+        room = float(self.water.field.distance(np.vstack([goals, mission.anchor])).min())
+        bounds = self.scene.bounds
+        return Problem(
+            base=mission.anchor, obstacles=obstacles,
+            goals=tuple(Goal(position=(x, y, z)) for x, y, z in goals.tolist()),
+            tether_length=share * mission.tether_length,
+            clearance=growth
+            + max(0.0, min(mission.clearance, (1.0 - UPRIGHT_TOLERANCE) * room)),
+            bounds=None if bounds is None else (bounds[0], bounds[1], bounds[3], bounds[4]),
+        )  # fmt: skip
+
+    def _in_reach(self, points: Floats, goals: Ints, share: float) -> Ints:
+        """Return the indices of the goals that the tether reaches in some class."""
+        needed = shortest_tethers(self._problem(points[goals], share))
+        return np.flatnonzero(needed <= share * self.water.mission.tether_length)
+
+    def _vertex(
+        self, roadmap: TautRoadmap, graph: TravelGraph, here: Floats, line: Floats
+    ) -> int | None:
+        """Return the vertex of a place whose tether lies in the class of a line."""
+        word = signature(line, roadmap.problem.representative_points)
+        same = [v for v in np.flatnonzero(here).tolist() if graph.signatures[v] == word]
+        return same[0] if same else None
+
+
+def _solved(
+    graph: TravelGraph, place: Ints, places: Places, home: int, begin: int | None, clock: Clock,
+    seed: int,
+) -> tuple[list[int], bool] | None:  # fmt: skip
+    """Return the vertices of the shortest tour that ends at `home` and begins at `begin`, or at
+    `home` if `begin` is None, and whether it is proven to be the shortest."""
+    count = len(places)
+    if home == 0 and begin is None and not places.choice.any():
+        result = solve_graph(graph, "auto", time_limit=clock, seed=seed)
+        if result.tour is None:
+            return None
+        return list(result.tour[1:]), result.status is Status.OPTIMAL
+    others = [
+        v for v in range(1, len(graph))
+        if 0 <= place[v] < count and (place[v] != places.begin or v == begin)
+    ]  # fmt: skip
+    rows = np.array([home, *others])
+    waypoint = places.waypoint[place[others]]
+    cluster = np.r_[0, 1 + np.unique(waypoint, return_inverse=True)[1]]
+    part = TravelGraph.from_costs(graph.costs_among(rows), cluster)
+    first = 1
+    if begin is not None:
+        part, first = from_state(part, 1 + others.index(begin)), 2
+    result = solve_graph(part, "auto", time_limit=clock, seed=seed)
+    if result.tour is None:
+        return None
+    return [int(rows[v]) for v in result.tour[first:]], result.status is Status.OPTIMAL

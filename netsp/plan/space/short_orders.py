@@ -1,0 +1,154 @@
+"""Tours in short orders: estimate the lengths of legs, solve for an order, and drive it.
+
+The estimate of a leg is the straight distance, and more if a solid stands between its ends. The
+planner `predictive` drives the order in both directions (`netsp.plan.space.given_order`). The
+lengths of the driven legs replace their estimates, and the next round begins. Each round takes
+about as long as driving one tour, which is far less than a search for states. The tours have no
+proof.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from netsp.base.arrays import Floats, Ints
+from netsp.base.clock import Clock
+from netsp.base.errors import InputError
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.plan.solve_problem import solve_graph
+from netsp.plan.space.board import Driven
+from netsp.plan.space.given_order import drive_order
+from netsp.plan.space.places import Places
+from netsp.plan.space.planning_context import Water, along, straight
+from netsp.roadmap.from_state import from_state
+
+
+@dataclass(frozen=True)
+class OrderPolicy:
+    """Effort for tours in short orders.
+
+    Parameters
+    ----------
+    blocked_ratio : float
+        Estimated length of a leg whose ends do not see one another, as a multiple of the straight
+        distance; at least 1.
+    max_rounds : int
+        Largest number of orders; at least 1.
+    max_sighted : int
+        Largest number of places whose lines of sight are tested; at least 0. With more places,
+        straight distances are the estimates.
+    max_solve_s : float
+        Seconds for the solver in each round; more than 0.
+    time_share : float
+        Share of the remaining time for all rounds, from 0 to 1.
+    """
+
+    blocked_ratio: float = 1.5
+    max_rounds: int = 4
+    max_sighted: int = 300
+    max_solve_s: float = 2.0
+    time_share: float = 0.2
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        for name, least in (("blocked_ratio", 1.0), ("max_rounds", 1), ("max_sighted", 0)):
+            if not getattr(self, name) >= least:
+                raise InputError(f"{name}: {getattr(self, name)}; expected {least:g} or more")
+        if not self.max_solve_s > 0.0:
+            raise InputError(f"max_solve_s: {self.max_solve_s}; expected more than 0")
+        if not 0.0 <= self.time_share <= 1.0:
+            raise InputError(f"time_share: {self.time_share}; expected a number from 0 to 1")
+
+
+def short_order_tour(
+    water: Water, places: Places, clock: Clock, seed: int = 0, policy: OrderPolicy | None = None
+) -> Driven | None:
+    """Drive tours in short orders, and return the best.
+
+    Parameters
+    ----------
+    water : Water
+        Water of the mission.
+    places : Places
+        Places of the waypoints.
+    clock : Clock
+        Clock of the run; when it is up, the best tour so far is returned.
+    seed : int
+        Random seed of the solver.
+    policy : OrderPolicy, optional
+        Effort.
+
+    Returns
+    -------
+    Driven or None
+        The tour with the most stops, and of these the shortest; None if no order can be driven.
+    """
+    policy = policy or OrderPolicy()
+    clock = clock.part(policy.time_share)
+    estimates = _estimates(water, places, clock, policy)
+    best: Driven | None = None
+    seen: set[tuple[int, ...]] = set()
+    for _ in range(policy.max_rounds):
+        order = _shortest_order(estimates, places, Clock(policy.max_solve_s, within=clock), seed)
+        if order is None or tuple(order) in seen:
+            return best
+        seen |= {tuple(order), tuple(order[::-1])}
+        # a mission under way has one direction: from the robot to the start
+        for there in (order, order[::-1])[: 1 if places.begin is not None else 2]:
+            if clock.up:
+                return best
+            driven = drive_order(water, [(int(n), int(c)) for n, c in _stops(places, there)], clock)
+            if driven is None:
+                continue
+            _update_estimates(estimates, places, there, driven)
+            if best is None or _rank(driven) < _rank(best):
+                best = driven
+    return best
+
+
+def _rank(driven: Driven) -> tuple[int, float]:
+    """Return the sort key of a tour: more stops first, then the shorter tour."""
+    return -len(driven.stops), driven.length
+
+
+def _stops(places: Places, order: list[int]) -> Ints:
+    """Return the waypoint and the choice of each place of an order, shape (n, 2)."""
+    return np.column_stack([places.waypoint[order], places.choice[order]])
+
+
+def _estimates(water: Water, places: Places, clock: Clock, policy: OrderPolicy) -> Floats:
+    """Return the estimated lengths (n + 1, n + 1) of legs; row 0 is the start, then places."""
+    points = np.vstack([water.mission.start, places.points])
+    lengths = np.linalg.norm(points[:, None] - points[None], axis=2)
+    if len(points) > policy.max_sighted + 1:
+        return np.asarray(lengths)
+    for u in range(len(points)):
+        if clock.up:
+            break
+        for v in range(u):
+            if not straight(water.field, points[u], points[v], water.mission.clearance):
+                lengths[u, v] = lengths[v, u] = policy.blocked_ratio * lengths[u, v]
+    return np.asarray(lengths)
+
+
+def _shortest_order(estimates: Floats, places: Places, clock: Clock, seed: int) -> list[int] | None:
+    """Return the places of the shortest tour by estimates; None if the time is up."""
+    cluster = np.r_[0, 1 + places.waypoint]
+    graph, first = TravelGraph.from_costs(estimates, cluster), 1
+    if places.begin is not None:
+        graph, first = from_state(graph, 1 + places.begin), 2
+    result = solve_graph(graph, "auto", time_limit=clock, seed=seed)
+    return None if result.tour is None else [v - 1 for v in result.tour[first:]]
+
+
+def _update_estimates(estimates: Floats, places: Places, order: list[int], driven: Driven) -> None:
+    """Replace the estimates of legs by the lengths that they were driven with."""
+    place_of = {places.waypoint[n]: 1 + n for n in order}
+    here = 0 if places.begin is None else 1 + places.begin
+    for stop in driven.stops:
+        there = place_of[stop.waypoint]
+        estimates[here, there] = estimates[there, here] = along(stop.path)
+        here = there
+    estimates[here, 0] = estimates[0, here] = along(driven.home)

@@ -1,0 +1,355 @@
+"""Ways of the robot from one waypoint to another, and what its tether does on them."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from netsp.base.arrays import Floats, Ints
+from netsp.base.clock import Clock
+from netsp.plan.space.detour_variants import ways_beside
+from netsp.plan.space.places import Places
+from netsp.plan.space.planning_context import LONGER, Water, along, has_room, straight
+from netsp.plan.space.states import ROUNDS, Effort, State, States
+
+SEARCHING, PULLING = 0.3, 0.3
+"""Of the time left, what the search for ways may take, and then what those along tethers may."""
+
+NEIGHBOURS = 10
+"""Waypoints nearest to each that legs are sought to; places, where some have alternatives."""
+
+
+@dataclass
+class Ways:
+    """The robot's ways between waypoints that are near one another, by the words they write.
+
+    Parameters
+    ----------
+    water : Water
+        Where they are.
+    places : Places
+        The waypoints, and where else the robot may be.
+    effort : Effort
+        How many.
+    tethers : dict of int to list of ndarray of shape (k, 3)
+        Of some places, how tethers hang there: ways are made of these where there is no time for a
+        search, metres.
+    """
+
+    water: Water
+    places: Places
+    effort: Effort
+    tethers: dict[int, list[Floats]] = field(default_factory=dict)
+    _known: dict[tuple[int, int], list[tuple[int, Floats]]] = field(default_factory=dict)
+    _beyond: dict[tuple[int, int], float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        apart = self.places.apart
+        per = len(apart) / np.count_nonzero(self.places.choice == 0)
+        count = min(math.ceil(NEIGHBOURS * per), len(apart) - 1)
+        nearest = np.argsort(apart, axis=1, kind="stable")[:, :count]
+        both = np.zeros(apart.shape, dtype=bool)
+        both[np.arange(len(apart))[:, None], nearest] = True
+        both = (both | both.T) & np.isfinite(apart)
+        self.near: list[Ints] = [np.flatnonzero(row) for row in both]
+        self._apart = apart
+
+    @property
+    def points(self) -> Floats:
+        """(n, 3) the places, metres."""
+        return self.places.points
+
+    def prepare(self, n: int, *, search: bool = True, pulling: Clock | None = None) -> None:
+        """Seek the ways from a waypoint to those near it that have a greater number.
+
+        Parameters
+        ----------
+        n : int
+            The waypoint.
+        search : bool
+            Search for all classes; else there are the straight ways, and those along tethers.
+        pulling : Clock, optional
+            When it is up, there are no more of those along tethers, either.
+        """
+        to = [int(m) for m in self.near[n] if m > n and (n, int(m)) not in self._known]
+        if not to:
+            return
+        water, words = self.water, self.water.words
+        here = words.held(self.points[n])
+        found = None
+        if here is not None and search:
+            ends = {m: words.held(self.points[m]) for m in to}
+            limits = {
+                c: self.effort.farther * float(self._apart[n, m])
+                for m, c in ends.items()
+                if c is not None
+            }
+            found = water.search(True, here, self.effort.ways, limits) if limits else None
+        for m in to:
+            ways = []
+            if straight(water.field, self.points[n], self.points[m], water.mission.clearance):
+                line = self.points[[n, m]]
+                word = water.number(line)
+                if word is not None:
+                    ways.append((word, line))
+            there = ends[m] if found is not None else None
+            if found is not None and there is not None:
+                for _, cells in water.ways(found, there):
+                    path = water.taut(np.vstack([self.points[n], cells, self.points[m]]))
+                    word = water.number(path)
+                    if word is not None and all(word != w for w, _ in ways):
+                        ways.append((word, path))
+            if found is None and not (pulling is not None and pulling.up):
+                self._add_along_tethers(n, m, ways)
+            ways.sort(key=lambda way: along(way[1]))
+            classes = list(ways)
+            if found is not None and ways:
+                farther = self.effort.farther * float(self._apart[n, m])
+                for path in ways_beside(water, [way for _, way in ways], farther):
+                    word = water.number(path)
+                    if word is not None:
+                        ways.append((word, path))
+                ways.sort(key=lambda way: along(way[1]))
+            back = []
+            for _, path in ways:
+                word = water.number(path[::-1])
+                if word is not None:
+                    back.append((word, path[::-1]))
+            self._known[n, m], self._known[m, n] = ways, back
+            if found is not None and there is not None:
+                self._beyond[n, m] = self._beyond[m, n] = self._least_beyond(n, m, classes)
+
+    def _add_along_tethers(self, n: int, m: int, ways: list[tuple[int, Floats]]) -> None:
+        """The shortest ways back along a tether of one place and out along one of another, pulled
+        taut, each of a class of its own."""
+        found: dict[int, Floats] = {}
+        for back in self.tethers.get(n, ()):
+            for out in self.tethers.get(m, ()):
+                path = self.water.taut(np.vstack([back[::-1], out[1:]]))
+                word = self.water.number(path)
+                if word is None or not has_room(self.water.field, path, self.water.mission):
+                    continue
+                if word not in found or along(path) < along(found[word]):
+                    found[word] = path
+        for word, path in sorted(found.items(), key=lambda way: along(way[1])):
+            if len(ways) < self.effort.ways and all(word != w for w, _ in ways):
+                ways.append((word, path))
+
+    def _least_beyond(self, n: int, m: int, ways: list[tuple[int, Floats]]) -> float:
+        """Metres that ways of other classes than those found are at least long."""
+        farther = self.effort.farther * float(self._apart[n, m])
+        if len(ways) < self.effort.ways:
+            return farther
+        # paths along cells are longer than those pulled taut by no more than that factor
+        return min(farther, along(ways[-1][1]) / LONGER)
+
+    def beyond(self, n: int, m: int) -> float:
+        """Metres that ways of other classes than those of `known` are at least long.
+
+        Parameters
+        ----------
+        n : int
+            Where they begin.
+        m : int
+            Where they end.
+
+        Returns
+        -------
+        float
+            0 where no search has told.
+        """
+        return self._beyond.get((n, m), 0.0)
+
+    def prepare_all(self, clock: Clock, tell: Callable[[str], None]) -> None:
+        """Seek all ways between waypoints that are near.
+
+        Parameters
+        ----------
+        clock : Clock
+            When a share of it is up, ways are made of tethers; when another is, straight ways are
+            all that is looked at.
+        tell : callable
+            Called with a line of text now and then.
+        """
+        searching, pulling = clock.part(SEARCHING), None
+        for n in range(len(self.points)):
+            tell(f"ways of the robot from waypoint {n + 1} of {len(self.points)}")
+            if searching.up and pulling is None:
+                pulling = clock.part(PULLING)
+            self.prepare(n, search=pulling is None, pulling=pulling)
+
+    def known(self, n: int, m: int) -> list[tuple[int, Floats]]:
+        """Ways from one waypoint to another that were found so far, shortest first.
+
+        Parameters
+        ----------
+        n : int
+            Where they begin.
+        m : int
+            Where they end.
+
+        Returns
+        -------
+        list of (int, ndarray of shape (k, 3))
+            Number of the word, and the path, metres.
+        """
+        return self._known.get((n, m), [])
+
+    def sought(self, n: int, m: int) -> list[tuple[int, Floats]]:
+        """The same, of those that bounds may rest on: of a search, or straight. Where ways were
+        made of tethers, there may be shorter ones.
+
+        Parameters
+        ----------
+        n : int
+            Where they begin.
+        m : int
+            Where they end.
+
+        Returns
+        -------
+        list of (int, ndarray of shape (k, 3))
+            As of `known`.
+        """
+        found = self.known(n, m)
+        return found if (n, m) in self._beyond else [way for way in found if len(way[1]) == 2]
+
+
+@dataclass
+class Legs:
+    """Legs between states: each was driven with the tether of the state that it begins at.
+
+    Attributes
+    ----------
+    arrives : dict of (state, state) to ndarray of shape (k, 3)
+        The shortest path from one to the other.
+    """
+
+    arrives: dict[tuple[int, int], Floats] = field(default_factory=dict)
+
+    def each(self) -> Iterator[tuple[int, int, Floats, bool]]:
+        """Legs that arrive in one direction at least.
+
+        A tether may hang otherwise when the robot comes back: from there it then arrives in a state
+        that is none or another one.
+
+        Yields
+        ------
+        (int, int, ndarray, bool)
+            The two states, the path from the first to the second, and whether the way back arrives,
+            too: the lower number is then the first, and the path the shorter of the two.
+        """
+        for (v, w), path in self.arrives.items():
+            back = self.arrives.get((w, v))
+            if back is None:
+                yield v, w, path, False
+            elif v < w:
+                yield v, w, min(path, back[::-1], key=along), True
+
+
+@dataclass
+class Growth:
+    """Legs and the states that they lead to: each state's own tether is driven along all ways to
+    waypoints near, and what it arrives in is a state, too. The shortest legs come first, so that
+    states are made in chains of neighbours, and what there is when the time is up joins them.
+
+    Parameters
+    ----------
+    states : States
+        Those so far; more are added.
+    ways : Ways
+        The robot's ways.
+    """
+
+    states: States
+    ways: Ways
+    legs: Legs = field(default_factory=Legs)
+    _waiting: list[tuple[float, int, int, int, int]] = field(default_factory=list)
+    _no_room: list[tuple[float, int, int, int, int]] = field(default_factory=list)
+    _known: int = 0
+    _count: int = 0
+    _shortest: dict[tuple[int, int], float] = field(default_factory=dict)
+
+    def go_on(self, most: int, clock: Clock, tell: Callable[[str], None]) -> bool:
+        """Drive legs until there are none left to drive, or the time is up.
+
+        Parameters
+        ----------
+        most : int
+            States of a waypoint.
+        clock : Clock
+            When it is up, legs and states are what they are by then.
+        tell : callable
+            Called with a line of text now and then.
+
+        Returns
+        -------
+        bool
+            Whether there are none left for so many states.
+        """
+        self.states.most = most
+        for leg in self._no_room:
+            heapq.heappush(self._waiting, leg)
+        self._no_room.clear()
+        while self._drive_on():
+            tell(f"legs, {len(self.legs.arrives)} driven between {len(self.states.all)} states")
+            if clock.up:
+                return False
+        return True
+
+    def _look_at_new(self) -> None:
+        """Take the ways from new states on among those that wait."""
+        for v in range(self._known, len(self.states.all)):
+            state = self.states.all[v]
+            key = state.point, state.word
+            self._shortest[key] = min(state.tether.length, self._shortest.get(key, np.inf))
+            for m in self.ways.near[state.point]:
+                for k, (_, path) in enumerate(self.ways.known(state.point, int(m))):
+                    self._count += 1
+                    heapq.heappush(self._waiting, (along(path), self._count, v, int(m), k))
+        self._known = len(self.states.all)
+
+    def _drive_on(self) -> bool:
+        """Drive the next leg; whether there was one."""
+        self._look_at_new()
+        if not self._waiting:
+            return False
+        leg = heapq.heappop(self._waiting)
+        _, _, v, m, k = leg
+        states, legs = self.states, self.legs
+        state = states.all[v]
+        word, path = self.ways.known(state.point, m)[k]
+        writes = states.water.words.times(state.word, word)
+        if not states.may_take(m, writes):
+            self._no_room.append(leg)
+            return True
+        if not self._may_fit(state, m, writes, path):
+            return True
+        there, longest = states.water.driven(state.tether, path)
+        if longest > states.limit:
+            return True
+        w = states.find(m, writes, there)
+        if w is None:
+            w = states.add(m, writes, there)
+        if w is None:
+            self._no_room.append(leg)
+        else:
+            old = legs.arrives.get((v, w))
+            if old is None or along(path) < along(old):
+                legs.arrives[v, w] = path
+        return True
+
+    def _may_fit(self, state: State, m: int, writes: int, path: Floats) -> bool:
+        """Whether the tether may be within its limit at the end of a way: a drive takes ten times
+        as long as to pull it taut there."""
+        key = m, writes
+        if self._shortest.get(key, np.inf) > self.states.limit:
+            line = np.vstack([state.tether.nodes, path[1:]])
+            length = self.states.water.model.relaxed(line, ROUNDS).length
+            self._shortest[key] = min(length, self._shortest.get(key, np.inf))
+            return bool(length <= self.states.limit)
+        return True

@@ -1,0 +1,648 @@
+"""NE-TSP in space: the shortest tour through a mission's waypoints that the tether allows.
+
+Offline, a goal and the class of its tether make one vertex, and legs belong to classes, so that no
+tour can wind the tether up. The same here, where states take the place of classes
+(`netsp.plan.space.states`), and legs are those that the tether model was driven along
+(`netsp.plan.space.space_legs`); between any two states there is also the way back along one tether
+and out along the other. The travel graph is solved like any other, and the whole tour is driven.
+Where the tether gets too long on the way, or is not free at the end, the first leg that did not
+arrive in the state that was meant is forbidden, and the graph is solved again: no tour is believed
+that was not driven without fault.
+
+Status and bound of the result hold for tours along these states and legs, without the forbidden
+ones, and not for all tours: the shortest tour along them is `optimal_of_states`. It is `optimal`
+only if a bound on all tours (`netsp.plan.space.path_bound`) proves it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.clock import Clock, TimeLimit, until_interrupt
+from netsp.base.errors import InputError, LimitReachedError, counted
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.result import Result, relative_gap
+from netsp.model.bound_scope import LowerBound, Scope
+from netsp.model.solution import Status
+from netsp.online.mission import Mission
+from netsp.online.mission_limits import check_bounds, check_size, check_tether
+from netsp.online.mission_run import grid_of
+from netsp.online.paths.tree import Grid
+from netsp.online.planned_tour import PlannedStop, PlannedTour, in_file
+from netsp.plan.solve_problem import SolverLike, solve_graph
+from netsp.plan.solver_table import SOLVERS
+from netsp.plan.space.board import Board, Driven, Stop, with_status
+from netsp.plan.space.given_order import drive_given_order
+from netsp.plan.space.judge import verify_mission
+from netsp.plan.space.non_taut_moves import SAVED, Detours
+from netsp.plan.space.passages import resolved, resolved_on
+from netsp.plan.space.places import Places
+from netsp.plan.space.planning_context import SHARE, Water
+from netsp.plan.space.prisms import PlaneParams, tours_of_plan
+from netsp.plan.space.short_orders import short_order_tour
+from netsp.plan.space.space_legs import Growth, Ways
+from netsp.plan.space.states import Effort, first_states, states_with_room
+from netsp.plan.space.trees import states_of_trees
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.scene import Scene
+
+ROUNDING = 1e-9
+"""Share of a length."""
+
+MOST_AGAIN = 20
+"""Times that a graph is solved again because legs were at fault."""
+
+STARTING, PLANTING, GROWING, WAYS_OUT, SOLVING = 0.3, 0.3, 0.5, 0.3, 0.5
+"""Of the time left, what first states may take, then, once ways are known, states and legs, their
+ways by the anchor, and the solver each time; the rest is for driving, and for solving again."""
+
+TAUT = 0.6
+"""Of the time left once ways are known, what tours along taut ways may take; the rest is for those
+with detours."""
+
+EARLY = 0.1
+"""Of the time left, what the solver may take while there are more states to come: its tour is then
+where the next search starts."""
+
+TAUT_LEGS = "taut"
+"""Kind of a plan along states and their taut legs."""
+
+DETOURS = "detours"
+"""Kind of a plan along states and legs with detours."""
+
+PLANE = "plane"
+"""Kind of a plan from the tour of the plane, in a scene of upright prisms."""
+
+SHORT_ORDER = "short-order"
+"""Kind of a plan in an order that is short by estimated distances."""
+
+OUT_AND_BACK = "out-and-back"
+"""Kind of a plan that goes out to each waypoint along a taut tether, and back the same way."""
+
+AS_GIVEN = "as-given"
+"""Kind of a plan in the order of the mission file."""
+
+LEAST_GROWING, LEAST_SOLVING = 1.0, 0.5
+"""Seconds that legs and the solver get even if the time is up: there would be no tour, or one by
+way of the anchor."""
+
+
+@dataclass(frozen=True)
+class SpacePlan:
+    """A tour of a mission's waypoints.
+
+    Parameters
+    ----------
+    mission : Mission
+        What was planned.
+    stops : tuple of Stop
+        In the order of the tour.
+    home : ndarray, shape (k, 3)
+        From the last stop back to the start, metres.
+    length : float
+        Of the tour, metres.
+    result : Result
+        Of the solver: its status, bound and gap are about the states and legs that were found.
+    states : int
+        How many there were to choose from.
+    legs : int
+        How many of them were driven.
+    unreached : tuple of int
+        Waypoints that no tether within the limit was found to.
+    free : bool
+        Whether the tether was as at the start when the whole tour was driven.
+    water : Water
+        With the words.
+    ways : Ways
+        Of the robot between waypoints.
+    kind : str
+        How the tour was found: `TAUT_LEGS`, `DETOURS`, `PLANE`, `SHORT_ORDER`, `OUT_AND_BACK` or
+        `AS_GIVEN`.
+    """
+
+    mission: Mission
+    stops: tuple[Stop, ...]
+    home: Floats
+    length: float
+    result: Result
+    states: int
+    legs: int
+    unreached: tuple[int, ...]
+    free: bool
+    water: Water
+    ways: Ways
+    kind: str = TAUT_LEGS
+
+    @property
+    def order(self) -> tuple[int, ...]:
+        """The waypoints' numbers in the order of the tour."""
+        return tuple(stop.waypoint for stop in self.stops)
+
+    @property
+    def every_waypoint(self) -> tuple[int, ...]:
+        """The same, and then those that no tether reaches."""
+        rest = set(range(len(self.mission.waypoints))) - set(self.order)
+        return (*self.order, *sorted(rest))
+
+    def replaces(self, other: SpacePlan) -> bool:
+        """Return whether this plan is better than another that has passed the judge.
+
+        Parameters
+        ----------
+        other : SpacePlan
+            The other plan.
+
+        Returns
+        -------
+        bool
+            True if it visits more waypoints, or as many and is shorter. A tour along states and
+            legs may be longer than a tour of the plane by the share `SAVED`, because it has a
+            bound.
+        """
+        if len(self.stops) != len(other.stops):
+            return len(self.stops) > len(other.stops)
+        known = self.kind == TAUT_LEGS and other.kind == PLANE
+        return self.length < other.length * (1.0 + (SAVED if known else 0.0))
+
+    def _status(self, bound: float | None) -> Status:
+        """Return the status of the tour: `optimal` if a bound on all tours to all waypoints proves
+        it, else that of the tour along states and legs."""
+        if bound is None or self.unreached:
+            return self.result.status
+        proven = LowerBound(bound, Scope.ALL_TOURS).proves(self.length)
+        return Status.OPTIMAL if proven else self.result.status
+
+    def planned(self, solver: str = "auto", seed: int = 0, bound: float | None = None) -> Mission:
+        """The mission with its waypoints in the order of the tour, and the tour; waypoints that no
+        tether reaches come last.
+
+        Parameters
+        ----------
+        solver : str
+            Name of the solver that was used.
+        seed : int
+            That it was given.
+        bound : float, optional
+            Of all tours (`netsp.plan.space.path_bound`), metres.
+
+        Returns
+        -------
+        Mission
+            The same mission, planned.
+        """
+        result = self.result
+        if bound is not None:
+            # its legs are pulled taut more finely than those of the tour
+            bound = min(bound, self.length)
+        tour = PlannedTour(
+            stops=tuple(
+                PlannedStop(
+                    path=in_file(stop.path), signature=stop.word,
+                    tether_length=stop.tether, longest_tether=stop.most, given_as=stop.waypoint,
+                )
+                for stop in self.stops
+            ),
+            home=in_file(self.home), status=self._status(bound),
+            solver=solver if self.kind in (TAUT_LEGS, DETOURS) else self.kind, seed=seed,
+            length=self.length, lower_bound=result.lower_bound,
+            gap=relative_gap(self.length, result.lower_bound),
+            bound_of_all=bound, gap_to_all=relative_gap(self.length, bound),
+            states=self.states, legs=self.legs, exact=self.water.words.exact,
+            unresolved_gaps=self.water.unresolved_gaps,
+        )  # fmt: skip
+        all_of = self.mission.waypoints
+        waypoints = (
+            *(all_of[stop.waypoint].at(stop.choice) for stop in self.stops),
+            *(all_of[n] for n in self.every_waypoint[len(self.stops) :]),
+        )
+        return self.mission.model_copy(update={"waypoints": waypoints, "tour": tour})
+
+
+def plan(
+    mission: Mission,
+    *,
+    scene: Scene | None = None,
+    field: DistanceField | None = None,
+    grid: Grid | None = None,
+    solver: SolverLike = "auto",
+    params: Mapping[str, Any] | None = None,
+    time_limit: TimeLimit = 60.0,
+    iteration_limit: int | None = None,
+    seed: int = 0,
+    on_progress: Callable[[str], None] | None = None,
+) -> SpacePlan:
+    """Find the shortest tour of a mission's waypoints that leaves the tether free.
+
+    It begins where the mission's state has the robot, and goes to one alternative of each waypoint.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission; the order of its waypoints does not count.
+    scene : Scene, optional
+        Its scene, when it is at hand.
+    field : DistanceField, optional
+        The scene's field, when it is at hand.
+    grid : Grid, optional
+        That paths are sought on, when it is at hand; the scene is then not asked for.
+    solver : str or callable
+        As of `netsp.plan.solve_problem.solve_graph`.
+    params : mapping, optional
+        Options of the solver.
+    time_limit : float or Clock, optional
+        Seconds for all; the best tour so far is returned when they are up.
+    iteration_limit : int, optional
+        Iterations of the solver.
+    seed : int
+        Of the solver.
+    on_progress : callable, optional
+        Called with a line of text now and then.
+
+    Returns
+    -------
+    SpacePlan
+        The tour. At Ctrl-C, the best by then.
+
+    Raises
+    ------
+    InputError
+        A moving anchor; waypoints in solids; no tether that reaches any of them; as of
+        `netsp.plan.space.space_signature.SpaceSignature`.
+    LimitReachedError
+        No tour was found whose tether stays within its limit all along, or the time was up before
+        the words of the scene were found.
+    """
+    kept: SpacePlan | None = None
+    with until_interrupt(time_limit) as clock:
+        for found in plans(
+            mission, scene=scene, field=field, grid=grid, solver=solver, params=params,
+            clock=clock, iteration_limit=iteration_limit, seed=seed, on_progress=on_progress,
+        ):  # fmt: skip
+            if kept is None or found.replaces(kept):
+                verdict = verify_mission(found.planned(), scene=scene, water=found.water)
+                kept = found if verdict else kept
+            if kept is not None and found.kind == TAUT_LEGS:
+                break
+        if kept is None:
+            raise LimitReachedError(
+                "waypoints: no tour was found whose tether stays within the limit all along"
+            )
+        return kept
+
+
+def plans(
+    mission: Mission,
+    *,
+    scene: Scene | None = None,
+    field: DistanceField | None = None,
+    grid: Grid | None = None,
+    water: Water | None = None,
+    solver: SolverLike = "auto",
+    params: Mapping[str, Any] | None = None,
+    clock: Clock,
+    iteration_limit: int | None = None,
+    seed: int = 0,
+    whole_tether: bool = False,
+    on_progress: Callable[[str], None] | None = None,
+) -> Iterator[SpacePlan]:
+    """Find candidate tours of a mission's waypoints, which the judge has not checked yet.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission; the order of its waypoints is ignored.
+    scene : Scene, optional
+        Scene of the mission; loaded if needed.
+    field : DistanceField, optional
+        Distance field of the scene; computed if needed.
+    grid : Grid, optional
+        Grid for paths; made if needed.
+    water : Water, optional
+        Water of the mission with its words; if given, `field` and `grid` are not used.
+    solver : str or callable
+        Solver, as in `netsp.plan.solve_problem.solve_graph`.
+    params : mapping, optional
+        Options of the solver.
+    clock : Clock
+        Clock of the run; when it is up, the best tours so far are yielded.
+    iteration_limit : int, optional
+        Largest number of iterations of the solver.
+    seed : int
+        Random seed of the solver.
+    whole_tether : bool
+        Whether tours of the plane may need the whole tether, for a caller that flies them.
+    on_progress : callable, optional
+        Called with a line of text at each stage.
+
+    Yields
+    ------
+    SpacePlan
+        First, among upright prisms, the tours of the plane, or if there are none, the tour in a
+        short order; then the tour with detours, if it is
+        shorter than the tour along taut legs; then the tour along taut legs; last the tour out and
+        back to each waypoint, which is computed only if the caller asks for it.
+
+    Raises
+    ------
+    InputError
+        A moving anchor; waypoints in solids; no tether that reaches any waypoint.
+    """
+    check_plannable(mission, solver, params, seed)
+    how = {
+        "solver": solver, "seed": seed, "params": params, "iteration_limit": iteration_limit
+    }  # fmt: skip
+    if water is None:
+        if field is None or grid is None:
+            scene = scene or mission.load_scene()
+        water = water_of(mission, clock, scene=scene, field=field, grid=grid, tell=on_progress)
+    yield from _planned(water, scene, clock, on_progress or _silent, how, whole_tether)
+
+
+def water_of(
+    mission: Mission, clock: Clock, *, scene: Scene | None = None,
+    field: DistanceField | None = None, grid: Grid | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> Water:  # fmt: skip
+    """Make the water of a mission for a plan: check the mission, find the gaps that its grid does
+    not show, refine the grid where that shows them, and find the words of the scene.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission.
+    clock : Clock
+        Clock of the run; the search for gaps takes a share of it (`GapParams`).
+    scene : Scene, optional
+        Scene of the mission; needed unless `field` and `grid` are given.
+    field : DistanceField, optional
+        Distance field of the scene; computed if needed.
+    grid : Grid, optional
+        Grid for paths. If both `field` and `grid` are given, the grid is kept and its gaps are only
+        named.
+    tell : callable, optional
+        Called with a line of text at each stage.
+
+    Returns
+    -------
+    Water
+        The water, with `cells`. Its mission has the cell size of the grid.
+
+    Raises
+    ------
+    InputError
+        Waypoints in solids, a mission too large, or bounds that do not hold it.
+    LimitReachedError
+        The time was up before; says which work was broken off.
+    """
+    tell = tell or _silent
+    check_size(mission)
+    if field is None or grid is None:
+        scene = scene or clock.bounded("reading the scene", mission.load_scene)
+        check_bounds(mission, scene)
+        field = field or clock.bounded("measuring distances in the scene", scene.field)
+        grid = None
+    mission = mission.checked_waypoints(field)
+    tell("gaps that the cells do not show")
+    if grid is None:
+        assert scene is not None
+        find_gaps = partial(resolved, mission, scene, field, clock=clock)
+    else:
+        find_gaps = partial(resolved_on, mission, grid, clock=clock)
+    cells = clock.bounded("searching for gaps that the cells do not show", find_gaps)
+    mission = cells.mission
+    Places.of(mission, field)  # refuse bad waypoints before the long search for words
+    if grid is None:
+        assert scene is not None
+        grid = clock.bounded("measuring the cells", partial(grid_of, mission, scene, field))
+    tell("words of the scene")
+    bounds = None if scene is None else scene.bounds
+    water = clock.bounded(
+        "finding the words of the scene", partial(Water.within, mission, field, grid, bounds)
+    )
+    return replace(water, cells=cells)
+
+
+def given_plan(water: Water) -> SpacePlan | None:
+    """Drive a mission in the order of its file: the first incumbent.
+
+    Parameters
+    ----------
+    water : Water
+        Water of the mission.
+
+    Returns
+    -------
+    SpacePlan or None
+        The plan, without known paths between waypoints; None if that order cannot be driven.
+    """
+    driven = drive_given_order(water)
+    if driven is None:
+        return None
+    return _plan_of(water, Places.of(water.mission, water.field), driven, AS_GIVEN)
+
+
+def _plan_of(water: Water, places: Places, driven: Driven, kind: str) -> SpacePlan:
+    """Return a tour that was found without states and legs as a plan, without known paths between
+    waypoints."""
+    visited = {stop.waypoint for stop in driven.stops}
+    unreached = tuple(n for n in range(len(water.mission.waypoints)) if n not in visited)
+    return SpacePlan(
+        water.mission, tuple(driven.stops), driven.home, driven.length,
+        Result(None, driven.length, None, Status.FEASIBLE), len(driven.stops),
+        len(driven.stops) + 1, unreached, driven.free, water,
+        Ways(water, places, Effort.of(len(places))), kind,
+    )  # fmt: skip
+
+
+def check_plannable(
+    mission: Mission, solver: SolverLike, params: Mapping[str, Any] | None, seed: int
+) -> None:
+    """Refuse arguments that are wrong, before the search begins.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission.
+    solver : str or callable
+        Solver, as in `netsp.plan.solve_problem.solve_graph`.
+    params : mapping, optional
+        Options of the solver.
+    seed : int
+        Random seed of the solver.
+
+    Raises
+    ------
+    InputError
+        A moving anchor; an unknown solver or option.
+    """
+    if mission.track:
+        raise InputError("track: a moving anchor has no one best order; expected a mission without")
+    _try_out(solver, params, seed)
+
+
+def _silent(_: str) -> None:
+    """Ignore a line of progress."""
+
+
+def _planned(
+    water: Water, scene: Scene | None, clock: Clock, tell: Callable[[str], None],
+    how: dict[str, Any], whole_tether: bool,
+) -> Iterator[SpacePlan]:  # fmt: skip
+    mission, field = water.mission, water.field
+    places = Places.of(mission, field)
+    # a robot that is farther out than the share may still come back
+    limit = max(SHARE * mission.tether_length, water.present.length * (1.0 + ROUNDING))
+    check_tether(mission, water.present.length)
+    in_plane = False
+    if scene is not None:
+        plane = PlaneParams()
+        for driven in tours_of_plan(
+            water, scene, places, clock.part(plane.time_share), how["seed"], plane, whole_tether
+        ):
+            in_plane = True
+            yield _plan_of(water, places, driven, PLANE)
+    if not in_plane:
+        tell("short orders")
+        driven_short = short_order_tour(water, places, clock, how["seed"])
+        if driven_short is not None and driven_short.stops:
+            yield _plan_of(water, places, driven_short, SHORT_ORDER)
+    tell("shortest tethers to each waypoint")
+    effort = Effort.of(len(places))
+    states = first_states(water, places, limit, effort, clock.part(STARTING))
+    if not states.reached - {len(mission.waypoints)}:
+        nearest = float(np.linalg.norm(mission.places - np.array(mission.anchor), axis=1).min())
+        if nearest <= limit:
+            raise InputError(
+                f"waypoints: no way in the water leads a tether of {limit:.4g} m to any of them, "
+                f"though the nearest is {nearest:.4g} m from the anchor as the crow flies: walls, "
+                f"or gaps narrower than a cell ({water.words.cells.cell:.3g} m)"
+            )
+        raise InputError(
+            f"waypoints: no tether within the limit reaches any of them: {limit:.4g} m "
+            f"({100 * SHARE:g} % of tether_length), and the nearest is {nearest:.4g} m from the "
+            "anchor as the crow flies"
+        )
+    hanging = {n: [states.all[s].tether.nodes for s in of] for n, of in states.of.items()}
+    ways = Ways(water, places, effort, hanging)
+    board, growth = Board(water, states), Growth(states, ways)
+
+    def planned(result: Result, driven: Driven, kind: str) -> SpacePlan:
+        visited = {stop.waypoint for stop in driven.stops}
+        unreached = tuple(n for n in range(len(mission.waypoints)) if n not in visited)
+        return SpacePlan(
+            mission, tuple(driven.stops), driven.home, driven.length, result, len(states.all),
+            len(board.legs), unreached, driven.free, water, ways, kind,
+        )  # fmt: skip
+
+    ways.prepare_all(clock, tell)
+    tell("trees of legs")
+    states_of_trees(states, ways, clock.part(PLANTING))
+    board.take(growth.legs, clock.part(WAYS_OUT))
+    if lacking := set(range(len(mission.waypoints))) - board.reached:
+        tell("ways with room for the robot")
+        states_with_room(states, lacking, effort.words, clock.part(STARTING))
+        board.take(growth.legs, clock.part(WAYS_OUT))
+    growth.go_on(0, clock.part(PLANTING), tell)
+    taut = clock.part(TAUT)
+    best: tuple[Result, Driven] | None = None
+    complete = False
+    for most in effort.states:
+        begin = taut.elapsed
+        enough = board.legs or GROWING * taut.left >= LEAST_GROWING
+        growing = taut.part(GROWING) if enough else Clock(LEAST_GROWING)
+        grown = growth.go_on(most, growing, tell)
+        tell("ways by the anchor")
+        complete = (board.take(growth.legs, taut.part(WAYS_OUT)) and grown) or complete
+        last = most == effort.states[-1]
+        share = SOLVING if last else EARLY
+        best = _better(best, _best_driven(board, taut, tell, best, share, how))
+        if taut.left < taut.elapsed - begin:
+            if not last and not (best is not None and best[0].status is Status.OPTIMAL):
+                best = _better(best, _best_driven(board, taut, tell, best, SOLVING, how))
+            break
+    if not board.reached:
+        raise InputError(
+            f"waypoints: the robot gets to none of them with its clearance of {mission.clearance:g}"
+        )
+    # where words tell all, detours lead to the tethers that straight legs lead to
+    proven = best is not None and best[0].status is Status.OPTIMAL and complete
+    shorter = None
+    if states.hang_on_free_ends or not proven:
+        shorter = Detours(board, ways).shortened(best and best[1], clock, tell, how["seed"])
+
+    along_taut = None
+    if best is not None:
+        result, driven = best
+        if result.status is Status.OPTIMAL:
+            # optimal over the graph only; an incomplete graph lacks legs within reach
+            of_states = Status.OPTIMAL_OF_STATES if complete else Status.FEASIBLE
+            result = replace(result, status=of_states)
+        along_taut = planned(result, driven, TAUT_LEGS)
+    if shorter is not None:
+        # the solver's bound does not hold for the detours, which are not in its graph
+        yield planned(Result(None, shorter.length, None, Status.FEASIBLE), shorter, DETOURS)
+    if along_taut is not None:
+        yield along_taut
+    tell("out along the tether and back")
+    fallback = board.out_and_back()
+    if fallback is not None:
+        yield planned(Result(None, fallback.length, None, Status.FEASIBLE), fallback, OUT_AND_BACK)
+
+
+def _try_out(solver: SolverLike, params: Mapping[str, Any] | None, seed: int) -> None:
+    """Solve next to nothing, so that a name or an option that is wrong is told at once."""
+    if isinstance(solver, str) and SOLVERS.named(solver).geometric:
+        raise InputError(
+            f"solver: {solver!r} needs the geometry of a problem in the plane; expected one that "
+            "takes any travel graph, as auto, mip, dp, lns, anneal or greedy"
+        )
+    costs = np.ones((3, 3)) - np.eye(3)
+    solve_graph(
+        TravelGraph.from_costs(costs, [0, 1, 2]), solver, params=params, seed=seed,
+        iteration_limit=1,
+    )  # fmt: skip
+
+
+def _better(
+    best: tuple[Result, Driven] | None, found: tuple[Result, Driven] | None
+) -> tuple[Result, Driven] | None:
+    """The shorter of two tours; of equals the second, more was known when it was found."""
+    if best is None or (found is not None and found[1].length <= best[1].length):
+        return found
+    return best
+
+
+def _best_driven(
+    board: Board, clock: Clock, tell: Callable[[str], None],
+    best: tuple[Result, Driven] | None, share: float, how: dict[str, Any],
+) -> tuple[Result, Driven] | None:  # fmt: skip
+    """The best tour that was driven without fault. As long as there is time, the graph is solved
+    again without the legs that were at fault; then the tour goes by way of the start there."""
+    again, found = 0, None
+    warm = None if best is None else best[1].tour
+    while again < MOST_AGAIN or clock.up:
+        if found is None:
+            tell("order" if again == 0 else f"order, {counted(again, 'leg')} at fault forbidden")
+            solving = Clock(LEAST_SOLVING) if clock.up else clock.part(share)
+            found = board.solved(solving, warm, **how)
+            if found is None:
+                return None
+        result, tour = found
+        tell("driving the tour")
+        driven = board.driven(tour)
+        if driven.fault is None:
+            return with_status(result, driven, ROUNDING), driven
+        joined = board.forbid(driven.fault)
+        if clock.up and not (joined and board.leads_to(tour)):
+            return None  # no time is left, and this tour can no longer be driven
+        warm = None  # it may go along that leg
+        again += 1
+        if not clock.up:
+            found = None
+    return None

@@ -1,0 +1,111 @@
+"""The plane's proof as a bound in space, for solids that stand through all depths of the tours.
+
+Remove all other solids, and shrink these a little. No path and no tether gets longer by that, and a
+free tether stays free, so the shortest tour of the reduced scene bounds all tours. The reduced
+scene is a problem in the plane with heights. The exact roadmap and its solvers bound its tours over
+all homotopy classes of the tether. The proof, and which solids stand through all depths, is in
+docs/theory.md ("Upright solids").
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from netsp.base.clock import Clock
+from netsp.base.errors import NetspError
+from netsp.base.geometry import polylines
+from netsp.model.bound_scope import Scope
+from netsp.model.problem import Circle, Polygon, Problem
+from netsp.online.mission import Mission
+from netsp.plan.solve_problem import solve
+from netsp.plan.space.cross_sections import Depths, cross_sections, level_range
+from netsp.plan.space.places import Places
+from netsp.plan.space.planning_context import DEEPEST, DIP, Water
+
+ROUNDING = 1e-9
+"""Relative reduction of the bound, which covers the rounding of lengths."""
+
+
+def bound_of_upright(
+    mission: Mission, water: Water, some: list[int], places: Places, clock: Clock
+) -> float | None:
+    """Return a bound on all tours from the scene's upright solids.
+
+    Parameters
+    ----------
+    mission : Mission
+        Mission with the tether.
+    water : Water
+        Scene, and tether at the start.
+    some : list of int
+        Numbers of the places that tours visit.
+    places : Places
+        All places.
+    clock : Clock
+        Clock of the run; when it is up, the bound proven so far is returned.
+
+    Returns
+    -------
+    float or None
+        Lower bound, metres; None if there are no upright solids, the mission begins under way, a
+        waypoint has alternatives, or there was no time.
+    """
+    if places.begin is not None or len(set(places.waypoint[some].tolist())) < len(some):
+        return None
+    # the judge lets a path dip into solids a little, and a tether between its nodes a little more:
+    # among obstacles shrunk by the larger depth both are free, and the taut tether is no longer
+    # than its model
+    dip = max(2.0 * DEEPEST, DIP * mission.delta)
+    obstacles = upright_obstacles(water, dip)
+    if not obstacles or clock.up:
+        return None
+    # the problem begins at the start: a tether there is at most the tether from the anchor and the
+    # tether laid from the anchor to the start
+    laid = float(polylines.length(water.laid.nodes))
+    max_length = mission.tether_length * (1.0 + 1e-6) + laid
+    try:
+        problem = Problem(
+            base=mission.start, goals=places.points[some].tolist(), obstacles=tuple(obstacles),
+            tether_length=max_length,
+        )  # fmt: skip
+        bound = solve(problem, time_limit=clock).bound
+    except NetspError:
+        return None  # no bound in the plane, so none in space
+    if bound is None or bound.scope is not Scope.ALL_TOURS:
+        return None
+    return bound.length * (1.0 - ROUNDING)
+
+
+def upright_obstacles(water: Water, dip: float) -> list[Circle | Polygon]:
+    """Return obstacles of the plane that lie within a scene's upright solids.
+
+    A solid must stand through all heights in which tethers lie or words tell classes apart. If all
+    solids are upright, these are the heights of the scene's bounds. If not, a tether may be led out
+    of the bounds over another solid, and these are all heights in its reach, too.
+
+    Parameters
+    ----------
+    water : Water
+        The scene.
+    dip : float
+        Depth to which paths and tethers may enter solids, metres.
+
+    Returns
+    -------
+    list of Circle or Polygon
+        One for each upright solid that is thicker than twice `dip`.
+    """
+    field, grid = water.field, water.grid
+    anchor = np.asarray(water.mission.anchor, dtype=float)
+    reach = water.mission.tether_length * (1.0 + 1e-6) + dip
+    floor, ceiling = level_range(field, dip)
+    heights = [float(grid.low[2]), float(grid.low[2]) + grid.cell * grid.free.shape[2]]
+    if water.bounds is not None:
+        heights += [water.bounds[2], water.bounds[5], *water.laid.nodes[:, 2].tolist()]
+        in_bounds = Depths(max(floor, min(heights)), min(ceiling, max(heights)), anchor, reach)
+        obstacles, all_upright = cross_sections(field, in_bounds, dip)
+        if all_upright:
+            return obstacles
+    heights += [anchor[2] - reach, anchor[2] + reach]
+    in_reach = Depths(max(floor, min(heights)), min(ceiling, max(heights)), anchor, reach)
+    return cross_sections(field, in_reach, dip)[0]

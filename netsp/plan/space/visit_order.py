@@ -1,0 +1,195 @@
+"""An order of waypoints in which the tether stays short, by going straight on: the older way.
+
+A tour of states and legs (`netsp.plan.space.space_plan`) is mostly shorter; this one is for bodies
+with many free ends. A waypoint and the class of its tether make one vertex, and legs belong to
+classes, so that no tour can wind the tether up, as offline. Classes are found by the tether model:
+the shortest tether to each waypoint, and those that come of going straight on to it from its
+neighbours. A leg within a class is the straight line if the tether that comes of it is that of the
+class; between any two classes there is the path back along one tether and out along the other,
+pulled taut. What comes out is a generalised TSP, which our own solvers take.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from netsp.base.clock import Clock
+from netsp.base.errors import InputError
+from netsp.base.geometry import polylines
+from netsp.gtsp.search import Instance, best_classes
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.online.mission import Mission
+from netsp.online.paths.tree import Grid, ShortestTree, taut
+from netsp.plan.solve_problem import solve_graph
+from netsp.plan.space.planning_context import SHARE, straight, stride
+from netsp.plan.space.states import alike
+from netsp.world.scene.field import DistanceField
+from netsp.world.tether import GeodesicTether, Tether
+
+NEIGHBOURS = 12
+"""Waypoints nearest to each that legs are sought to."""
+
+MOST_CLASSES = 3
+"""Classes of tether kept for each waypoint."""
+
+ROUNDS = 150
+"""Of pulling a tether taut."""
+
+ITERATIONS = 400
+"""Of the search for an order."""
+
+
+@dataclass
+class _Classes:
+    """Tethers to the waypoints: waypoint and state of each vertex."""
+
+    point: list[int]
+    tether: list[Tether]
+
+    def find(self, n: int, tether: Tether, delta: float) -> int | None:
+        """The vertex of a waypoint with the same tether."""
+        for v, (m, other) in enumerate(zip(self.point, self.tether, strict=True)):
+            if m == n and alike(tether, other, delta):
+                return v
+        return None
+
+
+def order_by_going_on(
+    mission: Mission, field: DistanceField, grid: Grid, *, clock: Clock, seed: int = 0
+) -> tuple[int, ...]:
+    """The shortest order of a mission's waypoints along classes and legs of going straight on.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission; its order is what the search starts from.
+    field : DistanceField
+        Its scene.
+    grid : Grid
+        The grid that paths are sought on.
+    clock : Clock
+        When it is up, the best order so far is returned.
+    seed : int
+        Of the solver.
+
+    Returns
+    -------
+    tuple of int
+        Waypoints; those that no tether reaches are left out.
+
+    Raises
+    ------
+    InputError
+        No tether reaches any of them.
+    LimitReachedError
+        The time was up before legs were known.
+    """
+    graph, points, start = waypoint_graph(mission, field, grid, clock)
+    given = [start.index(n) + 1 for n in range(len(mission.waypoints)) if n in start]
+    instance = Instance.of(graph)
+    _, warm = best_classes(np.array(given), instance.start, instance.costs)
+    result = solve_graph(
+        graph, "lns", time_limit=clock, iteration_limit=ITERATIONS, seed=seed,
+        warm_start=[int(v) for v in instance.original(warm)],
+    )  # fmt: skip
+    assert result.tour is not None
+    return tuple(points[v] for v in result.tour[1:])
+
+
+def waypoint_graph(
+    mission: Mission, field: DistanceField, grid: Grid, clock: Clock | None = None
+) -> tuple[TravelGraph, list[int], list[int]]:
+    """Classes and legs of a mission.
+
+    Waypoints that no tether reaches are left out.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission.
+    field : DistanceField
+        Its scene.
+    grid : Grid
+        The grid that paths are sought on.
+    clock : Clock, optional
+        When it is up, there is no graph.
+
+    Returns
+    -------
+    graph : TravelGraph
+        Classes of the waypoints, and legs.
+    at : list of int
+        The waypoint of each vertex, -1 for the anchor.
+    clusters : list of int
+        The waypoints in the order of the clusters.
+
+    Raises
+    ------
+    InputError
+        No tether reaches any of them.
+    LimitReachedError
+        The time was up.
+    """
+    clock = clock or Clock()
+    model = GeodesicTether(field, mission.delta)
+    anchor, limit = np.array(mission.anchor), SHARE * mission.tether_length
+    points = mission.places
+    tree = ShortestTree(grid, anchor, points)
+    found = _Classes([], [])
+    for n in range(len(points)):
+        clock.check("looking for tethers to waypoints")
+        path = tree.path(n)
+        if path is None:
+            continue
+        tether = model.relaxed(path[::-1], 2 * ROUNDS)
+        if tether.length <= limit:
+            found.point.append(n)
+            found.tether.append(tether)
+    near = np.argsort(np.linalg.norm(points[:, None] - points[None], axis=2), axis=1)[
+        :, 1 : NEIGHBOURS + 1
+    ]
+    direct: dict[tuple[int, int], float] = {}
+    v = 0
+    while v < len(found.point):
+        clock.check("driving straight legs")
+        n = found.point[v]
+        for m in near[n]:
+            if not straight(field, points[n], points[m], mission.clearance):
+                continue
+            path = np.array([points[n], points[m]])
+            there, lengths = model.drive(found.tether[v], polylines.dense(path, stride(mission)))
+            if lengths.max() > limit:
+                continue
+            w = found.find(int(m), there, mission.delta)
+            if w is None and found.point.count(int(m)) < MOST_CLASSES:
+                w = len(found.point)
+                found.point.append(int(m))
+                found.tether.append(there)
+            if w is not None:
+                direct[v, w] = float(np.linalg.norm(path[1] - path[0]))
+        v += 1
+    count = len(found.point)
+    reach = np.array([t.length for t in found.tether])
+    costs = np.zeros((count + 1, count + 1))
+    costs[1:, 1:] = reach[:, None] + reach[None, :]
+    costs[0, 1:] = costs[1:, 0] = reach
+    neighbours = {(n, int(m)) for n in range(len(points)) for m in near[n]}
+    for v in range(count):
+        clock.check("pulling legs taut")
+        for w in range(v + 1, count):
+            pair = (found.point[v], found.point[w])
+            if pair not in neighbours and pair[::-1] not in neighbours:
+                continue
+            leg = min(direct.get((v, w), np.inf), direct.get((w, v), np.inf))
+            if not np.isfinite(leg):
+                line = np.vstack([found.tether[v].nodes[::-1], found.tether[w].nodes[1:]])
+                path = taut(field, line, mission.clearance, mission.delta)
+                leg = polylines.length(path)
+            costs[v + 1, w + 1] = costs[w + 1, v + 1] = min(leg, costs[v + 1, w + 1])
+    reached = sorted(set(found.point))
+    if not reached:
+        raise InputError("waypoints: no tether within the limit reaches any of them")
+    cluster = [0, *(reached.index(n) + 1 for n in found.point)]
+    return TravelGraph.from_costs(costs, cluster), [-1, *found.point], reached

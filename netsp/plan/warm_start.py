@@ -1,0 +1,219 @@
+"""A solution to start from, also of a problem that has been edited since.
+
+Goals are found again by their names, and those without by their places; obstacles by where the old
+path passes them: the path writes the words of the problem that there is now. New goals are put
+where they lengthen the way least, goals that are gone are left out, and where a class is not in the
+travel graph, the best for the order are taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.clock import Clock
+from netsp.base.errors import InputError
+from netsp.gtsp.search import Instance, best_classes
+from netsp.gtsp.travel.graph import TravelGraph, least_tethers
+from netsp.hsignature import Word, concatenate
+from netsp.hsignature.rays import crossings
+from netsp.model.arrangement import keeps
+from netsp.model.problem import Problem
+from netsp.model.solution import Solution
+
+NEAR = 0.02
+"""Of the problem's size: a goal without a name that has moved no farther is found again."""
+
+FEW_CLASSES = 3
+"""Of every goal, when classes are chosen for an order."""
+
+
+@dataclass(frozen=True)
+class OldTour:
+    """What is left of a tour.
+
+    Parameters
+    ----------
+    goals : tuple of int
+        Goals of the problem that there is now, from 0, in the order of the visits.
+    words : tuple of Word
+        At each of them, the word that the old path writes there now.
+    gone : int
+        Visits to goals that are not there any more.
+    """
+
+    goals: tuple[int, ...]
+    words: tuple[Word, ...]
+    gone: int
+
+
+def old_tour(problem: Problem, solution: Solution) -> OldTour:
+    """Find the goals of a solution again.
+
+    Parameters
+    ----------
+    problem : Problem
+        That there is now.
+    solution : Solution
+        Of this problem, or of one that it was edited from.
+
+    Returns
+    -------
+    OldTour
+        Without goals if the solution has no tour.
+
+    Raises
+    ------
+    InputError
+        None of its goals is in the problem.
+    """
+    if solution.problem.sha256 == problem.sha256:
+        same = tuple(tuple(v.signature) for v in solution.tour)
+        return OldTour(tuple(v.goal for v in solution.tour), same, 0)
+    rays = problem.representative_points
+    path = np.array(solution.path).reshape(-1, 3)
+    if solution.tour and len(path) < 2:
+        raise InputError("warm_start: has no path, by which it could be known in another problem")
+    by_name = {g.name: k for k, g in enumerate(problem.goals) if g.name is not None}
+    goals: list[int] = []
+    words: list[Word] = []
+    taken: set[int] = set()
+    word: Word = ()
+    at = gone = 0
+    for visit in solution.tour:
+        if visit.position is None:
+            continue
+        place = np.array(visit.position)
+        there = at + int(np.argmin(np.linalg.norm(path[at:] - place, axis=1)))
+        word = concatenate(word, crossings(path[at : there + 1, :2], rays))
+        at = there
+        goal = by_name.get(visit.name, -1) if visit.name is not None else -1
+        if goal < 0:
+            goal = _nearest(problem, place, taken)
+        if goal < 0 or goal in taken:
+            gone += 1
+            continue
+        taken.add(goal)
+        goals.append(goal)
+        step = np.vstack([path[at], problem.points[goal + 1]])
+        words.append(concatenate(word, crossings(step[:, :2], rays)))
+    if solution.tour and not goals:
+        raise InputError("warm_start: none of its goals is in the problem, by name or by place")
+    return OldTour(tuple(goals), tuple(words), gone)
+
+
+def _nearest(problem: Problem, place: Floats, taken: set[int]) -> int:
+    """The goal at a place that is not found yet; -1 for none."""
+    away = np.linalg.norm(problem.points[1:] - place, axis=1)
+    away[list(taken)] = np.inf
+    k = int(np.argmin(away))
+    return k if away[k] <= NEAR * problem.scale else -1
+
+
+def with_old_classes(
+    problem: Problem, solution: Solution, graph: TravelGraph, clock: Clock
+) -> TravelGraph:
+    """Return the graph with the classes of an old tour, if its roadmap left some out.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem as it is now.
+    solution : Solution
+        Solution of the problem, or of an earlier version.
+    graph : TravelGraph
+        Travel graph of the problem.
+    clock : Clock
+        Clock of the run; when it is up, no further class is added.
+
+    Returns
+    -------
+    TravelGraph
+        Graph with these classes; the same graph if it is complete.
+
+    Raises
+    ------
+    InputError
+        None of its goals is in the problem.
+    """
+    if graph.complete or graph.carrier is None:
+        return graph
+    found = old_tour(problem, solution)
+    wanted = [(goal + 1, word) for goal, word in zip(found.goals, found.words, strict=True)]
+    before = graph.before
+    graph = graph.carrier.with_classes(wanted, lambda: clock.up)
+    graph.before = before
+    return graph
+
+
+def tour_from(problem: Problem, solution: Solution, graph: TravelGraph) -> list[int] | None:
+    """A tour to start from.
+
+    Parameters
+    ----------
+    problem : Problem
+        That there is now.
+    solution : Solution
+        Of this problem, or of one that it was edited from.
+    graph : TravelGraph
+        Of the problem.
+
+    Returns
+    -------
+    list of int or None
+        Vertices; None if the solution has no tour, or its order is not allowed any more.
+
+    Raises
+    ------
+    InputError
+        None of its goals is in the problem.
+    """
+    found = old_tour(problem, solution)
+    if not found.goals or graph.start is not None:
+        return None
+    cluster_of = dict(zip(graph.goal.tolist(), graph.cluster.tolist(), strict=True))
+    place_of = {c: k - 1 for k, c in reversed(list(cluster_of.items())) if k > 0}
+    order: list[int] = []
+    known: list[int] = []
+    for goal, word in zip(found.goals, found.words, strict=True):
+        cluster = cluster_of.get(goal + 1, 0)
+        if cluster and cluster not in order:
+            order.append(cluster)
+            place_of[cluster] = goal
+            known += graph.vertices_of([goal + 1], [word]) or []
+    new = [c for c in range(1, graph.goal_count + 1) if c not in order and c in place_of]
+    for c in new:
+        _insert(order, c, problem.points, place_of)
+    if len(order) != graph.goal_count or not keeps(order, graph.before):
+        return None
+    if len(known) == len(order):
+        return [0, *known]
+    core = np.union1d(least_tethers(graph.costs_to_base, graph.cluster, FEW_CLASSES), known)
+    instance = Instance.among(graph, core.astype(np.int64))
+    _, tour = best_classes(np.array(order, dtype=np.int64), instance.start, instance.costs)
+    return list(instance.original(tour))
+
+
+def _insert(order: list[int], c: int, points: Floats, place_of: dict[int, int]) -> None:
+    """Put a cluster where it lengthens the way least, in straight lines."""
+    stops = points[[0, *(place_of[k] + 1 for k in order), 0]]
+    here = points[place_of[c] + 1]
+    away = np.linalg.norm(stops - here, axis=1)
+    more = away[:-1] + away[1:] - np.linalg.norm(np.diff(stops, axis=0), axis=1)
+    order.insert(int(np.argmin(more)), c)
+
+
+def told(problem: Problem, solution: Solution) -> str | None:
+    """What became of the goals of a solution, for people; None where nothing was edited."""
+    if solution.problem.sha256 == problem.sha256 or not solution.tour:
+        return None
+    found = old_tour(problem, solution)
+    clusters = {int(problem.clusters[g]) for g in found.goals}
+    parts = [f"{len(clusters)} of {problem.visits} goals are those of an older version"]
+    if len(clusters) < problem.visits:
+        parts.append(f"{problem.visits - len(clusters)} new")
+    if found.gone:
+        parts.append(f"{found.gone} gone")
+    return "warm start: " + ", ".join(parts)

@@ -1,0 +1,184 @@
+"""Tabulates the detours in any class between base, goals and sub-goals beside the obstacles.
+
+McCammon & Hollinger 2016, section III-B, change the class of a path by planning it again "through
+an additional sub-goal placed on the opposite side of an obstacle", and leave open where exactly.
+Here every obstacle offers the free ones of eight places around it, a little off its boundary; the
+far side of a path is the one most opposite to where the path comes nearest to the obstacle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+from netsp.base.arrays import Floats, Ints
+from netsp.base.clock import Clock
+from netsp.base.compiled.kernel import kernel
+from netsp.gtsp.travel.tether_blind_legs import Detours
+from netsp.hsignature import signature
+from netsp.model.problem import Problem
+from netsp.roadmap.outline import Outline, build_outline
+from netsp.roadmap.shortest import ContactGraph, ShortestPaths
+from netsp.roadmap.tangents import build_tangents
+
+AROUND = 8
+"""Places for sub-goals around an obstacle."""
+
+OFF = 0.05
+"""How far off the boundary they lie, as a share of the obstacle's size."""
+
+
+def taut_detours(
+    problem: Problem, with_sub_goals: bool, check: Callable[[], None] = lambda: None,
+    clock: Clock | None = None,
+) -> Detours:  # fmt: skip
+    """The detours over tangents and arcs: exact shortest paths.
+
+    Parameters
+    ----------
+    check
+        May raise to stop.
+    clock
+        The clock of the run; when it is up, LimitReachedError is raised.
+    """
+    places, side = sub_goals(problem, with_sub_goals)
+    check()
+    outline = build_outline(problem, clock)
+    outline = replace(
+        outline,
+        points=np.vstack([outline.points, places]),
+        places=np.vstack([outline.places, places]),
+    )
+    tangents = build_tangents(outline, np.inf, clock)
+    check()
+    graph = ContactGraph(outline, tangents)
+    check()
+    return tabulate(problem, outline, graph, np.arange(graph.points), places, side, check)
+
+
+def sub_goals(problem: Problem, wanted: bool = True) -> tuple[Floats, Ints]:
+    """Places (k, 2) beside the obstacles, relative to the base, and the obstacle of each; none if
+    they are not wanted."""
+    if not wanted:
+        return np.zeros((0, 2)), np.zeros(0, dtype=np.int64)
+    origin = problem.points[0, :2]
+    shapes = [o.shape(problem.clearance) for o in problem.obstacles]
+    solid = shapely.union_all([s.buffer(1e-6 * problem.scale) for s in shapes])
+    shapely.prepare(solid)
+    places, side = [], []
+    for i, (shape, middle) in enumerate(zip(shapes, problem.representative_points, strict=True)):
+        xmin, ymin, xmax, ymax = shape.bounds
+        size = max(xmax - xmin, ymax - ymin)
+        for k in range(AROUND):
+            angle = 2.0 * np.pi * k / AROUND
+            sense = np.array([np.cos(angle), np.sin(angle)])
+            ray = shapely.LineString([middle, middle + 2.0 * size * sense])
+            inside = shape.intersection(ray)
+            reach = max(
+                float(np.hypot(*(np.array(c) - middle))) for c in shapely.get_coordinates(inside)
+            )
+            p = middle + (reach + OFF * size) * sense
+            in_bounds = problem.bounds is None or (
+                problem.bounds[0] <= p[0] <= problem.bounds[2]
+                and problem.bounds[1] <= p[1] <= problem.bounds[3]
+            )
+            if in_bounds and not shapely.contains_xy(solid, *p):
+                places.append(p - origin)
+                side.append(i)
+    return np.array(places).reshape(-1, 2), np.array(side, dtype=np.int64)
+
+
+def tabulate(
+    problem: Problem,
+    outline: Outline,
+    graph: ShortestPaths,
+    terminals: Ints,
+    places: Floats,
+    side: Ints,
+    check: Callable[[], None] = lambda: None,
+) -> Detours:
+    """All detours from base and goals to base, goals and sub-goals over a graph of shortest paths.
+
+    Parameters
+    ----------
+    terminals
+        (m + 1 + k,) node of the graph for base, goals and sub-goals.
+    side
+        (k,) obstacle of each sub-goal.
+    check
+        Called for every base or goal; may raise to stop.
+    """
+    fixed = len(problem.points)
+    count = len(terminals)
+    middles = problem.representative_points - outline.origin
+    n = len(middles)
+    planar = np.full((fixed, count), np.inf)
+    far = np.full((fixed, count, n), -1, dtype=np.int64)
+    near = np.full((fixed, count, n), np.inf)
+    row = np.zeros((fixed, count + 1), dtype=np.int64)
+    letters: list[int] = []
+    trees = []
+    for a in range(fixed):
+        check()
+        length, before = graph.tree(int(terminals[a]))
+        trees.append(before)
+        planar[a] = length[terminals]
+        row[a, 0] = len(letters)
+        for p in range(count):
+            check()
+            if np.isfinite(planar[a, p]) and p != a:
+                xy = graph.draw(int(terminals[a]), int(terminals[p]), before)
+                letters += signature(xy, middles)
+                near[a, p], far[a, p] = _far_sides(xy, middles, places, side, fixed)
+            row[a, p + 1] = len(letters)
+
+    def draw(a: int, p: int) -> Floats:
+        xy = graph.draw(int(terminals[a]), int(terminals[p]), trees[a]) + outline.origin
+        xy[0] = problem.points[a, :2]
+        if p < fixed:
+            xy[-1] = problem.points[p, :2]
+        return xy
+
+    return Detours(
+        planar=planar,
+        height=problem.points[:, 2],
+        letters=np.array(letters, dtype=np.int64),
+        row=row,
+        far=far,
+        near=near,
+        draw=draw,
+    )
+
+
+@kernel
+def _far_sides(
+    xy: Floats, middles: Floats, places: Floats, side: Ints, first: int
+) -> tuple[Floats, Ints]:
+    """Distance of a path from every obstacle's middle, and the sub-goal most opposite to it."""
+    n = len(middles)
+    near = np.full(n, np.inf)
+    far = np.full(n, -1, dtype=np.int64)
+    away = np.zeros((n, 2))
+    for o in range(n):
+        for k in range(len(xy) - 1):
+            px, py = xy[k, 0], xy[k, 1]
+            dx, dy = xy[k + 1, 0] - px, xy[k + 1, 1] - py
+            ax, ay = middles[o, 0] - px, middles[o, 1] - py
+            square = dx * dx + dy * dy
+            t = 0.0 if square == 0.0 else min(1.0, max(0.0, (ax * dx + ay * dy) / square))
+            fx, fy = ax - t * dx, ay - t * dy
+            gap = math.hypot(fx, fy)
+            if gap < near[o]:
+                near[o], away[o, 0], away[o, 1] = gap, fx, fy
+    best = np.full(n, -np.inf)
+    for k in range(len(side)):
+        o = side[k]
+        x, y = places[k, 0] - middles[o, 0], places[k, 1] - middles[o, 1]
+        score = (x * away[o, 0] + y * away[o, 1]) / max(math.hypot(x, y), 1e-300)
+        if score > best[o]:
+            best[o], far[o] = score, first + k
+    return near, far

@@ -1,0 +1,80 @@
+"""The travel graph of a problem in which goals have alternatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from netsp.base.errors import InfeasibleError, InputError
+from netsp.gtsp.travel.choices import with_choices
+from netsp.gtsp.travel.graph import TravelGraph
+from netsp.model.problem import Problem
+from netsp.roadmap.explain_unreachable import shortest_tethers
+from netsp.roadmap.reachable_goals import HAIR
+
+
+def nearest_places(problem: Problem) -> list[int]:
+    """Of every goal the place that the shortest tether reaches: for solvers that walk between
+    places, and cannot choose among them.
+
+    Parameters
+    ----------
+    problem : Problem
+        Some of its goals are alternatives.
+
+    Returns
+    -------
+    list of int
+        Indices of goals, one of each cluster, in order.
+    """
+    tethers, clusters = shortest_tethers(problem), problem.clusters
+    members = (np.flatnonzero(clusters == c) for c in range(1, problem.visits + 1))
+    return sorted(int(m[np.argmin(tethers[m])]) for m in members)
+
+
+def graph_of_choices(problem: Problem, build: Callable[[Problem], TravelGraph]) -> TravelGraph:
+    """Build over all places in reach, then take alternatives together.
+
+    Parameters
+    ----------
+    problem : Problem
+        Some of its goals are alternatives.
+    build : callable
+        Makes the travel graph of a problem without alternatives.
+
+    Returns
+    -------
+    TravelGraph
+        Its clusters are those of the problem.
+
+    Raises
+    ------
+    InfeasibleError
+        Some goal is out of the tether's reach with all its alternatives.
+    InputError
+        The robot is already out: which alternatives were visited is then known, and the others are
+        to be left out.
+    """
+    if problem.state is not None:
+        raise InputError(
+            "state: alternatives are chosen before the robot is out; expected one of each choice"
+        )
+    within = shortest_tethers(problem) <= problem.tether_length * (1.0 + HAIR)
+    clusters = problem.clusters
+    for c in range(1, problem.visits + 1):
+        if not within[clusters == c].any():
+            within |= clusters == c  # out of reach altogether: that will be said
+    kept = np.flatnonzero(within)
+    goals = [problem.goals[k].model_copy(update={"choice": None, "after": ()}) for k in kept]
+    try:
+        graph = build(problem.model_copy(update={"goals": tuple(goals)}))
+    except InfeasibleError as error:
+        goal = None if error.goal is None else int(kept[error.goal])
+        raise InfeasibleError(
+            error, goal=goal, needed=error.needed, enclosing=error.enclosing
+        ) from None
+    out = with_choices(graph, np.concatenate([[0], clusters[kept]]))
+    out.goal = np.concatenate([[0], kept + 1])[graph.cluster]
+    out.before = problem.precedences
+    return out

@@ -1,0 +1,111 @@
+"""Ways between goals, told apart by the rays that they cross an odd number of times.
+
+A search from every goal (`netsp.roadmap.explore`) finds all taut paths up to a length; of those
+that cross the same rays an odd number of times the shortest counts. Classes by the thousand are few
+such ways, for a path twice around is no other than one that goes straight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.arrays import Floats, Ints
+from netsp.base.compiled.kernel import kernel
+from netsp.gtsp.travel.parity_distances import BITS, WaysByParity
+from netsp.roadmap.explore import ALL, run_explore
+from netsp.roadmap.paths import TautPaths
+from netsp.roadmap.trie import LETTER, PARENT, Trie
+
+FIRST, GROWTH = 1.5, 1.25
+"""Ways are sought up to the first multiple of the greatest distance of a goal to its nearest, then
+up to ever more."""
+
+LEAST = 1e-3
+"""Share of the tether that they are sought up to at least."""
+
+MOST_PATHS = 1_000_000
+"""With so many no longer ones are sought."""
+
+MOST_STEPS = 20_000_000
+"""Departures that are looked at from one goal."""
+
+Found = tuple[Ints, Floats, npt.NDArray[np.uint64]]
+"""(k,) other goals, (k,) lengths in the plan, (k, w) bits."""
+
+
+def ways_by_parity(paths: TautPaths, up: Callable[[], bool]) -> WaysByParity | None:
+    """The ways between goals, as long ones as there are not too many of, and those from the base as
+    long as the tether; None where that takes too long."""
+    points, tether = paths.outline.points, paths.problem.tether_length
+    apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
+    np.fill_diagonal(apart, np.inf)
+    nearest = float(apart.min(axis=1).max(initial=0.0))
+    reach, best = max(FIRST * nearest, LEAST * tether), None
+    if up():
+        return None
+    from_base = _from(paths, 0, tether + paths.margin)
+    while from_base is not None and reach < GROWTH * tether:
+        found = _within(paths, min(reach, tether), from_base[0], best is None, up)
+        if found is None:
+            break
+        best, reach = found, reach * GROWTH
+    return best
+
+
+def _within(
+    paths: TautPaths, reach: float, from_base: Found, first: bool, up: Callable[[], bool]
+) -> WaysByParity | None:
+    """All ways up to a length in the plan; None if there are too many, unless they are the first,
+    or there is no time."""
+    each, count = [from_base], 0
+    for a in range(1, len(paths.outline.points) - 1):
+        found = None if up() else _from(paths, a, reach)
+        if found is None:
+            return None
+        each.append(found[0])
+        count += found[1]
+        if count > MOST_PATHS and not first:
+            return None
+    ends: Ints = np.vstack([
+        np.column_stack([np.full(len(goal), a), goal]) for a, (goal, _, _) in enumerate(each)
+    ])  # fmt: skip
+    z = paths.problem.points[:, 2]
+    planar: Floats = np.concatenate([length for _, length, _ in each])
+    in_space = np.hypot(planar, z[ends[:, 1]] - z[ends[:, 0]])
+    odd = np.vstack([bits for _, _, bits in each])
+    return WaysByParity(ends, odd, in_space, reach, len(paths.outline.rays))
+
+
+def _from(paths: TautPaths, a: int, reach: float) -> tuple[Found, int] | None:
+    """The ways from a goal to those of higher numbers, and how many paths there are; None where
+    there are too many."""
+    words = max(1, -(-len(paths.outline.rays) // BITS))
+    trie = Trie.root(reach)
+    found = run_explore(
+        paths.tangents, a, trie, margin=paths.outline.margin, rule=ALL, cap=MOST_STEPS
+    )
+    if found.capped:
+        return None
+    later = found.goal > a
+    goal, planar = found.goal[later], found.length[later]
+    bits = _odd(trie.nodes, trie.size, words)[found.word[later]]
+    order = np.lexsort((planar, *bits.T, goal))
+    goal, planar, bits = goal[order], planar[order], bits[order]
+    new = np.ones(len(goal), dtype=bool)
+    new[1:] = (goal[1:] != goal[:-1]) | (bits[1:] != bits[:-1]).any(axis=1)
+    return (goal[new], planar[new], bits[new]), len(found.goal)
+
+
+@kernel
+def _odd(trie: Ints, size: int, words: int) -> npt.NDArray[np.uint64]:
+    """(size, words) bits of the obstacles of which a node's word has an odd number of letters."""
+    out = np.zeros((size, words), dtype=np.uint64)
+    for k in range(1, size):
+        for j in range(words):
+            out[k, j] = out[trie[k, PARENT], j]
+        i = abs(trie[k, LETTER]) - 1
+        out[k, i // BITS] ^= np.uint64(1) << np.uint64(i % BITS)
+    return out

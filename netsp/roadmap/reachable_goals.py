@@ -1,0 +1,92 @@
+"""Which goals a tether reaches among the obstacles, in some class."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from netsp.base.errors import InfeasibleError, counted
+from netsp.model.problem import Goal, Problem
+from netsp.roadmap.explain_unreachable import shortest_tethers, why_unreached
+
+MAX_EXPLAINED = 5
+"""Enclosed goals whose obstacles are named: to find them takes longer than to find the goals."""
+
+UNREACHED = "out of the tether's reach among the obstacles"
+"""Reason to leave a goal out, in the record of an import."""
+
+HAIR = 1e-6
+"""Relative; what is so little too far is left to the roadmap to judge."""
+
+
+def within_reach(
+    problem: Problem, removable: Collection[str] | None = None
+) -> tuple[Problem, list[str]]:
+    """The problem without the goals that its tether cannot reach.
+
+    Parameters
+    ----------
+    problem : Problem
+        Any.
+    removable : collection of str, optional
+        Goals that may be left out; default all.
+
+    Returns
+    -------
+    problem : Problem
+        The same if all are in reach; goals that come after one left out do so no more.
+    why : list of str
+        A line for every goal left out.
+
+    Raises
+    ------
+    InfeasibleError
+        No goal is in reach.
+    """
+    needed = shortest_tethers(problem)
+    far = needed > problem.tether_length * (1.0 + HAIR)
+    if removable is not None:
+        far &= np.array([g.name in removable for g in problem.goals])
+    if not far.any():
+        return problem, []
+    why = []
+    enclosed = 0
+    for k in np.flatnonzero(far).tolist():
+        enclosed += bool(np.isinf(needed[k]))
+        if np.isinf(needed[k]) and enclosed > MAX_EXPLAINED:
+            why.append(f"{problem.goal_label(k)} cannot be reached with a tether of any length")
+        else:
+            why.append(str(why_unreached(problem, needed, [k])))
+    if far.all():
+        raise InfeasibleError(f"no goal is in reach: {why[0]}")
+    kept = [g for g, out in zip(problem.goals, far, strict=True) if not out]
+    names = {n for g in kept for n in (g.name, g.choice)}
+    goals = tuple(
+        g.model_copy(update={"after": tuple(n for n in g.after if n in names)}) for g in kept
+    )
+    return problem.model_copy(update={"goals": goals}), why
+
+
+def unreached_note(before: Sequence[Goal], after: Sequence[Goal]) -> str:
+    """Return one line on viewpoints that a tether cannot reach.
+
+    Parameters
+    ----------
+    before : sequence of Goal
+        All of them.
+    after : sequence of Goal
+        Those in reach.
+
+    Returns
+    -------
+    str
+        Their number and the first of their names.
+    """
+    kept = {goal.name for goal in after}
+    names = [str(goal.name) for goal in before if goal.name not in kept]
+    shown = ", ".join(names[:MAX_EXPLAINED]) + (", …" if len(names) > MAX_EXPLAINED else "")
+    return (
+        f"{counted(len(names), 'viewpoint')} left out: the tether cannot reach there among the "
+        f"obstacles ({shown})"
+    )

@@ -1,0 +1,494 @@
+"""The taut path of a word without a search: a string among slits, pulled over the obstacles.
+
+Its class names the strip and the side on which a path passes every obstacle, so the string among
+slits (`netsp.roadmap.slits`) is known at once, and has the right class. Its bends name obstacles
+and senses; these become directed arcs of the tangent graph, and then, from the start on, wherever
+
+- the tangent between two that follow one another is blocked, what stands out farthest comes
+  between them, on the side on which the string passes its representative point;
+- a path would have to slide backwards on an arc, the arc is left out.
+
+This is a funnel (Lee and Preparata 1984) with arcs for corners. It proves nothing: what is swept
+over may end up on the wrong side, and a bay needs more care. What is proven is the result. A path
+of tangents of the graph that slides forwards on every arc is taut, a class holds one taut path
+(docs/theory.md), and its word is read off the letters of the graph. What is not so is left to the
+search (`netsp.roadmap.explore`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from netsp.base.arrays import Floats, Ints
+from netsp.base.compiled.kernel import kernel
+from netsp.base.geometry.kernels import TWO_PI, enters_polygon
+from netsp.roadmap.arcs import (
+    AFTER_ARRIVAL,
+    AFTER_EDGES,
+    AFTER_LETTERS,
+    AFTER_SEGMENT,
+    ALONG,
+    ARRIVAL,
+    ARRIVES,
+    BEGIN,
+    CX,
+    CY,
+    END,
+    FIRST,
+    FIRST_EDGE,
+    GAPS,
+    GROWTH,
+    LEAVES,
+    LENGTH,
+    LETTERS,
+    MIDDLE_X,
+    MIDDLE_Y,
+    OWNER,
+    RADIUS,
+    RANK,
+    RAY_X,
+    RAY_Y,
+    ROUND,
+    SEGMENT,
+    TURN,
+    XMAX,
+    XMIN,
+    YMAX,
+    YMIN,
+    Arcs,
+    tangent,
+)
+from netsp.roadmap.slits import HIGH, LINE, LOW, Ends, Room, Slits, longest_word, room_for, string
+from netsp.roadmap.tangents import ANGLE_TOLERANCE
+
+MOST_NODES = 256
+"""Arcs that a path may bend around; longer ones are searched for."""
+
+SAME_ANGLE = 1e-6
+"""Radians, between angles that are one."""
+
+ON_LINE = 1e-9
+"""A string that runs along the line of a slit is taken off it by that share of its length."""
+
+TOUCH = 1e-9
+"""Share of a circle's radius that goes no deeper than touching."""
+
+LITTLE_BACK = 0.5
+"""Radians that a string may seem to go back on an arc on which it bends twice in a row."""
+
+NOT_PULLED = -1.0
+"""Instead of a length."""
+
+ARRIVING, LEAVING, X_IN, Y_IN, X_OUT, Y_OUT, STRIP, SLID = range(8)
+"""Columns of a node of a path: angles on its arc where the string first and last bends (arrival and
+departure are less than half a turn from them, so that whole turns are counted); where the string is
+then, and the strip that it comes from; and the angle slid before the departure."""
+
+NODE, EDGE = range(2)
+"""And of whole numbers: directed arc or point, and departure."""
+
+
+class Path(NamedTuple):
+    """Where a path is worked out.
+
+    Attributes
+    ----------
+    real, whole
+        (k, 8) and (k, 2) columns ARRIVING … and NODE ….
+    word
+        (w,) letters written, reduced as they come, from the second place on.
+    """
+
+    real: Floats
+    whole: Ints
+    word: Ints
+
+
+@kernel
+def path_for(longest: int) -> Path:
+    """For words of at most twice so many letters."""
+    return Path(
+        np.empty((MOST_NODES, 8)), np.empty((MOST_NODES, 2), dtype=np.int64),
+        np.empty(2 * longest + 64, dtype=np.int64),
+    )  # fmt: skip
+
+
+def path_along(a: int, pieces: Sequence[tuple[int, float]], target: Ints, arcs: Arcs) -> Path:
+    """A path from point a that was found otherwise.
+
+    Parameters
+    ----------
+    pieces
+        Departures, and the angle slid before each.
+    target
+        (e,) node at which each departure ends.
+    """
+    path = Path(np.zeros((len(pieces) + 1, 8)), np.zeros((len(pieces) + 1, 2), dtype=np.int64),
+                np.zeros(0, dtype=np.int64))  # fmt: skip
+    path.whole[0, NODE] = arcs.points + a
+    for k, (e, slid) in enumerate(pieces):
+        path.whole[k, EDGE], path.real[k, SLID] = e, slid
+        path.whole[k + 1, NODE] = target[e]
+    return path
+
+
+@kernel
+def pull(
+    u: int, v: int, ends: Ends, point: Ints, slits: Slits, arcs: Arcs, room: Room, path: Path
+) -> tuple[float, float, int]:
+    """The taut path from u to v of the word inverse(word of u) times (word of v).
+
+    Parameters
+    ----------
+    point
+        (V,) number of the point at which each end is.
+
+    Returns
+    -------
+    tuple
+        Its length, `NOT_PULLED` where it was not found; the length among slits; how many tangents
+        it has. These, and the angles slid before them, are in `path`.
+    """
+    low, bends = string(u, v, ends, slits, room)
+    count = _named(
+        u, v, bends, arcs.points + point[u], arcs.points + point[v], ends.place, ends.cell,
+        slits.obstacle, slits.x, room.gate, room.corner, arcs.of, arcs.row, arcs.disk, path.real,
+        path.whole,
+    )  # fmt: skip
+    count = _tightened(
+        count, arcs.of, arcs.row, arcs.disk, arcs.span, arcs.table, arcs.real, arcs.solid,
+        arcs.edges, path.real, path.whole,
+    )  # fmt: skip
+    length = _proven(
+        u, v, count, ends.letters, ends.row, arcs.disk, arcs.span, arcs.real, arcs.whole,
+        arcs.letters, path.real, path.whole, path.word,
+    )  # fmt: skip
+    return length, low, count - 1
+
+
+@kernel
+def pull_each(
+    us: Ints, vs: Ints, ends: Ends, point: Ints, slits: Slits, arcs: Arcs, out: Floats
+) -> None:
+    """The lengths of (k,) taut paths as of `pull`, into `out`."""
+    longest = longest_word(ends.row)
+    room, path = room_for(longest, slits), path_for(longest)
+    for k in range(len(us)):
+        out[k], _, _ = pull(us[k], vs[k], ends, point, slits, arcs, room, path)
+
+
+@kernel
+def pull_one(ends: Ends, point: Ints, slits: Slits, arcs: Arcs) -> tuple[float, Ints, Floats]:
+    """The taut path between two ends: its length as of `pull`, departures and angles slid before
+    them."""
+    longest = longest_word(ends.row)
+    path = path_for(longest)
+    length, _, count = pull(0, 1, ends, point, slits, arcs, room_for(longest, slits), path)
+    return length, path.whole[:count, EDGE].copy(), path.real[:count, SLID].copy()
+
+
+@kernel
+def _tightened(
+    count: int, of: Ints, row: Ints, disk: Floats, span: Ints, table: Ints, real: Floats,
+    solid: Floats, edges: Floats, at: Floats, on: Ints,
+) -> int:  # fmt: skip
+    """How many nodes a path has when it is pulled taut; 0 where it could not be.
+
+    Parameters
+    ----------
+    of, row, disk, span, table, real, solid, edges
+        Of `Arcs`.
+    at, on
+        `Path.real` and `Path.whole`.
+    """
+    nodes = len(disk)
+    at[0, SLID] = 0.0
+    i, left = 0, 16 + 8 * count
+    while i + 1 < count:
+        left -= 1
+        if left < 0 or count + 1 >= MOST_NODES:
+            return 0
+        a, b = on[i, NODE], on[i + 1, NODE]
+        if a == b:
+            # on along the arc, from where it was left to where it was met again
+            sense = 1.0 - 2.0 * (a % 2)
+            on_by = sense * (at[i + 1, ARRIVING] - at[i, LEAVING])
+            turns = math.floor((on_by + LITTLE_BACK) / TWO_PI)
+            at[i, LEAVING] = at[i + 1, LEAVING] - sense * turns * TWO_PI
+            at[i, X_OUT], at[i, Y_OUT] = at[i + 1, X_OUT], at[i + 1, Y_OUT]
+            _close_up(i + 1, count, at, on)
+            count -= 1
+            continue
+        e = tangent(a * nodes + b, table)
+        if e < 0:
+            new, angle = _between(a, b, i, of, row, disk, span, solid, edges, at)
+            if new < 0 or new in (a, b):
+                return 0
+            for k in range(count, i + 1, -1):
+                _copy(k - 1, k, at, on)
+            on[i + 1, NODE], at[i + 1, ARRIVING], at[i + 1, LEAVING] = new, angle, angle
+            _note(
+                i + 1, disk[new, CX] + disk[new, RADIUS] * math.cos(angle),
+                disk[new, CY] + disk[new, RADIUS] * math.sin(angle), at[i, STRIP], at,
+            )  # fmt: skip
+            count += 1
+            continue
+        if i > 0:
+            arrival = _near(real[on[i - 1, EDGE], ARRIVES], at[i, ARRIVING])
+            departure = _near(real[e, LEAVES], at[i, LEAVING])
+            by = departure - arrival if a % 2 == 0 else arrival - departure
+            if by < -SAME_ANGLE:
+                _close_up(i, count, at, on)
+                count -= 1
+                i -= 1
+                continue
+            at[i, SLID] = by
+        on[i, EDGE] = e
+        i += 1
+    return count
+
+
+@kernel
+def _close_up(i: int, count: int, at: Floats, on: Ints) -> None:
+    """Node i is none any more."""
+    for k in range(i, count - 1):
+        _copy(k + 1, k, at, on)
+
+
+@kernel
+def _copy(k: int, to: int, at: Floats, on: Ints) -> None:
+    on[to, NODE] = on[k, NODE]
+    for c in range(SLID):
+        at[to, c] = at[k, c]
+
+
+@kernel
+def _note(i: int, x: float, y: float, strip: float, at: Floats) -> None:
+    at[i, X_IN], at[i, Y_IN], at[i, X_OUT], at[i, Y_OUT], at[i, STRIP] = x, y, x, y, strip
+
+
+@kernel
+def _near(angle: float, to: float) -> float:
+    """The same angle, but for whole turns, within half a turn of another."""
+    return angle - TWO_PI * math.floor((angle - to + math.pi) / TWO_PI)
+
+
+@kernel
+def _facing(node: int, ux: float, uy: float) -> float:
+    """The angle on a directed arc that a line along (ux, uy) touches it at."""
+    return math.atan2(-ux, uy) if node % 2 == 0 else math.atan2(ux, -uy)
+
+
+@kernel
+def _named(
+    u: int, v: int, bends: int, from_: int, to: int, place: Floats, cell: Ints, obstacle: Ints,
+    line_x: Floats, gate: Floats, corner: Ints, of: Ints, row: Ints, disk: Floats, at: Floats,
+    on: Ints,
+) -> int:  # fmt: skip
+    """The directed arcs that the bends of a string name, between its two ends; how many, 0 where
+    that is not known."""
+    if bends and gate[corner[bends - 1, 0], LOW] == gate[corner[bends - 1, 0], HIGH]:
+        bends -= 1  # that is its end
+    on[0, NODE] = from_
+    x, y = place[u, 0], place[u, 1]
+    _note(0, x, y, float(cell[u]), at)
+    count = 1
+    before = -1
+    for c in range(bends):
+        k, high = corner[c, 0], corner[c, 1]
+        rightward = gate[k, LINE] > 0.0
+        line = int(abs(gate[k, LINE])) - 1
+        o = obstacle[line]
+        ccw = rightward == (high == 1)
+        if row[o + 1] == row[o]:
+            return 0
+        new = 2 * of[row[o]] + (0 if ccw else 1)
+        here_x, here_y = line_x[line], gate[k, LOW + high]
+        if disk[new, END] == np.inf:
+            if new == before:  # on, to the other end of the slit
+                at[count - 1, LEAVING] += math.pi if ccw else -math.pi
+                at[count - 1, X_OUT], at[count - 1, Y_OUT] = here_x, here_y
+                x, y = here_x, here_y
+                continue
+            angle = -0.5 * math.pi if high == 1 else 0.5 * math.pi
+        else:
+            # what stands out from a line past it
+            to_x, to_y = place[v, 0], place[v, 1]
+            if c + 1 < bends:
+                k_next = corner[c + 1, 0]
+                to_x = line_x[int(abs(gate[k_next, LINE])) - 1]
+                to_y = gate[k_next, LOW + corner[c + 1, 1]]
+            far = math.hypot(to_x - x, to_y - y)
+            ux, uy = 1.0 if rightward else -1.0, 0.0
+            if far > 0.0:
+                ux, uy = (to_x - x) / far, (to_y - y) / far
+            new, _ = _standing_out(o, not ccw, x, y, ux, uy, -1, -1, of, row, disk)
+            angle = _facing(new, ux, uy)
+        on[count, NODE], at[count, ARRIVING], at[count, LEAVING] = new, angle, angle
+        _note(count, here_x, here_y, line + (0.0 if rightward else 1.0), at)
+        count += 1
+        before = new
+        x, y = here_x, here_y
+        if count + 2 >= MOST_NODES:
+            return 0
+    on[count, NODE] = to
+    _note(count, place[v, 0], place[v, 1], float(cell[v]), at)
+    return count + 1
+
+
+@kernel
+def _standing_out(
+    o: int, left: bool, x: float, y: float, ux: float, uy: float, a: int, b: int, of: Ints,
+    row: Ints, disk: Floats,
+) -> tuple[int, float]:  # fmt: skip
+    """The directed arc of an obstacle that stands out farthest to one side of a line through (x, y)
+    along (ux, uy), and how far; -1 if there is none but those of nodes a and b."""
+    side = 1.0 if left else -1.0
+    nx, ny = -side * uy, side * ux
+    best, farthest = -1, -np.inf
+    for k in range(row[o], row[o + 1]):
+        n = 2 * of[k]
+        if n <= a <= n + 1 or n <= b <= n + 1:
+            continue
+        middle = nx * (disk[n, CX] - x) + ny * (disk[n, CY] - y)
+        out = middle + disk[n, RADIUS]
+        begin, end = disk[n, BEGIN], disk[n, END]
+        if end < np.inf and (math.atan2(ny, nx) - begin) % TWO_PI > end - begin:
+            out = middle + disk[n, RADIUS] * max(
+                nx * math.cos(begin) + ny * math.sin(begin), nx * math.cos(end) + ny * math.sin(end)
+            )
+        if out > farthest:
+            best, farthest = n + (1 if left else 0), out
+    return best, farthest
+
+
+@kernel
+def _between(
+    a: int, b: int, i: int, of: Ints, row: Ints, disk: Floats, span: Ints, solid: Floats,
+    edges: Floats, at: Floats,
+) -> tuple[int, float]:  # fmt: skip
+    """The directed arc that a path from node a to node b, number i and the one after it, has to
+    pass in between, -1 if it is not known; and the angle at which it stands out."""
+    ra = 0.0 if span[a, OWNER] < 0 else disk[a, RADIUS] * (1.0 - 2.0 * (a % 2))
+    rb = 0.0 if span[b, OWNER] < 0 else disk[b, RADIUS] * (1.0 - 2.0 * (b % 2))
+    dx, dy = disk[b, CX] - disk[a, CX], disk[b, CY] - disk[a, CY]
+    apart, k = math.hypot(dx, dy), rb - ra
+    if apart <= abs(k):
+        return -1, 0.0
+    length = math.sqrt((apart - abs(k)) * (apart + abs(k)))
+    ux, uy = (dx * length + dy * k) / apart**2, (dy * length - dx * k) / apart**2
+    px, py = disk[a, CX] + ra * uy, disk[a, CY] - ra * ux
+    qx, qy = disk[b, CX] + rb * uy, disk[b, CY] - rb * ux
+    x0, x1, y0, y1 = min(px, qx), max(px, qx), min(py, qy), max(py, qy)
+    best, farthest = -1, 0.0
+    for o in range(len(solid)):
+        if x1 < solid[o, XMIN] or x0 > solid[o, XMAX] or y1 < solid[o, YMIN] or y0 > solid[o, YMAX]:
+            continue
+        if solid[o, ROUND] >= 0.0:
+            cx, cy = solid[o, MIDDLE_X] - px, solid[o, MIDDLE_Y] - py
+            t = min(max(cx * ux + cy * uy, 0.0), length)
+            if math.hypot(cx - t * ux, cy - t * uy) >= solid[o, ROUND] - TOUCH * solid[o, ROUND]:
+                continue
+        elif not enters_polygon(
+            px, py, qx, qy, edges, int(solid[o, FIRST_EDGE]), int(solid[o, AFTER_EDGES]),
+            solid[o, GROWTH],
+        ):  # fmt: skip
+            continue
+        if span[a, OWNER] == o:
+            left = a % 2 == 1
+        elif span[b, OWNER] == o:
+            left = b % 2 == 1
+        else:
+            # past the side on which the string has not its representative point; where it runs
+            # straight along its line, the strip that it is in tells
+            sx, sy = at[i + 1, X_IN] - at[i, X_OUT], at[i + 1, Y_IN] - at[i, Y_OUT]
+            shift = ON_LINE * (abs(sx) + abs(sy))
+            shift = shift if solid[o, RANK] < at[i + 1, STRIP] else -shift
+            rx, ry = solid[o, RAY_X] - at[i, X_OUT] - shift, solid[o, RAY_Y] - at[i, Y_OUT]
+            left = sx * ry - sy * rx < 0.0
+        new, out = _standing_out(o, left, px, py, ux, uy, a, b, of, row, disk)
+        if new >= 0 and out > farthest:
+            best, farthest = new, out
+    return best, 0.0 if best < 0 else _facing(best, ux, uy)
+
+
+@kernel
+def _proven(
+    u: int, v: int, count: int, letters: Ints, row: Ints, disk: Floats, span: Ints, real: Floats,
+    whole: Ints, written: Ints, at: Floats, on: Ints, word: Ints,
+) -> float:  # fmt: skip
+    """Length of a path of so many nodes if it is taut and has the word of the leg from u to v;
+    else `NOT_PULLED`.
+
+    Parameters
+    ----------
+    letters, row
+        Of `Ends`.
+    disk, span, real, whole, written
+        Of `Arcs`, the last its letters.
+    at, on, word
+        Of `Path`.
+    """
+    if count < 2:
+        return NOT_PULLED
+    n, total = 0, 0.0
+    for i in range(count - 1):
+        e = on[i, EDGE]
+        first, last = whole[e, SEGMENT], whole[e, AFTER_SEGMENT]
+        if i > 0:
+            arrived, node = on[i - 1, EDGE], on[i, NODE]
+            f = whole[arrived, FIRST]
+            if f < 0:
+                return NOT_PULLED
+            by = real[arrived, TURN] + real[e, ALONG] - real[f, ALONG]
+            turns = round((at[i, SLID] - by) / TWO_PI)
+            by += turns * TWO_PI
+            whole_circle = disk[node, END] == np.inf
+            if turns < 0 or by < -ANGLE_TOLERANCE:
+                return NOT_PULLED
+            if (turns and not whole_circle) or (turns == 0 and e < f):
+                return NOT_PULLED
+            at[i, SLID] = max(by, 0.0)
+            total += disk[node, RADIUS] * at[i, SLID]
+            n = _append(whole[arrived, ARRIVAL], whole[arrived, AFTER_ARRIVAL], written, word, n)
+            begin = whole[f, GAPS]
+            for _ in range(turns):
+                n = _append(begin, span[node, AFTER_LETTERS], written, word, n)
+                begin = span[node, LETTERS]
+            n = _append(begin, whole[e, GAPS], written, word, n)
+        n = _append(first, last, written, word, n)
+        total += real[e, LENGTH]
+        if n < 0:
+            return NOT_PULLED
+    # inverse(word of u) times (word of v)
+    a, a_end, b, b_end = row[u], row[u + 1], row[v], row[v + 1]
+    while a < a_end and b < b_end and letters[a] == letters[b]:
+        a += 1
+        b += 1
+    back, ahead = a_end - a, b_end - b
+    same = n == back + ahead
+    if same:
+        for k in range(back):
+            same = same and word[1 + k] == -letters[a_end - 1 - k]
+        for k in range(ahead):
+            same = same and word[1 + back + k] == letters[b + k]
+    return total if same else NOT_PULLED
+
+
+@kernel
+def _append(first: int, last: int, letters: Ints, word: Ints, n: int) -> int:
+    """How many letters there are when some more are written; -1 if there is no room for them."""
+    for k in range(first, last):
+        a = letters[k]
+        if n > 0 and word[n] == -a:
+            n -= 1
+        elif n < 0 or n + 1 >= len(word):
+            return -1
+        else:
+            n += 1
+            word[n] = a
+    return n

@@ -1,0 +1,376 @@
+"""Exact legs between augmented goals: branch by branch, or pulled along their words."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
+
+import numpy as np
+
+from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.clock import NEVER, Clock, Flag
+from netsp.base.errors import LimitReachedError
+from netsp.base.ram import ask
+from netsp.gtsp.travel.graph import UNTIMED
+from netsp.hsignature import Word, concatenate, invert
+from netsp.roadmap.branches import OPEN, Branches, Lengths, branches_of, fill, spread
+from netsp.roadmap.paths import TautPaths, UnknownPathError
+from netsp.roadmap.slits import Ends, flattened, slit_lengths
+from netsp.roadmap.taut_by_word import Path, path_along, pull_each
+from netsp.roadmap.tethertree import GrowingTree, TetherTree
+
+ROUNDED_DOWN = 1.0 - 2.0**-23
+"""Of a length, what single precision rounds to no more than the length."""
+
+BLOCK = 256
+"""Rows of a matrix that are worked on at a time, so that what is in between stays small."""
+
+BLOCK_LEGS = 64_000_000
+"""At a time where not all are held, a quarter of a GiB: a leg that many share is pulled in every
+block again."""
+
+FEW = 20_000
+"""So many legs asked for in a matrix are pulled one by one, hundredths of a second; as many at a
+time where there are more."""
+
+MANY = 1500
+"""Of so many classes or fewer it is soon known where all tethers part."""
+
+SEARCHED_TOGETHER = 20
+"""More tethers than these that could not be pulled are looked for by one search."""
+
+
+class TautLegs:
+    """Exact legs between given augmented goals. Satisfies `netsp.gtsp.travel.graph.Legs`.
+
+    Parameters
+    ----------
+    cluster, signatures, planar
+        Goal (0 is the base), word and planar taut tether length of each vertex; the first is the
+        base.
+
+    Attributes
+    ----------
+    left_out
+        Legs (u, v), u < v, whose taut path was not found. Such a leg is replaced by the path back
+        along the tether of u and out along the tether of v, which has the same class and is at
+        least as long.
+    """
+
+    def __init__(
+        self, paths: TautPaths, cluster: Ints, signatures: Sequence[Word], planar: Floats
+    ) -> None:
+        self.paths, self.cluster, self.planar = paths, cluster, planar
+        self.signatures = list(signatures)
+        self._z = paths.problem.points[:, 2]
+        self._tree: TetherTree | None = None
+        self.left_out: set[tuple[int, int]] = set()
+
+    at_once = True
+
+    def lengths(
+        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+    ) -> Floats:
+        """(k, k) 3D leg lengths among the given vertices; inf within a cluster, and where `asked`
+        is given and false, anything. LimitReachedError when the clock is up before all of many are
+        found; among `UNTIMED` vertices they are, whatever the clock says."""
+        vertices = np.asarray(vertices, dtype=np.int64)
+        if asked is None and len(vertices) <= UNTIMED and len(self.cluster) > MANY:
+            # one by one, whatever the time: to know where all tethers part takes a while
+            asked = np.ones((len(vertices), len(vertices)), dtype=bool)
+        if asked is not None and asked.sum() <= max(FEW, 2 * len(vertices)):
+            return self._few(vertices, asked)
+        return self._all(vertices, np.float64, 1.0, clock)
+
+    def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
+        """(k, k) 3D leg lengths among the given vertices in single precision, rounded down; inf
+        within a cluster. LimitReachedError as of `lengths`."""
+        return self._all(np.asarray(vertices, dtype=np.int64), np.float32, ROUNDED_DOWN, clock)
+
+    def blocks(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Iterator[tuple[Ints, Floats]]:
+        """The legs among vertices in single precision, rounded down, some vertices at a time:
+        which (r,), as positions among them, and (r, k) lengths, to be used before the next are
+        asked for; of some rows only, if they are given. LimitReachedError as of `lengths`."""
+        vertices = np.asarray(vertices, dtype=np.int64)
+        clock, n = clock or Clock(), len(vertices)
+        _found(clock, lambda: self._grown(clock.flag), n)
+        size = max(BLOCK, BLOCK_LEGS // max(n, 1))
+        branches = branches_of(self._grown(clock.flag), vertices)
+        places = np.arange(n) if rows is None else np.sort(branches.rank[rows])
+        out: Floats = np.empty((min(size, len(places)), n), dtype=np.float32)  # type: ignore[assignment]
+        for first in range(0, len(places), size):
+            at = places[first : first + size]
+            block, own = out[: len(at)], branches.order[at]
+            row = np.full(n, -1, dtype=np.int64)
+            row[at] = np.arange(len(at))
+
+            def some(row: Ints = row, block: Floats = block) -> None:
+                self._fill(vertices, ROUNDED_DOWN, block, clock.flag, branches, row)
+
+            _found(clock, some, n)
+            self._beyond_goals(vertices, own, ROUNDED_DOWN, block)
+            yield own, block
+
+    def _all(
+        self, vertices: Ints, kind: type[np.floating], share: float, clock: Clock | None
+    ) -> Floats:
+        """All legs among vertices, branch by branch (`netsp.roadmap.branches`)."""
+        n = len(vertices)
+        ask(
+            float(np.dtype(kind).itemsize) * n**2,
+            f"legs between {n} homotopy classes",
+            "lower tether_length or max_classes",
+        )
+        out: Floats = np.empty((n, n), dtype=kind)  # type: ignore[assignment]
+
+        def whole(stop: Flag) -> None:
+            branches = branches_of(self._grown(stop), vertices)
+            self._fill(vertices, share, out, stop, branches, branches.order)
+
+        # what takes a fraction of a second is measured all the same, or there would be no tour
+        if n <= UNTIMED and len(self.cluster) <= MANY:
+            whole(NEVER)
+        else:
+            clock = clock or Clock()
+            _found(clock, lambda: whole(clock.flag), n)
+        self._beyond_goals(vertices, np.arange(n), share, out)
+        return out
+
+    def _beyond_goals(self, vertices: Ints, rows: Ints, share: float, out: Floats) -> None:
+        """What is no leg between goals, into rows (r, k): legs of the base are tethers, and there
+        are none within a goal."""
+        point, tethers = self.cluster[vertices], share * self.to_base()[vertices]
+        for base in np.flatnonzero(point == 0).tolist():
+            out[rows == base] = tethers
+            out[:, base] = tethers[rows]
+        for g in np.unique(point).tolist():
+            out[np.ix_(point[rows] == g, point == g)] = np.inf
+
+    def _fill(
+        self, vertices: Ints, share: float, out: Floats, stop: Flag, branches: Branches, row: Ints
+    ) -> None:
+        """The legs between goals, into (r, k) `out`; unfinished when the flag is set."""
+        for first in range(0, len(out), BLOCK):
+            if stop[0]:
+                return
+            out[first : first + BLOCK] = OPEN
+        paths, (every, points) = self.paths, self._ends
+        letters, at = flattened([self.signatures[v] for v in vertices])
+        ends = Ends(every.place[vertices], every.cell[vertices], letters, at)
+        point = points[vertices]
+        lengths = Lengths(self.planar[vertices], self._z[point], share, out, row)
+        i, j = 0, 1 if len(out) == len(vertices) else 0
+        while True:
+            i, j = fill(branches, lengths, point, ends, paths.slits, paths.arcs, stop, i, j)
+            if i >= len(vertices) or stop[0]:
+                return
+            u, v = branches.order[sorted((i, j))].tolist()
+            found = self._searched(int(vertices[u]), int(vertices[v]), stop)
+            if found is None:
+                around = share * self._by_way_of_base(int(vertices[u]), int(vertices[v]))
+                for x, y in ((u, v), (v, u)):
+                    if row[branches.rank[x]] >= 0:
+                        out[row[branches.rank[x]], y] = around
+                continue
+            length, path = found
+            spread(u, v, length, len(path.whole) - 1, path.whole, path.real, branches, lengths)
+
+    def _searched(self, u: int, v: int, stop: Flag) -> tuple[float, Path] | None:
+        """Search for a leg that could not be pulled. Return its planar length and its path, or None
+        if it is not found; raise LimitReachedError if the flag is set first."""
+        a, b = int(self.cluster[u]), int(self.cluster[v])
+        word, longest = self.relative_word(u, v), self._longest(u, v)
+        try:
+            length, pieces = self.paths.pieces(a, b, word, longest, stop)
+        except UnknownPathError:
+            return None
+        return length, path_along(a, pieces, self.paths.tangents.target, self.paths.arcs)
+
+    def _by_way_of_base(self, u: int, v: int) -> float:
+        """Return the 3D length of the path back along one tether and out along another, and record
+        the leg as left out."""
+        self.left_out.add((min(u, v), max(u, v)))
+        tethers = self.to_base()
+        return float(tethers[u] + tethers[v])
+
+    def bounds_of_left_out(self) -> Floats:
+        """Return lower bounds (k, 3) in 3D for each leg of `left_out`: on the tether at one end,
+        the leg, and the tether at the other end."""
+        tethers = self.to_base()
+        rows = [
+            (tethers[u], self.lower_bounds(np.array([u, v]))[0, 1], tethers[v])
+            for u, v in sorted(self.left_out)
+        ]
+        return np.array(rows).reshape(-1, 3)
+
+    def _grown(self, stop: Flag) -> TetherTree:
+        """Where the tethers part, found out once; unfinished when the flag is set."""
+        if self._tree is not None:
+            return self._tree
+        paths, (ends, point) = self.paths, self._ends
+        growing = GrowingTree(len(point))
+        missing = growing.pull(ends, point, paths.slits, paths.arcs, stop).tolist()
+        known: dict[int, Path] = {}
+        if len(missing) > SEARCHED_TOGETHER and not stop[0]:
+            known = self._tethers(missing, stop)
+        for v in missing:
+            if stop[0]:
+                break
+            path = known.get(v)
+            if path is None and (found := self._searched(0, v, stop)) is not None:
+                path = found[1]
+            # a leg left out has no taut path, so it shares no part with other legs
+            if path is not None:
+                growing.add(v, path, paths.arcs)
+        tree = growing.tree()
+        if not stop[0]:
+            self._tree = tree
+        return tree
+
+    def _tethers(self, vertices: list[int], stop: Flag) -> dict[int, Path]:
+        """The tethers of vertices, by one search; fewer when the flag is set."""
+        paths, (_, point) = self.paths, self._ends
+        found = paths.tethers(
+            point[vertices].tolist(), [self.signatures[v] for v in vertices],
+            float(self.planar[vertices].max()), stop,
+        )  # fmt: skip
+        return {
+            v: path_along(0, pieces, paths.tangents.target, paths.arcs)
+            for v, pieces in zip(vertices, found, strict=True)
+            if pieces is not None and not stop[0]
+        }
+
+    def to_base(self) -> Floats:
+        """(V,) 3D lengths of the legs from the base, which are the tethers."""
+        return np.asarray(np.hypot(self.planar, self._z[self.cluster] - self._z[0]))
+
+    def lower_bounds(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Floats:
+        """(k, k) lower bounds on leg lengths: a leg is no shorter than its class among slits
+        (`netsp.roadmap.slits`), nor than the difference of its two tethers (triangle inequality
+        on the cover).
+
+        Parameters
+        ----------
+        rows
+            (r,) positions among the vertices; then (r, k).
+        """
+        vertices = np.asarray(vertices, dtype=np.int64)
+        cluster, planar, z = self.cluster[vertices], self.planar[vertices], self._z
+        own = np.arange(len(vertices)) if rows is None else np.asarray(rows, dtype=np.int64)
+        ask(
+            3.0 * 8.0 * len(own) * len(vertices),
+            f"bounds on the legs between {len(vertices)} homotopy classes",
+            "lower tether_length or max_classes",
+        )
+        stop = NEVER if clock is None else clock.flag
+        words = [self.signatures[v] for v in vertices]
+        low = slit_lengths(self.paths.slits, self.paths.outline.places, cluster, words, rows, stop)
+        if stop[0]:
+            raise LimitReachedError(
+                f"time limit reached while bounding the legs between {len(vertices)} homotopy "
+                "classes; lower tether_length or raise the limit"
+            )
+        for first in range(0, len(own), BLOCK):
+            part, block = own[first : first + BLOCK], low[first : first + BLOCK]
+            np.maximum(block, np.abs(planar[part][:, None] - planar[None, :]), out=block)
+            # rounding must not lift a bound above the length
+            block -= self.paths.margin
+            np.maximum(block, 0.0, out=block)
+            if np.ptp(z) > 0.0:
+                np.hypot(block, z[cluster[part]][:, None] - z[cluster][None, :], out=block)
+        return low
+
+    def relative_word(self, u: int, v: int) -> Word:
+        """The word of the leg from vertex u to vertex v."""
+        return concatenate(invert(self.signatures[u]), self.signatures[v])
+
+    def path(self, u: int, v: int) -> Floats:
+        """(n, 3) polyline of the taut leg from vertex u to vertex v, arcs circumscribed; height
+        changes in proportion to planar length."""
+        if u > v:  # searched once for both senses
+            return self.path(v, u)[::-1].copy()
+        word, longest = self.relative_word(u, v), self._longest(u, v)
+        try:
+            return self.paths.path(int(self.cluster[u]), int(self.cluster[v]), word, longest)
+        except UnknownPathError:
+            if 0 in (u, v):
+                raise
+            return np.vstack([self.path(u, 0), self.path(0, v)[1:]])
+
+    def _longest(self, u: int, v: int) -> float:
+        """More than the planar length of a leg: back along one tether to where the other parts, as
+        far as that is known."""
+        part = 0.0 if self._tree is None else self._tree.part(u, v)
+        return float(self.planar[u] + self.planar[v] - 2.0 * part)
+
+    def _few(self, vertices: Ints, asked: Bools) -> Floats:
+        """As `lengths`, for a few legs; those that cannot be pulled are searches of their own."""
+        out = np.full(asked.shape, np.inf)
+        rows, columns = np.nonzero(np.triu(asked, 1) | np.tril(asked, -1).T)
+        us, vs = vertices[rows], vertices[columns]
+        apart = self.cluster[us] != self.cluster[vs]
+        rows, columns, us, vs = rows[apart], columns[apart], us[apart], vs[apart]
+        out[rows, columns] = out[columns, rows] = self.pairs(us, vs)
+        return out
+
+    def pairs(self, us: Ints, vs: Ints) -> Floats:
+        """(k,) 3D lengths of legs between vertices of different goals."""
+        planar = self._each(us, vs)
+        around: dict[int, float] = {}
+        for k in np.flatnonzero(planar < 0.0).tolist():
+            u, v = int(us[k]), int(vs[k])
+            if 0 in (u, v):
+                planar[k] = self.planar[max(u, v)]
+                continue
+            a, b = int(self.cluster[u]), int(self.cluster[v])
+            try:
+                planar[k] = self.paths.planar_length(
+                    a, b, self.relative_word(u, v), self._longest(u, v)
+                )
+            except UnknownPathError:
+                around[k] = self._by_way_of_base(u, v)
+        out = np.hypot(planar, self._z[self.cluster[us]] - self._z[self.cluster[vs]])
+        for k, length in around.items():
+            out[k] = length
+        return np.asarray(out)
+
+    def _each(self, us: Ints, vs: Ints) -> Floats:
+        """(k,) planar lengths of legs, negative where they could not be pulled."""
+        paths, (ends, point) = self.paths, self._ends
+        # strided arrays are another type, for which the kernel would be compiled anew
+        us, vs = np.ascontiguousarray(us), np.ascontiguousarray(vs)
+        out = np.empty(len(us))
+
+        def some(first: int) -> None:
+            k = slice(first, first + FEW)
+            pull_each(us[k], vs[k], ends, point, paths.slits, paths.arcs, out[k])
+
+        if len(us) <= FEW:
+            some(0)
+        else:
+            with ThreadPoolExecutor(os.cpu_count()) as pool:
+                list(pool.map(some, range(0, len(us), FEW)))
+        return out
+
+    @cached_property
+    def _ends(self) -> tuple[Ends, Ints]:
+        """Of all vertices, and their points."""
+        places, point = self.paths.outline.places, np.asarray(self.cluster, dtype=np.int64)
+        letters, row = flattened(self.signatures)
+        return Ends(places[point], self.paths.slits.cells(places[:, 0])[point], letters, row), point
+
+
+def _found(clock: Clock, find: Callable[[], object], classes: int) -> None:
+    """Find legs until the clock is up; LimitReachedError if it was."""
+    clock.interruptible(find)
+    if clock.flag[0]:
+        raise LimitReachedError(
+            f"time limit reached while measuring the legs between {classes} homotopy classes; "
+            "lower tether_length or raise the limit"
+        )

@@ -1,0 +1,212 @@
+"""The taut tether to any place, while somebody moves a cursor there.
+
+The tangents between the arcs and the base are found once. For a new place only its own tangents are
+added, and a search from there (`netsp.roadmap.explore`) finds the taut paths to the base.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from netsp.base.arrays import Bools, ComparesArrays, Floats
+from netsp.base.errors import NetspError
+from netsp.hsignature import Word, invert, reduce
+from netsp.model.field_types import checked_argument
+from netsp.model.problem import Goal, Problem
+from netsp.roadmap.explore import ALL, Found, run_explore
+from netsp.roadmap.outline import STAND_OFF, Outline, build_outline, pushed_out
+from netsp.roadmap.paths import TautPaths
+from netsp.roadmap.tangents import TangentGraph, assembled, tangent_rows
+from netsp.roadmap.trie import Trie
+
+FIRST, GROWTH = 1.05, 1.25
+"""A shortest path is sought up to the first multiple of the distance, then up to ever more."""
+
+MOST_STEPS = 5_000_000
+"""Departures that are looked at for one place."""
+
+
+@dataclass(frozen=True, eq=False)
+class TautTether(ComparesArrays):
+    """A taut tether from the base to a place.
+
+    Parameters
+    ----------
+    word : Word
+        Its h-signature.
+    length : float
+        In 3D, in the problem's units.
+    path : ndarray, shape (n, 3)
+        Its polyline, base first.
+    """
+
+    word: Word
+    length: float
+    path: Floats = field(repr=False)
+
+
+class Tethers:
+    """Taut tethers from a problem's base to any place, in any class, quickly again and again.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its base, obstacles, bounds and tether length count.
+
+    Examples
+    --------
+    >>> from netsp import Circle, Problem
+    >>> problem = Problem(base=(0, 0), goals=[(9, 0)], tether_length=20,
+    ...                   obstacles=[Circle(center=(5, 0), radius=1)])
+    >>> tethers = Tethers(problem)
+    >>> [t.word for t in tethers.classes(9, 1)][:2]
+    [(1,), ()]
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem.model_copy(update={"state": None})
+        whole = build_outline(self.problem)
+        self._outline = dataclasses.replace(whole, points=whole.points[:1], places=whole.places[:1])
+        near = np.hypot(*(whole.arcs[:, :2] - whole.points[0]).T) - whole.arcs[:, 2]
+        close = near <= problem.tether_length
+        self._arcs: Floats = whole.arcs[close]
+        self._full: Bools = whole.full[close]
+        self._rows = tangent_rows(self._outline, self._arcs, self._full, problem.tether_length)
+
+    def to(self, x: float, y: float, word: Word | None = None, z: float = 0.0) -> TautTether | None:
+        """The taut tether to a place.
+
+        Parameters
+        ----------
+        x : float
+            Of the place, in the problem's units.
+        y : float
+            Of the place.
+        word : Word, optional
+            The class; None takes the shortest of all.
+        z : float
+            Height of the place.
+
+        Returns
+        -------
+        TautTether or None
+            None where no tether of that class within the tether's length leads there, or where the
+            place lies in an obstacle or out of bounds.
+
+        Raises
+        ------
+        InputError
+            No finite place.
+        """
+        there = self._there(x, y, z)
+        if there is None:
+            return None
+        if word is not None:
+            return there.of_class(reduce(tuple(word)))
+        limit = FIRST * there.apart
+        while True:
+            found = there.everything(min(limit, there.most))
+            if len(found.goal):
+                return there.along(found, int(np.argmin(found.length)))
+            if limit >= there.most or found.capped:
+                return None
+            limit *= GROWTH
+
+    def classes(self, x: float, y: float, z: float = 0.0) -> list[TautTether]:
+        """All taut tethers to a place within the tether's length, the shortest first.
+
+        Parameters
+        ----------
+        x : float
+            Of the place, in the problem's units.
+        y : float
+            Of the place.
+        z : float
+            Height of the place.
+
+        Returns
+        -------
+        list of TautTether
+            One for each class; with very long tethers those found within `MOST_STEPS`.
+
+        Raises
+        ------
+        InputError
+            No finite place.
+        """
+        there = self._there(x, y, z)
+        if there is None:
+            return []
+        found = there.everything(there.most)
+        out: dict[Word, TautTether] = {}
+        for hit in np.argsort(found.length, kind="stable"):
+            tether = there.along(found, int(hit))
+            out.setdefault(tether.word, tether)
+        return list(out.values())
+
+    def _there(self, x: float, y: float, z: float) -> _Place | None:
+        values = ((n, v) for n, v in (("x", x), ("y", y), ("z", z)))
+        px, py, pz = (checked_argument(n, v, -1e12) for n, v in values)
+        problem = self.problem
+        away = (float(o.signed_distance((px, py))) for o in problem.obstacles)
+        if min(away, default=math.inf) < problem.clearance - problem.tolerance:
+            return None
+        if problem.bounds is not None:
+            xmin, ymin, xmax, ymax = problem.bounds
+            if not (xmin <= px <= xmax and ymin <= py <= ymax):
+                return None
+        xy = np.array([px, py]) - self._outline.origin
+        free = pushed_out(xy, self._outline.blockers, STAND_OFF * problem.scale)
+        outline = dataclasses.replace(
+            self._outline,
+            points=np.vstack([self._outline.points, free]),
+            places=np.vstack([self._outline.places, xy]),
+        )
+        own = tangent_rows(outline, self._arcs, self._full, problem.tether_length, since=1)
+        tangents = assembled(outline, self._arcs, self._full, np.vstack([self._rows, own]))
+        goal = Goal.model_construct(position=(px, py, pz), name=None, choice=None, after=())
+        return _Place(problem.model_copy(update={"goals": (goal,)}), outline, tangents)
+
+
+class _Place(TautPaths):
+    """Taut paths between the base (point 0) and one place (point 1), whose tangents are there."""
+
+    def __init__(self, problem: Problem, outline: Outline, tangents: TangentGraph) -> None:
+        self.problem, self.outline, self.tangents = problem, outline, tangents
+        self._longest = problem.tether_length
+        self.margin = 100.0 * outline.margin
+        self._z = problem.points[:, 2]
+        self._known = {}
+        self.rise = float(self._z[1] - self._z[0])
+        self.apart = math.dist(*outline.points)
+        self.most = math.sqrt(max(problem.tether_length**2 - self.rise**2, 0.0))
+
+    def everything(self, limit: float) -> Found:
+        """All taut paths from the place to the base, up to a planar length."""
+        self._trie = Trie.root(limit)
+        nowhere = np.zeros(len(self.tangents.target))
+        return run_explore(
+            self.tangents, 1, self._trie, margin=self.outline.margin, rule=ALL, keep=True,
+            toward=(0, nowhere), cap=MOST_STEPS,
+        )  # fmt: skip
+
+    def along(self, found: Found, hit: int) -> TautTether:
+        """The tether of a path found."""
+        word = invert(self._trie.word(int(found.word[hit])))
+        xy = self._polyline(1, 0, found.pieces(hit))[::-1]
+        length = math.hypot(float(found.length[hit]), self.rise)
+        return TautTether(tuple(word), length, self._raised(0, 1, xy))
+
+    def of_class(self, word: Word) -> TautTether | None:
+        """The tether of a class; None where there is none within the tether's length."""
+        try:
+            length = self.length(0, 1, word)
+        except NetspError:
+            return None
+        if length > self.problem.tether_length + self.margin:
+            return None
+        return TautTether(word, length, self.path(0, 1, word))

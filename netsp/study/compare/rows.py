@@ -1,0 +1,215 @@
+"""The results: one line of JSON for every trial, appended when it is finished.
+
+A line is written whole and flushed to the disk, so a kill at any moment costs the trials that were
+running. A last line without its end is what a kill in mid-write leaves: it is cut off, and its
+trial run again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from netsp.base.errors import InputError
+from netsp.base.files import STANDARD, read_bytes, read_gzip
+from netsp.model.field_types import LARGEST
+
+SCHEMA = "netsp-trial/1"
+TrialRow = dict[str, Any]
+
+LOST = frozenset({"crashed", "killed", "timeout", "out_of_memory"})
+"""Statuses of trials that took their worker with them, or may have."""
+
+FAILED = LOST | {"error"}
+"""Statuses of trials that came to nothing."""
+
+_BEGIN = f'{{"schema": "{SCHEMA}"'.encode()
+
+
+_TEXTS = ("study", "study_name", "trial", "status", "message", "finished", "machine")
+_TABLES = ("world", "roadmap", "solver")
+
+
+def read_rows(path: str | Path) -> list[TrialRow]:
+    """All rows of a results file, gzipped if its name ends in .gz; a torn last line is left out.
+    InputError if it is not one."""
+    data = read_gzip(path) if Path(path).suffix == ".gz" else read_bytes(path)
+    rows = []
+    *lines, torn = data.split(b"\n")
+    for number, line in enumerate(lines, start=1):
+        row = _parsed(line)
+        if row is None:
+            raise InputError(
+                f"{path}: line {number}: expected a row of schema {SCHEMA}, got "
+                f"{line[:40].decode(errors='replace')!r}"
+            )
+        rows.append(row)
+    begin = _BEGIN[: len(torn)]
+    if not rows and not torn.startswith(begin):
+        raise InputError(f"{path}: expected rows of schema {SCHEMA}; it is another kind of file")
+    return rows
+
+
+def _parsed(line: bytes) -> TrialRow | None:
+    """A line as a row; None if it is none."""
+    try:
+        row = json.loads(line, parse_constant=_no_constant)
+    except (ValueError, RecursionError):
+        return None
+    good = (
+        isinstance(row, dict)
+        and row.get("schema") == SCHEMA
+        and all(isinstance(row.get(name), str) for name in _TEXTS)
+        and all(isinstance(row.get(name), dict) for name in _TABLES)
+        and isinstance(row["solver"].get("label"), str)
+        and isinstance(row["roadmap"].get("label"), str)
+        and all(
+            isinstance(s, int) and s is not True
+            for s in (row.get("seed"), row["world"].get("seed"))
+        )
+        and all(_fits(row["world"].get(k), kinds) for k, kinds in _WORLD.items())
+        and all(_fits(row.get(k), kinds) for k, kinds in _VALUES.items())
+        and (row.get("length") is None or (row.get("total_s") or 0.0) > 0.0)
+        and all(isinstance(v, str) for v in (row.get("versions") or {}).values())
+        and all(
+            isinstance(p, list)
+            and len(p) == 3
+            and _fits(p[0], (int, float))
+            and all(_fits(v, _MAYBE) for v in p[1:])
+            for p in row.get("history") or ()
+        )
+    )
+    return row if good and _encodable(row) else None
+
+
+def _encodable(row: object) -> bool:
+    """Whether no name is something that cannot be written, such as half a character."""
+    try:
+        json.dumps(row, ensure_ascii=False).encode()
+    except UnicodeError:
+        return False
+    return True
+
+
+_MAYBE = (int, float, type(None))
+_WORLD: dict[str, tuple[type, ...]] = {
+    "goals": (int,), "tether_length": (int, float), "family": (str,),
+}  # fmt: skip
+_VALUES: dict[str, tuple[type, ...]] = {
+    "length": _MAYBE, "lower_bound": _MAYBE, "gap": _MAYBE, "total_s": _MAYBE,
+    "cpu_s": _MAYBE,
+    "roadmap_s": _MAYBE, "matrix_s": _MAYBE, "solve_s": _MAYBE, "longest_tether": _MAYBE,
+    "entangled": (int, type(None)), "redrawn": (int, type(None)),
+    "problem_sha256": (str, type(None)), "versions": (dict, type(None)),
+    "history": (list, type(None)), "lower_bound_of": (str, type(None)),
+}  # fmt: skip
+"""Which types the fields of a row may have; a page is made of them without asking again."""
+
+
+def _fits(value: object, kinds: tuple[type, ...]) -> bool:
+    if isinstance(value, bool) or not isinstance(value, kinds):
+        return False
+    return not isinstance(value, int | float) or abs(value) <= LARGEST
+
+
+def _no_constant(name: str) -> None:
+    raise ValueError(name)
+
+
+class RowsFile:
+    """A results file of one study, open for appending; nobody else may have it open.
+
+    Attributes
+    ----------
+    done
+        Ids of the trials that are in it.
+
+    Raises
+    ------
+    InputError
+        The file holds anything but rows of this study.
+    """
+
+    def __init__(self, path: str | Path, study: str) -> None:
+        self.path = Path(path)
+        if path == STANDARD:
+            raise InputError("-: a comparison resumes from its results; expected a file's name")
+        try:
+            if self.path.exists() and not self.path.is_file():
+                raise InputError(f"{path}: expected a file of results, not a folder or a device")
+            self._fd = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+        try:
+            fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(self._fd)
+            raise InputError(f"{path}: another comparison is writing to it") from None
+        try:
+            rows = read_rows(path)
+            check_study(rows, study, str(path))
+        except InputError:
+            os.close(self._fd)
+            raise
+        self.done = {row["trial"] for row in rows}
+        whole = self.path.read_bytes()
+        os.ftruncate(self._fd, whole.rfind(b"\n") + 1)
+
+    def append(self, row: TrialRow) -> None:
+        """Write a row, to the disk; InputError if it cannot be, and then nothing of it is there."""
+        data = (json.dumps(row, allow_nan=False) + "\n").encode()
+        end = os.fstat(self._fd).st_size
+        try:
+            while data:
+                data = data[os.write(self._fd, data) :]
+            os.fsync(self._fd)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._fd, end)
+            raise InputError(f"{self.path}: cannot be written: {error.strerror}") from None
+        self.done.add(row["trial"])
+
+    def close(self) -> None:
+        """Let others have it."""
+        os.close(self._fd)
+
+    def __enter__(self) -> RowsFile:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def check_study(rows: Iterable[TrialRow], study: str, source: str) -> None:
+    """InputError if a row belongs to another study (by its sha256)."""
+    for number, row in enumerate(rows, start=1):
+        if row["study"] != study:
+            raise InputError(
+                f"{source}: line {number}: is of another study ({row['study_name']!r}, sha256 "
+                f"{row['study'][:12]}…); name another file"
+            )
+
+
+def combine(sources: list[str], target: str) -> int:
+    """Add the rows of shards of one study to a results file, each trial once; how many that makes.
+
+    Raises InputError if the sources hold no trial or rows of several studies, and if the target
+    exists and is anything but results of the same study.
+    """
+    found: list[TrialRow] = []
+    for source in sources:
+        rows = read_rows(source)
+        check_study(rows, (found or rows)[0]["study"] if found or rows else "", source)
+        found += rows
+    if not found:
+        raise InputError(f"{sources[0]}: holds no trial yet")
+    with RowsFile(target, found[0]["study"]) as out:
+        for row in found:
+            if row["trial"] not in out.done:
+                out.append(row)
+        return len(out.done)

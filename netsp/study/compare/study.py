@@ -1,0 +1,289 @@
+"""A study: which worlds, roadmaps, solvers and seeds are tried with one another."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from netsp.base.errors import InputError
+from netsp.base.files import read_text
+from netsp.model.field_types import Integer, Name, Number, Positive
+from netsp.model.random_worlds import FAMILIES
+from netsp.model.validated import Model, explain
+from netsp.plan.solve_problem import check_solver
+from netsp.plan.solver_table import ROADMAPS, SOLVERS
+
+Whole = Annotated[Integer, Field(ge=1, le=100_000)]
+Natural = Annotated[Integer, Field(ge=0, le=2**62)]
+
+
+MOST_TRIALS = 500_000
+"""Of one study."""
+
+
+class Worlds(Model):
+    """Random worlds `first` to `first + count - 1` of a family (`netsp.model.random_worlds`)."""
+
+    family: Annotated[str, Field(description="of random worlds")] = "icra2017"
+    count: Annotated[Whole, Field(description="worlds per cell")] = 10
+    first: Annotated[Natural, Field(description="seed of the first")] = 0
+    obstacles: Annotated[
+        Natural | tuple[Natural, Natural] | None,
+        Field(
+            description="per world: how many, or least and most of a number that is drawn "
+            "uniformly; null for the family's own"
+        ),
+    ] = None
+    side: Annotated[Positive, Field(description="of the square, in units of length")] = 500.0
+    radii: Annotated[
+        tuple[Positive, Positive],
+        Field(description="least and greatest radius of obstacles, in units of length"),
+    ] = (10.0, 30.0)
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        if self.family not in FAMILIES:
+            raise ValueError(f"family: unknown {self.family!r}; expected one of {_list(FAMILIES)}")
+        if isinstance(self.obstacles, tuple) and self.obstacles[0] > self.obstacles[1]:
+            raise ValueError(
+                "obstacles: expected minimum <= maximum, got {} and {}".format(*self.obstacles)
+            )
+        if self.radii[0] > self.radii[1]:
+            raise ValueError(
+                f"radii: expected minimum <= maximum, got {self.radii[0]:g} and {self.radii[1]:g}"
+            )
+        return self
+
+
+class StudyRoadmap(Model):
+    """A roadmap by name, with options; `label` tells it apart in the results."""
+
+    name: Annotated[str, Field(description="taut, prm or one of another package")] = "taut"
+    label: Annotated[Name, Field(description="in tables; the name if empty")] = ""
+    options: Annotated[dict[str, Any], Field(description="of the roadmap, by name")] = Field(
+        default_factory=dict
+    )
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        if self.name not in ROADMAPS:
+            raise ValueError(
+                f"name: unknown roadmap {self.name!r}; expected one of {_list(ROADMAPS)}"
+            )
+        return self
+
+
+class StudySolver(Model):
+    """A solver by name, with options and limits of its own; `label` tells it apart."""
+
+    name: Annotated[str, Field(description="one of netsp or of another package")]
+    label: Annotated[Name, Field(description="in tables; the name if empty")] = ""
+    time_limit: Annotated[Positive | None, Field(description="seconds; null for the study's")] = (
+        None
+    )
+    iteration_limit: Annotated[
+        Annotated[Integer, Field(ge=1, lt=2**62)] | None,
+        Field(description="of the solver; null for none"),
+    ] = None
+    options: Annotated[dict[str, Any], Field(description="of the solver, by name")] = Field(
+        default_factory=dict
+    )
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        try:
+            SOLVERS.named(self.name)
+        except InputError as error:
+            raise ValueError(
+                f"name: {str(error).replace('solver: unknown', 'unknown solver')}"
+            ) from None
+        try:
+            check_solver(self.name, self.options)
+        except InputError as error:
+            raise ValueError(str(error)) from None
+        return self
+
+
+class Study(Model):
+    """Everything tried with everything: goals x tether lengths x worlds x roadmaps x solvers x
+    seeds.
+
+    Attributes
+    ----------
+    time_limit
+        Seconds for a solver that has none of its own.
+    memory_limit
+        GiB for one trial beyond what the worker needs to start.
+    """
+
+    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
+    name: Annotated[Annotated[Name, Field(min_length=1)], Field(description="of the study")]
+    goals: Annotated[
+        Annotated[tuple[Whole, ...], Field(min_length=1)], Field(description="numbers of goals")
+    ]
+    tether_lengths: Annotated[
+        Annotated[tuple[Positive, ...], Field(min_length=1)],
+        Field(description="in units of length"),
+    ]
+    worlds: Annotated[Worlds, Field(description="which random worlds")] = Worlds()
+    roadmaps: Annotated[
+        Annotated[tuple[StudyRoadmap, ...], Field(min_length=1)], Field(description="tried each")
+    ] = (StudyRoadmap(),)
+    solvers: Annotated[
+        Annotated[tuple[StudySolver, ...], Field(min_length=1)], Field(description="tried each")
+    ]
+    seeds: Annotated[
+        Annotated[tuple[Natural, ...], Field(min_length=1)], Field(description="of the solvers")
+    ] = (0,)
+    time_limit: Annotated[
+        Positive | None, Field(description="seconds of a trial; null for none")
+    ] = 120.0
+    memory_limit: Annotated[
+        Annotated[Number, Field(gt=0, le=1e6)] | None,
+        Field(description="GiB of a trial; null for none"),
+    ] = None
+
+    @model_validator(mode="after")
+    def _told_apart(self) -> Self:
+        for what, specs in (("roadmaps", self.roadmaps), ("solvers", self.solvers)):
+            labels = [s.label or s.name for s in specs]
+            twice = [name for name in labels if labels.count(name) > 1]
+            if twice:
+                raise ValueError(f"{what}: {twice[0]!r} appears twice; give each a label")
+        for what in ("goals", "tether_lengths", "seeds"):
+            values = getattr(self, what)
+            again = [v for v in values if values.count(v) > 1]
+            if again:
+                raise ValueError(f"{what}: {again[0]:g} appears twice; expected each once")
+        count = self.worlds.count * len(self.goals) * len(self.tether_lengths)
+        count *= len(self.roadmaps) * len(self.solvers) * len(self.seeds)
+        if count > MOST_TRIALS:
+            raise ValueError(f"{count} trials; expected at most {MOST_TRIALS}")
+        return self
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a study file; InputError with key and line for anything wrong."""
+        text = read_text(path)
+        try:
+            data = tomllib.loads(text)
+        except (ValueError, RecursionError) as error:  # endless numbers, deep nesting, too
+            raise InputError(f"{path}: not TOML that netsp reads: {error}"[:300]) from None
+        return cls.checked(data, str(path), text)
+
+    @classmethod
+    def checked(cls, data: dict[str, Any], source: str, text: str = "") -> Self:
+        """A study from plain data; `text` is where it came from, for the line of a complaint."""
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            where = error.errors()[0]["loc"]
+            raise InputError(f"{source}: {_line(text, where)}{explain(error)}") from None
+
+    @property
+    def sha256(self) -> str:
+        """Hash of what the trials depend on, without the name."""
+        return _digest(self.model_dump(mode="json", exclude={"name"}))
+
+    def trials(self) -> Iterator[Trial]:
+        """All trials, those of one world next to one another."""
+        for world in range(self.worlds.first, self.worlds.first + self.worlds.count):
+            for goals in self.goals:
+                for tether in self.tether_lengths:
+                    for roadmap in self.roadmaps:
+                        for solver in self.solvers:
+                            for seed in self.seeds:
+                                yield self._trial(world, goals, tether, roadmap, solver, seed)
+
+    def _trial(
+        self,
+        world: int,
+        goals: int,
+        tether: float,
+        roadmap: StudyRoadmap,
+        solver: StudySolver,
+        seed: int,
+    ) -> Trial:
+        recipe = self.worlds.model_dump(mode="json", exclude={"count", "first"})
+        return Trial(
+            world={"seed": world, **recipe, "goals": goals, "tether_length": tether},
+            roadmap={**roadmap.model_dump(mode="json"), "label": roadmap.label or roadmap.name},
+            solver={
+                **solver.model_dump(mode="json"),
+                "label": solver.label or solver.name,
+                "time_limit": solver.time_limit or self.time_limit,
+            },
+            seed=seed,
+            memory_limit=self.memory_limit,
+        )
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One solver on one world, as plain data that a worker anywhere can run.
+
+    Attributes
+    ----------
+    world
+        Arguments of `netsp.model.random_worlds.reachable_world`.
+    roadmap
+        Name, label, options.
+    solver
+        Name, label, options, limits.
+    seed
+        Of the solver, and of a roadmap that samples.
+    """
+
+    world: dict[str, Any]
+    roadmap: dict[str, Any]
+    solver: dict[str, Any]
+    seed: int
+    memory_limit: float | None = None
+
+    @property
+    def id(self) -> str:
+        """Hash of all of it: the same trial anywhere."""
+        return _digest(
+            {
+                "world": self.world, "roadmap": self.roadmap, "solver": self.solver,
+                "seed": self.seed,
+            }
+        )[:16]  # fmt: skip
+
+
+def shard(trials: list[Trial], part: int, of: int) -> list[Trial]:
+    """Part 1 to `of` of the trials, dealt out in turn; together the parts are all of them."""
+    return trials[part - 1 :: of]
+
+
+def _digest(data: Any) -> str:
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
+
+
+def _line(text: str, where: tuple[int | str, ...]) -> str:
+    """``line N: `` of the key in question, as far as it can be found by sight."""
+    lines = text.splitlines()
+    at, found = 0, None
+    for k, part in enumerate(where):
+        if isinstance(part, int):
+            heads = [n for n, s in enumerate(lines) if s.strip() == f"[[{where[k - 1]}]]"]
+            if part < len(heads):
+                at = found = heads[part]
+            continue
+        pattern = re.compile(rf"\s*(\[+\s*)?\"?{re.escape(part)}\"?\s*(=|\])")
+        hit = next((n for n in range(at, len(lines)) if pattern.match(lines[n])), None)
+        if hit is not None:
+            at = found = hit
+    return "" if found is None else f"line {found + 1}: "
+
+
+def _list(names: Any) -> str:
+    return ", ".join(names)

@@ -1,0 +1,73 @@
+"""A comparison from study to results file: what is done already is left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from netsp.study.compare.pool import run_all
+from netsp.study.compare.rows import FAILED, RowsFile, TrialRow
+from netsp.study.compare.study import Study, Trial, shard
+from netsp.study.compare.trial import check, full_row
+
+
+class Executor(Protocol):
+    """Where trials are run."""
+
+    def __call__(self, trials: list[Trial]) -> Iterator[tuple[Trial, TrialRow]]:
+        """Each trial with its outcome, as they finish."""
+
+
+@dataclass(frozen=True)
+class Tally:
+    """How far a comparison has got: trials in all, done (those of earlier runs too), failed now."""
+
+    total: int
+    done: int
+    failed: int
+    begun: int
+
+
+def compare(
+    study: Study,
+    output: str | Path,
+    *,
+    jobs: int = 1,
+    part: tuple[int, int] = (1, 1),
+    executor: Executor | None = None,
+    on_row: Callable[[TrialRow, Tally], None] | None = None,
+) -> Tally:
+    """Run the trials of a study that the results file does not hold yet, and append their rows.
+
+    Parameters
+    ----------
+    jobs
+        Processes on this machine, unless an executor is given.
+    part
+        (i, n), the i-th of n shards.
+    on_row
+        Called with every new row.
+
+    Raises InputError if the file holds anything but rows of this study, or options of a roadmap do
+    not exist. A trial that fails has a row and is not run again.
+    """
+    trials = shard(list(study.trials()), *part)
+    for trial in {t.roadmap["label"]: t for t in trials}.values():
+        check(trial)
+    with RowsFile(output, study.sha256) as rows:
+        left = [t for t in trials if t.id not in rows.done]
+        begun = done = len(trials) - len(left)
+        failed = 0
+        outcomes = run_all(left, jobs) if executor is None else executor(left)
+        with closing(outcomes):  # type: ignore[type-var]
+            for trial, outcome in outcomes:
+                row = full_row(trial, outcome, study.sha256, study.name)
+                rows.append(row)
+                done += 1
+                failed += row["status"] in FAILED
+                if on_row:
+                    on_row(row, Tally(len(trials), done, failed, begun))
+        return Tally(len(trials), done, failed, begun)

@@ -1,0 +1,152 @@
+"""One trial, run where it is: a world, a roadmap, a solver; the outcome as a row."""
+
+from __future__ import annotations
+
+import datetime
+import functools
+import os
+import platform
+import time
+from typing import Any
+
+from netsp.base.errors import (
+    InfeasibleError,
+    InputError,
+    LimitReachedError,
+    MemoryLimitError,
+    NetspError,
+    PluginError,
+)
+from netsp.gtsp.travel.result import Progress
+from netsp.model.problem import Goal, Problem
+from netsp.model.solution import Status
+from netsp.study.compare.rows import SCHEMA, TrialRow
+from netsp.study.compare.study import Trial
+
+MOST_POINTS = 200
+"""Most points of a trial's history of bests that a row keeps."""
+
+
+@functools.lru_cache(maxsize=4)
+def _world(recipe: tuple[tuple[str, Any], ...]) -> tuple[Problem, int]:
+    from netsp.model.random_worlds import reachable_world
+
+    return reachable_world(**dict(recipe))
+
+
+def world_of(trial: Trial) -> tuple[Problem, int]:
+    """The problem of a trial, and how many worlds were drawn in vain before it."""
+    recipe = {k: tuple(v) if isinstance(v, list) else v for k, v in trial.world.items()}
+    return _world(tuple(sorted(recipe.items())))
+
+
+def run(trial: Trial) -> TrialRow:
+    """Run a trial; whatever netsp complains of becomes the row's status `error` and its message.
+
+    Every trial builds its own roadmap and measures its own legs, so its times are what a user would
+    see. Other exceptions are the worker's business (`netsp.study.compare.pool`).
+    """
+    from netsp.plan.solve_problem import solve
+
+    row: TrialRow = {"status": "error", "message": ""}
+    history: list[tuple[float, float | None, float | None]] = []
+
+    def listen(p: Progress) -> None:
+        bound = None if p.bound is None else p.bound.length
+        if not history or (p.incumbent, bound) != history[-1][1:]:
+            history.append((round(p.time, 4), p.incumbent, bound))
+
+    begin, cpu_begin = time.perf_counter(), _cpu_s()
+    try:
+        problem, row["redrawn"] = world_of(trial)
+        row["problem_sha256"] = problem.sha256
+        begin, cpu_begin = time.perf_counter(), _cpu_s()
+        solution = solve(
+            problem,
+            trial.solver["name"],
+            roadmap=trial.roadmap["name"],
+            roadmap_options=trial.roadmap["options"],
+            time_limit=trial.solver["time_limit"],
+            iteration_limit=trial.solver["iteration_limit"],
+            seed=trial.seed,
+            params=trial.solver["options"],
+            on_progress=listen,
+        )
+    except InfeasibleError as error:
+        row |= {"status": "infeasible", "message": str(error)}
+    except MemoryLimitError as error:
+        row["message"] = str(error)
+    except LimitReachedError as error:  # also: a sampled roadmap that does not reach a goal
+        row |= {"status": Status.NO_SOLUTION_FOUND.value, "message": str(error)}
+    except PluginError:
+        raise
+    except NetspError as error:
+        row["message"] = str(error)
+    else:
+        row |= {
+            "status": solution.status.value,
+            "length": solution.length,
+            "lower_bound": solution.lower_bound,
+            "lower_bound_of": None if solution.bound is None else solution.bound.scope.value,
+            "gap": solution.gap,
+            "entangled": len(solution.entangled),
+            "longest_tether": max((v.tether_length for v in solution.tour), default=0.0),
+            **solution.timings.model_dump(),
+            "history": thinned(history),
+            "versions": solution.versions,
+        }
+    row.setdefault("total_s", round(time.perf_counter() - begin, 6))
+    row["cpu_s"] = round(_cpu_s() - cpu_begin, 6)
+    return row
+
+
+def _cpu_s() -> float:
+    """Return the CPU seconds so far of this process and of the programs that it has run."""
+    t = os.times()
+    return t.user + t.system + t.children_user + t.children_system
+
+
+def thinned(history: list[Any]) -> list[Any]:
+    """At most `MOST_POINTS`, evenly, the first and the last among them."""
+    n = len(history)
+    if n <= MOST_POINTS:
+        return history
+    return [history[k * (n - 1) // (MOST_POINTS - 1)] for k in range(MOST_POINTS)]
+
+
+def full_row(trial: Trial, outcome: TrialRow, study: str, study_name: str) -> TrialRow:
+    """The immutable row: what was tried, what came of it, where and when."""
+    return {
+        "schema": SCHEMA,
+        "study": study,
+        "study_name": study_name,
+        "trial": trial.id,
+        "world": trial.world,
+        "roadmap": trial.roadmap,
+        "solver": trial.solver,
+        "seed": trial.seed,
+        **outcome,
+        "finished": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "machine": _machine(),
+    }
+
+
+@functools.cache
+def _machine() -> str:
+    return f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
+
+
+def check(trial: Trial) -> None:
+    """InputError now rather than in every trial: a roadmap's options that are unknown or wrong, by
+    building it over a problem of one goal."""
+    from netsp.plan.solve_problem import build_roadmap
+
+    name, options = trial.roadmap["name"], trial.roadmap["options"]
+    goal = Goal(position=(1.0, 0.0, 0.0))
+    problem = Problem(base=(0.0, 0.0, 0.0), goals=(goal,), obstacles=(), tether_length=3.0)
+    try:
+        build_roadmap(problem, name, **options)
+    except InfeasibleError:
+        pass  # so few samples that nothing is joined; a trial may still have luck
+    except (TypeError, ValueError) as error:
+        raise InputError(f"roadmap {name!r}: options {options}: {error}") from None

@@ -1,0 +1,268 @@
+"""Runs a solver over the library, and ranks solvers by what they found."""
+
+from __future__ import annotations
+
+import datetime
+import functools
+import importlib
+import json
+import os
+import shlex
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from netsp.base.clock import Clock, until_interrupt
+from netsp.base.errors import InputError, NetspError
+from netsp.base.files import read_text
+from netsp.base.registry import foreign
+from netsp.judge import verify
+from netsp.model.field_types import Name, NonNegative, Total
+from netsp.model.problem import Problem
+from netsp.model.solution import Solution
+from netsp.model.validated import Model, read_model
+from netsp.study.library.records import SAME, Library
+
+LATE, LATE_S = 1.1, 5.0
+"""What takes longer than so many times its limit, and so many seconds (of loading what it needs),
+does not count."""
+
+GRACE = 10.0
+"""Seconds beyond twice its limit after which a command is killed."""
+
+
+class Row(Model):
+    """What a solver found for a problem."""
+
+    schema_version: Annotated[Literal[1], Field(description="of the row's format")] = 1
+    solver: Annotated[Name, Field(description="what it is called in the ranking")]
+    problem: Annotated[Name, Field(description="name of the problem")]
+    limit: Annotated[NonNegative, Field(description="seconds that it was given")]
+    seconds: Annotated[NonNegative, Field(description="seconds that it took, from file to file")]
+    length: Annotated[Total | None, Field(description="of its tour; null for none")] = None
+    verified: Annotated[bool, Field(description="whether the judge passed it")] = False
+    message: Annotated[str, Field(description="why there is none")] = ""
+    date: Annotated[Name, Field(description="when")] = "unknown"
+
+
+Solve = Callable[[Problem, Path, float, Callable[[], bool]], Solution]
+"""Problem, its file, seconds, and whether to stop → solution."""
+
+
+def by_name(name: str, seed: int) -> Solve:
+    """A solver of netsp or of a plug-in, or a function ``module:attribute`` of a travel graph.
+
+    Raises
+    ------
+    InputError
+        There is no such function.
+    """
+    from netsp.plan.solve_problem import check_solver, solve
+
+    solver: Any = name
+    if ":" in name:
+        module, _, attribute = name.partition(":")
+        sys.path.insert(0, os.getcwd())
+        try:
+            solver = getattr(importlib.import_module(module), attribute)
+        except (ImportError, AttributeError) as error:
+            raise InputError(f"--solver: {name}: cannot be imported: {error}") from None
+        finally:
+            sys.path.remove(os.getcwd())
+        if callable(solver):
+            solver = _guarded(solver, name)
+    check_solver(solver, None)
+    return lambda problem, _, limit, should_stop: solve(
+        problem, solver, time_limit=limit, seed=seed, should_stop=should_stop
+    )
+
+
+def _guarded(function: Callable[..., Any], name: str) -> Callable[..., Any]:
+    """The same, whose errors cost a row and no more; it is asked for the same arguments."""
+
+    @functools.wraps(function)
+    def call(*args: Any, **more: Any) -> Any:
+        with foreign(f"{name} failed"):
+            return function(*args, **more)
+
+    return call
+
+
+def by_command(command: str) -> Solve:
+    """A command that reads a problem file and writes a solution file: ``{problem}``, ``{solution}``
+    and ``{seconds}`` stand for these.
+
+    Raises
+    ------
+    InputError
+        It does not say where problem and solution go.
+    """
+    words = shlex.split(command)
+    for place in ("{problem}", "{solution}"):
+        if not any(place in w for w in words):
+            raise InputError(f"--command: expected {place} in it, got {command!r}")
+
+    def solve(
+        problem: Problem, path: Path, limit: float, should_stop: Callable[[], bool]
+    ) -> Solution:
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder) / "solution.json"
+            filled = [
+                w.replace("{problem}", str(path)).replace("{solution}", str(out))
+                .replace("{seconds}", f"{limit:g}") for w in words
+            ]  # fmt: skip
+            try:
+                done = subprocess.run(
+                    filled, timeout=2.0 * limit + GRACE, stdout=subprocess.DEVNULL,
+                    stderr=subprocess.PIPE, text=True, errors="replace",
+                )  # fmt: skip
+            except OSError as error:
+                raise InputError(f"--command: {words[0]}: {error.strerror or error}") from None
+            except subprocess.TimeoutExpired:
+                raise NetspError(f"did not end within {2.0 * limit + GRACE:g} s") from None
+            if not out.exists():
+                last = (done.stderr.strip().splitlines() or ["nothing said"])[-1]
+                raise NetspError(f"wrote no solution; exit code {done.returncode}: {last[:120]}")
+            return Solution.load(out)
+
+    return solve
+
+
+def run(
+    library: Library, names: Sequence[str], label: str, solve: Solve, limit: float
+) -> Iterator[Row]:
+    """Run a solver over problems, one after the other. Ctrl-C ends it; what was cut short by it has
+    no row.
+
+    Parameters
+    ----------
+    library : Library
+        Where the problems are.
+    names : sequence of str
+        Which.
+    label : str
+        What the solver is called.
+    solve : callable
+        The solver.
+    limit : float
+        Seconds for each.
+
+    Yields
+    ------
+    Row
+        Of each problem; one without a tour says why.
+
+    Raises
+    ------
+    InputError
+        A command that cannot be run at all.
+    """
+    with until_interrupt(None) as clock:
+        for name in names:
+            row = _run(library, name, label, solve, limit, clock)
+            if clock.stopped:
+                return
+            yield row
+
+
+def _run(
+    library: Library, name: str, label: str, solve: Solve, limit: float, clock: Clock
+) -> Row:  # fmt: skip
+    """Of one problem."""
+    problem = library.problem(name)
+    begin = time.perf_counter()
+    row: dict[str, Any] = {"solver": label, "problem": name, "limit": limit,
+                           "date": str(datetime.date.today())}  # fmt: skip
+    try:
+        solution = solve(problem, library.paths[name], limit, lambda: clock.stopped)
+        row["seconds"] = round(time.perf_counter() - begin, 3)
+        if row["seconds"] > LATE * limit + LATE_S:
+            row["message"] = f"late: answered after {row['seconds']:.1f} s of {limit:g}"
+        elif solution.length is None:
+            row["message"] = solution.status.value
+        elif solution.problem.sha256 != problem.sha256:
+            row["message"] = "a solution of another problem"
+        else:
+            verdict = verify(problem, solution)
+            row |= {"length": solution.length, "verified": bool(verdict)}
+            if not verdict:
+                row["message"] = next(c.name for c in verdict.checks if not c.passed)
+    except NetspError as error:
+        if isinstance(error, InputError) and str(error).startswith("--"):
+            raise
+        row |= {"seconds": round(time.perf_counter() - begin, 3), "message": str(error)[:200]}
+    return Row(**row)
+
+
+def read_rows(path: str | Path) -> list[Row]:
+    """Rows of a file, one to a line; none if there is no file.
+
+    Raises
+    ------
+    InputError
+        A line is no row.
+    """
+    if not Path(path).exists():
+        return []
+    lines = [line for line in read_text(path).splitlines() if line.strip()]
+    return [read_model(Row, line, f"{path}: line {k}") for k, line in enumerate(lines, 1)]
+
+
+def append_row(path: str | Path, row: Row) -> None:
+    """Add a row to a file.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+    """
+    try:
+        with open(path, "a", encoding="utf-8") as stream:
+            stream.write(json.dumps(row.model_dump(mode="json"), ensure_ascii=False) + "\n")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def ranking(library: Library, rows: Iterable[Row]) -> list[dict[str, Any]]:
+    """One entry for each solver and limit, the best first: by the mean share above the best known,
+    where a problem without a verified tour counts as twice the best.
+
+    Parameters
+    ----------
+    library : Library
+        With the records.
+    rows : iterable of Row
+        Of problems that have a record; others do not count.
+
+    Returns
+    -------
+    list of dict
+        ``solver``, ``limit``, ``problems``, ``verified``, ``best`` (as short as the best known),
+        ``above`` (mean share above it), ``worst``, ``seconds`` (median).
+    """
+    groups: dict[tuple[str, float], list[Row]] = {}
+    for row in rows:
+        if row.problem in library.records:
+            groups.setdefault((row.solver, row.limit), []).append(row)
+    out = []
+    for (solver, limit), some in groups.items():
+        above = [_above(row, library.records[row.problem].length) for row in some]
+        out.append({
+            "solver": solver, "limit": limit, "problems": len(some),
+            "verified": sum(row.verified for row in some),
+            "best": sum(a <= SAME for a in above),
+            "above": statistics.fmean(above), "worst": max(above),
+            "seconds": statistics.median(row.seconds for row in some),
+        })  # fmt: skip
+    return sorted(out, key=lambda e: (e["above"], e["seconds"]))
+
+
+def _above(row: Row, best: float) -> float:
+    return row.length / best - 1.0 if row.verified and row.length is not None else 1.0

@@ -1,0 +1,277 @@
+"""Problems in a folder, and a file with the best that is known of each."""
+
+from __future__ import annotations
+
+import datetime
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import ConfigDict, Field
+
+from netsp.base.errors import InputError, VerificationError
+from netsp.base.files import FileModel, write_text
+from netsp.hsignature import Word
+from netsp.judge import Verification, verify
+from netsp.model.bound_scope import LowerBound, Scope, gap_of, strongest
+from netsp.model.field_types import Name, NonNegative, Total
+from netsp.model.problem import Problem
+from netsp.model.solution import Solution
+from netsp.model.validated import Model
+
+RECORDS = "records.json"
+
+SAME = 1e-6
+"""Lengths that differ by no larger share are the same."""
+
+
+class Record(Model):
+    """Best known tour of a problem, with a lower bound on all tours."""
+
+    problem: Annotated[Name, Field(description="name of the problem, and of its file")]
+    sha256: Annotated[str, Field(description="of what its answer depends on")]
+    length: Annotated[Total, Field(description="of the best tour known, in the problem's units")]
+    lower_bound: Annotated[
+        Total | None,
+        Field(description="no tour at all is shorter (scope all_tours); null if nothing is known"),
+    ] = None
+    solver: Annotated[Name, Field(description="what found the tour")]
+    by: Annotated[Name, Field(description="who ran it")]
+    seconds: Annotated[NonNegative, Field(description="that it took")]
+    commit: Annotated[Name, Field(description="of netsp, where that found it")] = "unknown"
+    date: Annotated[Name, Field(description="when, as 2026-11-25")]
+    verified: Annotated[bool, Field(description="whether the judge passed it")] = True
+    tour: Annotated[
+        tuple[tuple[int, Word], ...],
+        Field(description="goals, numbered from 0, with the word of the tether at each"),
+    ] = ()
+
+    @property
+    def bound(self) -> LowerBound | None:
+        """Lower bound on all tours; None if nothing is known."""
+        return None if self.lower_bound is None else LowerBound(self.lower_bound, Scope.ALL_TOURS)
+
+    @property
+    def proven(self) -> bool:
+        """Whether no tour is shorter."""
+        return self.bound is not None and self.bound.proves(self.length)
+
+    @property
+    def gap(self) -> float | None:
+        """(length - lower_bound) / length; None without a bound."""
+        return gap_of(self.length, self.bound)
+
+
+class RecordFile(FileModel):
+    """The records of a library."""
+
+    file_kind: ClassVar[str] = "records"
+
+    model_config = ConfigDict(title="netsp library")
+
+    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
+    records: Annotated[tuple[Record, ...], Field(description="one for each problem")] = ()
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A solution beside what is known.
+
+    Parameters
+    ----------
+    name : str
+        Of the problem.
+    verification : Verification
+        The judge's verdict.
+    length : float, optional
+        Of the solution.
+    record : Record, optional
+        What is known; None for nothing.
+    """
+
+    name: str
+    verification: Verification
+    length: float | None
+    record: Record | None
+
+    @property
+    def above(self) -> float | None:
+        """By which share it is longer than the best known; negative if it is shorter."""
+        if self.length is None or self.record is None:
+            return None
+        return self.length / self.record.length - 1.0
+
+    @property
+    def better(self) -> bool:
+        """Whether it is a tour shorter than any known, and passed the judge."""
+        if not self.verification or self.length is None:
+            return False
+        return self.above is None or self.above < -SAME
+
+
+class Library:
+    """A folder with problems and their records.
+
+    Parameters
+    ----------
+    folder : str or Path
+        The folder.
+
+    Raises
+    ------
+    InputError
+        There is no library in it.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+        files = self.folder.glob("*.json") if self.folder.is_dir() else iter(())
+        self.paths = {p.stem: p for p in sorted(files) if p.name != RECORDS}
+        if not self.paths:
+            raise InputError(
+                f"{folder}: there are no problems here; expected the folder problems/library of "
+                "the project (it is not part of the package)"
+            )
+        path = self.folder / RECORDS
+        known = RecordFile.load(path).records if path.exists() else ()
+        self.records = {r.problem: r for r in known}
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of the problems, by family and size."""
+        return iter(sorted(self.paths, key=_by_size))
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    def problem(self, name: str) -> Problem:
+        """A problem.
+
+        Parameters
+        ----------
+        name : str
+            Its name.
+
+        Returns
+        -------
+        Problem
+            From its file.
+
+        Raises
+        ------
+        InputError
+            There is none of that name, or its file is wrong.
+        """
+        if name not in self.paths:
+            raise InputError(f"problem: there is no {name!r} in {self.folder}")
+        return Problem.load(self.paths[name])
+
+    @cached_property
+    def names(self) -> dict[str, str]:
+        """sha256 → name."""
+        return {self.problem(name).sha256: name for name in self}
+
+    def compared(self, solution: Solution) -> Comparison:
+        """Judge a solution and compare it with what is known.
+
+        Parameters
+        ----------
+        solution : Solution
+            Of one of the problems, as they are: without margin or slack.
+
+        Returns
+        -------
+        Comparison
+            The judge's verdict, and the record.
+
+        Raises
+        ------
+        InputError
+            It is of none of the problems, or of grown obstacles.
+        """
+        name = self.names.get(solution.problem.sha256)
+        if name is None:
+            raise InputError(
+                f"solution: is of {solution.problem.name!r}, which is none of the problems in "
+                f"{self.folder} as they are there"
+            )
+        if solution.margin or solution.slack:
+            raise InputError("solution: was found with margin or slack; expected neither")
+        verification = verify(self.problem(name), solution)
+        return Comparison(name, verification, solution.length, self.records.get(name))
+
+    def take(
+        self, solution: Solution, by: str, commit: str = "unknown", bound: LowerBound | None = None
+    ) -> Comparison:
+        """Keep a solution as a record if it is better; `save` writes it.
+
+        Parameters
+        ----------
+        solution : Solution
+            Of one of the problems.
+        by : str
+            Who found it.
+        commit : str
+            Of the solver, where it is netsp.
+        bound : LowerBound, optional
+            Bound on all tours from a trusted solver. The judge cannot check a bound, so the bound
+            that a contribution states is ignored.
+
+        Returns
+        -------
+        Comparison
+            With the record as it was before.
+
+        Raises
+        ------
+        InputError
+            As of `compared`; a bound of another scope.
+        VerificationError
+            The judge did not pass it.
+        """
+        found = self.compared(solution)
+        if not found.verification or solution.length is None:
+            failed = [c.name for c in found.verification.checks if not c.passed]
+            raise VerificationError(f"{found.name}: the judge did not pass: {', '.join(failed)}")
+        old = found.record
+        if bound is not None and bound.scope is not Scope.ALL_TOURS:
+            raise InputError(
+                f"bound: holds for {bound.scope.tours}; expected one on {Scope.ALL_TOURS.tours}"
+            )
+        best = strongest(bound, None if old is None else old.bound)
+        low = None if best is None else best.length
+        if found.better:
+            self.records[found.name] = Record(
+                problem=found.name, sha256=solution.problem.sha256, length=solution.length,
+                lower_bound=None if low is None else min(low, solution.length),
+                solver=solution.solver, by=by, seconds=round(solution.timings.total_s, 3),
+                commit=commit, date=str(datetime.date.today()),
+                tour=tuple((v.goal, v.signature) for v in solution.tour),
+            )  # fmt: skip
+        elif old is not None and low is not None and low > (old.lower_bound or 0.0):
+            self.records[found.name] = old.model_copy(update={"lower_bound": min(low, old.length)})
+        return found
+
+    def save(self) -> None:
+        """Write the records, one to a line.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
+        rows = [
+            json.dumps(self.records[name].model_dump(mode="json"), ensure_ascii=False)
+            for name in self if name in self.records
+        ]  # fmt: skip
+        body = ",\n".join("  " + row for row in rows)
+        write_text(
+            self.folder / RECORDS, f'{{\n "schema_version": 1,\n "records": [\n{body}\n ]\n}}\n'
+        )
+
+
+def _by_size(name: str) -> tuple[object, ...]:
+    family, *numbers = name.split("-")
+    return (family, *(int(n) if n.isdigit() else 0 for n in numbers), name)

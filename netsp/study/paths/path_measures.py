@@ -1,0 +1,471 @@
+"""Measure a path in the plane of a problem: length, time, goals, tether and word.
+
+One function computes the figures that `netsp compare-path`, `netsp verify --measures` and the map
+show.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.base.geometry import polylines
+from netsp.hsignature import Word, concatenate, crossings, entangled, reduce
+from netsp.judge.stringpull import StringPuller
+from netsp.model.field_types import checked_argument
+from netsp.model.problem import Problem
+from netsp.model.validated import shown
+from netsp.study.paths.carried_tether import CarriedTether
+from netsp.study.paths.free_route import FreeSpace, Route, Stretch
+from netsp.study.paths.goal_visits import Passing, passings
+
+SPEED = 0.5
+"""Default speed of a path without time stamps, in the problem's units per second; the default of
+`netsp execute`, too."""
+
+
+@dataclass(frozen=True)
+class PathPolicy:
+    """Rules of when a goal counts as visited, and the accuracy of tether lengths.
+
+    Parameters
+    ----------
+    radius : float, optional
+        Distance from a goal at which it counts as visited, and from the base at which the path
+        counts as at home, in the problem's units; by default `radius_share` of the problem's size.
+    radius_share : float
+        Default radius as a share of the problem's size.
+    leave_ratio : float
+        Distance to which a path must leave a goal before it can visit it again, in radii; above 1,
+        so that noise of the positions makes no visits.
+    tether_error : float
+        Largest error of the longest tether along the path, as a share of the problem's tether.
+    """
+
+    radius: float | None = None
+    radius_share: float = 0.02
+    leave_ratio: float = 2.0
+    tether_error: float = 1e-6
+
+    def __post_init__(self) -> None:
+        if self.radius is not None:
+            checked_argument("radius", self.radius, 0.0)
+        checked_argument("radius_share", self.radius_share, 0.0, 1.0)
+        checked_argument("leave_ratio", self.leave_ratio, 1.0, 1e6)
+        checked_argument("tether_error", self.tether_error, 0.0, 1.0)
+
+    def radius_in(self, problem: Problem) -> float:
+        """Return the radius for a problem.
+
+        Parameters
+        ----------
+        problem : Problem
+            The problem; its size gives the default radius.
+
+        Returns
+        -------
+        float
+            In the problem's units; the default is rounded to two digits.
+        """
+        if self.radius is not None:
+            return float(self.radius)
+        return float(f"{self.radius_share * problem.scale:.2g}")
+
+
+@dataclass(frozen=True)
+class GoalVisit:
+    """Visit of a path to a goal.
+
+    Parameters
+    ----------
+    goal : int
+        Index of the goal.
+    is_first : bool
+        Whether this is the first visit to the goal or to one of its alternatives.
+    along : float
+        Length of the path up to the visit.
+    time_s : float
+        Seconds from the beginning of the path to the visit.
+    miss : float
+        Distance of the path from the goal.
+    tether : float, optional
+        Length of the taut tether at the goal, in 3D; None if no free path follows the path up to
+        the goal.
+    word : Word
+        Word of the tether at the goal.
+    """
+
+    goal: int
+    is_first: bool
+    along: float
+    time_s: float
+    miss: float
+    tether: float | None
+    word: Word
+
+
+@dataclass(frozen=True)
+class PathMeasures:
+    """Figures of one path. Lengths are in the problem's units.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem in whose plane the path runs.
+    length : float
+        Length in 3D.
+    duration_s : float
+        Duration, s.
+    is_timed : bool
+        Whether the duration comes from time stamps; else it comes from `speed`.
+    speed : float
+        Mean speed, or the given speed of a path without time stamps.
+    has_heights : bool
+        Whether the path was given with heights; else heights rise evenly between visited goals.
+    radius : float
+        Distance at which a goal counts as visited.
+    visits : tuple of GoalVisit
+        Visits in their order along the path.
+    start_gap, end_gap : float
+        Distance from the base, or from the end of the tether that was laid, at the beginning, and
+        from the base at the end.
+    is_closed : bool
+        Whether both gaps are within the radius.
+    longest_tether : float, optional
+        Greatest length of the taut tether anywhere along the path, in the class that the path gives
+        it; None if no free path follows the path to its end.
+    longest_at : float
+        Length along the path at which the tether is longest.
+    longest_place : (float, float)
+        Place at which the tether is longest.
+    end_tether : float, optional
+        Length of the taut tether at the end.
+    end_word : Word
+        Word of the tether at the end.
+    word : Word
+        Word of the path, closed by the straight line to the base.
+    entangled : tuple of int
+        Obstacles that the closed path is wrapped around.
+    stretches : tuple of Stretch
+        Parts of the path in obstacles, within their clearance, or out of bounds.
+    route : ndarray, shape (n, 3)
+        The path led round these parts, from the base and back; words and tethers are measured
+        along it.
+    route_end : int
+        Index of the point of `route` at which the path ends.
+    route_lengths : ndarray, shape (route_end + 1,)
+        Length along the path at the points of `route`.
+    points : ndarray, shape (k, 3)
+        The path with heights.
+    carried : CarriedTether
+        Tethers at the points of `route` up to the end of the path.
+    """
+
+    problem: Problem = field(repr=False)
+    length: float
+    duration_s: float
+    is_timed: bool
+    speed: float
+    has_heights: bool
+    radius: float
+    visits: tuple[GoalVisit, ...]
+    start_gap: float
+    end_gap: float
+    is_closed: bool
+    longest_tether: float | None
+    longest_at: float
+    longest_place: tuple[float, float]
+    end_tether: float | None
+    end_word: Word
+    word: Word
+    entangled: tuple[int, ...]
+    stretches: tuple[Stretch, ...]
+    route: Floats = field(repr=False, compare=False)
+    route_end: int
+    route_lengths: Floats = field(repr=False, compare=False)
+    points: Floats = field(repr=False, compare=False)
+    carried: CarriedTether = field(repr=False, compare=False)
+
+    @property
+    def order(self) -> tuple[int, ...]:
+        """Goals in the order of their first visits."""
+        return tuple(v.goal for v in self.visits if v.is_first)
+
+    @property
+    def revisits(self) -> dict[int, int]:
+        """Number of further visits to each goal that is visited more than once."""
+        out: dict[int, int] = {}
+        for v in self.visits:
+            if not v.is_first:
+                out[v.goal] = out.get(v.goal, 0) + 1
+        return out
+
+    @cached_property
+    def missing(self) -> tuple[int, ...]:
+        """Goals that the path misses, and whose alternatives it misses, too."""
+        cluster = self.problem.clusters
+        seen = {int(cluster[v.goal]) for v in self.visits}
+        return tuple(g for g in range(len(self.problem.goals)) if int(cluster[g]) not in seen)
+
+    @property
+    def is_free(self) -> bool:
+        """True if the path comes home and its tether is free there."""
+        return self.is_closed and not self.word and self.longest_tether is not None
+
+    @property
+    def fits(self) -> bool:
+        """True if the tether is long enough everywhere along the path."""
+        if self.longest_tether is None:
+            return False
+        limit = self.problem.tether_length
+        return self.longest_tether <= limit * (1.0 + 1e-7) + 1e-9 * self.problem.scale
+
+    def tether_profile(self, count: int = 200) -> Floats:
+        """Return the length of the tether along the path.
+
+        Parameters
+        ----------
+        count : int
+            Number of places, evenly along the route in the plan.
+
+        Returns
+        -------
+        ndarray, shape (count, 2)
+            Length along the path, and length of the taut tether; no rows if the tether is unknown.
+        """
+        if self.longest_tether is None:
+            return np.zeros((0, 2))
+        route = self.route[: self.route_end + 1]
+        rows = self.carried.profile(count)
+        s = np.interp(rows[:, 0], polylines.along(route[:, :2]), self.route_lengths)
+        return np.column_stack([s, rows[:, 1]])
+
+    @property
+    def is_inside(self) -> bool:
+        """True if the path avoids all obstacles and stays within the bounds."""
+        return all(s.kind == "clearance" for s in self.stretches)
+
+
+def measure_path(
+    problem: Problem,
+    path: npt.ArrayLike,
+    *,
+    times: npt.ArrayLike | None = None,
+    speed: float = SPEED,
+    policy: PathPolicy | None = None,
+    tether: npt.ArrayLike | None = None,
+) -> PathMeasures:
+    """Measure a path among a problem's obstacles.
+
+    Parts in an obstacle, within its clearance or out of bounds are reported; for words and tethers
+    they are replaced by a free path round the obstacle (`netsp.study.paths.free_route`). If the
+    path begins away from the base, its tether lies straight from the base to the beginning. If it
+    ends away from the base, a straight line closes it for `word` and `entangled`.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem with base, goals, obstacles, bounds and tether.
+    path : array_like, shape (n, 2) or (n, 3)
+        The path. Without heights, its heights rise evenly between those of the visited goals, as
+        along the legs of a tour.
+    times : array_like, shape (n,), optional
+        Time stamps of the points, s, in ascending order.
+    speed : float
+        Speed of a path without time stamps, in the problem's units per second.
+    policy : PathPolicy, optional
+        Rules of when a goal counts as visited.
+    tether : array_like, shape (k, 2) or (k, 3), optional
+        Line of the tether at the beginning, from the base on; by default straight.
+
+    Returns
+    -------
+    PathMeasures
+        Figures of the path.
+
+    Raises
+    ------
+    InputError
+        Fewer than two points, or points that are not finite; times in descending order, or another
+        number of times than points.
+
+    Examples
+    --------
+    >>> from netsp import Circle, Problem
+    >>> problem = Problem(base=(0, 0), goals=[(4, 0)], tether_length=9,
+    ...                   obstacles=[Circle(center=(2, 0), radius=1)])
+    >>> round_it = measure_path(problem, [(0, 0), (2, 2), (4, 0), (2, -2), (0, 0)])
+    >>> round_it.order, round_it.is_free, round_it.entangled
+    ((0,), False, (0,))
+    """
+    policy = policy or PathPolicy()
+    given = _polyline("path", path)
+    stamps = _times(times, len(given))
+    speed = checked_argument("speed", speed, 1e-9)
+    radius = policy.radius_in(problem)
+    base, goals = np.array(problem.base, dtype=float), problem.points[1:]
+    size = given.shape[1]
+    found = passings(given, goals[:, :size], radius, policy.leave_ratio * radius)
+    laid = None if tether is None else _polyline("tether", tether)
+    start = base if laid is None else np.append(laid[-1], base[len(laid[-1]) :])
+    start_gap = float(np.linalg.norm(given[0] - start[:size]))
+    end_gap = float(np.linalg.norm(given[-1] - base[:size]))
+    led = _Led(problem, given, found, laid)
+    seen = [p for p in found if led.sees(p, goals[p.goal])]
+    heights = given[:, 2] if size == 3 else None
+    if heights is None:
+        known = [(p.place, float(goals[p.goal, 2])) for p in seen]
+        end = [(len(given) - 1.0, float(base[2]))] if end_gap <= radius else []
+        heights = _rising(given, [(0.0, float(base[2])), *known, *end])
+    points = np.column_stack([given[:, :2], heights])
+    travelled = polylines.along(points)
+    length = float(travelled[-1])
+    seconds = travelled / speed if stamps is None else stamps - stamps[0]
+    duration = float(seconds[-1])
+    if stamps is not None:
+        speed = length / duration if duration > 0.0 else 0.0
+
+    route = led.lifted(heights)
+    carried = CarriedTether(led.puller, route[: led.last + 1])
+    place = np.arange(len(given))
+    cluster, before, visits = problem.clusters, set[int](), []
+    for p in seen:
+        k, goal = led.index(p.place), goals[p.goal]
+        visits.append(GoalVisit(
+            goal=p.goal, is_first=int(cluster[p.goal]) not in before,
+            along=float(np.interp(p.place, place, travelled)),
+            time_s=float(np.interp(p.place, place, seconds)), miss=p.miss,
+            tether=carried.length_to(k, goal) if led.is_reached(k) else None,
+            word=led.word(k, goal),
+        ))  # fmt: skip
+        before.add(int(cluster[p.goal]))
+    is_reached = led.is_reached(led.last)
+    error = policy.tether_error * problem.tether_length
+    at, longest = carried.longest(error, led.first) if is_reached else (led.first, 0.0)
+    word = led.closed_word
+    return PathMeasures(
+        problem=problem, length=length, duration_s=duration, is_timed=stamps is not None,
+        speed=speed, has_heights=size == 3, radius=radius, visits=tuple(visits),
+        start_gap=start_gap, end_gap=end_gap, is_closed=max(start_gap, end_gap) <= radius,
+        longest_tether=longest if is_reached else None,
+        longest_at=float(np.interp(led.route.along[at], led.flat, travelled)),
+        longest_place=(float(route[at, 0]), float(route[at, 1])),
+        end_tether=carried.length(led.last) if is_reached else None,
+        end_word=led.word(led.last), word=word,
+        entangled=tuple(k - 1 for k in entangled(word)),
+        stretches=led.space.stretches(given[:, :2], led.flat), route=route, route_end=led.last,
+        route_lengths=np.interp(led.route.along[: led.last + 1], led.flat, travelled),
+        points=points, carried=carried,
+    )  # fmt: skip
+
+
+class _Led:
+    """Route of a path: the tether at the beginning, the path, and the straight line home, led round
+    all obstacles.
+
+    Places on the path are counted in segments from its beginning. Lengths along the path are in the
+    plan; they are negative on the tether, and exceed the path's length on the line home.
+    """
+
+    def __init__(
+        self, problem: Problem, given: Floats, found: list[Passing], tether: Floats | None
+    ) -> None:
+        xy, base = given[:, :2], np.array(problem.base[:2], dtype=float)
+        self.flat = polylines.along(xy)
+        self.tether = np.vstack([problem.base[:2], xy[:1]]) if tether is None else tether[:, :2]
+        places = np.unique([*range(len(xy)), *(p.place for p in found)])
+        self._place = np.arange(len(xy), dtype=float)
+        dense = np.column_stack([np.interp(places, self._place, xy[:, k]) for k in range(2)])
+        out = polylines.along(self.tether)
+        home = float(np.hypot(*(dense[-1] - base)))
+        line = np.vstack([self.tether, dense, base])
+        along = np.concatenate([
+            out - out[-1], np.interp(places, self._place, self.flat), [self.flat[-1] + home]
+        ])  # fmt: skip
+        moves = np.concatenate([[True], np.any(np.diff(line, axis=0) != 0.0, axis=1)])
+        reach = float(np.abs(line - base).max())
+        self.puller = StringPuller(problem, max(reach, problem.scale))
+        self.space = FreeSpace(self.puller, reach)
+        self.route: Route = self.space.route(line[moves], along[moves])
+        s = self.route.along
+        self.first = min(int(np.searchsorted(s, 0.0)), len(s) - 1)
+        self.last = max(int(np.searchsorted(s, self.flat[-1], side="right")) - 1, self.first)
+        rays = problem.representative_points
+        self._rays, self._base_z = rays, float(problem.base[2])
+        pairs = np.stack([self.route.xy[:-1], self.route.xy[1:]], axis=1)
+        steps = [crossings(pair, rays) for pair in pairs]
+        self._begin = np.concatenate([[0], np.cumsum([len(step) for step in steps], dtype=int)])
+        self._letters = [letter for step in steps for letter in step]
+
+    def index(self, place: float) -> int:
+        """Return the index of the point of the route for a place on the path."""
+        s = float(np.interp(place, self._place, self.flat))
+        return int(np.argmin(np.abs(self.route.along - s)))
+
+    def sees(self, passing: Passing, goal: Floats) -> bool:
+        """Return whether a goal is in sight where the path is nearest to it."""
+        return self.space.sees(self.route.xy[self.index(passing.place)], goal[:2])
+
+    def is_reached(self, k: int) -> bool:
+        """Return whether a free path follows the path to a point of the route."""
+        return bool(self.route.along[k] <= self.route.shut_in)
+
+    def word(self, k: int, place: Floats | None = None) -> Word:
+        """Return the word of the tether at a point of the route, or at a place in sight of it."""
+        letters = self._letters[: self._begin[k]]
+        if place is None:
+            return reduce(letters)
+        return concatenate(letters, crossings([self.route.xy[k], place[:2]], self._rays))
+
+    @property
+    def closed_word(self) -> Word:
+        """Word of the path with the straight line home."""
+        return reduce(self._letters)
+
+    def lifted(self, heights: Floats) -> Floats:
+        """Return the route (n, 3) with the heights of the path's points."""
+        s = [self.route.along[0], *self.flat, self.route.along[-1]]
+        z = [self._base_z, *heights, self._base_z]
+        return np.column_stack([self.route.xy, np.interp(self.route.along, s, z)])
+
+
+def _rising(given: Floats, known: list[tuple[float, float]]) -> Floats:
+    """Return heights that rise evenly along a path between places of known height."""
+    flat = polylines.along(given[:, :2])
+    place = np.arange(len(given), dtype=float)
+    known = sorted(known)
+    s = np.interp([p for p, _ in known], place, flat)
+    return np.asarray(np.interp(flat, s, [z for _, z in known]))
+
+
+def _polyline(name: str, value: npt.ArrayLike) -> Floats:
+    try:
+        line = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        line = np.zeros(0)
+    if line.ndim != 2 or line.shape[1] not in (2, 3) or len(line) < 2:
+        raise InputError(
+            f"{name}: expected two points (x, y) or (x, y, z) or more, got {shown(value)}"
+        )
+    if not (np.abs(line) <= 1e12).all():
+        raise InputError(f"{name}: expected finite coordinates of at most 1e12")
+    return line
+
+
+def _times(value: npt.ArrayLike | None, count: int) -> Floats | None:
+    if value is None:
+        return None
+    times = np.asarray(value, dtype=float)
+    if times.shape != (count,) or not np.isfinite(times).all():
+        raise InputError(f"times: expected one number of seconds for each of {count} points")
+    if (np.diff(times) < 0.0).any():
+        k = int(np.argmax(np.diff(times) < 0.0)) + 1
+        raise InputError(
+            f"times: expected times that never fall, got {times[k]:g} after {times[k - 1]:g}"
+        )
+    return times

@@ -1,0 +1,221 @@
+"""What a moving picture shows: moments of a tour, a run, a flight or a planned mission."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.geometry import polylines
+from netsp.model.problem import Problem
+from netsp.model.solution import Solution
+from netsp.online.mission import Mission
+from netsp.online.run_log import Run
+from netsp.view.pictures.mission_picture import title_of
+from netsp.view.pictures.moments import (
+    Moment,
+    moments_of_flight,
+    moments_of_mission,
+    moments_of_plan,
+    moments_of_run,
+)
+from netsp.world.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class Film:
+    """What one panel shows.
+
+    Parameters
+    ----------
+    title : str
+        Above it.
+    moments : sequence of Moment
+        At even steps.
+    length : float
+        Of it all: seconds of a run, or the length of a tour.
+    places : ndarray, shape (n, 3)
+        Goals or waypoints, also those that are added on the way.
+    anchor : (x, y, z)
+        Of the tether, at first.
+    scene : Scene, optional
+        What stands still in a picture in space; by default, the map of each moment.
+    by_time : bool
+        Whether the length is of seconds.
+    """
+
+    title: str
+    moments: Sequence[Moment]
+    length: float
+    places: Floats
+    anchor: tuple[float, float, float]
+    scene: Scene | None = None
+    by_time: bool = True
+
+    @property
+    def measured_in(self) -> str:
+        """What its length is of, with the unit."""
+        if self.by_time:
+            return "time (s)"
+        problem = self.moments[0].problem
+        units = self.scene.units if self.scene else problem.units if problem else ""
+        return f"distance ({units})"
+
+    @property
+    def every_fate(self) -> set[str]:
+        """What becomes of any goal or waypoint."""
+        return {fate for m in self.moments for fate, which in m.fates.items() if which}
+
+
+@dataclass(frozen=True)
+class Step:
+    """A moment of each of several films.
+
+    Parameters
+    ----------
+    name : str
+        How far it is.
+    moments : tuple of int
+        Numbers of the films' moments.
+    """
+
+    name: str
+    moments: tuple[int, ...]
+
+
+def steps_of(films: Sequence[Film], count: int) -> tuple[str, list[Step]]:
+    """Films that run together, all by time or all by distance; the shorter ones wait at their ends.
+    Where some are of seconds and some of metres, all take as long.
+
+    Parameters
+    ----------
+    films : sequence of Film
+        One at least.
+    count : int
+        How many steps, two at least.
+
+    Returns
+    -------
+    str, list of Step
+        What the names of the steps measure, and the steps.
+    """
+    alike = len({film.measured_in for film in films}) == 1
+    longest = [max(film.length for film in films) if alike else film.length for film in films]
+    steps = []
+    for share in np.linspace(0.0, 1.0, count):
+        numbers = tuple(
+            round(min(share * most / film.length, 1.0) * (len(film.moments) - 1))
+            if film.length > 0.0 else 0
+            for film, most in zip(films, longest, strict=True)
+        )  # fmt: skip
+        steps.append(Step(f"{share * (longest[0] if alike else 100.0):.4g}", numbers))
+    return films[0].measured_in if alike else "done (%)", steps
+
+
+def film_of_plan(problem: Problem, solution: Solution, count: int) -> Film:
+    """Of a tour that is to be carried out.
+
+    Parameters
+    ----------
+    problem : Problem
+        The site.
+    solution : Solution
+        With a tour.
+    count : int
+        How many steps.
+
+    Returns
+    -------
+    Film
+        With the length of the tour.
+    """
+    title = f"{problem.name}: tour of {solution.length:.4g} {problem.units} by {solution.solver}"
+    moments = moments_of_plan(problem, solution, count)
+    length = float(polylines.length(np.array(solution.path)))
+    places = np.array([g.position for g in problem.goals]).reshape(-1, 3)
+    return Film(title, moments, length, places, problem.base, by_time=False)
+
+
+def film_of_run(
+    maps: Sequence[tuple[float, Problem]], rows: Sequence[dict[str, str]],
+    tethers: Sequence[dict[str, Any]], since: Mapping[str, Mapping[int, float]], count: int,
+) -> Film:  # fmt: skip
+    """Of a tour that was carried out.
+
+    Parameters
+    ----------
+    maps, rows, tethers, since
+        As of `netsp.view.pictures.moments.moments_of_run`.
+    count : int
+        How many moments, about.
+
+    Returns
+    -------
+    Film
+        With its seconds.
+    """
+    problem = maps[-1][1]
+    moments = moments_of_run(maps, rows, tethers, count, since)
+    places = np.array([g.position for g in problem.goals]).reshape(-1, 3)
+    seconds = float(rows[-1]["time"])
+    return Film(f"{problem.name}, carried out", moments, seconds, places, problem.base)
+
+
+def film_of_flight(run: Run, scene: Scene, count: int) -> Film:
+    """Of a flight in space.
+
+    Parameters
+    ----------
+    run : Run
+        The flight.
+    scene : Scene
+        Its scene.
+    count : int
+        How many moments, about.
+
+    Returns
+    -------
+    Film
+        With its seconds.
+    """
+    moments = moments_of_flight(run, scene, count)
+    mission = run.mission
+    title, seconds = f"{mission.name}\n{title_of(run)}", run.log[-1].time
+    return Film(title, moments, seconds, mission.places, mission.anchor, scene)
+
+
+def film_of_mission(mission: Mission, scene: Scene, count: int) -> Film:
+    """Of a planned mission.
+
+    Parameters
+    ----------
+    mission : Mission
+        With a tour.
+    scene : Scene
+        Its scene.
+    count : int
+        How many steps.
+
+    Returns
+    -------
+    Film
+        With the length of the tour.
+
+    Raises
+    ------
+    InputError
+        The mission has no tour.
+    """
+    moments = moments_of_mission(mission, scene, count)
+    assert mission.tour is not None
+    length, units = mission.tour.length, scene.units
+    stops = len(mission.tour.stops)
+    title = f"{mission.name}\nplanned by {mission.tour.solver}: {stops} of "
+    title += f"{len(mission.waypoints)} waypoints, {length:.4g} {units}"
+    return Film(
+        title, moments, polylines.length(mission.tour.line), mission.places, mission.anchor, scene,
+        by_time=False,
+    )  # fmt: skip

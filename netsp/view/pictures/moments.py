@@ -1,0 +1,278 @@
+"""Moments of a tour or a run: where the robot is, what it has gone, and how its tether lies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.base.geometry import polylines
+from netsp.model.problem import Problem
+from netsp.model.solution import Solution
+from netsp.online.execute.tour_plan import HOME
+from netsp.online.laid import present_tether
+from netsp.online.mission import Mission
+from netsp.online.mission_run import grid_of
+from netsp.online.run_log import Run
+from netsp.view.pictures.mission_picture import path_of, tethers_along
+from netsp.world.scene.scene import Scene, scene_of
+from netsp.world.tether import GeodesicTether
+from netsp.world.tether.resolution import suggested_delta
+
+THIN = 400
+"""Points of what a run has gone so far, about."""
+
+VISITED, LEFT_OUT, CANCELLED = "visited", "left out", "cancelled"
+"""What may have become of a goal or waypoint."""
+
+Fates = Mapping[str, tuple[int, ...]]
+"""Numbers of goals or waypoints, by what has become of them so far."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One of them.
+
+    Parameters
+    ----------
+    nodes : ndarray, shape (k, 3)
+        The tether, to where the robot is.
+    path : ndarray, shape (m, 3)
+        What was gone so far.
+    text : str
+        How far it is.
+    problem : Problem or None
+        The site, as it is then; None in space.
+    fates : mapping
+        Of goals or waypoints, by then.
+    """
+
+    nodes: Floats
+    path: Floats
+    text: str
+    problem: Problem | None = None
+    fates: Fates = field(default_factory=dict)
+
+
+def moments_of_plan(problem: Problem, solution: Solution, count: int) -> list[Moment]:
+    """The tether at even steps along the tour, by the model that watches it online.
+
+    Parameters
+    ----------
+    problem : Problem
+        The site.
+    solution : Solution
+        With a tour.
+    count : int
+        How many steps.
+
+    Returns
+    -------
+    list of Moment
+        One more than steps.
+    """
+    model = GeodesicTether(scene_of(problem).field(), suggested_delta(problem))
+    path = np.array(solution.path)
+    s = polylines.along(path)
+    reached = _reached(path, problem, solution)
+    if problem.state is None:
+        state = model.start(problem.base, problem.base)
+    else:
+        state = model.lay(np.array(solution.start_tether))
+    out, at = [], 0
+    for u in np.linspace(0.0, s[-1], count + 1):
+        here = np.array([np.interp(u, s, path[:, k]) for k in range(3)])
+        passed = int(np.searchsorted(s, u))
+        state = model.drive(state, np.vstack([path[at:passed], here]))[0]
+        at = max(at, passed)
+        text = (
+            f"{u:.4g} of {s[-1]:.4g} {problem.units}; tether {state.length:.4g} of "
+            f"{problem.tether_length:g} {problem.units}"
+        )
+        gone = np.vstack([path[:passed], here])
+        visited = tuple(g for g, n in reached if s[n] <= u * (1.0 + 1e-12))
+        out.append(Moment(state.nodes, gone, text, problem, {VISITED: visited}))
+    return out
+
+
+def _reached(path: Floats, problem: Problem, solution: Solution) -> list[tuple[int, int]]:
+    """Each goal of the tour, and the vertex of the path at which it is visited."""
+    out, at = [], 0
+    for visit in solution.tour:
+        apart = np.linalg.norm(path[at:] - np.array(problem.goals[visit.goal].position), axis=1)
+        at += int(np.argmax(apart <= apart.min() + problem.tolerance))
+        out.append((visit.goal, at))
+    return out
+
+
+def moments_of_run(
+    maps: Sequence[tuple[float, Problem]], rows: Sequence[dict[str, str]],
+    tethers: Sequence[dict[str, Any]], count: int, since: Mapping[str, Mapping[int, float]],
+) -> list[Moment]:  # fmt: skip
+    """Moments of a run that were recorded.
+
+    Parameters
+    ----------
+    maps : sequence of (float, Problem)
+        The site as it is from some seconds on; the first from 0.
+    rows : sequence of dict
+        Of log.csv.
+    tethers : sequence of dict
+        Of tethers.json.
+    count : int
+        How many, about.
+    since : mapping of str to mapping of int to float
+        For each fate, seconds since when goals have it.
+
+    Returns
+    -------
+    list of Moment
+        The last one among them.
+
+    Raises
+    ------
+    KeyError, ValueError
+        Of files that are damaged.
+    """
+    times = np.array([float(r["time"]) for r in rows])
+    path = np.array([[float(r[k]) for k in "xyz"] for r in rows])
+    step = max(1, len(tethers) // count)
+    chosen = [*tethers[::step], *([tethers[-1]] if (len(tethers) - 1) % step else [])]
+    out = []
+    for frame in chosen:
+        nodes = np.array(frame["nodes"], dtype=float).reshape(-1, 3)
+        if not np.isfinite([frame["time"], *nodes.ravel()]).all():
+            raise ValueError(f"tethers.json: time {frame['time']}: expected numbers")
+        k = min(int(np.searchsorted(times, frame["time"])), len(rows) - 1)
+        row = rows[k]
+        problem = next(p for since, p in reversed(maps) if since <= max(frame["time"], 0.0))
+        where = f"next: {next_of(problem, int(row['goal']))}"
+        if k == len(rows) - 1:
+            where = "the end"
+        text = (
+            f"{frame['time']:.4g} s; tether {float(row['tether']):.4g} of {float(row['limit']):g} "
+            f"{problem.units}; {where}"
+        )
+        gone = np.vstack([path[: k : max(1, k // THIN)], nodes[-1:]])
+        now = frame["time"] if k < len(rows) - 1 else np.inf
+        fates = {
+            fate: tuple(g for g, when in begins.items() if when <= now)
+            for fate, begins in since.items()
+        }
+        out.append(Moment(nodes, gone, text, problem, fates))
+    return out
+
+
+def moments_of_flight(run: Run, scene: Scene, count: int) -> list[Moment]:
+    """Moments of a flight in space: its tether is driven again along the path.
+
+    Parameters
+    ----------
+    run : Run
+        The flight.
+    scene : Scene
+        Its scene.
+    count : int
+        How many, about.
+
+    Returns
+    -------
+    list of Moment
+        The last one among them.
+    """
+    path = path_of(run)
+    visited = {int(stop["waypoint"]) for stop in run.summary["stops"]}
+    stamps = np.array([r.time for r in run.log])
+    rows = np.searchsorted(stamps, np.linspace(0.0, stamps[-1], count))
+    rows = np.minimum(rows, len(stamps) - 1)
+    units, out = scene.units, []
+    for row, tether in zip(rows, tethers_along(run, scene, rows), strict=True):
+        r = run.log[row]
+        end = row == len(stamps) - 1
+        passed = range(len(run.mission.waypoints) if end else r.waypoint)
+        fates = {
+            VISITED: tuple(k for k in passed if k in visited),
+            LEFT_OUT: tuple(k for k in passed if k not in visited),
+        }
+        text = (
+            f"{r.time:.4g} s; tether {r.tether:.4g} of {r.limit:g} {units}; "
+            f"{len(fates[VISITED])} of {len(run.mission.waypoints)} visited"
+        )
+        gone = np.vstack([path[: row : max(1, row // THIN)], path[row]])
+        nodes = np.vstack([tether.nodes[:-1], path[row]])
+        out.append(Moment(nodes, gone, text, fates=fates))
+    return out
+
+
+def moments_of_mission(mission: Mission, scene: Scene, count: int) -> list[Moment]:
+    """Moments of a planned mission, at even steps along its tour.
+
+    Parameters
+    ----------
+    mission : Mission
+        Planned.
+    scene : Scene
+        Its scene.
+    count : int
+        How many steps.
+
+    Returns
+    -------
+    list of Moment
+        One more than steps.
+
+    Raises
+    ------
+    InputError
+        The mission has no tour.
+    """
+    if mission.tour is None:
+        raise InputError(
+            f"{mission.name}: tour: the mission has none; expected one that netsp solve has planned"
+        )
+    field_of = scene.field()
+    model = GeodesicTether(field_of, mission.delta)
+    state = present_tether(mission, field_of, model, grid_of(mission, scene, field_of))
+    legs = [mission.tour.leg(k) for k in range(len(mission.tour.stops))]
+    ends = np.cumsum([polylines.length(leg) for leg in legs if leg is not None])
+    path = mission.tour.line
+    s = polylines.along(path)
+    units, all_of, out, at = scene.units, len(mission.waypoints), [], 0
+    for u in np.linspace(0.0, s[-1], count + 1):
+        here = np.array([np.interp(u, s, path[:, k]) for k in range(3)])
+        passed = int(np.searchsorted(s, u))
+        state = model.drive(state, np.vstack([path[at:passed], here]))[0]
+        at = max(at, passed)
+        visited = tuple(range(int((ends <= u + 1e-9 * s[-1]).sum())))
+        left = tuple(range(len(ends), all_of)) if u == s[-1] else ()
+        text = (
+            f"{u:.4g} of {s[-1]:.4g} {units}; tether {state.length:.4g} of "
+            f"{mission.tether_length:g} {units}; {len(visited)} of {all_of} visited"
+        )
+        gone = np.vstack([path[:passed], here])
+        out.append(Moment(state.nodes, gone, text, fates={VISITED: visited, LEFT_OUT: left}))
+    return out
+
+
+def next_of(problem: Problem, goal: int) -> str:
+    """What a run calls where it is going.
+
+    Parameters
+    ----------
+    problem : Problem
+        The site.
+    goal : int
+        Number of the goal; those that were added on the way have one, too.
+
+    Returns
+    -------
+    str
+        The goal's name or number, or the base.
+    """
+    if goal == HOME:
+        return "the base"
+    return problem.goal_label(goal) if goal < len(problem.goals) else f"goal #{goal}"

@@ -1,0 +1,242 @@
+"""What an operator takes along: every stop in numbers, how the tether runs there in words, what to
+do if it snags, and how far the world may be off."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from netsp.base.errors import counted
+from netsp.judge import Verification
+from netsp.model.import_record import Site
+from netsp.model.problem import Problem
+from netsp.model.solution import Solution, Status
+from netsp.online.execute.tour_plan import legs_of
+from netsp.plan.sizing.tether_margins import Margins, margins
+from netsp.roadmap.paths import TautPaths
+from netsp.view.report.wording import Passage, back_from, bearing, listed, passages
+
+STYLE = """
+.ok { color: #2b8a3e } .bad { color: #c92a2a } .wide { overflow-x: auto }
+th.words, td.words { text-align: left } td { vertical-align: top }
+"""
+"""Of tables and checks."""
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[int] = ()) -> str:
+    """A table that scrolls sideways on a narrow screen.
+
+    Parameters
+    ----------
+    head : sequence of str
+        Names of the columns.
+    rows : sequence of sequence of str
+        Cells, as plain text.
+    words : sequence of int
+        Columns of text, which are set from the left.
+
+    Returns
+    -------
+    str
+        An element.
+    """
+    kind = [' class="words"' if k in words else "" for k in range(len(head))]
+    top = "".join(f"<th{kind[k]}>{html.escape(h)}</th>" for k, h in enumerate(head))
+    body = "".join(
+        "<tr>" + "".join(f"<td{kind[k]}>{html.escape(c)}</td>" for k, c in enumerate(row)) + "</tr>"
+        for row in rows
+    )
+    return f'<div class="wide"><table><tr>{top}</tr>{body}</table></div>'
+
+
+def imported(site: Site) -> str:
+    """Return the table of what an import made of every feature of a map.
+
+    Parameters
+    ----------
+    site : Site
+        The record of a problem.
+
+    Returns
+    -------
+    str
+        Elements.
+    """
+    head, *rows = site.table()
+    said = f"Imported from {site.file}. What was left out is not in the plan."
+    if site.edited:
+        said += " The problem was edited after the import; the table shows the import."
+    if site.cropped is not None:
+        x, y = site.cropped.center
+        said += (
+            f" Obstacles farther than {site.cropped.radius:.4g} from ({x:.4g}, {y:.4g}) were left "
+            "out: no tether of the length given at the import reaches them."
+        )
+    words = (0, len(head) - 1)
+    return f'<p class="note">{html.escape(said)}</p>' + table(head, rows, words)
+
+
+def checks(verdict: Verification) -> str:
+    """The judge's checks.
+
+    Parameters
+    ----------
+    verdict : Verification
+        Of a solution or a mission.
+
+    Returns
+    -------
+    str
+        An element.
+    """
+    rows = "".join(
+        f'<tr><td class="{"ok" if c.passed else "bad"}">{"ok" if c.passed else "FAIL"}</td>'
+        f'<td style="text-align:left">{html.escape(c.name)}</td>'
+        f'<td style="text-align:left">{html.escape(c.detail)}</td></tr>'
+        for c in verdict.checks
+    )
+    return f"<table>{rows}</table>"
+
+
+def planned_with(solution: Solution) -> str:
+    """What a tour was planned to bear, as a sentence; empty if nothing."""
+    parts = []
+    if solution.margin:
+        parts.append(f"obstacles that are off by {solution.margin:g}")
+    if solution.slack:
+        parts.append(f"{100.0 * solution.slack:g} % of slack")
+    if solution.max_tension_ratio is not None:
+        parts.append(
+            f"friction {solution.friction:g} that multiplies the tension by at most "
+            f"{solution.max_tension_ratio:g}"
+        )
+    if solution.kept_order:
+        parts.append("the order given")
+    return f"Planned with {', '.join(parts)}." if parts else ""
+
+
+def stops(problem: Problem, solution: Solution, found: Margins | None) -> str:
+    """The visits in numbers.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of the solution.
+    solution : Solution
+        With a tour.
+    found : Margins, optional
+        Of the tour, if it has any.
+
+    Returns
+    -------
+    str
+        An element.
+    """
+    u = problem.units
+    north = "from north" if problem.origin else "from y"
+    head = ["visit", "goal", f"x ({u})", f"y ({u})", f"depth ({u})", f"course (° {north})",
+            f"leg ({u})", f"path so far ({u})", f"tether ({u})", f"slack ({u})"]  # fmt: skip
+    if found is not None:
+        head += ["turning (°)", f"clearance ({u})"]
+    rows, total = [], 0.0
+    for n, (v, leg) in enumerate(zip(solution.tour, legs_of(problem, solution), strict=False)):
+        x, y, z = problem.goals[v.goal].position
+        total += leg.length
+        row = [
+            str(n + 1), problem.goal_name(v.goal), f"{x:.6g}", f"{y:.6g}", f"{0.0 - z:g}",
+            _course(problem, leg.path), f"{leg.length:.5g}", f"{total:.6g}",
+            f"{v.tether_length:.5g}", f"{problem.tether_length - v.tether_length:.5g}",
+        ]  # fmt: skip
+        if found is not None:
+            s = found.stops[n]
+            row += [
+                f"{math.degrees(s.turning):.0f}",
+                "–" if math.isinf(s.clearance) else f"{s.clearance:.4g}",
+            ]
+        rows.append(row)
+    note = (
+        f'<p class="note">Course: on arrival, clockwise {north}'
+        f"{'' if problem.origin else ' (the problem has no origin, so north is not known)'}. "
+        "Slack: tether that is left. Turning: sum of the angles by which the tether bends. "
+        "Clearance: from tether or goal to the nearest obstacle.</p>"
+    )
+    return table(head, rows, (1,)) + note
+
+
+def _course(problem: Problem, path: np.ndarray) -> str:
+    steps = np.diff(path[:, :2], axis=0)
+    long = np.flatnonzero(np.hypot(*steps.T) > 1e-9 * problem.scale)
+    return f"{bearing(problem, steps[long[-1]]):.0f}" if len(long) else "–"
+
+
+def tethers(problem: Problem, solution: Solution) -> str:
+    """How the tether runs at every visit, and what to do if it snags there or on the way on.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of the solution.
+    solution : Solution
+        Whose tour is not entangled.
+
+    Returns
+    -------
+    str
+        An element.
+    """
+    longest = max(v.tether_length for v in solution.tour)
+    paths = TautPaths(problem, 2.0 * max(problem.tether_length, longest))
+    runs: list[list[Passage]] = []
+    names: list[str] = []
+    rows = []
+    for k, v in enumerate(solution.tour):
+        tether, name = paths.tether_if_found(v.goal, v.signature), problem.goal_name(v.goal)
+        passed = back = "unknown: the taut tether was not found"
+        if tether is not None:
+            runs.append(passages(problem, tether, v.signature))
+            names.append(name)
+            passed, back = listed(problem, runs[-1]), back_from(problem, runs, names, len(runs) - 1)
+        rows.append([str(k + 1), name, passed, back, str(list(v.signature))])
+    return table(
+        ["visit", "goal", "the tether passes", "if it snags here, or on the way on", "word"],
+        rows, (1, 2, 3, 4),
+    )  # fmt: skip
+
+
+def of_tour(problem: Problem, solution: Solution) -> Margins | None:
+    """The margins of a tour from the base that keeps the tether's length; None for others."""
+    if problem.state is not None or solution.status is Status.INVALID:
+        return None
+    return margins(problem, solution, solution.friction)
+
+
+def margin_list(problem: Problem, found: Margins) -> str:
+    """How far the world may be off, as a list."""
+    u = problem.units
+    lines = [
+        "every obstacle may be elsewhere or larger, as long as it is all open water now"
+        if math.isinf(found.obstacles)
+        else f"every obstacle may be off by {found.obstacles:.4g} {u}, moved or grown; then "
+        f"{found.limited_by}",
+        f"{found.tether:.4g} {u} of the tether may be lost before a goal is out of reach",
+        f"the robot may be {found.cross_track:.4g} {u} beside its path",
+    ]
+    if found.friction:
+        worst = max(found.stops, key=lambda s: s.tension_ratio)
+        lines.append(
+            f"friction multiplies the tension by at most {worst.tension_ratio:.3g}, at {worst.name}"
+        )
+    return "<ul>" + "".join(f"<li>{html.escape(t)}</li>" for t in lines) + "</ul>"
+
+
+def first_words(problem: Problem, solution: Solution) -> str:
+    """The tour in a sentence for the head of the sheet."""
+    longest = max(solution.tour, key=lambda v: v.tether_length)
+    return (
+        f"{counted(len(solution.tour), 'visit')}; "
+        f"longest tether {longest.tether_length:.5g} of {problem.tether_length:g} "
+        f"{problem.units}, at {problem.goal_name(longest.goal)}."
+    )

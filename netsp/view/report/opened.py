@@ -1,0 +1,227 @@
+"""A solution or the folder of a run, read with its problem, and found to belong together."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.base.files import read_text
+from netsp.base.geometry import polylines
+from netsp.model.problem import Problem
+from netsp.model.solution import Solution
+from netsp.model.validated import parse_json
+from netsp.online.execute.tour_plan import HOME
+from netsp.online.run_log import check_log
+from netsp.view.pictures.film import Film, film_of_plan, film_of_run
+from netsp.view.pictures.moments import CANCELLED, LEFT_OUT, VISITED
+from netsp.view.report import run_page
+
+
+@dataclass(frozen=True)
+class Opened:
+    """What was read.
+
+    Parameters
+    ----------
+    problem : Problem
+        The site.
+    solution : Solution
+        With a tour.
+    rows : list of dict
+        Of a run's log; empty for a solution.
+    tethers : list of dict or None
+        Of a run.
+    run : Path or None
+        Its folder.
+    maps : sequence of (float, Problem)
+        The site as it was from some seconds on; the first from 0.
+    """
+
+    problem: Problem
+    solution: Solution
+    rows: Sequence[dict[str, str]] = ()
+    tethers: list[dict[str, Any]] | None = None
+    run: Path | None = None
+    maps: Sequence[tuple[float, Problem]] = ()
+
+    @property
+    def driven(self) -> Floats | None:
+        """(k, 3) where the robot of a run went; None of a solution."""
+        if not self.rows:
+            return None
+        return np.array([[float(r[k]) for k in "xyz"] for r in self.rows])
+
+    @property
+    def order(self) -> dict[int, int] | None:
+        """Of the goals that a run has visited, the numbers of their visits; None of a solution.
+
+        Raises
+        ------
+        KeyError, ValueError
+            The list of visits is damaged.
+        """
+        if self.run is None:
+            return None
+        goals = [int(r["goal"]) for r in run_page.rows_of(self.run / "visits.csv")]
+        return {goal: n for n, goal in enumerate((g for g in goals if g != HOME), 1)}
+
+    @property
+    def fates(self) -> dict[int, str]:
+        """Goals that a run did not visit, and why not in two words; InputError if its summary is
+        damaged."""
+        if self.run is None:
+            return {}
+        s = json_of(self.run / "summary.json")
+        try:
+            left_out = {int(x["goal"]): LEFT_OUT for x in s["left_out"]}
+            return left_out | {int(g): CANCELLED for g in s["cancelled"]}
+        except (KeyError, ValueError, TypeError) as error:
+            raise InputError(
+                f"{self.run / 'summary.json'}: is damaged: {type(error).__name__}: {error}"
+            ) from None
+
+    def film(self, count: int) -> Film:
+        """The tour, or the run, as a moving picture.
+
+        Parameters
+        ----------
+        count : int
+            Moments, about.
+
+        Returns
+        -------
+        Film
+            Of it.
+
+        Raises
+        ------
+        InputError
+            A file of the run is damaged.
+        """
+        if not self.tethers:
+            return film_of_plan(self.problem, self.solution, count)
+        try:
+            return film_of_run(self.maps, self.rows, self.tethers, self._since(), count)
+        except (KeyError, IndexError, ValueError, TypeError, OverflowError) as error:
+            raise InputError(
+                f"{self.run}: a file of the run is damaged: {type(error).__name__}: {error}"
+            ) from None
+
+    def _since(self) -> dict[str, dict[int, float]]:
+        """For what has become of goals in a run, seconds since when it has."""
+        assert self.run is not None
+        visits = run_page.rows_of(self.run / "visits.csv")
+        summary = json_of(self.run / "summary.json")
+        left = {int(x["goal"]): self._covered(int(x["goal"])) for x in summary["left_out"]}
+        cancelled = [int(g) for g in summary["cancelled"]]
+        times = summary.get("cancelled_s", [math.inf] * len(cancelled))  # runs of before have none
+        visited = {int(v["goal"]): float(v["time"]) for v in visits if int(v["goal"]) != HOME}
+        return {
+            VISITED: visited,
+            LEFT_OUT: left,
+            CANCELLED: dict(zip(cancelled, map(float, times), strict=True)),
+        }
+
+    def _covered(self, goal: int) -> float:
+        """Since when an obstacle stands on a goal; inf where it was left out for another reason."""
+        for time, problem in self.maps:
+            if goal < len(problem.goals):
+                place, least = problem.goals[goal].position[:2], problem.clearance
+                if any(
+                    float(o.signed_distance(place)) < least - problem.tolerance
+                    for o in problem.obstacles
+                ):
+                    return time
+        return math.inf
+
+
+def opened(source: str | Path, problem_file: str | Path | None) -> Opened:
+    """Read a solution file, whose problem is named, or the folder of a run.
+
+    Parameters
+    ----------
+    source : str or Path
+        The file or folder.
+    problem_file : str or Path, optional
+        The problem of a solution file; a run's folder holds its own.
+
+    Returns
+    -------
+    Opened
+        What is there.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be read, or do not belong together.
+    """
+    file: str | Path = source
+    run = Path(source) if Path(source).is_dir() else None
+    if run is not None:
+        if (run / "mission.json").exists() and not (run / "solution.json").exists():
+            raise InputError(f"{source}: is of a mission; expected a run of a problem")
+        problem_file = run / "problem.json"
+        file = run / "solution.json"
+        if not file.exists():
+            raise InputError(f"{source}: is not the folder of a run; expected solution.json in it")
+    solution = Solution.load(file)
+    if problem_file is None:
+        raise InputError(f"{source}: does not hold its problem; expected --problem FILE")
+    problem = (
+        Problem.load(problem_file) if run is None
+        else Problem.from_run(read_text(problem_file), str(problem_file))
+    )  # fmt: skip
+    if run is None and problem.sha256 != solution.problem.sha256:
+        raise InputError(f"{source}: solves another problem than {problem_file} (sha256 differs)")
+    if solution.length is None:
+        raise InputError(f"{source}: has no tour (status {solution.status.value})")
+    if len(solution.path) < 2:
+        raise InputError(f"{source}: path: expected at least 2 points, got {len(solution.path)}")
+    beyond = [v.goal for v in solution.tour if v.goal >= len(problem.goals)]
+    if beyond:
+        raise InputError(
+            f"{source}: tour: no goal #{beyond[0]}; expected #0 to #{len(problem.goals) - 1}"
+        )
+    drawn = polylines.length(np.array(solution.path))
+    if abs(drawn - solution.length) > 0.05 * max(drawn, solution.length):
+        raise InputError(
+            f"{source}: path: is {drawn:.4g} long; expected about length, {solution.length:.4g}"
+        )
+    rows = run_page.rows_of(run / "log.csv") if run else []
+    if run is not None and not rows:
+        raise InputError(f"{run / 'log.csv'}: holds no row")
+    if run is not None:
+        check_log(rows, run / "log.csv")
+    tethers = json_of(run / "tethers.json") if run else None
+    maps = [(0.0, problem)]
+    if run is not None and (run / "maps.json").exists():
+        maps = _maps_of(run / "maps.json")
+    return Opened(problem, solution, rows, tethers, run, maps)
+
+
+def _maps_of(file: Path) -> list[tuple[float, Problem]]:
+    found = json_of(file)
+    try:
+        maps = [
+            (float(m["time"]), Problem.from_run(json.dumps(m["problem"]), str(file))) for m in found
+        ]
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{file}: expected times and problems: {error}") from None
+    times = [time for time, _ in maps]
+    if not times or times[0] != 0.0 or not all(a <= b for a, b in pairwise(times)):
+        raise InputError(f"{file}: expected times from 0 on, got {times[:4]}")
+    return maps
+
+
+def json_of(file: Path) -> Any:
+    """What a file of a run holds; InputError if that is no JSON."""
+    return parse_json(read_text(file), str(file))

@@ -1,0 +1,54 @@
+"""A page of tours or runs side by side, which one slider moves."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from pathlib import Path
+
+from netsp.base.files import write_text
+from netsp.view.report import chart, moving
+from netsp.view.report.opened import Opened
+from netsp.view.report.page import STYLE
+
+BESIDE = """
+body { max-width: none } .beside { display: flex; flex-wrap: wrap; gap: 1em 2em }
+.beside > section { flex: 1 1 22em; min-width: 0 } .beside h2 { margin: .2em 0 }
+"""
+
+
+def save_beside(opened: Sequence[Opened], output: str | Path) -> None:
+    """Write the page.
+
+    Parameters
+    ----------
+    opened : sequence of Opened
+        From left to right.
+    output : str or Path
+        The file; replaced when it is there.
+
+    Raises
+    ------
+    InputError
+        A file of a run is damaged; the page cannot be written.
+    """
+    films = [one.film(moving.FRAMES) for one in opened]
+    views = [chart.View.of(one.problem, film) for one, film in zip(opened, films, strict=True)]
+    names = list(dict.fromkeys(one.problem.name for one in opened))
+    title = f"{' and '.join(names)}: {len(opened)} side by side"
+    sections = "".join(
+        f"<section><h2>{html.escape(film.title)}</h2>"
+        f"{chart.draw(one.problem, one.solution, view, one.fates, one.maps, one.driven, one.order)}"
+        f"{moving.STATE}"
+        "</section>"
+        for one, film, view in zip(opened, films, views, strict=True)
+    )
+    write_text(output, (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f'<title>{html.escape(title)}</title><link rel="icon" href="data:,">'
+        f"<style>{STYLE}{moving.STYLE}{BESIDE}</style></head><body>"
+        f"<h1>{html.escape(title)}</h1>{moving.CONTROLS}"
+        f'<div class="beside">{sections}</div>{chart.legend(run=any(one.run for one in opened))}'
+        f"{moving.script(films, views)}</body></html>\n"
+    ))  # fmt: skip

@@ -1,0 +1,181 @@
+"""What the rows of a comparison say: groups, medians with intervals, profiles."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.model.bound_scope import LowerBound, Scope
+from netsp.model.solution import Status, scope_of
+from netsp.study.compare.rows import FAILED, TrialRow
+
+ROUNDING = 1e-6
+"""Per cent over the best that are taken for none: the same tour, summed in another order."""
+
+MAX_CLOSED_GAP = 1e-5
+"""Largest gap, as a share of the length, at which a tour counts as proven; also that of the judge,
+because a path from the robot's state is proven to that share only."""
+
+CONFIDENCE = 0.95
+"""Of the intervals about medians."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Where a row belongs in a table."""
+
+    method: str
+    goals: int
+    tether: float
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Of one number over the trials of a cell: median, its interval, mean, how many."""
+
+    median: float
+    low: float
+    high: float
+    mean: float
+    count: int
+
+
+def methods(rows: Iterable[TrialRow]) -> dict[str, list[TrialRow]]:
+    """Rows by method: the solver's label, and the roadmap's where there are several."""
+    rows = list(rows)
+    several = len({r["roadmap"]["label"] for r in rows}) > 1
+    out: dict[str, list[TrialRow]] = defaultdict(list)
+    for row in rows:
+        name = row["solver"]["label"]
+        out[f"{name}, {row['roadmap']['label']}" if several else name].append(row)
+    return {name: out[name] for name in sorted(out)}
+
+
+def cells(by_method: dict[str, list[TrialRow]]) -> dict[Cell, list[TrialRow]]:
+    """Rows by method, goals and tether length."""
+    out: dict[Cell, list[TrialRow]] = defaultdict(list)
+    for method, rows in by_method.items():
+        for row in rows:
+            world = row["world"]
+            out[Cell(method, world["goals"], world["tether_length"])].append(row)
+    return dict(out)
+
+
+def best_lengths(rows: Iterable[TrialRow]) -> dict[str, float]:
+    """Shortest tour known of each problem, by its sha256; tours that entangle do not count."""
+    out: dict[str, float] = {}
+    for row in rows:
+        if row.get("length") is not None and row["status"] != "invalid":
+            key = row["problem_sha256"]
+            out[key] = min(out.get(key, np.inf), row["length"])
+    return out
+
+
+def over_best(row: TrialRow, best: dict[str, float]) -> float | None:
+    """Per cent by which a row's tour is longer than the best of its problem."""
+    key = row.get("problem_sha256")
+    if row.get("length") is None or key not in best:
+        return None
+    over = float(100.0 * (row["length"] / best[key] - 1.0))
+    return over if abs(over) > ROUNDING else 0.0
+
+
+def summary(values: Sequence[float]) -> Summary | None:
+    """Median with its distribution-free interval: between the order statistics that hold it with
+    `CONFIDENCE` by the binomial distribution; with few trials that is from least to greatest."""
+    if not values:
+        return None
+    x = np.sort(np.asarray(values, dtype=float))
+    n = len(x)
+    from scipy.stats import binom
+
+    k = int(binom.ppf(0.5 * (1.0 - CONFIDENCE), n, 0.5))
+    k = max(0, min(k - 1, (n - 1) // 2)) if k > 0 else 0
+    return Summary(float(np.median(x)), float(x[k]), float(x[n - 1 - k]), float(x.mean()), n)
+
+
+def failures(rows: Iterable[TrialRow]) -> list[TrialRow]:
+    """Rows that came to nothing."""
+    return [r for r in rows if r["status"] in FAILED or r["status"] == "no_solution_found"]
+
+
+def is_proven(row: TrialRow) -> bool:
+    """Say whether a row's tour is the shortest of the tours that its bound holds for: of all, of
+    its roadmap, or of its rule for classes.
+
+    Parameters
+    ----------
+    row : dict
+        A trial's.
+
+    Returns
+    -------
+    bool
+        False where the bound is open.
+    """
+    try:
+        status = Status(row["status"])
+    except ValueError:  # of a failed trial
+        return False
+    return status.is_optimal and (row.get("gap") or 0.0) <= MAX_CLOSED_GAP
+
+
+def bound_of(row: TrialRow) -> LowerBound | None:
+    """Return the lower bound of a row, with the tours that it holds for.
+
+    Parameters
+    ----------
+    row : dict
+        A trial's; one of an older version does not say which tours, but its roadmap does.
+
+    Returns
+    -------
+    LowerBound or None
+        None without a bound.
+    """
+    if row.get("lower_bound") is None:
+        return None
+    named = row.get("lower_bound_of")
+    if named in set(Scope):
+        return LowerBound(row["lower_bound"], Scope(named))
+    rule = row["roadmap"].get("options", {}).get("classes")
+    scope = scope_of(row["roadmap"]["name"], "non-looping" if rule == "non-looping" else None)
+    return LowerBound(row["lower_bound"], scope)
+
+
+def profile(by_method: dict[str, list[TrialRow]]) -> dict[str, Floats]:
+    """For each method the sorted ratios of its time to proof to the fastest's, over the problems
+    that any of them proved (Dolan & Moré 2002); inf where it proved nothing. Methods that prove
+    nothing at all are left out."""
+    times: dict[str, dict[tuple[str, int], float]] = {}
+    for method, rows in by_method.items():
+        proven = {(r["problem_sha256"], r["seed"]): r["total_s"] for r in rows if is_proven(r)}
+        if proven:
+            times[method] = proven
+    problems = sorted(set().union(*times.values())) if times else []
+    fastest = {p: min(t[p] for t in times.values() if p in t) for p in problems}
+    return {
+        method: np.sort([t.get(p, np.inf) / max(fastest[p], 1e-9) for p in problems])
+        for method, t in times.items()
+    }
+
+
+def gap_over_time(rows: Iterable[TrialRow], best: dict[str, float], times: Floats) -> Floats | None:
+    """Median per cent over the best known at given times, of anytime solvers; inf before the first
+    tour. None if no row has a history."""
+    curves = []
+    for row in rows:
+        history = row.get("history") or []
+        known = best.get(row.get("problem_sha256", ""))
+        if not history or known is None or row["status"] == "invalid":
+            continue
+        at = np.array([h[0] for h in history])
+        length = np.array([np.inf if h[1] is None else h[1] for h in history])
+        index = np.searchsorted(at, times, side="right") - 1
+        value = np.where(index >= 0, length[np.maximum(index, 0)], np.inf)
+        curves.append(100.0 * (np.maximum(value, known) / known - 1.0))
+    return np.asarray(np.median(curves, axis=0)) if curves else None

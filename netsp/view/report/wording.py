@@ -1,0 +1,181 @@
+"""How a tether runs, in words: by the names of obstacles and the sides on which it passes them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.arrays import Floats
+from netsp.hsignature import Word
+from netsp.hsignature.rays import crossings
+from netsp.model.problem import Circle, Polygon, Problem
+
+WINDS = (
+    "north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west"
+)  # fmt: skip
+AXES = ("+y", "+x +y", "+x", "+x −y", "−y", "−x −y", "−x", "−x +y")
+"""Sides where north is not known."""
+
+TOUCHING = 2e-3
+"""Relative to the size of an obstacle: arcs are drawn with corners that lie so far off."""
+
+
+def bearing(problem: Problem, direction: npt.ArrayLike) -> float:
+    """Where a direction in the plan points.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its origin says where north is.
+    direction : array_like
+        (x, y, …).
+
+    Returns
+    -------
+    float
+        Degrees clockwise from north, or from the y axis where north is not known; from 0 to 360.
+    """
+    x, y = np.asarray(direction, dtype=float)[:2]
+    heading = problem.origin.heading if problem.origin else 0.0
+    return (math.degrees(math.atan2(x, y)) + heading) % 360.0
+
+
+def side(problem: Problem, direction: npt.ArrayLike) -> str:
+    """The name of a direction: a wind, or an axis where north is not known."""
+    names = WINDS if problem.origin else AXES
+    return names[int((bearing(problem, direction) + 22.5) // 45.0) % 8]
+
+
+@dataclass(frozen=True)
+class Passage:
+    """How a tether passes an obstacle.
+
+    Parameters
+    ----------
+    obstacle : int
+        Index, from 0.
+    side : str
+        On which side.
+    rests : bool
+        Whether it lies against it.
+    """
+
+    obstacle: int
+    side: str
+    rests: bool
+
+
+def passages(problem: Problem, tether: Floats, word: Word) -> list[Passage]:
+    """The obstacles that make the class of a taut tether, from the base on: those that it lies
+    against, and those whose letters its word has.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of the tether.
+    tether : ndarray, shape (n, 3)
+        The taut tether.
+    word : Word
+        Of the tether.
+
+    Returns
+    -------
+    list of Passage
+        Each obstacle once for every time that the tether comes to it.
+    """
+    rays, letters = problem.representative_points, {abs(a) for a in word}
+    out: list[Passage] = []
+    run: list[int] = []
+    on = -1
+
+    def leave() -> None:
+        if run:
+            away = tether[run, :2].mean(0) - rays[on]
+            out.append(Passage(on, side(problem, away), True))
+            run.clear()
+
+    lies_on = _touched(problem, tether[:-1])
+    right = tether[:, :1] >= rays[:, 0]
+    may_cross = (right[1:] != right[:-1]).any(axis=1)
+    for k in range(len(tether) - 1):
+        if k > 0:
+            here = int(lies_on[k])
+            if here != on:
+                leave()
+            on = here
+            if here >= 0:
+                run.append(k)
+        for a in crossings(tether[k : k + 2], rays) if may_cross[k] else ():
+            i = abs(a) - 1
+            known = i == on or (out and out[-1].obstacle == i)
+            if i + 1 in letters and not known:
+                leave()
+                on = -1
+                out.append(Passage(i, side(problem, (0.0, 1.0)), False))
+    leave()
+    return out
+
+
+def _touched(problem: Problem, points: Floats) -> npt.NDArray[np.intp]:
+    """(k,) the obstacles that corners (k, 3) of a taut tether lie on; -1 for none."""
+    if not problem.obstacles:
+        return np.full(len(points), -1, dtype=np.intp)
+    clearance = problem.clearance
+    gaps = np.array([
+        np.abs(o.signed_distance(points[:, :2]) - clearance) / _size(o, clearance)
+        for o in problem.obstacles
+    ])  # fmt: skip
+    on = gaps.argmin(axis=0)
+    return np.where(gaps.min(axis=0) <= TOUCHING, on, -1)
+
+
+@lru_cache(maxsize=4096)
+def _size(obstacle: Circle | Polygon, clearance: float) -> float:
+    """The longer side of its bounding box."""
+    return float(np.ptp(np.array(obstacle.shape(clearance).bounds).reshape(2, 2), axis=0).max())
+
+
+def listed(problem: Problem, run: list[Passage]) -> str:
+    """Passages as a phrase."""
+    if not run:
+        return "straight from the base"
+    return ", ".join(
+        f"{p.side} of {problem.obstacle_name(p.obstacle)}" + (" (rests on it)" if p.rests else "")
+        for p in run
+    )
+
+
+def back_from(problem: Problem, runs: list[list[Passage]], names: list[str], k: int) -> str:
+    """What to do when the tether snags at visit k or on the way on from there.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of the tour.
+    runs : list of list of Passage
+        The passages at every visit.
+    names : list of str
+        Of the goals visited.
+    k : int
+        Visit, from 0.
+
+    Returns
+    -------
+    str
+        Where to go back to: the latest visit at which the tether lies against less of the same, and
+        the way home along the tether.
+    """
+    here = [p for p in runs[k] if p.rests]
+    if not here:
+        return "straight home: the tether lies against nothing"
+    for j in range(k - 1, -1, -1):
+        there = [p for p in runs[j] if p.rests]
+        if len(there) < len(here) and here[: len(there)] == there:
+            freed = ", ".join(problem.obstacle_name(p.obstacle) for p in here[len(there) :])
+            return f"back the way it came to visit {j + 1} ({names[j]}), which clears {freed}"
+    home = ", ".join(f"{p.side} of {problem.obstacle_name(p.obstacle)}" for p in reversed(here))
+    return f"home along the tether: {home}"

@@ -1,0 +1,1 @@
+"""Scenes in space, distance fields and the model of the taut tether."""

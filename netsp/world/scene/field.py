@@ -1,0 +1,425 @@
+"""The signed distance field of a scene: distance to the nearest solid, negative inside."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.arrays import Floats
+from netsp.base.clock import end_if_abandoned
+from netsp.base.errors import InputError
+from netsp.world.scene import packing
+from netsp.world.scene.grid import VoxelGrid
+from netsp.world.scene.sampling import Field, lowest_along, sample_many
+
+ASK_ALL = 6
+"""So many solids or fewer are all asked at every point."""
+
+CELLS = 40
+"""Cells along the longest side of the coarse grid that tells which solids may be nearest."""
+
+CHUNK = 1_000_000
+"""Points measured between two looks at whether the work is abandoned: about half a second."""
+
+FILE_VERSION = 4
+
+MOST_LOOKS = 2_000
+"""Solid voxels in blocks whose surroundings tell how much of a scene is thin."""
+
+
+def finite_point(value: npt.ArrayLike, name: str) -> tuple[float, float, float]:
+    """Three finite coordinates; InputError, that names them, if they are something else."""
+    try:
+        x, y, z = (float(v) for v in np.asarray(value, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: expected three finite coordinates, got {value!r}") from None
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
+        raise InputError(f"{name}: expected three finite coordinates, got {value!r}")
+    return x, y, z
+
+
+@dataclass(frozen=True, eq=False)
+class DistanceField:
+    """Distance, gradient and sight in a scene.
+
+    Parameters
+    ----------
+    arrays : Field
+        What kernels take (`netsp.world.scene.sampling.Field`).
+    voxel : float, optional
+        Size of a voxel, metres; None when all is exact.
+    notes : tuple of str
+        What was assumed about meshes and clouds.
+    thickness : tuple of (str, float)
+        Thickness of each part, metres.
+    seams : tuple of int
+        For each solid that was put in at the end to fill a seam between two others
+        (`netsp.world.scene.seams`), the number of one of them.
+    """
+
+    arrays: Field
+    voxel: float | None = None
+    notes: tuple[str, ...] = ()
+    thickness: tuple[tuple[str, float], ...] = ()
+    seams: tuple[int, ...] = ()
+
+    @classmethod
+    def build(
+        cls,
+        kinds: list[int],
+        rows: list[list[float]],
+        outline: npt.ArrayLike,
+        boxes: Sequence[Floats],
+        grid: VoxelGrid | None,
+        offset: float,
+        thickness: Sequence[tuple[str, float]] = (),
+        seams: Sequence[int] = (),
+    ) -> DistanceField:
+        """A field from encoded solids, their bounding boxes and voxels.
+
+        Parameters
+        ----------
+        kinds : list of int
+            Kind of each solid (`netsp.world.scene.solids`).
+        rows : list of list of float
+            Its numbers.
+        outline : array_like, shape (e, 4)
+            Edges of the prisms, all in one list.
+        boxes : sequence of ndarray
+            Bounding box of each solid.
+        grid : VoxelGrid or None
+            The voxels.
+        offset : float
+            Metres that everything is grown by.
+        thickness : sequence of (str, float)
+            Thickness of each part, metres.
+        seams : sequence of int
+            As the attribute.
+
+        Returns
+        -------
+        DistanceField
+            The field.
+        """
+        data = packing.of_solids(kinds, rows, outline)
+        if len(kinds) > ASK_ALL and boxes:
+            low = np.min([b[0] for b in boxes], axis=0)
+            high = np.max([b[1] for b in boxes], axis=0)
+            room = 0.25 * float((high - low).max()) + 1e-9
+            low, high = low - room, high + room
+            data = packing.with_lookup(data, low, high, float((high - low).max()) / CELLS)
+        voxels = np.empty(0, dtype=np.float32)
+        if grid is not None:
+            data, voxels = packing.with_voxels(data, grid), grid.values
+        return cls(
+            Field(data, voxels, float(offset)),
+            grid.voxel if grid is not None else None,
+            grid.notes if grid is not None else (),
+            tuple(thickness),
+            tuple(seams),
+        )
+
+    def distance(self, points: npt.ArrayLike) -> Floats:
+        """Distances of points, negative inside a solid.
+
+        Exact outside of solids, and trilinear between voxels. Inside overlapping solids it is the
+        distance to the nearest of their surfaces.
+
+        Parameters
+        ----------
+        points : array_like, shape (..., 3)
+            Metres.
+
+        Returns
+        -------
+        ndarray, shape (...)
+            Metres.
+        """
+        p = self._points(points)
+        rows, out = p.reshape(-1, 3), np.empty(p.shape[:-1])
+        for first in range(0, len(rows), CHUNK):
+            end_if_abandoned()
+            part = slice(first, first + CHUNK)
+            out.reshape(-1)[part] = sample_many(self.arrays, rows[part])[:, 0]
+        return out
+
+    def gradient(self, points: npt.ArrayLike) -> Floats:
+        """Unit gradients of the distance: the direction out, or away from the nearest solid.
+
+        Parameters
+        ----------
+        points : array_like, shape (..., 3)
+            Metres.
+
+        Returns
+        -------
+        ndarray, shape (..., 3)
+            Unit vectors.
+        """
+        p = self._points(points)
+        return np.asarray(sample_many(self.arrays, p.reshape(-1, 3))[:, 1:4].reshape(p.shape))
+
+    def nearest(self, points: npt.ArrayLike) -> npt.NDArray[np.int64]:
+        """The solid nearest to each point.
+
+        Parameters
+        ----------
+        points : array_like, shape (..., 3)
+            Metres.
+
+        Returns
+        -------
+        ndarray of int, shape (...)
+            Index of the solid, -1 for voxels.
+        """
+        p = self._points(points)
+        found = sample_many(self.arrays, p.reshape(-1, 3))[:, 4].astype(np.int64)
+        if self.seams:
+            first = int(self.arrays.data[packing.COUNT]) - len(self.seams)
+            inside = found >= first
+            found[inside] = np.array(self.seams)[found[inside] - first]
+        return np.asarray(found.reshape(p.shape[:-1]))
+
+    def line_of_sight(self, a: npt.ArrayLike, b: npt.ArrayLike, depth: float = 0.0) -> bool:
+        """Whether a segment is nowhere deeper inside a solid than allowed.
+
+        To within a thousandth of its length or of a voxel (sphere tracing).
+
+        Parameters
+        ----------
+        a : array_like, shape (3,)
+            One end, metres.
+        b : array_like, shape (3,)
+            The other end, metres.
+        depth : float
+            Depth that is allowed, metres.
+
+        Returns
+        -------
+        bool
+            Whether the segment is free.
+        """
+        p, q = self._points(a), self._points(b)
+        step = max(1e-3 * float(np.linalg.norm(q - p)), 1e-9)
+        if self.voxel is not None:
+            step = min(step, 0.1 * self.voxel)
+        low, _ = lowest_along(
+            self.arrays, p[0], p[1], p[2], q[0], q[1], q[2], max(min(step, depth or step), 1e-9)
+        )
+        return bool(low >= -max(depth, 1e-9))
+
+    def free_point(self, value: npt.ArrayLike, name: str, depth: float = 1e-6) -> Floats:
+        """A point as floats, checked.
+
+        Parameters
+        ----------
+        value : array_like, shape (3,)
+            The point, metres.
+        name : str
+            What messages call it.
+        depth : float
+            Depth inside a solid that is allowed, metres.
+
+        Returns
+        -------
+        ndarray, shape (3,)
+            The point.
+
+        Raises
+        ------
+        InputError
+            It is not three finite numbers, or deeper inside a solid.
+        """
+        point = np.array(finite_point(value, name))
+        d = float(sample_many(self.arrays, point[None])[0, 0])
+        if d < -depth:
+            shown = ", ".join(f"{v:g}" for v in point)
+            raise InputError(f"{name}: ({shown}) lies {-d:.3g} inside a solid")
+        return point
+
+    def thinner_than(self, thickness: float) -> tuple[str, ...]:
+        """Parts of the scene that are thinner than a thickness.
+
+        Parameters
+        ----------
+        thickness : float
+            Metres.
+
+        Returns
+        -------
+        tuple of str
+            One line for each such part.
+        """
+        lines = [
+            f"{name} is {t:.3g} thick, thinner than {thickness:.3g}"
+            for name, t in self.thickness
+            if t + 2.0 * self.arrays.offset < thickness
+        ]
+        share = self._thin_share(thickness) if self.voxel is not None else 0.0
+        if share > 0.005:
+            lines.append(
+                f"{100 * share:.0f} % of the solid voxels belong to parts thinner than "
+                f"{thickness:.3g}"
+            )
+        return tuple(lines)
+
+    def _thin_share(self, thickness: float) -> float:
+        """Share of solid voxels that no ball of this diameter inside the solid covers."""
+        from scipy.ndimage import distance_transform_edt
+
+        size, reach = self._size, 0.5 * thickness + 1.74 * self._size
+        depth = 0.5 * thickness - 0.87 * size
+        data = self.arrays.data
+        if not data[packing.BLOCKS]:
+            counts = data[packing.SHAPE : packing.SHAPE + 3].astype(int)
+            grid = self.arrays.grid.reshape(counts) - self.arrays.offset
+            solid, deep = grid < 0.0, grid <= -depth
+            if not deep.any():
+                return float(solid.any())
+            far = distance_transform_edt(~deep) * size
+            return float((far[solid] > reach).mean())
+        some = packing.block_points(data, self.arrays.grid, self.arrays.offset, MOST_LOOKS)
+        if not len(some):
+            return 0.0
+        steps = np.linspace(-reach, reach, 9)
+        ball = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
+        ball = ball[np.linalg.norm(ball, axis=1) <= reach]
+        deepest = np.array([self.distance(p + ball).min() for p in some])
+        return float((deepest > -depth).mean())
+
+    @cached_property
+    def _size(self) -> float:
+        return self.voxel or math.nan
+
+    def grown(self, by: float) -> DistanceField:
+        """The field of the same scene with everything grown.
+
+        Parameters
+        ----------
+        by : float
+            Metres.
+
+        Returns
+        -------
+        DistanceField
+            The grown field.
+        """
+        arrays = self.arrays._replace(offset=float(self.arrays.offset) + by)
+        return DistanceField(arrays, self.voxel, self.notes, self.thickness, self.seams)
+
+    @property
+    def voxels(self) -> VoxelGrid | None:
+        """The voxels, to be had in another field; None where all is exact."""
+        return packing.voxels_of(self.arrays.data, self.arrays.grid, self.notes)
+
+    @property
+    def box(self) -> Floats | None:
+        """(2, 3) bounding box of the voxels' solid part; None without voxels."""
+        if self.voxel is None:
+            return None
+        begin = packing.PLACE + 4
+        return self.arrays.data[begin : begin + 6].reshape(2, 3).copy()
+
+    def _points(self, points: npt.ArrayLike) -> Floats:
+        p = np.asarray(points, dtype=float, order="C")  # each memory order compiles a kernel anew
+        if p.shape[-1:] != (3,):
+            raise InputError(f"points: expected shape (..., 3), got {p.shape}")
+        if not np.isfinite(p).all():
+            raise InputError("points: expected finite coordinates")
+        return p
+
+    def save(self, path: str | Path) -> None:
+        """Write the field to an .npz file, voxels and solids.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
+        try:
+            np.savez_compressed(
+                path,
+                version=FILE_VERSION,
+                voxel=np.nan if self.voxel is None else self.voxel,
+                notes=np.array(self.notes, dtype=str),
+                parts=np.array([n for n, _ in self.thickness], dtype=str),
+                thickness=np.array([t for _, t in self.thickness]),
+                seams=np.array(self.seams, dtype=np.int64),
+                **dict(self.arrays._asdict().items()),
+            )
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+    @classmethod
+    def load(cls, path: str | Path) -> DistanceField:
+        """Read what `save` wrote.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        DistanceField
+            The field.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read or is something else.
+        """
+        try:
+            with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
+                if int(data["version"]) != FILE_VERSION:
+                    raise InputError(f"{path}: a distance field of another version")
+                arrays = Field(**{k: data[k] for k in Field._fields})
+                arrays = arrays._replace(offset=float(arrays.offset))
+                voxel = float(data["voxel"])
+                return cls(
+                    arrays,
+                    None if math.isnan(voxel) else voxel,
+                    tuple(str(n) for n in data["notes"]),
+                    tuple(
+                        (str(n), float(t))
+                        for n, t in zip(data["parts"], data["thickness"], strict=True)
+                    ),
+                    tuple(data["seams"].tolist()),
+                )
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+        except (KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
+            raise InputError(f"{path}: not a distance field of netsp: {error}") from None
+
+
+def pushed_out(
+    field: DistanceField, points: npt.ArrayLike, clearance: float, rounds: int = 20
+) -> npt.NDArray[np.float64]:
+    """Points (n, 3) moved along the distance's gradient until they are at the clearance, as far as
+    that goes; never to where the distance is smaller than it was."""
+    p = np.array(points, dtype=float).reshape(-1, 3)
+    d = field.distance(p)
+    for _ in range(rounds):
+        short = d < clearance - 1e-6
+        if not short.any():
+            break
+        step = np.where(short, clearance - d, 0.0)[:, None]
+        moved = p + step * field.gradient(p)
+        after = field.distance(moved)
+        better = after > d
+        if not (better & short).any():
+            break
+        p[better], d[better] = moved[better], after[better]
+    return p

@@ -1,0 +1,328 @@
+"""Where a distance grid is built: at all points of a box, or at all only near surfaces.
+
+Both kinds of lattice number their points in one row, so that what is computed point by point
+(`netsp.world.scene.voxels`) is written once.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.arrays import Bools, Floats, Ints, Singles
+from netsp.base.clock import Flag, abandoned, end_if_abandoned
+from netsp.world.scene import blocks as compiled
+from netsp.world.scene.blocks import REACHED, WATER
+from netsp.world.scene.closest import Owners, nearest_sites, sweep, windings
+from netsp.world.scene.grid import SIDE, VoxelGrid
+
+OnStage = Callable[[str, float], None] | None
+
+OUTSIDE, INSIDE = 1.25, 0.9
+"""Sides of a cell: cells with a corner nearer to a surface are blocks. Inside solids: no surface
+passes through a cell whose corners are all deeper than half of its diagonal, sqrt(3) / 2."""
+
+WORKERS = min(4, os.cpu_count() or 1)
+"""More would hold more slabs at a time, and the memory is for one site, not for one core."""
+
+SLAB, HALO = 80_000 // WORKERS, 2
+"""Blocks whose distances each computes at a time, and cells to either side that take part."""
+
+
+@dataclass
+class Dense:
+    """All points of a box.
+
+    Parameters
+    ----------
+    origin : ndarray, shape (3,)
+        The first point, metres.
+    size : float
+        Metres between points.
+    counts : (int, int, int)
+        Points along x, y and z.
+    """
+
+    origin: Floats
+    size: float
+    counts: tuple[int, int, int]
+
+    def closest(
+        self, sites: Floats, on_progress: OnStage = None, *, whose: bool = True
+    ) -> tuple[Singles, Owners]:
+        """Distance to the nearest site and, if wanted, which it is, at each point."""
+        distances, owner = _closest(sites, self.origin, self.size, self.counts, on_progress)
+        return distances.ravel(), owner.ravel()
+
+    def turn_inside(self, values: Singles, triangles: Floats) -> int:
+        """Negate the values where a mesh (m, 3, 3) winds around; how often it does at most."""
+        around = windings(triangles, self.origin, self.size, self.counts).ravel()
+        np.negative(values, out=values, where=around != 0)
+        return int(np.abs(around).max(initial=0))
+
+    def unreached(self, values: Singles) -> Bools:
+        """Points outside of the solid that water from the border does not reach."""
+        from scipy.ndimage import label
+
+        parts, count = label(values.reshape(self.counts) > 0.0)
+        if count <= 1:
+            return np.zeros(values.shape, dtype=bool)
+        border = np.zeros(count + 1, dtype=bool)
+        for axis in range(3):
+            for end in (0, -1):
+                border[np.unique(parts.take(end, axis))] = True
+        border[0] = True
+        return np.asarray(~border[parts]).ravel()
+
+    def positions(self, chosen: Bools) -> tuple[Floats, Ints]:
+        """(m, 3) of the points that are chosen, each place once, and which they are."""
+        at = np.argwhere(chosen.reshape(self.counts))
+        return self.origin + self.size * at, np.flatnonzero(chosen)
+
+    def least_around(self, values: Singles, points: Floats, reach: int) -> Singles:
+        """(m,) least value up to some voxels around each of some places (m, 3)."""
+        from scipy.ndimage import minimum_filter
+
+        cell = np.rint((points - self.origin) / self.size).astype(int)
+        cell = np.clip(cell, 0, np.array(self.counts) - 1)
+        least = minimum_filter(values.reshape(self.counts), size=2 * reach + 1)
+        return np.asarray(least[tuple(cell.T)])
+
+    def grid(self, values: Singles, solid: Floats, notes: tuple[str, ...]) -> VoxelGrid:
+        """The grid that has the values."""
+        return VoxelGrid(values, self.counts, self.origin, self.size, solid, notes)
+
+
+class Sparse:
+    """The corners of cells of 8³ voxels, and all points of the cells near surfaces.
+
+    Parameters
+    ----------
+    origin : ndarray, shape (3,)
+        The first corner, metres.
+    size : float
+        Metres between points of a block.
+    near : ndarray of bool, shape (nx, ny, nz)
+        Which cells are blocks.
+    known : (ndarray, ndarray, ndarray)
+        Some sites, the distances of the corners to them, and which is nearest to each.
+    """
+
+    def __init__(
+        self, origin: Floats, size: float, near: Bools, known: tuple[Floats, Singles, Owners]
+    ) -> None:
+        self.origin, self.size, self.known = origin, size, known
+        self.counts = (near.shape[0] + 1, near.shape[1] + 1, near.shape[2] + 1)
+        self.first = int(np.prod(self.counts))
+        self.blocks = np.argwhere(near).astype(np.int32)
+        self.table = np.full(near.shape, -1, dtype=np.int32)
+        self.table[tuple(self.blocks.T)] = np.arange(len(self.blocks))
+
+    def _parts(self, row: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+        """Of a row of values those of corners (nx + 1, …) and of blocks (n, 512)."""
+        shape = (len(self.blocks), SIDE**3)
+        return row[: self.first].reshape(self.counts), row[self.first :].reshape(shape)
+
+    def closest(
+        self, sites: Floats, on_progress: OnStage = None, *, whose: bool = True
+    ) -> tuple[Singles, Owners]:
+        """As of `Dense`; slab by slab, so that what is in between needs little memory."""
+        total = self.first + len(self.blocks) * SIDE**3
+        distances = np.empty(total, dtype=np.float32)
+        owner = np.empty(total if whose else 0, dtype=np.int32)
+        known, far, nearest = self.known
+        if sites is not known:
+            side = SIDE * self.size
+            far, nearest = _closest(sites, self.origin, side, self.counts, None)
+        distances[: self.first] = far.ravel()
+        owner[: self.first] = nearest.ravel()[: len(owner)]
+        reach = compiled.along_x(sites)
+        stop = abandoned()  # the threads of the pool have no context
+
+        def fill(slab: tuple[int, int]) -> int:
+            d, s, inner = self._slab(slab, sites, reach, nearest, stop)
+            rows = slice(*np.searchsorted(self.blocks[:, 0], slab))
+            self._parts(distances)[1][rows] = d[inner]
+            if whose:
+                self._parts(owner)[1][rows] = s[inner]
+            return len(d[inner])
+
+        done, pool = 0, ThreadPoolExecutor(WORKERS)
+        try:
+            for count in pool.map(fill, self._slabs()):
+                end_if_abandoned()
+                done += count
+                tell(on_progress, "distances", done / (len(self.blocks) + 1))
+        finally:
+            pool.shutdown(cancel_futures=True)
+        end_if_abandoned()
+        return distances, owner
+
+    def _slabs(self) -> list[tuple[int, int]]:
+        """Ranges of cells along x with not too many blocks each."""
+        many = np.cumsum(np.bincount(self.blocks[:, 0], minlength=len(self.table)))
+        slab = many // SLAB
+        cuts: list[Any] = [0, *(np.flatnonzero(np.diff(slab)) + 1), len(slab)]
+        return [(int(a), int(b)) for a, b in itertools.pairwise(cuts) if a < b]
+
+    def _slab(
+        self, slab: tuple[int, int], sites: Floats, reach: tuple[Floats, Floats],
+        corners: Owners, stop: Flag,
+    ) -> tuple[Singles, Owners, slice]:  # fmt: skip
+        """Distances and owners of the blocks of a slab and around it, and which are its own."""
+        low, high = slab
+        cuts = np.array([low - HALO, low, high, high + HALO])
+        begin, first, last, end = np.searchsorted(self.blocks[:, 0], cuts).tolist()
+        blocks = self.blocks[begin:end]
+        distances = np.full((len(blocks), SIDE**3), np.float32(np.inf))
+        owner = np.full(distances.shape, -1, dtype=np.int32)
+        if not len(blocks):
+            return distances, owner, slice(0, 0)
+        side = SIDE * self.size
+        ends = self.origin[0] + side * np.array([low - HALO - 1, high + HALO + 1])
+        which = np.flatnonzero((reach[1] >= ends[0]) & (reach[0] <= ends[1]))
+        place = (self.origin, self.size, begin)
+        compiled.nearest_to_corners(sites, place, blocks, corners, distances, owner)
+        compiled.nearest_in_blocks(sites, which, place, blocks, self.table, distances, owner, stop)
+        changed = np.zeros(len(blocks), dtype=np.int64)
+        asked = np.full((len(blocks), 6), -1)
+        for turn in range(8):
+            signs = [1 if turn // s % 2 == 0 else -1 for s in (1, 2, 4)]
+            i, j, k = (sign * row for sign, row in zip(signs, blocks.T, strict=True))
+            order = np.lexsort((k, j, i)).astype(np.int64)
+            state = (distances, owner, turn, changed, asked, stop)
+            compiled.sweep_blocks(sites, place, blocks, self.table, order, *state)
+        return distances, owner, slice(first - begin, last - begin)
+
+    def turn_inside(self, values: Singles, triangles: Floats) -> int:
+        """As of `Dense`."""
+        corners, fine = self._parts(values)
+        around = windings(triangles, self.origin, SIDE * self.size, self.counts)
+        np.negative(corners, out=corners, where=around != 0)
+        place = (self.origin, self.size, 0)
+        return int(compiled.turn_inside(fine, triangles, place, self.blocks, self.table))
+
+    def unreached(self, values: Singles) -> Bools:
+        """As of `Dense`."""
+        water = values > 0.0
+        corners, fine = self._parts(water.view(np.uint8))
+        cells = corners[:-1, :-1, :-1].copy()
+        compiled.flood(fine.reshape(-1, SIDE, SIDE, SIDE), cells, self.table)
+        cells[tuple(self.blocks.T)] = fine[:, 0]
+        reached = np.full(self.counts, REACHED, dtype=np.uint8)
+        reached[:-1, :-1, :-1] = cells
+        water[: self.first].view(np.uint8)[:] = reached.ravel()
+        return np.equal(water.view(np.uint8), WATER, out=water)
+
+    def positions(self, chosen: Bools) -> tuple[Floats, Ints]:
+        """As of `Dense`; corners of cells that are no blocks are left out."""
+        fine = self._parts(chosen)[1].reshape(-1, SIDE, SIDE, SIDE)
+        at = np.argwhere(fine)
+        places = self.origin + self.size * (SIDE * self.blocks[at[:, 0]] + at[:, 1:])
+        return places, np.flatnonzero(fine) + self.first
+
+    def least_around(self, values: Singles, points: Floats, reach: int) -> Singles:
+        """As of `Dense`."""
+        cell = np.rint((points - self.origin) / self.size).astype(np.int64)
+        corners, fine = self._parts(values)
+        return np.asarray(compiled.least_in_blocks(corners, fine, self.table, cell, reach))
+
+    def grid(self, values: Singles, solid: Floats, notes: tuple[str, ...]) -> VoxelGrid:
+        """As of `Dense`."""
+        side = SIDE * self.size
+        compiled.understate(values, side, OUTSIDE)
+        compiled.meet_corners(*self._parts(values), self.blocks, self.table)
+        return VoxelGrid(values, self.counts, self.origin, side, solid, notes, self.table)
+
+
+def sparse_near(
+    origin: Floats, size: float, cells: tuple[int, int, int], sites: Floats,
+    shell: float, triangles: Floats | None, region: Floats | None,
+) -> Sparse:  # fmt: skip
+    """The lattice with blocks wherever a surface is near.
+
+    Parameters
+    ----------
+    origin : ndarray, shape (3,)
+        The first corner, metres.
+    size : float
+        Metres between points of a block.
+    cells : (int, int, int)
+        Cells along x, y and z.
+    sites : ndarray
+        As of `netsp.world.scene.sites`.
+    shell : float
+        Metres by which they are thickened to either side.
+    triangles : ndarray, shape (m, 3, 3), or None
+        Those of a closed mesh, whose inside needs fewer blocks.
+    region : ndarray, shape (2, 3), or None
+        Box, metres, outside of which no blocks are needed.
+
+    Returns
+    -------
+    Sparse
+        The lattice.
+    """
+    corners = (cells[0] + 1, cells[1] + 1, cells[2] + 1)
+    side = SIDE * size
+    distances, owner = _closest(sites, origin, side, corners, None)
+    near = distances <= shell + OUTSIDE * side
+    if triangles is not None:
+        inside = windings(triangles, origin, side, corners) != 0
+        near &= ~inside | (distances <= INSIDE * side)
+    cell = np.zeros(cells, dtype=bool)
+    for p in range(2):
+        for q in range(2):
+            for r in range(2):
+                cell |= near[p : p + cells[0], q : q + cells[1], r : r + cells[2]]
+    if region is not None:
+        for axis in range(3):
+            at = origin[axis] + side * np.arange(cells[axis])
+            wanted = (at + side >= region[0][axis]) & (at <= region[1][axis])
+            cell &= wanted.reshape([-1 if a == axis else 1 for a in range(3)])
+    return Sparse(origin, size, cell, (sites, distances, owner))
+
+
+Lattice = Dense | Sparse
+"""The points at which a grid is built, in one row."""
+
+
+def tell(on_progress: OnStage, stage: str, fraction: float) -> None:
+    """Hand on how far a stage has come, if anybody asks.
+
+    Parameters
+    ----------
+    on_progress : callable or None
+        Takes both.
+    stage : str
+        Its name.
+    fraction : float
+        From 0 to 1.
+    """
+    if on_progress is not None:
+        on_progress(stage, fraction)
+
+
+def _closest(
+    sites: Floats, origin: Floats, size: float, counts: tuple[int, ...],
+    on_progress: OnStage,
+) -> tuple[Singles, Owners]:  # fmt: skip
+    """Distances of all points of a grid to the nearest site, and which it is."""
+    tell(on_progress, "distances", 0.0)
+    distances = np.full(counts, np.float32(np.inf))
+    owner = np.full(counts, -1, dtype=np.int32)
+    stop = abandoned()
+    nearest_sites(sites, origin, size, distances, owner, stop)
+    for turn in range(8):
+        end_if_abandoned()
+        sweep(sites, origin, size, distances, owner, turn, stop)
+        tell(on_progress, "distances", (turn + 1) / 9)
+    end_if_abandoned()
+    return distances, owner

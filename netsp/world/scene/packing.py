@@ -1,0 +1,143 @@
+"""All of a field but its voxels in one vector: how it is laid out, and written.
+
+A kernel that takes an array out of a tuple counts a reference, with an atomic instruction: of a
+distance to one solid that was four fifths of the time while each table was an array of its own. So
+there is one vector: a header, a row for each solid, the corners of prisms, and the look-up.
+
+Look-up: a coarse grid of cells, with the solids that may be nearest somewhere in each. The list of
+cell k is ``data[int(data[c + k]) : int(data[c + k + 1])]``, c at `CELLS`; it holds where their rows
+begin.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.arrays import Floats, Ints, Singles
+from netsp.base.compiled.dynamic_array import write_ints
+from netsp.base.compiled.kernel import kernel
+from netsp.world.scene.grid import SIDE, VoxelGrid
+from netsp.world.scene.solids import PRISM, solid_distance
+
+COUNT, CELLS, VOXELS, NEAR, PLACE, SHAPE, BLOCKS, FINE = 0, 1, 2, 3, 10, 20, 23, 24
+"""Places in the header: number of solids; where the look-up begins (0: there is none, all solids
+are asked); 1 where there are voxels; of the look-up the origin (3), size of a cell and counts (3);
+of the voxels the origin (3), size and bounding box of all that is solid (6), counts (3), where the
+table of blocks begins (0: there is none), size of a voxel in a block.
+
+The table has for each cell between grid points 0, or where its block begins among the voxels."""
+
+ROWS, ROW = 25, 17
+"""Where the rows begin, and the length of each: kind and 16 numbers."""
+
+
+def of_solids(kinds: list[int], rows: list[list[float]], outline: npt.ArrayLike) -> Floats:
+    """The vector of some solids, without look-up; rows of prisms say which corners of the outline
+    (m, 2) are theirs."""
+    corners = np.asarray(outline, dtype=float).reshape(-1, 2)
+    data = np.zeros(ROWS + ROW * len(kinds) + corners.size)
+    data[COUNT] = len(kinds)
+    first = len(data) - corners.size
+    data[first:] = corners.ravel()
+    for n, (kind, row) in enumerate(zip(kinds, rows, strict=True)):
+        at = ROWS + ROW * n
+        data[at] = kind
+        data[at + 1 : at + 1 + len(row)] = row
+        if kind == PRISM:
+            data[at + 1 : at + 3] = first + 2 * data[at + 1 : at + 3]
+    return data
+
+
+def with_lookup(data: Floats, low: Floats, high: Floats, size: float) -> Floats:
+    """The same with a look-up: cells of a size over a box."""
+    counts = np.ceil((high - low) / size)
+    data = data.copy()
+    data[NEAR : NEAR + 7] = [*low, size, *counts]
+    cells, items = candidates(data)
+    begin = len(data)
+    data[CELLS] = begin
+    return np.concatenate([data, begin + len(cells) + cells, items])
+
+
+def with_voxels(data: Floats, grid: VoxelGrid) -> Floats:
+    """The same for a field with voxels."""
+    data = data.copy()
+    data[VOXELS] = 1.0
+    data[PLACE : PLACE + 10] = [*grid.origin, grid.size, *np.ravel(grid.solid)]
+    data[SHAPE : SHAPE + 3] = grid.counts
+    data[FINE] = grid.voxel
+    if grid.table is None:
+        return data
+    data[BLOCKS] = len(data)
+    begins = np.prod(grid.counts) + SIDE**3 * grid.table.astype(float)
+    return np.concatenate([data, np.where(grid.table < 0, 0.0, begins).ravel()])
+
+
+def voxels_of(data: Floats, values: Singles, notes: tuple[str, ...]) -> VoxelGrid | None:
+    """What `with_voxels` was given; None where there are no voxels."""
+    if data[VOXELS] == 0.0:
+        return None
+    nx, ny, nz = data[SHAPE : SHAPE + 3].astype(int).tolist()
+    table = None
+    if data[BLOCKS]:
+        begin, cells = int(data[BLOCKS]), (nx - 1, ny - 1, nz - 1)
+        begins = data[begin : begin + int(np.prod(cells))].reshape(cells)
+        blocks = (begins - nx * ny * nz) / SIDE**3
+        table = np.where(begins > 0.0, blocks, -1.0).astype(np.int32)
+    box = data[PLACE + 4 : PLACE + 10].reshape(2, 3).copy()
+    place, size = data[PLACE : PLACE + 3].copy(), float(data[PLACE + 3])
+    return VoxelGrid(values, (nx, ny, nz), place, size, box, notes, table)
+
+
+def block_points(data: Floats, voxels: Singles, offset: float, most: int) -> Floats:
+    """(n, 3) of points in blocks where the distance is below an offset, at most so many: as many of
+    each of some blocks, evenly chosen."""
+    counts = data[SHAPE : SHAPE + 3].astype(int) - 1
+    begin = int(data[BLOCKS])
+    table = data[begin : begin + int(np.prod(counts))].reshape(counts)
+    cells = np.argwhere(table > 0.0)
+    cells = cells[np.argsort(table[tuple(cells.T)])]
+    values = voxels[int(np.prod(counts + 1)) :].reshape(-1, SIDE, SIDE, SIDE)
+    some = np.arange(0, len(cells), max(1, len(cells) // most))
+    at = np.argwhere(values[some] < offset)
+    at = at[:: max(1, len(at) // most)]
+    return np.asarray(
+        data[PLACE : PLACE + 3] + data[FINE] * (SIDE * cells[some[at[:, 0]]] + at[:, 1:])
+    )
+
+
+@kernel
+def candidates(data: Floats) -> tuple[Ints, Ints]:
+    """For every cell of the look-up, the solids that may be nearest to some point of it: those no
+    farther from its centre than the nearest plus the cell's diagonal. Returns (cells, items): in
+    cell k the rows that begin at ``items[cells[k] : cells[k + 1]]``."""
+    near = data[NEAR : NEAR + 7]
+    nx, ny, nz = int(near[4]), int(near[5]), int(near[6])
+    count = int(data[COUNT])
+    cells = np.zeros(nx * ny * nz + 1, dtype=np.int64)
+    items = np.empty(4 * nx * ny * nz + count, dtype=np.int64)
+    found = np.empty(count)
+    size, reach = 0, math.sqrt(3.0) * near[3] * (1.0 + 1e-9)
+    for i in range(nx):
+        for j in range(ny):
+            for k in range(nz):
+                x = near[0] + (i + 0.5) * near[3]
+                y = near[1] + (j + 0.5) * near[3]
+                z = near[2] + (k + 0.5) * near[3]
+                least = math.inf
+                for n in range(count):
+                    found[n] = solid_distance(data, ROWS + ROW * n, x, y, z)[0]
+                    least = min(least, found[n])
+                if size + count > len(items):
+                    more = np.empty(2 * len(items) + count, dtype=np.int64)
+                    write_ints(more, items, size)
+                    items = more
+                for n in range(count):
+                    if found[n] <= least + reach:
+                        items[size] = ROWS + ROW * n
+                        size += 1
+                cells[(i * ny + j) * nz + k + 1] = size
+    return cells, items[:size].copy()

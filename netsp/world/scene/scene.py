@@ -1,0 +1,536 @@
+"""The scene: what stands in the water. Solids, a mesh, a cloud of points, or an NE-TSP problem.
+
+Validated at the door like a problem; `netsp schema scene` prints the JSON Schema.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import ConfigDict, Field, model_validator
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.base.files import FileModel, read_text
+from netsp.model.field_types import Name, NonNegative, Number, Point2, Positive
+from netsp.model.problem import Circle, Problem
+from netsp.model.validated import Model
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.grid import VoxelGrid
+from netsp.world.scene.readers import Placement, read_cloud_file, read_mesh_file
+from netsp.world.scene.seams import seam_boxes
+from netsp.world.scene.shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Post,
+    Prism,
+    Shape,
+    Sphere,
+    Torus,
+)
+from netsp.world.scene.solids import BOX
+from netsp.world.scene.tally import Tally
+
+_KINDS = ("sphere", "capsule", "cylinder", "box", "torus", "post", "prism", "half_space")
+
+
+class Solid(Model):
+    """One solid: exactly one of its shapes, and a name."""
+
+    name: Annotated[Name | None, Field(description="shown in pictures, reports and `inspect`")] = (
+        None
+    )
+    sphere: Annotated[Sphere | None, Field(description="exactly one of these shapes")] = None
+    capsule: Annotated[Capsule | None, Field(description="a cylinder with rounded ends")] = None
+    cylinder: Annotated[Cylinder | None, Field(description="with flat ends")] = None
+    box: Annotated[Box | None, Field(description="in any position")] = None
+    torus: Annotated[Torus | None, Field(description="a ring, or a bend of a pipe")] = None
+    post: Annotated[Post | None, Field(description="an upright cylinder without ends")] = None
+    prism: Annotated[Prism | None, Field(description="an upright prism without ends")] = None
+    half_space: Annotated[
+        HalfSpace | None, Field(description="everything behind a plane: sea floor, wall")
+    ] = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        given = [k for k in _KINDS if getattr(self, k) is not None]
+        if len(given) != 1:
+            raise ValueError(f"expected one of {', '.join(_KINDS)}, got {given or 'none'}")
+        return self
+
+    @property
+    def shape(self) -> Shape:
+        """The shape it is."""
+        shapes: list[Shape | None] = [getattr(self, k) for k in _KINDS]
+        return next(s for s in shapes if s is not None)
+
+
+class Source(Model):
+    """A mesh or cloud in a file beside the scene's.
+
+    Attributes
+    ----------
+    file
+        Path, relative to the scene file.
+    scale
+        Metres per unit of the file.
+    voxel
+        Metres; size of a voxel, default 1/200 of the longest side.
+    origin
+        (x, y) in the file, z upwards, that is (0, 0) of the scene, in units of the file.
+    up
+        Axis of the file that points upwards; None for what its format says, or z.
+    rotate
+        Degrees about the axes x, then y, then z of the scene.
+    """
+
+    file: Annotated[
+        str,
+        Field(
+            description="mesh (STL, OBJ, PLY, GLB, glTF, DAE) or cloud (npz, npy, csv, txt, xyz, "
+            "asc, PTS, PCD, PLY, LAS, LAZ), relative to the scene file"
+        ),
+    ]
+    scale: Annotated[Positive, Field(description="factor from the file's units to metres")] = 1.0
+    voxel: Annotated[
+        Positive | None, Field(description="edge of the voxels, m; null for a choice by size")
+    ] = None
+    origin: Annotated[
+        Point2, Field(description="(x, y) of the file that is (0, 0) here, in its units")
+    ] = (0.0, 0.0)
+    up: Annotated[
+        Literal["x", "y", "z"] | None,
+        Field(description="axis of the file that points upwards; null for its format's, or z"),
+    ] = None
+    rotate: Annotated[
+        tuple[Number, Number, Number],
+        Field(description="degrees about the axes x, then y, then z of the scene"),
+    ] = (0.0, 0.0, 0.0)
+
+    @property
+    def placement(self) -> Placement:
+        """Place of the file in the scene."""
+        return Placement(self.scale, self.up, self.origin, self.rotate)
+
+
+class Floor(Model):
+    """A sea floor from a bathymetry grid beside the scene's file.
+
+    Attributes
+    ----------
+    file
+        Bathymetry grid, relative to the scene file.
+    scale
+        Metres per unit of the file.
+    voxel
+        Metres; as of `Source`.
+    origin
+        (x, y) on the file's map that is (0, 0) of the scene.
+    depths
+        Whether its values count downwards; None for what its band or column is called.
+    """
+
+    file: Annotated[
+        str,
+        Field(
+            description="bathymetry grid (GeoTIFF, ASC, netCDF, BAG, table of x, y and z), "
+            "relative to the scene file"
+        ),
+    ]
+    scale: Annotated[Positive, Field(description="factor from the file's units to metres")] = 1.0
+    voxel: Annotated[
+        Positive | None, Field(description="edge of the voxels, m; null for a choice by size")
+    ] = None
+    origin: Annotated[
+        Point2, Field(description="(x, y) of the file's map that is (0, 0) here, its units")
+    ] = (0.0, 0.0)
+    depths: Annotated[
+        bool | None,
+        Field(
+            description="whether values are depths, which count downwards; null for what its "
+            "band or column is called, else heights"
+        ),
+    ] = None
+
+
+class Scene(FileModel):
+    """The union of solids, a mesh, a cloud and the obstacles of a problem.
+
+    Attributes
+    ----------
+    solids : tuple of Solid
+        Exact shapes.
+    mesh : Source or None
+        A file, turned into voxels (`netsp.world.scene.voxels`).
+    cloud : Source or None
+        A file, turned into voxels.
+    floor : Floor or None
+        A bathymetry grid, turned into voxels, together with the mesh if there is one.
+    problem : str or None
+        An NE-TSP problem file, whose obstacles, grown by its clearance, stand from the sea floor to
+        the surface.
+    tether_radius : float
+        Everything is grown by it for the tether, metres.
+    bounds : (xmin, ymin, zmin, xmax, ymax, zmax) or None
+        What the robot stays in, metres.
+
+    Raises
+    ------
+    InputError
+        From `load` and `field`, in one line.
+    """
+
+    file_kind: ClassVar[str] = "scene"
+
+    model_config = ConfigDict(title="netsp scene")
+
+    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
+    name: Annotated[Name, Field(description="of the scene")] = "scene"
+    units: Annotated[Name, Field(description="name of the unit of length")] = "m"
+    solids: Annotated[tuple[Solid, ...], Field(description="what stands in the water")] = ()
+    mesh: Annotated[Source | None, Field(description="a closed triangle mesh; null for none")] = (
+        None
+    )
+    cloud: Annotated[Source | None, Field(description="points on surfaces; null for none")] = None
+    floor: Annotated[Floor | None, Field(description="the sea floor; null for none")] = None
+    problem: Annotated[
+        str | None,
+        Field(description="problem file whose obstacles stand upright in the water; null for none"),
+    ] = None
+    tether_radius: Annotated[
+        NonNegative, Field(description="by which all solids are grown for the tether, m")
+    ] = 0.0
+    bounds: Annotated[
+        tuple[Number, Number, Number, Number, Number, Number] | None,
+        Field(description="[xmin, ymin, zmin, xmax, ymax, zmax] of the water, m; null for none"),
+    ] = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.bounds is not None and not all(
+            a < b for a, b in zip(self.bounds[:3], self.bounds[3:], strict=True)
+        ):
+            raise ValueError(
+                "bounds: expected (xmin, ymin, zmin, xmax, ymax, zmax) with min < max, got "
+                f"{list(self.bounds)}"
+            )
+        return self
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a scene file; file names in it become relative to the working directory.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Scene
+            The scene.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read or is not valid, in one line.
+        """
+        scene = cls.from_json(read_text(path), source=str(path))
+        folder = Path(path).parent
+        changes: dict[str, Any] = {
+            key: given.model_copy(update={"file": str(folder / given.file)})
+            for key in ("mesh", "cloud", "floor")
+            if (given := getattr(scene, key)) is not None
+        }
+        if scene.problem is not None:
+            changes["problem"] = str(folder / scene.problem)
+        return scene.model_copy(update=changes)
+
+    @classmethod
+    def from_problem(cls, problem: Problem) -> Self:
+        """The obstacles of an NE-TSP problem as posts and prisms: offline and online share one
+        world.
+
+        Parameters
+        ----------
+        problem : Problem
+            Its obstacles are grown by its clearance.
+
+        Returns
+        -------
+        Scene
+            The scene.
+        """
+        return cls(name=problem.name, units=problem.units, solids=_standing(problem))
+
+    def all_solids(self) -> tuple[Solid, ...]:
+        """The solids with those of the problem.
+
+        Returns
+        -------
+        tuple of Solid
+            All solids.
+
+        Raises
+        ------
+        InputError
+            The problem file cannot be read.
+        """
+        more = _standing(Problem.load(self.problem)) if self.problem is not None else ()
+        return (*self.solids, *more)
+
+    def thickness(self) -> list[tuple[str, float]]:
+        """How thick each solid is where it is thinnest, without mesh and cloud.
+
+        Returns
+        -------
+        list of (str, float)
+            Name and metres of each solid; inf where nothing of it is thin.
+
+        Raises
+        ------
+        InputError
+            The problem file cannot be read.
+        """
+        return _thickness(self.all_solids())
+
+    def field(
+        self,
+        *,
+        voxel: float | None = None,
+        memory_limit: float = 4.0,
+        on_progress: Callable[[str, float], None] | None = None,
+    ) -> DistanceField:
+        """The distance field of the scene.
+
+        Parameters
+        ----------
+        voxel : float, optional
+            Metres; overrides that of mesh and cloud.
+        memory_limit : float
+            GiB; a grid that needs more is refused with a voxel size that does not.
+        on_progress : callable, optional
+            Called with (stage, fraction done) of long builds.
+
+        Returns
+        -------
+        DistanceField
+            The field.
+
+        Raises
+        ------
+        InputError
+            Nothing in the scene, unreadable files, a grid that is too large.
+        """
+        solids = self.all_solids()
+        if not solids and self.mesh is None and self.cloud is None and self.floor is None:
+            raise InputError(
+                f"{self.name}: the scene is empty; expected solids, mesh, cloud or floor"
+            )
+        grid = self.voxels(voxel=voxel, memory_limit=memory_limit, on_progress=on_progress)
+        return self.field_with(solids, grid)
+
+    def field_with(self, solids: tuple[Solid, ...], grid: VoxelGrid | None) -> DistanceField:
+        """The field of other solids about the same voxels.
+
+        Parameters
+        ----------
+        solids : tuple of Solid
+            Instead of the scene's.
+        grid : VoxelGrid or None
+            Of `voxels`.
+
+        Returns
+        -------
+        DistanceField
+            The field.
+        """
+        kind, rows, outline = encode(solids)
+        boxes = [b for s in solids if (b := s.shape.box()) is not None]
+        seams = seam_boxes([s.shape for s in solids])
+        return DistanceField.build(
+            kind + [BOX] * len(seams), rows + [row for _, row in seams], outline, boxes, grid,
+            self.tether_radius, _thickness(solids), [owner for owner, _ in seams],
+        )  # fmt: skip
+
+    def voxels(
+        self,
+        *,
+        voxel: float | None = None,
+        memory_limit: float = 4.0,
+        on_progress: Callable[[str, float], None] | None = None,
+    ) -> VoxelGrid | None:
+        """Distances to what no solid describes.
+
+        Parameters
+        ----------
+        voxel : float, optional
+            As of `field`.
+        memory_limit : float
+            As of `field`.
+        on_progress : callable, optional
+            As of `field`.
+
+        Returns
+        -------
+        VoxelGrid or None
+            None where there is none of it.
+
+        Raises
+        ------
+        InputError
+            Unreadable files, a grid that is too large.
+        """
+        if self.mesh is None and self.cloud is None and self.floor is None:
+            return None
+        from netsp.world.scene import voxels
+
+        parts, points, said = self._files()
+        options: dict[str, Any] = {
+            "voxel": voxel or self._voxel(), "memory_limit": memory_limit,
+            "on_progress": on_progress, "source": self._source(),
+        }  # fmt: skip
+        if points is not None:
+            grid = (
+                voxels.of_meshes_and_cloud(list(parts.values()), points, **options)
+                if parts
+                else voxels.of_cloud(points, **options)
+            )
+        else:
+            region = self._water(parts) if "floor" in parts else None
+            grid = voxels.of_meshes(list(parts.values()), region=region, **options)
+        return replace(grid, notes=(*said, *grid.notes))
+
+    def _water(self, parts: Mapping[str, Any]) -> Floats:
+        """Return the box above a sea floor; below it, and beyond its walls, there is nothing to
+        know."""
+        vertices = parts["floor"][0]
+        top = vertices[: len(vertices) // 2]
+        water = np.array([top.min(0), [*top.max(0)[:2], np.inf]])
+        if "mesh" in parts:
+            water = np.array([
+                np.minimum(water[0], parts["mesh"][0].min(0)),
+                np.maximum(water[1], parts["mesh"][0].max(0)),
+            ])  # fmt: skip
+        return water
+
+    def _voxel(self) -> float | None:
+        """Return the edge of voxels that the scene asks for: the smallest of its files, metres."""
+        given = [f.voxel for f in (self.floor, self.mesh, self.cloud) if f is not None and f.voxel]
+        return min(given) if given else None
+
+    def _source(self) -> str:
+        files = [f.file for f in (self.mesh, self.cloud, self.floor) if f is not None]
+        return files[0] if len(files) == 1 and self.floor is None else self.name
+
+    def _files(
+        self,
+    ) -> tuple[dict[str, tuple[Floats, npt.NDArray[np.int64]]], Floats | None, list[str]]:
+        """Read mesh, floor and cloud: triangles by name, points, and notes of what was left out."""
+        parts: dict[str, tuple[Floats, npt.NDArray[np.int64]]] = {}
+        points: Floats | None = None
+        said: list[str] = []
+        if self.mesh is not None:
+            mesh = read_mesh_file(self.mesh.file, self.mesh.placement)
+            parts["mesh"] = mesh.vertices, mesh.faces
+            said += _said(self.mesh.file, mesh.notes, mesh.tally)
+        if self.floor is not None:
+            from netsp.world.scene.floor import read_floor
+
+            floor = read_floor(
+                self.floor.file, scale=self.floor.scale, origin=self.floor.origin,
+                depths=self.floor.depths,
+            )  # fmt: skip
+            parts["floor"] = floor.vertices, floor.faces
+            said += _said(self.floor.file, floor.notes, floor.tally)
+        if self.cloud is not None:
+            cloud = read_cloud_file(self.cloud.file, self.cloud.placement)
+            points = cloud.points
+            said += _said(self.cloud.file, cloud.notes, cloud.tally)
+        return parts, points, said
+
+    def reading_notes(self) -> list[str]:
+        """Return what was left out, turned or converted when the scene's files were read.
+
+        Returns
+        -------
+        list of str
+            One line for each file and reason.
+
+        Raises
+        ------
+        InputError
+            A file cannot be read.
+        """
+        return self._files()[2]
+
+    def meshes(self) -> list[tuple[str, tuple[Floats, npt.NDArray[np.int64]]]]:
+        """Mesh and sea floor as triangles.
+
+        Returns
+        -------
+        list of (str, (ndarray, ndarray))
+            ``mesh`` or ``floor``, with vertices (n, 3), metres, and faces (m, 3).
+
+        Raises
+        ------
+        InputError
+            A file cannot be read.
+        """
+        without = self.model_copy(update={"cloud": None})
+        return list(without._files()[0].items())
+
+
+def _said(file: str, notes: Sequence[str], tally: Tally) -> list[str]:
+    """Return the notes on a file, and how many of its parts are used where not all are."""
+    return [f"{file}: {note}" for note in (*notes, tally.note) if note]
+
+
+def _thickness(solids: tuple[Solid, ...]) -> list[tuple[str, float]]:
+    return [(s.name or f"solids[{k}]", s.shape.thickness()) for k, s in enumerate(solids)]
+
+
+def _standing(problem: Problem) -> tuple[Solid, ...]:
+    out = []
+    for i, o in enumerate(problem.obstacles):
+        name = o.name or f"obstacles[{i}]"
+        if isinstance(o, Circle):
+            post = Post(center=o.center, radius=o.radius + problem.clearance)
+            out.append(Solid(name=name, post=post))
+        else:
+            prism = Prism(polygon=o.polygon, grow=problem.clearance)
+            out.append(Solid(name=name, prism=prism))
+    return tuple(out)
+
+
+def encode(solids: tuple[Solid, ...]) -> tuple[list[int], list[list[float]], Floats]:
+    """Kinds, rows and polygon vertices for `netsp.world.scene.packing.of_solids`."""
+    kind: list[int] = []
+    rows: list[list[float]] = []
+    outline: list[tuple[float, float]] = []
+    for solid in solids:
+        k, row = solid.shape.row()
+        if isinstance(solid.shape, Prism):
+            row = [len(outline), len(outline) + len(solid.shape.polygon), row[2]]
+            outline += list(solid.shape.polygon)
+        kind.append(k)
+        rows.append(row)
+    return kind, rows, np.array(outline, dtype=float).reshape(-1, 2)
+
+
+def scene_of(problem: Problem) -> Scene:
+    """The scene of a problem; where there is no obstacle, with a solid far below the base, because
+    a scene needs one."""
+    if problem.obstacles:
+        return Scene.from_problem(problem)
+    x, y, z = problem.base
+    far = 1e3 * (problem.tether_length + problem.scale)
+    stone = {"sphere": {"center": [x, y, z - far], "radius": problem.tether_length}}
+    return Scene.model_validate({"schema_version": 1, "name": problem.name, "solids": [stone]})

@@ -1,0 +1,257 @@
+"""Where solids touch along a face, the distance to their union is 0 inside it: a seam.
+
+The distance field of a scene is the least of its solids' distances, which outside of them is exact.
+Inside, a point on a face that two solids share is 0 deep, though there is no water for metres
+around, and a tether whose edges may dip into a surface by an eighth of delta would pass along such
+a face as through a slit. So every flat seam is filled with boxes that lie within the two solids:
+no distance outside changes, but by the millimetre that counts as touching.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Polygon, box
+from shapely.geometry.polygon import orient
+
+from netsp.base.arrays import Floats
+from netsp.base.clock import end_if_abandoned
+from netsp.world.scene.shapes import Box, Cylinder, HalfSpace, Prism, Shape
+
+GAP, OVERLAP = 1e-3, 0.1
+"""Metres between two faces that count as touching, and how far one solid may be in the other until
+what they share is deep enough without."""
+
+PARALLEL = 1e-3
+"""Radians between two faces that count as parallel."""
+
+THICK = 0.5
+"""Metres that a box goes into either solid at most."""
+
+LEAST = 1e-3
+"""Metres: a seam that is narrower than that is left as it is."""
+
+LOWEST, GROWTH = 0.17, 1.7
+"""Metres of the lowest box that stands on a side of a seam with few of them, and how much each is
+higher than the one before: a point that is r from its nearest side and from all others has a box
+of any height between r and 2 r on it. So everything 0.15 m from the rim is as deep as edges dip."""
+
+FEW = 10
+"""Sides of a seam that are few."""
+
+STRIP, FEWEST, MOST = 0.15, 18, 120
+"""Metres of the parts that a seam with many sides is cut into, and how many there are."""
+
+AROUND = 32
+"""Corners that stand for a circle; they lie on it, so that nothing sticks out."""
+
+FAR = 1e4
+"""Metres to where a face without end is taken."""
+
+
+@dataclass(frozen=True)
+class Face:
+    """A flat face of a solid.
+
+    Parameters
+    ----------
+    corners : ndarray, shape (k, 3)
+        Of a convex polygon, metres.
+    normal : ndarray, shape (3,)
+        Unit vector out of the solid.
+    depth : float
+        Metres that the solid goes on behind all of the face, but for `inset`.
+    inset : bool
+        Whether it goes on there only as far from the face's rim as it is deep.
+    """
+
+    corners: Floats
+    normal: Floats
+    depth: float
+    inset: bool = False
+
+
+def seam_boxes(shapes: Sequence[Shape]) -> list[tuple[int, list[float]]]:
+    """Boxes that fill the seams between solids.
+
+    Parameters
+    ----------
+    shapes : sequence of Shape
+        The solids.
+
+    Returns
+    -------
+    list of (int, list of float)
+        Number of one of the two solids, and the row of a box for `netsp.world.scene.solids`.
+    """
+    flat = [k for k, s in enumerate(shapes) if isinstance(s, Box | Cylinder | Prism | HalfSpace)]
+    ends = np.array([_ends(shapes[k]) for k in flat]).reshape(-1, 2, 3)
+    rows = []
+    for n, a in enumerate(flat[:-1]):
+        end_if_abandoned()
+        others = ends[n + 1 :]
+        near = (others[:, 0] <= ends[n, 1] + GAP) & (others[:, 1] >= ends[n, 0] - GAP)
+        for m in np.flatnonzero(near.all(1)):
+            b = flat[n + 1 + int(m)]
+            at = 0.5 * (np.maximum(ends[n, 0], others[m, 0]) + np.minimum(ends[n, 1], others[m, 1]))
+            for one in _faces(shapes[a], at):
+                for other in _faces(shapes[b], at):
+                    rows += [(a, row) for row in _between(one, other)]
+    return rows
+
+
+def _ends(shape: Shape) -> Floats:
+    """(2, 3) bounding box; `FAR` where there is no end."""
+    found = shape.box()
+    if found is None:
+        return np.array([[-FAR] * 3, [FAR] * 3])
+    if isinstance(shape, Prism):
+        found[:, 2] = -FAR, FAR
+    return found
+
+
+def _faces(shape: Shape, at: Floats) -> Iterator[Face]:
+    """The flat faces of a solid; of those without end the part about a point."""
+    if isinstance(shape, Box):
+        axes, half = shape.axes(), 0.5 * np.array(shape.size)
+        for k in range(3):
+            u, v = (axes[i] * half[i] for i in range(3) if i != k)
+            for side in (1.0, -1.0):
+                middle = np.array(shape.center) + side * half[k] * axes[k]
+                corners = middle + np.array([u + v, u - v, -u - v, v - u])
+                yield Face(corners, side * axes[k], 2.0 * half[k])
+    elif isinstance(shape, Cylinder):
+        a, b = np.array(shape.a), np.array(shape.b)
+        axis = (b - a) / shape.length
+        u, v = _across(axis)
+        angle = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)[:, None]
+        ring = shape.radius * (np.cos(angle) * u + np.sin(angle) * v)
+        yield Face(a + ring, -axis, shape.length)
+        yield Face(b + ring, axis, shape.length)
+    elif isinstance(shape, HalfSpace):
+        normal = np.array(shape.normal) / np.linalg.norm(shape.normal)
+        u, v = _across(normal)
+        middle = at - ((at - np.array(shape.point)) @ normal) * normal
+        yield Face(middle + FAR * np.array([u + v, u - v, -u - v, v - u]), normal, np.inf)
+    elif isinstance(shape, Prism):
+        polygon = Polygon(shape.polygon)
+        ring = np.array(polygon.exterior.coords)
+        if not polygon.exterior.is_ccw:
+            ring = ring[::-1]
+        up = np.array([0.0, 0.0, FAR])
+        for p, q in pairwise(ring):
+            along = (q - p) / np.linalg.norm(q - p)
+            normal = np.array([along[1], -along[0], 0.0])
+            a, b = (np.array([*c, at[2]]) + shape.grow * normal for c in (p, q))
+            yield Face(np.array([a - up, b - up, b + up, a + up]), normal, shape.thickness(), True)
+
+
+def _across(axis: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors across an axis and one another."""
+    u = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+    u /= np.linalg.norm(u)
+    return u, np.cross(axis, u)
+
+
+def _between(one: Face, other: Face) -> Iterator[list[float]]:
+    """Rows of the boxes between two faces that touch or nearly so."""
+    if one.normal @ other.normal > -np.cos(PARALLEL):
+        return
+    gap = float((other.corners.mean(0) - one.corners[0]) @ one.normal)
+    if not -OVERLAP <= gap <= GAP:
+        return
+    # each goes that much into both solids, measured from half way between the faces
+    thick = min(one.depth, other.depth, THICK) - 0.5 * abs(gap)
+    normal, origin = one.normal, one.corners[0]
+    u = max(np.roll(one.corners, -1, axis=0) - one.corners, key=np.linalg.norm)
+    u = u / np.linalg.norm(u)
+    v = np.cross(normal, u)
+    frame = np.column_stack([u, v])
+    shared = Polygon((one.corners - origin) @ frame).intersection(
+        Polygon((other.corners - origin) @ frame)
+    )
+    if one.inset or other.inset:
+        thick = 0.5 * min(thick, _width(shared))
+        shared = shared.buffer(-thick, join_style="mitre")
+    if not isinstance(shared, Polygon) or shared.is_empty or min(thick, _width(shared)) < LEAST:
+        return
+    level = origin + 0.5 * gap * normal
+    for (x0, y0, x1, y1), turned in _rectangles(shared):
+        along = turned[0] * u + turned[1] * v
+        middle = np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1)])
+        across = np.cross(normal, along)
+        centre = level + middle[0] * along + middle[1] * across
+        half = [0.5 * (x1 - x0), 0.5 * (y1 - y0), thick]
+        yield [*centre, *half, *along, *across, *normal]
+
+
+def _width(shared: Polygon) -> float:
+    """Of the rectangle about a convex polygon, the shorter side."""
+    if not isinstance(shared, Polygon) or shared.is_empty:
+        return 0.0
+    corners = np.array(shared.minimum_rotated_rectangle.exterior.coords)[:3]
+    return float(np.linalg.norm(np.diff(corners, axis=0), axis=1).min())
+
+
+def _rectangles(shared: Polygon) -> Iterator[tuple[tuple[float, float, float, float], Floats]]:
+    """Rectangles inside a convex polygon that cover it but for slivers, in a frame of their own:
+    the ends of each, and the first axis of the frame."""
+    around = shared.minimum_rotated_rectangle
+    corners = np.array(around.exterior.coords)[:4]
+    edges = np.diff(corners[:3], axis=0)
+    first = edges[np.linalg.norm(edges, axis=1).argmax()]
+    first = first / np.linalg.norm(first)
+    frame = np.column_stack([first, [-first[1], first[0]]])
+    if shared.area >= (1.0 - 1e-9) * around.area:
+        local = corners @ frame
+        yield (*local.min(0), *local.max(0)), first
+        return
+    shared = shapely.remove_repeated_points(shared, LEAST)
+    sides = len(shared.exterior.coords) - 1
+    yield from _on_sides(shared) if sides <= FEW else _in_strips(shared, first)
+
+
+def _on_sides(shared: Polygon) -> Iterator[tuple[tuple[float, float, float, float], Floats]]:
+    """Rectangles of growing heights on each side of a convex polygon."""
+    corners = np.array(orient(shared).exterior.coords)
+    for p, q in pairwise(corners):
+        length = float(np.linalg.norm(q - p))
+        along = (q - p) / length
+        turned = Polygon(corners @ np.column_stack([along, [-along[1], along[0]]]))
+        x, y = along @ p, -along[1] * p[0] + along[0] * p[1]
+        left, _, right, top = turned.bounds
+        height, top = LOWEST, top - y
+        while height < GROWTH * top:
+            upper = min(height, top - LEAST)
+            across = LineString([(left - 1.0, y + upper), (right + 1.0, y + upper)])
+            x0, _, x1, _ = turned.intersection(across).bounds
+            x0, x1 = max(x, x0), min(x + length, x1)
+            if x1 - x0 > LEAST:
+                yield (x0, y, x1, y + upper), along
+            height *= GROWTH
+
+
+def _in_strips(
+    shared: Polygon, first: Floats
+) -> Iterator[tuple[tuple[float, float, float, float], Floats]]:
+    """Rectangles between cuts across a convex polygon, in a frame with the given first axis."""
+    turned = Polygon(
+        np.array(shared.exterior.coords) @ np.column_stack([first, [-first[1], first[0]]])
+    )
+    x0, y0, x1, y1 = turned.bounds
+    strips = int(np.clip(np.ceil((x1 - x0) / STRIP), FEWEST, MOST))
+    cuts = np.linspace(x0, x1, strips + 1)[1:-1]
+    # the lower side is convex and the upper concave: between two cuts they are narrowest at these
+    sides = [turned.intersection(box(x, y0 - 1.0, x, y1 + 1.0)).bounds for x in cuts]
+    # none may only touch the next: boxes that do would leave a seam of their own
+    nested = {(k, strips - 2 - k) for k in range((strips - 2) // 2)}
+    in_a_row = {(k, k + 4) for k in range(0, strips - 5, 2)} | {(strips - 6, strips - 2)}
+    for i, j in sorted(nested | in_a_row):
+        low = max(sides[i][1], sides[j][1])
+        high = min(sides[i][3], sides[j][3])
+        if high - low > LEAST:
+            yield (cuts[i], low, cuts[j], high), first

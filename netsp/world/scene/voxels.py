@@ -1,0 +1,429 @@
+"""From a mesh or a cloud of points to a grid of signed distances, true to a fraction of a voxel.
+
+Distances: every grid point near the surface knows its nearest triangle (or point) exactly; sweeps
+in the eight diagonal directions hand it on to the neighbours, that measure for themselves (a
+closest point transform). Signs: a closed mesh winds around its inside, so whatever it winds around
+is solid (overlapping parts unite); an open mesh or a cloud has no inside by itself, so water floods
+the grid from its border, and what it does not reach is solid.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.arrays import Floats, Singles
+from netsp.base.clock import end_if_abandoned
+from netsp.base.errors import InputError
+from netsp.world.scene.grid import SIDE, VoxelGrid
+from netsp.world.scene.lattice import Dense, Lattice, OnStage, sparse_near, tell
+from netsp.world.scene.readers import Placement, load_cloud, load_mesh
+from netsp.world.scene.sites import point_sites, triangle_sites
+
+DEFAULT_VOXELS = 200
+"""Voxels along the longest side when no size is given."""
+
+BYTES_PER_VOXEL = 28
+"""At the peak of building."""
+
+MOST_DENSE = 40_000_000
+"""Grid points, above which only those near surfaces are held."""
+
+MESH_BLOCK, CLOUD_BLOCK = 2700, 30_000
+"""Bytes per block of a sparse grid at the peak of building, with the points of a cloud and the tree
+that finds their neighbours (measured with 13 and 54 points to a block)."""
+
+BYTES_PER_CELL, PAD = 48, 4
+"""Of a cell without grid points, and cells between the solid and the border of a sparse grid."""
+
+SHEET = 2.0
+"""Voxels to either side of what has no thickness of its own. With one, interpolation between the
+grid's points rounds both sides into one: tethers of different resolutions then parted by up to
+85 % along a tour about FC-Planner's pipes, and a planner's forecast was off by 1 %."""
+
+MARGIN = 8
+"""Voxels between the solid and the border of the grid."""
+
+
+def of_mesh(
+    path: str | Path,
+    *,
+    scale: float = 1.0,
+    voxel: float | None = None,
+    memory_limit: float = 4.0,
+    on_progress: OnStage = None,
+) -> VoxelGrid:
+    """The distance grid of a mesh file in any format that trimesh reads (STL, OBJ, PLY, GLB, …).
+
+    Raises
+    ------
+    InputError
+        Not readable, no triangles, coordinates that are not finite, a grid too large for
+        `memory_limit` (GiB), or trimesh is not installed.
+    """
+    vertices, faces, notes = load_mesh(path, Placement(scale))
+    end_if_abandoned()
+    grid = of_triangles(
+        vertices, faces, voxel=voxel, memory_limit=memory_limit,
+        on_progress=on_progress, source=str(path),
+    )  # fmt: skip
+    return replace(grid, notes=(*notes, *grid.notes))
+
+
+def of_meshes(
+    parts: list[tuple[Floats, npt.NDArray[np.int64]]],
+    *,
+    voxel: float | None = None,
+    memory_limit: float = 4.0,
+    on_progress: OnStage = None,
+    region: Floats | None = None,
+    source: str = "mesh",
+) -> VoxelGrid:
+    """The distance grid of several meshes together: vertices (n, 3) and faces (m, 3) of each."""
+    first = np.cumsum([0, *(len(v) for v, _ in parts)])
+    return of_triangles(
+        np.vstack([v for v, _ in parts]),
+        np.vstack([f + n for (_, f), n in zip(parts, first, strict=False)]),
+        voxel=voxel, memory_limit=memory_limit, on_progress=on_progress, source=source,
+        region=region,
+    )  # fmt: skip
+
+
+def of_triangles(
+    vertices: npt.ArrayLike,
+    faces: npt.ArrayLike,
+    *,
+    voxel: float | None = None,
+    memory_limit: float = 4.0,
+    on_progress: OnStage = None,
+    region: Floats | None = None,
+    source: str = "mesh",
+) -> VoxelGrid:
+    """The distance grid of triangles: vertices (n, 3), faces (m, 3)."""
+    v, f = np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.int64)
+    if f.size == 0:
+        raise InputError(f"{source}: expected a mesh with triangles, got none")
+    if v.ndim != 2 or v.shape[1] != 3 or f.ndim != 2 or f.shape[1] != 3:
+        raise InputError(
+            f"{source}: expected vertices (n, 3) and faces (m, 3), got {v.shape} and {f.shape}"
+        )
+    if f.min() < 0 or f.max() >= len(v):
+        raise InputError(f"{source}: a face has a corner that is none of the {len(v)} vertices")
+    if not np.isfinite(v).all():
+        raise InputError(f"{source}: a vertex is not finite")
+    mesh = _Triangles.of(v, f)
+    low, high = mesh.triangles.min((0, 1)), mesh.triangles.max((0, 1))
+    lattice = _lattice(
+        low, high, voxel, memory_limit, source, mesh.sites,
+        shell=SHEET if mesh.open_edges else 0.0,
+        triangles=None if mesh.open_edges else mesh.triangles, region=region,
+    )  # fmt: skip
+    values, notes = mesh.values(lattice, on_progress, source)
+    grow = SHEET * lattice.size if mesh.open_edges else 0.0
+    tell(on_progress, "distances", 1.0)
+    return lattice.grid(values, np.array([low - grow, high + grow]), tuple(notes))
+
+
+@dataclass
+class _Triangles:
+    """Triangles (m, 3, 3) of a mesh, with their sites and what is known of their edges."""
+
+    triangles: Floats
+    sites: Floats
+    open_edges: int
+    uneven: int
+    turned: int
+
+    @classmethod
+    def of(cls, v: Floats, f: npt.NDArray[np.int64]) -> _Triangles:
+        open_edges, uneven = _edges(f, v)
+        turned = 0
+        if not open_edges:
+            f, turned = _outward(f, v)
+        triangles = v[f]
+        end_if_abandoned()
+        return cls(triangles, triangle_sites(triangles), open_edges, uneven, turned)
+
+    def values(
+        self, lattice: Lattice, on_progress: OnStage, source: str
+    ) -> tuple[Singles, list[str]]:
+        """Return the signed distances at the points of a lattice, and what was assumed."""
+        size, notes = lattice.size, []
+        values = lattice.closest(self.sites, on_progress, whose=False)[0]
+        if self.open_edges:
+            shell = SHEET * size
+            notes.append(
+                f"the mesh is open ({self.open_edges} edges have one triangle only): taken as a "
+                f"shell, {2 * shell:.3g} thick; spaces that water cannot reach count as solid"
+            )
+            values -= np.float32(shell)
+        else:
+            most = lattice.turn_inside(values, self.triangles)
+            if self.uneven:
+                notes.append(
+                    f"faces at {self.uneven} edges have opposite orientations: taken as solid "
+                    "wherever the winding number is not zero"
+                )
+            if self.turned:
+                notes.append(f"{self.turned} parts are inside out, or cavities: taken as solid")
+            elif most > 1:
+                notes.append("parts of the mesh overlap: taken as their union")
+        end_if_abandoned()
+        enclosed = lattice.unreached(values)
+        if enclosed.any():
+            values[enclosed] = -np.abs(values[enclosed])
+            if not self.open_edges:
+                notes.append("closed cavities count as solid")
+        if not (values < 0.0).any():
+            raise InputError(f"{source}: no solid at voxels of {size:.3g}; expected smaller voxels")
+        return values, notes
+
+
+def of_cloud_file(
+    path: str | Path,
+    *,
+    scale: float = 1.0,
+    voxel: float | None = None,
+    memory_limit: float = 4.0,
+    on_progress: OnStage = None,
+) -> VoxelGrid:
+    """The distance grid of a cloud file in any format of `netsp.world.scene.readers.load_cloud`.
+    InputError as for `of_mesh`."""
+    points, notes = load_cloud(path, Placement(scale))
+    grid = of_cloud(
+        points, voxel=voxel, memory_limit=memory_limit, on_progress=on_progress,
+        source=str(path),
+    )  # fmt: skip
+    return replace(grid, notes=(*notes, *grid.notes))
+
+
+def of_cloud(
+    points: npt.ArrayLike,
+    *,
+    voxel: float | None = None,
+    memory_limit: float = 4.0,
+    on_progress: OnStage = None,
+    source: str = "cloud",
+) -> VoxelGrid:
+    """The distance grid of a cloud (n, 3) that lies on the surface of something solid.
+
+    The cloud is closed: balls of radius r about the points, r wide enough to shut the gaps between
+    neighbours, keep the water out; what it does not reach is then eroded by r again. So the surface
+    passes through the points and bridges gaps of up to about 2 r. Where nothing solid would be left
+    (a sheet of points) the points themselves are, `SHEET` voxels to either side.
+    """
+    p = _points(points, source)
+    low, high = p.min(0), p.max(0)
+    ball = _ball(p, _size(low, high, voxel, source))
+    sites = point_sites(p)
+    lattice = _lattice(
+        low, high, voxel, memory_limit, source, sites, shell=0.0, extra=_spacing(p),
+        block=CLOUD_BLOCK,
+    )  # fmt: skip
+    out, notes, grow = _cloud_values(lattice, p, sites, ball, on_progress, source)
+    tell(on_progress, "distances", 1.0)
+    return lattice.grid(out, np.array([low - grow, high + grow]), tuple(notes))
+
+
+def _points(points: npt.ArrayLike, source: str) -> Floats:
+    p = np.asarray(points, dtype=float)
+    if p.ndim != 2 or p.shape[1] != 3:
+        raise InputError(f"{source}: expected points of three coordinates, got shape {p.shape}")
+    if len(p) < 4:
+        raise InputError(f"{source}: expected at least 4 points, got {len(p)}")
+    if not np.isfinite(p).all():
+        raise InputError(f"{source}: a point is not finite")
+    return p
+
+
+def _ball(p: Floats, size: float) -> float:
+    """Radius of the balls about points that keep the water out, metres."""
+    from scipy.spatial import cKDTree
+
+    near, _ = cKDTree(p).query(p, k=min(7, len(p)))
+    return max(1.5 * size, float(np.quantile(near[:, -1], 0.95)))
+
+
+def _cloud_values(
+    lattice: Lattice, p: Floats, sites: Floats, ball: float, on_progress: OnStage, source: str
+) -> tuple[Singles, list[str], float]:
+    """Return the signed distances at the points of a lattice, what was assumed, and by how much
+    the solid is larger than the box of the points."""
+    size = lattice.size
+    distances, owner = lattice.closest(sites, on_progress)
+    tell(on_progress, "flood", 0.5)
+    values = distances - np.float32(ball)
+    end_if_abandoned()
+    filled = lattice.unreached(values) | (values <= 0.0)
+    # the distance to the water's edge: balls about grid points in the water that just touch it
+    edge = ~filled & (values <= 1.8 * size)
+    if not edge.any() or not filled.any():
+        raise InputError(f"{source}: no solid at voxels of {size:.3g}; expected smaller voxels")
+    at, which = lattice.positions(edge)
+    weighted = point_sites(at, values[which])
+    to_water = lattice.closest(weighted, whose=False)[0]
+    out = np.where(filled, ball - to_water, distances).astype(np.float32)
+    notes = [f"gaps of up to {2 * ball:.3g} between points are closed"]
+    # points around which nothing is solid
+    loose = lattice.least_around(out, p, 2) > -size
+    grow = 0.0
+    if loose.any():
+        half = SHEET * size
+        out = np.where(loose[owner], np.minimum(out, distances - np.float32(half)), out)
+        grow = half
+        if loose.mean() > 0.01:
+            notes.append(
+                f"{100 * loose.mean():.0f} % of the points enclose nothing: taken as a sheet, "
+                f"{2 * half:.3g} thick"
+            )
+    return out, notes, grow
+
+
+def of_meshes_and_cloud(
+    parts: list[tuple[Floats, npt.NDArray[np.int64]]],
+    points: npt.ArrayLike,
+    *,
+    voxel: float | None = None,
+    memory_limit: float = 4.0,
+    on_progress: OnStage = None,
+    source: str = "scene",
+) -> VoxelGrid:
+    """Return the distance grid of meshes and a cloud of points together.
+
+    Both are measured at the points of one lattice. Outside of their union the smaller distance is
+    the distance to it; inside, it is no deeper than the truth.
+
+    Parameters
+    ----------
+    parts : list of (ndarray, ndarray)
+        Vertices (n, 3) and faces (m, 3) of each mesh.
+    points : ndarray, shape (k, 3)
+        Points of the cloud.
+    voxel : float, optional
+        Edge of a voxel, metres.
+    memory_limit : float
+        GiB.
+    on_progress : callable, optional
+        Called with (stage, fraction done).
+    source : str
+        Name of the scene, for messages.
+
+    Raises
+    ------
+    InputError
+        As for `of_triangles` and `of_cloud`.
+    """
+    p = _points(points, source)
+    first = np.cumsum([0, *(len(v) for v, _ in parts)])
+    v = np.vstack([v for v, _ in parts])
+    f = np.vstack([f + n for (_, f), n in zip(parts, first, strict=False)])
+    mesh = _Triangles.of(v, f)
+    low = np.minimum(mesh.triangles.min((0, 1)), p.min(0))
+    high = np.maximum(mesh.triangles.max((0, 1)), p.max(0))
+    size = _size(low, high, voxel, source)
+    extra = _spacing(p)
+    flat = triangle_sites(np.repeat(p[:, None], 3, axis=1))  # points, where blocks are placed
+    lattice = _lattice(
+        low, high, size, memory_limit, source, np.vstack([mesh.sites, flat]),
+        shell=SHEET if mesh.open_edges else 0.0, extra=extra, block=CLOUD_BLOCK,
+    )  # fmt: skip
+    values, notes = mesh.values(lattice, on_progress, source)
+    cloud, more, grow = _cloud_values(lattice, p, point_sites(p), _ball(p, size), None, source)
+    if mesh.open_edges:
+        grow = max(grow, SHEET * lattice.size)
+    tell(on_progress, "distances", 1.0)
+    box = np.array([low - grow, high + grow])
+    return lattice.grid(np.minimum(values, cloud), box, (*notes, *more))
+
+
+def _lattice(
+    low: Floats, high: Floats, voxel: float | None, memory_limit: float, source: str,
+    sites: Floats, *, shell: float, extra: float = 0.0, block: int = MESH_BLOCK,
+    triangles: Floats | None = None, region: Floats | None = None,
+) -> Lattice:  # fmt: skip
+    """The points at which the grid is built; `shell` in voxels, `extra` room in metres,
+    `block` the bytes of one at the peak.
+
+    InputError when there would be too many.
+    """
+    size = _size(low, high, voxel, source)
+    pad = MARGIN * size + 2.0 * extra
+    counts = np.ceil((high - low + 2.0 * pad) / size) + 1
+    # off by an odd fraction of a voxel: no row of the grid runs along an edge of the mesh
+    off = size * np.array([0.0123457, 0.0271828, 0.0314159])
+    if np.prod(counts) <= MOST_DENSE and np.prod(counts) * BYTES_PER_VOXEL <= memory_limit * 2**30:
+        return Dense(low - pad + off, size, (int(counts[0]), int(counts[1]), int(counts[2])))
+    side = SIDE * size
+    pad = PAD * side + 2.0 * extra
+    cells = np.ceil((high - low + 2.0 * pad) / side)
+    need = float(np.prod(cells + 1)) * BYTES_PER_CELL
+    if need <= memory_limit * 2**30:
+        lattice = sparse_near(
+            low - pad + off, size, (int(cells[0]), int(cells[1]), int(cells[2])), sites,
+            shell * size + extra, triangles, region,
+        )  # fmt: skip
+        need += len(lattice.blocks) * block
+        if need <= memory_limit * 2**30:
+            return lattice
+    # blocks lie along surfaces, cells fill the box
+    better = size * math.sqrt(need / (memory_limit * 2**30)) * 1.05
+    raise InputError(
+        f"{source}: voxels of {size:.3g} need {need / 2**30:.3g} GiB, more than "
+        f"{memory_limit:g}; expected voxels of {better:.2g} or more"
+    )
+
+
+def _size(low: Floats, high: Floats, voxel: float | None, source: str) -> float:
+    """Edge of a voxel, metres."""
+    if voxel is not None and not 0.0 < voxel < math.inf:
+        raise InputError(f"{source}: voxel: expected a positive length, got {voxel!r}")
+    side = float((high - low).max())
+    if side <= 0.0:
+        raise InputError(f"{source}: all points are the same")
+    return voxel if voxel is not None else side / DEFAULT_VOXELS
+
+
+def _edges(faces: npt.NDArray[np.int64], vertices: Floats) -> tuple[int, int]:
+    """How many edges have one triangle only, and at how many the triangles disagree on the side
+    that is out. Vertices at the same place count as one (STL files repeat them)."""
+    _, same = np.unique(np.round(vertices, 9), axis=0, return_inverse=True)
+    f = same.ravel()[faces]
+    f = f[(f[:, 0] != f[:, 1]) & (f[:, 1] != f[:, 2]) & (f[:, 2] != f[:, 0])]
+    directed = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
+    turned = directed[:, 0] > directed[:, 1]
+    undirected, index = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True)
+    uses = np.bincount(index.ravel(), minlength=len(undirected))
+    balance = np.bincount(index.ravel(), np.where(turned, 1, -1), minlength=len(undirected))
+    return int((uses % 2 == 1).sum()), int(((uses % 2 == 0) & (balance != 0)).sum())
+
+
+def _outward(faces: npt.NDArray[np.int64], vertices: Floats) -> tuple[npt.NDArray[np.int64], int]:
+    """The faces with every connected part turned so that its volume is positive, and how many parts
+    were not. So overlapping parts never cancel, and what is in a cavity is solid."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    _, same = np.unique(np.round(vertices, 9), axis=0, return_inverse=True)
+    f = same.ravel()[faces]
+    links = coo_array((np.ones(2 * len(f)), (np.r_[f[:, 0], f[:, 1]], np.r_[f[:, 1], f[:, 2]])))
+    count = int(f.max()) + 1
+    links.resize((count, count))
+    _, part = connected_components(links, directed=False)
+    part = part[f[:, 0]]
+    a, b, c = (vertices[faces[:, k]] - vertices.mean(0) for k in range(3))
+    volume = np.bincount(part, np.einsum("ij,ij->i", a, np.cross(b, c)))
+    wrong = volume[part] < 0.0
+    return np.where(wrong[:, None], faces[:, ::-1], faces), int((volume < 0.0).sum())
+
+
+def _spacing(points: Floats) -> float:
+    """A rough distance between neighbours, for the room around a cloud."""
+    from scipy.spatial import cKDTree
+
+    some = points[:: max(1, len(points) // 2000)]
+    far, _ = cKDTree(points).query(some, k=min(7, len(points)))
+    return float(np.quantile(far[:, -1], 0.95))
