@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 
 from netsp import InputError, Problem, Solution, Status, TravelGraph, solve, solve_graph, verify
+from netsp.base.number_ranges import check_not_negative
 from netsp.base.registry import Registry
 from netsp.command.main import main
+from netsp.gtsp.params import read_params
 from netsp.gtsp.travel.result import Result
 from netsp.online import GeodesicTether, Scene
 from netsp.online.mission import Mission
@@ -338,3 +340,56 @@ def test_a_bound_that_is_no_number_is_refused_and_own_errors_pass():
 
     with pytest.raises(ValueError, match="mine"):
         solve_graph(square(), breaks)
+
+
+@dataclasses.dataclass(frozen=True)
+class Cuts:
+    rounds: int = 3
+    share: float = 0.5
+
+    def __post_init__(self) -> None:
+        check_not_negative(self)
+
+
+@dataclasses.dataclass(frozen=True)
+class Policy:
+    cuts: Cuts = Cuts()
+    size: int = 7
+
+
+@dataclasses.dataclass(frozen=True)
+class Nested:
+    policy: Policy = Policy()
+    depth: int = 1
+
+
+@pytest.mark.parametrize(
+    ("params", "policy"),
+    [
+        ({}, Policy()),
+        ({"policy": {"cuts": {"rounds": 5}}}, Policy(Cuts(5))),
+        ({"policy.cuts.rounds": "5", "policy.size": 2}, Policy(Cuts(5), 2)),
+        ({"policy": {"size": 2}, "policy.cuts.rounds": 5}, Policy(Cuts(5), 2)),
+        ({"policy": {"cuts.rounds": 5, "cuts.share": 1}}, Policy(Cuts(5, 1.0))),
+        ({"policy": Policy(size=9)}, Policy(size=9)),
+        ({"policy": {"cuts": Cuts(9)}}, Policy(Cuts(9))),
+    ],
+)
+def test_policies_are_read_from_nested_mappings_and_dotted_names(params, policy):
+    assert read_params(Nested, "mine", params) == Nested(policy)
+
+
+@pytest.mark.parametrize(
+    ("params", "said"),
+    [
+        ({"policy": {"cut": 1}}, "unknown option 'policy.cut'; expected one of cuts, size"),
+        ({"policy.cuts.round": 1}, "unknown option 'policy.cuts.round'; expected one of rounds"),
+        ({"policy": {"cuts": {"rounds": 1.5}}}, "option 'policy.cuts.rounds': expected a whole"),
+        ({"policy": {"cuts": {"rounds": -1}}}, "policy.cuts.rounds: expected a number that is not"),
+        ({"policy": 5}, "option 'policy': expected a mapping of cuts, size, got 5"),
+        ({"policy": Cuts()}, "option 'policy': expected a mapping of cuts, size, got"),
+    ],
+)
+def test_what_is_wrong_with_a_policy_is_named_by_its_path(params, said):
+    with pytest.raises(InputError, match=f"^solver 'mine': {said}"):
+        read_params(Nested, "mine", params)
