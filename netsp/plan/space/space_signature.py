@@ -1,4 +1,4 @@
-"""Words of paths in any scene: the second kind of `netsp.hsignature.signature.Signature`.
+"""Words of paths in any scene: the second kind of `netsp.hsignature.signature_protocol.Signature`.
 
 The labels of a complex (`netsp.plan.space.triangle_labels`) after relations have eliminated what
 generators they can. How often a path's word is right: always where the path keeps off the solids by
