@@ -33,9 +33,11 @@ OFF = 0.05
 
 
 def taut_detours(
-    problem: Problem, with_sub_goals: bool, check: Callable[[], None] = lambda: None,
+    problem: Problem,
+    with_sub_goals: bool,
+    check: Callable[[], None] = lambda: None,
     clock: Clock | None = None,
-) -> Detours:  # fmt: skip
+) -> Detours:
     """The detours over tangents and arcs: exact shortest paths.
 
     Parameters

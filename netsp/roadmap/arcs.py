@@ -106,15 +106,31 @@ def arcs_of(problem: Problem, outline: Outline, graph: TangentGraph, slits: Slit
     _fill(source * nodes + graph.target, table)
     whole = np.column_stack([graph.first, graph.segment_row, graph.arrival_row, gaps])
     blockers = outline.blockers
-    solid = np.column_stack([
-        blockers.box, blockers.circles[:, 2], graph.rays, slits.rank, blockers.edge_start[:-1],
-        blockers.edge_start[1:], blockers.grow - blockers.eps, blockers.circles[:, :2],
-    ])  # fmt: skip
+    solid = np.column_stack(
+        [
+            blockers.box,
+            blockers.circles[:, 2],
+            graph.rays,
+            slits.rank,
+            blockers.edge_start[:-1],
+            blockers.edge_start[1:],
+            blockers.grow - blockers.eps,
+            blockers.circles[:, :2],
+        ]
+    )
     return Arcs(
-        np.concatenate(of), np.array(row), disk, np.column_stack([begin, owner]), table, real,
-        whole, np.concatenate([graph.letters.astype(np.int64), gap_letters]), solid,
-        blockers.edges, 2 * arcs,
-    )  # fmt: skip
+        np.concatenate(of),
+        np.array(row),
+        disk,
+        np.column_stack([begin, owner]),
+        table,
+        real,
+        whole,
+        np.concatenate([graph.letters.astype(np.int64), gap_letters]),
+        solid,
+        blockers.edges,
+        2 * arcs,
+    )
 
 
 def _along(graph: TangentGraph) -> Floats:

@@ -184,9 +184,16 @@ def augment(
         start, number, head, letters[0], letters[1], milestone, node, trie, n
     )
     return AugmentedGraph(
-        points, milestone, node, length, row, target, cost[edge],
-        Trie(trie, np.zeros(0), size), complete,
-    )  # fmt: skip
+        points,
+        milestone,
+        node,
+        length,
+        row,
+        target,
+        cost[edge],
+        Trie(trie, np.zeros(0), size),
+        complete,
+    )
 
 
 @kernel
@@ -268,9 +275,14 @@ def _reach(
                     ids[kept, 0], ids[kept, 1], length[kept] = ids[i, 0], ids[i, 1], length[i]
                     kept += 1
             return (
-                ids[:kept, 0].copy(), ids[:kept, 1].copy(), length[:kept].copy(), trie, size, True,
+                ids[:kept, 0].copy(),
+                ids[:kept, 1].copy(),
+                length[:kept].copy(),
+                trie,
+                size,
+                True,
                 False,
-            )  # fmt: skip
+            )
         d, v = heap_d[0], heap_v[0, 0]
         heap -= 1
         _sift_down(heap_d, heap_v, heap)
@@ -297,9 +309,14 @@ def _reach(
                     continue
                 if count == cap:
                     return (
-                        ids[:count, 0].copy(), ids[:count, 1].copy(), length[:count].copy(), trie,
-                        size, False, False,
-                    )  # fmt: skip
+                        ids[:count, 0].copy(),
+                        ids[:count, 1].copy(),
+                        length[:count].copy(),
+                        trie,
+                        size,
+                        False,
+                        False,
+                    )
                 if count == len(ids):
                     ids = more_int_rows(ids)
                     longer_length = longer(length)

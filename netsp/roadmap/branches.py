@@ -104,9 +104,18 @@ def branches_of(tree: TetherTree, vertices: Ints) -> Branches:
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     return Branches(
-        tree.node, tree.parent, tree.turned, last, slid, order, rank, end, row, angle[by_angle],
+        tree.node,
+        tree.parent,
+        tree.turned,
+        last,
+        slid,
+        order,
+        rank,
+        end,
+        row,
+        angle[by_angle],
         begin,
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -142,9 +151,16 @@ def _laid_out(what: Ints, row: Ints, size: Ints, count: int) -> tuple[Ints, Ints
 
 @kernel
 def fill(
-    branches: Branches, lengths: Lengths, point: Ints, ends: Ends, slits: Slits, arcs: Arcs,
-    stop: Ints, i: int, j: int,
-) -> tuple[int, int]:  # fmt: skip
+    branches: Branches,
+    lengths: Lengths,
+    point: Ints,
+    ends: Ends,
+    slits: Slits,
+    arcs: Arcs,
+    stop: Ints,
+    i: int,
+    j: int,
+) -> tuple[int, int]:
     """Find the legs between vertices of different goals in all rows, those of the vertices at
     places i and j in the order first, and then what is open after these; the next pair of places
     whose leg cannot be pulled, or more places than there are. What is within a goal may be
@@ -178,9 +194,16 @@ def fill(
 
 @interprets(fill)
 def _fill_in_numpy(
-    branches: Branches, lengths: Lengths, point: Ints, ends: Ends, slits: Slits, arcs: Arcs,
-    stop: Ints, i: int, j: int,
-) -> tuple[int, int]:  # fmt: skip
+    branches: Branches,
+    lengths: Lengths,
+    point: Ints,
+    ends: Ends,
+    slits: Slits,
+    arcs: Arcs,
+    stop: Ints,
+    i: int,
+    j: int,
+) -> tuple[int, int]:
     """Vectorise the search of `fill` for the open legs of a row."""
     order, out, row = branches.order, lengths.out, lengths.row
     whole, place = len(out) == len(order), point[order]
@@ -208,9 +231,15 @@ def _fill_in_numpy(
 
 @kernel
 def spread(
-    u: int, v: int, length: float, count: int, on: Ints, at: Floats, branches: Branches,
+    u: int,
+    v: int,
+    length: float,
+    count: int,
+    on: Ints,
+    at: Floats,
+    branches: Branches,
     lengths: Lengths,
-) -> None:  # fmt: skip
+) -> None:
     """Note all legs that cross over as that from u to v does, whose planar length is given, and its
     number of tangents (`Path.whole` and `Path.real`)."""
     i0, i1, j0, j1 = _alike(u, v, count, on, at, branches)
@@ -228,7 +257,7 @@ def spread(
 @kernel
 def _note(
     out: Floats, a: int, begin: int, end: int, saved: float, order: Ints, lengths: Lengths
-) -> None:  # fmt: skip
+) -> None:
     """The legs from one vertex to those of places in the order, so much shorter than both tethers;
     into its row."""
     planar, height, share = lengths.planar, lengths.height, lengths.share
@@ -243,9 +272,15 @@ def _note(
 
 @interprets(spread)
 def _spread_in_numpy(
-    u: int, v: int, length: float, count: int, on: Ints, at: Floats, branches: Branches,
+    u: int,
+    v: int,
+    length: float,
+    count: int,
+    on: Ints,
+    at: Floats,
+    branches: Branches,
     lengths: Lengths,
-) -> None:  # fmt: skip
+) -> None:
     """Vectorise `spread` over all legs."""
     i0, i1, j0, j1 = interpreted(_alike)(u, v, count, on, at, branches)
     order, planar, row = branches.order, lengths.planar, lengths.row

@@ -93,11 +93,17 @@ class _Search:
         trie = Trie.root(self.limit)
         found = self.clock.interruptible(
             lambda: run_explore(
-                self.paths.tangents, 0, trie, margin=self.paths.outline.margin, rule=self.rule,
+                self.paths.tangents,
+                0,
+                trie,
+                margin=self.paths.outline.margin,
+                rule=self.rule,
                 cap=max(1_000_000, STATES_PER_CLASS * self.most),
-                within=self.within, most=4 * self.most + 1000, stop=self.clock.flag,
+                within=self.within,
+                most=4 * self.most + 1000,
+                stop=self.clock.flag,
             )
-        )  # fmt: skip
+        )
         best = self._best(found)
         if found.capped or len(best) > self.most:
             return None
@@ -172,11 +178,18 @@ class _Search:
         within[g] = reach
         found = self.clock.interruptible(
             lambda: run_explore(
-                self.paths.tangents, 0, trie, margin=self.paths.outline.margin, rule=self.rule,
-                cap=max(20_000, STATES_PER_CLASS * share), toward=(g, rest), within=within,
-                most=8 * share + 64, stop=self.clock.flag,
+                self.paths.tangents,
+                0,
+                trie,
+                margin=self.paths.outline.margin,
+                rule=self.rule,
+                cap=max(20_000, STATES_PER_CLASS * share),
+                toward=(g, rest),
+                within=within,
+                most=8 * share + 64,
+                stop=self.clock.flag,
             )
-        )  # fmt: skip
+        )
         if found.capped:
             return None, []
         nearest = sorted((length, w) for (_, w), length in self._best(found).items())
@@ -190,9 +203,11 @@ class _Search:
         rows = np.flatnonzero((found.goal > 0) & (reach <= self.limit))
         best: dict[tuple[int, int], float] = {}
         for goal, word, length in zip(
-            found.goal[rows].tolist(), found.word[rows].tolist(), found.length[rows].tolist(),
+            found.goal[rows].tolist(),
+            found.word[rows].tolist(),
+            found.length[rows].tolist(),
             strict=True,
-        ):  # fmt: skip
+        ):
             best[goal, word] = min(best.get((goal, word), math.inf), length)
         return best
 

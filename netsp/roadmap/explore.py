@@ -277,9 +277,18 @@ def explore(
             w = -1
             if least <= limit[0]:  # no word may be longer
                 w, size = _walk(
-                    word, segment_row[e, 0], segment_row[e, 1], ends[e, 2], ends[e, 3],
-                    letters, pending, rule, trie, limit, size,
-                )  # fmt: skip
+                    word,
+                    segment_row[e, 0],
+                    segment_row[e, 1],
+                    ends[e, 2],
+                    ends[e, 3],
+                    letters,
+                    pending,
+                    rule,
+                    trie,
+                    limit,
+                    size,
+                )
             if w >= 0 and least > limit[w]:
                 w = -1
             goal = target[e]
@@ -302,9 +311,18 @@ def explore(
                     if 2 * seen > len(seen_key):
                         seen_key, seen_length = rehashed(seen_key, seen_length)
                     w, size = _walk(
-                        w, arrival_row[e, 0], arrival_row[e, 1], ends[f, 0], ends[f, 1],
-                        letters, pending, rule, trie, limit, size,
-                    )  # fmt: skip
+                        w,
+                        arrival_row[e, 0],
+                        arrival_row[e, 1],
+                        ends[f, 0],
+                        ends[f, 1],
+                        letters,
+                        pending,
+                        rule,
+                        trie,
+                        limit,
+                        size,
+                    )
                 else:
                     w = -1
                 if w >= 0:
@@ -325,9 +343,18 @@ def explore(
             slid += gap[e]
             following = e + 1 if e + 1 < end else begin
             word, size = _walk(
-                word, gap_row[e, 0], gap_row[e, 1], ends[following, 0], ends[following, 1],
-                letters, pending, rule, trie, limit, size,
-            )  # fmt: skip
+                word,
+                gap_row[e, 0],
+                gap_row[e, 1],
+                ends[following, 0],
+                ends[following, 1],
+                letters,
+                pending,
+                rule,
+                trie,
+                limit,
+                size,
+            )
             if word < 0:
                 break
             e = following
@@ -391,17 +418,30 @@ def run_explore(
     no_limit = np.iinfo(np.int64).max
     aim, rest = toward or (-1, np.zeros(len(graph.target)))
     net = Net(
-        graph.start, graph.target, graph.length, graph.ends, graph.first, graph.turn, graph.gap,
-        graph.segment_row, graph.arrival_row, graph.gap_row, graph.radius, 2 * len(graph.arcs),
+        graph.start,
+        graph.target,
+        graph.length,
+        graph.ends,
+        graph.first,
+        graph.turn,
+        graph.gap,
+        graph.segment_row,
+        graph.arrival_row,
+        graph.gap_row,
+        graph.radius,
+        2 * len(graph.arcs),
         graph.longest_step,
-    )  # fmt: skip
+    )
     wide = graph.pending + margin * np.array([-1.0, -1.0, 1.0, 1.0, 0.0])
     words = Words(graph.letters, wide, rule, SAME * margin)
     ask = Ask(
-        keep, no_limit if cap is None else cap, rest, aim,
+        keep,
+        no_limit if cap is None else cap,
+        rest,
+        aim,
         np.full(len(graph.points), np.inf) if within is None else within,
         no_limit if most is None else most,
-    )  # fmt: skip
+    )
     (trie.nodes, trie.limit, trie.size), (h_i, h_f), (s_i, s_f), capped = explore(
         net, words, ask, graph.point_node(source), trie.nodes, trie.limit, trie.size, stop
     )

@@ -59,14 +59,21 @@ class GraphFromState(TravelGraph):
     """
 
     def __init__(
-        self, within: TravelGraph, start: int, surcharge: float,
+        self,
+        within: TravelGraph,
+        start: int,
+        surcharge: float,
         start_tether: npt.NDArray[np.float64],
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__(
-            within.cluster, within.signatures, within.tethers,
-            _OpenedLegs(within, start, surcharge), within.roadmap,
-            classes=within.classes, least_left_out=within.least_left_out,
-        )  # fmt: skip
+            within.cluster,
+            within.signatures,
+            within.tethers,
+            _OpenedLegs(within, start, surcharge),
+            within.roadmap,
+            classes=within.classes,
+            least_left_out=within.least_left_out,
+        )
         self.within, self.start, self.surcharge = within, start, surcharge
         self.start_tether = start_tether
         self.goal, self.before = within.goal, within.before
@@ -104,9 +111,11 @@ class GraphFromState(TravelGraph):
         for a in self.signatures[self.start]:
             odd[0, (abs(a) - 1) // BITS] ^= np.uint64(1 << (abs(a) - 1) % BITS)
         return dataclasses.replace(
-            ways, ends=np.vstack([ways.ends[rest], [[0, goal]]]),
-            odd=np.vstack([ways.odd[rest], odd]), length=np.append(length[rest], 0.0),
-        )  # fmt: skip
+            ways,
+            ends=np.vstack([ways.ends[rest], [[0, goal]]]),
+            odd=np.vstack([ways.odd[rest], odd]),
+            length=np.append(length[rest], 0.0),
+        )
 
     def as_asked(self, result: Result) -> Result:
         """Return a solver's result on this graph as one about the path from the state."""
@@ -137,9 +146,13 @@ class GraphFromState(TravelGraph):
             closed = [b for b in (low, own) if b is not None and b.gap(length) <= ENOUGH]
             status = Status.optimal_of(closed[0].scope) if closed else Status.FEASIBLE
         return dataclasses.replace(
-            result, tour=tour, length=length, status=status, walk=walk[1:],
+            result,
+            tour=tour,
+            length=length,
+            status=status,
+            walk=walk[1:],
             lower_bound=None if low is None else low.at_most(length).length,
-        )  # fmt: skip
+        )
 
     def _of_path(self, bound: LowerBound | None) -> LowerBound | None:
         """Return a bound on paths from the state, given one on closed tours, which include the
@@ -177,9 +190,7 @@ class GraphFromState(TravelGraph):
         )
 
 
-def charged(
-    table: Floats, rows: Ints, columns: Ints, start: int, surcharge: float
-) -> Floats:  # fmt: skip
+def charged(table: Floats, rows: Ints, columns: Ints, start: int, surcharge: float) -> Floats:
     """Lengths with the surcharge on all legs of the base and the start, but for the one between
     them, which is for nothing.
 
@@ -270,9 +281,13 @@ class _OpenedLegs:
 
 
 def graph_from_state(
-    problem: Problem, *, classes: str = "all", max_classes: int = MAX_CLASSES,
-    time_limit: TimeLimit = None, limits_paths: bool = True,
-) -> GraphFromState:  # fmt: skip
+    problem: Problem,
+    *,
+    classes: str = "all",
+    max_classes: int = MAX_CLASSES,
+    time_limit: TimeLimit = None,
+    limits_paths: bool = True,
+) -> GraphFromState:
     """Return the travel graph of a problem with a state; options as of `TautRoadmap`.
 
     Raises
@@ -305,21 +320,27 @@ def graph_from_state(
     start_tether = far.path(0, last, word)
     # the goals' classes as ever; the state's own may be one that no tour would choose
     roadmap = TautRoadmap(
-        plain, classes=classes, max_classes=max_classes, time_limit=clock,
+        plain,
+        classes=classes,
+        max_classes=max_classes,
+        time_limit=clock,
         limits_paths=limits_paths,
-    )  # fmt: skip
+    )
     cluster = np.append(roadmap.cluster, last)
     words = [*roadmap.signatures, word]
     lengths = np.append(roadmap.planar, planar)
-    legs = TautLegs(
-        TautPaths(placed, limit + max(limit, planar), within), cluster, words, lengths
-    )  # fmt: skip
+    legs = TautLegs(TautPaths(placed, limit + max(limit, planar), within), cluster, words, lengths)
     part = TravelGraph(
-        cluster, words, legs.to_base(), legs, roadmap="taut",
+        cluster,
+        words,
+        legs.to_base(),
+        legs,
+        roadmap="taut",
         between=legs.paths.bounds_in_any_class,
         classes=roadmap.rule if roadmap.complete else "shortest",
-        least_left_out=roadmap.least_left_out, by_parity=partial(ways_by_parity, legs.paths),
-    )  # fmt: skip
+        least_left_out=roadmap.least_left_out,
+        by_parity=partial(ways_by_parity, legs.paths),
+    )
     part.excluded_by_rule = roadmap.rule != "all"
     if len(problem.precedences):
         part.before = np.zeros((last + 1, last + 1), dtype=bool)

@@ -62,9 +62,12 @@ class TautPaths:
     """
 
     def __init__(
-        self, problem: Problem, longest: float | None = None, clock: Clock | None = None,
+        self,
+        problem: Problem,
+        longest: float | None = None,
+        clock: Clock | None = None,
         max_states: int = 1_000_000,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.problem = problem
         self.max_states = max_states
         self.outline: Outline = build_outline(problem, clock)
@@ -291,9 +294,16 @@ class TautPaths:
         for limit in self._limits(a, b, longest):
             trie = Trie.root(limit)
             found = run_explore(
-                self.tangents, a, trie, keep=True, margin=self.outline.margin, rule=ALL,
-                toward=(b, rest), cap=self.max_states, stop=stop,
-            )  # fmt: skip
+                self.tangents,
+                a,
+                trie,
+                keep=True,
+                margin=self.outline.margin,
+                rule=ALL,
+                toward=(b, rest),
+                cap=self.max_states,
+                stop=stop,
+            )
             for w in np.unique(found.word[found.goal == b]).tolist():
                 if trie.word(w) == tuple(word):
                     return _shortest(found, b, w)
@@ -389,9 +399,7 @@ class TautPaths:
         return np.asarray(xy[keep] if keep.sum() > 1 else xy[[0, -1]])
 
 
-def _shortest(
-    found: Found, goal: int, word: int
-) -> tuple[float, list[tuple[int, float]]] | None:  # fmt: skip
+def _shortest(found: Found, goal: int, word: int) -> tuple[float, list[tuple[int, float]]] | None:
     """Return the length and the pieces of the shortest hit of a goal with the word of a trie's
     node; None if there is none."""
     wanted = np.flatnonzero((found.goal == goal) & (found.word == word))

@@ -130,9 +130,15 @@ def _crossed_edges(
 
 @kernel
 def _add_parts(
-    i: int, o: int, rays: Floats, blockers: Blockers, count: int, height: Floats, edge: Ints,
+    i: int,
+    o: int,
+    rays: Floats,
+    blockers: Blockers,
+    count: int,
+    height: Floats,
+    edge: Ints,
     out: Floats,
-) -> None:  # fmt: skip
+) -> None:
     """Add what each chord of a polygon on a ray cuts off from the polygon's point."""
     edges, growth = blockers.edges, blockers.grow[o]
     first, stop = blockers.edge_start[o], blockers.edge_start[o + 1]
@@ -150,9 +156,14 @@ def _add_parts(
             for e in range(first, stop):
                 for side in range(2):
                     _include(
-                        side, i, edges[e, 0] - growth, edges[e, 1] - growth,
-                        edges[e, 0] + growth, edges[e, 1] + growth, out,
-                    )  # fmt: skip
+                        side,
+                        i,
+                        edges[e, 0] - growth,
+                        edges[e, 1] - growth,
+                        edges[e, 0] + growth,
+                        edges[e, 1] + growth,
+                        out,
+                    )
             continue
         if not rightward:
             enter, leave = leave, enter

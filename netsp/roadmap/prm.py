@@ -130,11 +130,16 @@ class PrmRoadmap:
         """The travel graph over this roadmap. Tethers are the taut ones of their classes; that
         they fit was decided by the length along the roadmap, which is no shorter."""
         return TravelGraph(
-            self.cluster, self.signatures, self.tethers, self, roadmap="prm", detours=self._detours,
+            self.cluster,
+            self.signatures,
+            self.tethers,
+            self,
+            roadmap="prm",
+            detours=self._detours,
             between=self.paths.bounds_in_any_class,
             classes="non-looping" if self.complete else "shortest",
             least_left_out=math.inf if self.complete else 0.0,
-        )  # fmt: skip
+        )
 
     def _taut_lengths(self, clock: Clock) -> Floats:
         """Return the planar length of the taut tether of every class.

@@ -69,9 +69,9 @@ def _within(
         count += found[1]
         if count > MOST_PATHS and not first:
             return None
-    ends: Ints = np.vstack([
-        np.column_stack([np.full(len(goal), a), goal]) for a, (goal, _, _) in enumerate(each)
-    ])  # fmt: skip
+    ends: Ints = np.vstack(
+        [np.column_stack([np.full(len(goal), a), goal]) for a, (goal, _, _) in enumerate(each)]
+    )
     z = paths.problem.points[:, 2]
     planar: Floats = np.concatenate([length for _, length, _ in each])
     in_space = np.hypot(planar, z[ends[:, 1]] - z[ends[:, 0]])

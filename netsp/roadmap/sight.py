@@ -163,9 +163,18 @@ def _is_hidden(
 
 @kernel
 def _block(
-    cx: float, cy: float, offset: float, p: Floats, q: Floats, radius: float, far: float,
-    pencil: int, farthest: Singles, low: float, width: float,
-) -> None:  # fmt: skip
+    cx: float,
+    cy: float,
+    offset: float,
+    p: Floats,
+    q: Floats,
+    radius: float,
+    far: float,
+    pencil: int,
+    farthest: Singles,
+    low: float,
+    width: float,
+) -> None:
     """Lower horizons to what a connected set blocks that has the disks of a radius about p and q in
     it and stays clear of the pencil's own disk.
 
@@ -201,9 +210,14 @@ def _block(
 
 @kernel
 def find_horizons(
-    place: Floats, a_count: int, blockers: Blockers, horizons: Horizons, begin: int, end: int,
+    place: Floats,
+    a_count: int,
+    blockers: Blockers,
+    horizons: Horizons,
+    begin: int,
+    end: int,
     stop: Ints,
-) -> None:  # fmt: skip
+) -> None:
     """Lower the horizons of pencils `begin` to `end` - 1 to what blocks them; some stay too far
     when the flag of a clock is set."""
     farthest, lows, widths = horizons.farthest, horizons.low, horizons.width
@@ -240,9 +254,18 @@ def find_horizons(
                         max(box[node, 3] - cy, cy - box[node, 1]),
                     )
                     _block(
-                        cx, cy, offset, edges[e, :2], edges[part[last, 1], 2:],
-                        grow[o] - 2.0 * eps, far, pencil, farthest, low, width,
-                    )  # fmt: skip
+                        cx,
+                        cy,
+                        offset,
+                        edges[e, :2],
+                        edges[part[last, 1], 2:],
+                        grow[o] - 2.0 * eps,
+                        far,
+                        pencil,
+                        farthest,
+                        low,
+                        width,
+                    )
             if skip[node] > node + 1:
                 one, other = node + 1, skip[node + 1]
                 if _distance(cx, cy, box, one) < _distance(cx, cy, box, other):
@@ -257,9 +280,18 @@ def find_horizons(
                     radius = circles[o, 2] - 2.0 * eps
                     if radius > 0.0 and d > SEPARATE * (r + radius):
                         _block(
-                            cx, cy, offset, circles[o, :2], circles[o, :2], radius, d, pencil,
-                            farthest, low, width,
-                        )  # fmt: skip
+                            cx,
+                            cy,
+                            offset,
+                            circles[o, :2],
+                            circles[o, :2],
+                            radius,
+                            d,
+                            pencil,
+                            farthest,
+                            low,
+                            width,
+                        )
                     continue
                 radius = grow[o] - 2.0 * eps
                 ux, uy = edges[e, 0] - cx, edges[e, 1] - cy
@@ -273,9 +305,18 @@ def find_horizons(
                 if d > SEPARATE * (r + radius):
                     far = max(math.hypot(ux, uy), math.hypot(vx, vy))
                     _block(
-                        cx, cy, offset, edges[e, :2], edges[e, 2:], radius, far, pencil,
-                        farthest, low, width,
-                    )  # fmt: skip
+                        cx,
+                        cy,
+                        offset,
+                        edges[e, :2],
+                        edges[e, 2:],
+                        radius,
+                        far,
+                        pencil,
+                        farthest,
+                        low,
+                        width,
+                    )
 
 
 @kernel
@@ -318,9 +359,14 @@ def _may_see(direction: float, length: float, pencil: int, horizons: Horizons) -
 
 @kernel
 def pairs_in_sight(
-    place: Floats, a_count: int, targets: Targets, horizons: Horizons, begin: int, end: int,
+    place: Floats,
+    a_count: int,
+    targets: Targets,
+    horizons: Horizons,
+    begin: int,
+    end: int,
     stop: Ints,
-) -> Ints:  # fmt: skip
+) -> Ints:
     """Return the pairs (n, 2) of places i < j, i from `begin` to `end` - 1, that horizons do not
     rule out, without order; some are missing when the flag of a clock is set."""
     order, last = targets.order, targets.last
@@ -346,9 +392,13 @@ def pairs_in_sight(
                     away, angle = _subtended(cx, cy, box, node)
                     shift = CHORD * r / near
                     if _is_hidden(
-                        away - low - shift, angle + 2.0 * shift, near - r, pencil,
-                        horizons.farthest, width,
-                    ):  # fmt: skip
+                        away - low - shift,
+                        angle + 2.0 * shift,
+                        near - r,
+                        pencil,
+                        horizons.farthest,
+                        width,
+                    ):
                         node = skip[node]
                         continue
                 node += 1

@@ -115,9 +115,13 @@ def build_slits(problem: Problem) -> Slits:
 
 
 def slit_lengths(
-    slits: Slits, places: Floats, cluster: Ints, signatures: Sequence[Word],
-    rows: Ints | None = None, stop: Flag = NEVER,
-) -> Floats:  # fmt: skip
+    slits: Slits,
+    places: Floats,
+    cluster: Ints,
+    signatures: Sequence[Word],
+    rows: Ints | None = None,
+    stop: Flag = NEVER,
+) -> Floats:
     """(V, V) planar lengths among slits of the legs between vertices; 0 within a cluster.
 
     Parameters

@@ -228,9 +228,18 @@ def assembled(
 
     def written(stop: Flag) -> Any:
         return _write_letters(
-            arcs, full, start, target, key, arrival_key, ends, angle, outline.rays, order_of_rays,
+            arcs,
+            full,
+            start,
+            target,
+            key,
+            arrival_key,
+            ends,
+            angle,
+            outline.rays,
+            order_of_rays,
             stop,
-        )  # fmt: skip
+        )
 
     first, turn, gap, letters, segment_row, arrival_row, gap_row = (clock or Clock()).finish(
         WRITING, steps, written

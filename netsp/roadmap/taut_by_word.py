@@ -112,9 +112,10 @@ class Path(NamedTuple):
 def path_for(longest: int) -> Path:
     """For words of at most twice so many letters."""
     return Path(
-        np.empty((MOST_NODES, 8)), np.empty((MOST_NODES, 2), dtype=np.int64),
+        np.empty((MOST_NODES, 8)),
+        np.empty((MOST_NODES, 2), dtype=np.int64),
         np.empty(2 * longest + 64, dtype=np.int64),
-    )  # fmt: skip
+    )
 
 
 def path_along(a: int, pieces: Sequence[tuple[int, float]], target: Ints, arcs: Arcs) -> Path:
@@ -127,8 +128,11 @@ def path_along(a: int, pieces: Sequence[tuple[int, float]], target: Ints, arcs: 
     target
         (e,) node at which each departure ends.
     """
-    path = Path(np.zeros((len(pieces) + 1, 8)), np.zeros((len(pieces) + 1, 2), dtype=np.int64),
-                np.zeros(0, dtype=np.int64))  # fmt: skip
+    path = Path(
+        np.zeros((len(pieces) + 1, 8)),
+        np.zeros((len(pieces) + 1, 2), dtype=np.int64),
+        np.zeros(0, dtype=np.int64),
+    )
     path.whole[0, NODE] = arcs.points + a
     for k, (e, slid) in enumerate(pieces):
         path.whole[k, EDGE], path.real[k, SLID] = e, slid
@@ -155,18 +159,51 @@ def pull(
     """
     low, bends = string(u, v, ends, slits, room)
     count = _named(
-        u, v, bends, arcs.points + point[u], arcs.points + point[v], ends.place, ends.cell,
-        slits.obstacle, slits.x, room.gate, room.corner, arcs.of, arcs.row, arcs.disk, path.real,
+        u,
+        v,
+        bends,
+        arcs.points + point[u],
+        arcs.points + point[v],
+        ends.place,
+        ends.cell,
+        slits.obstacle,
+        slits.x,
+        room.gate,
+        room.corner,
+        arcs.of,
+        arcs.row,
+        arcs.disk,
+        path.real,
         path.whole,
-    )  # fmt: skip
+    )
     count = _tightened(
-        count, arcs.of, arcs.row, arcs.disk, arcs.span, arcs.table, arcs.real, arcs.solid,
-        arcs.edges, path.real, path.whole,
-    )  # fmt: skip
+        count,
+        arcs.of,
+        arcs.row,
+        arcs.disk,
+        arcs.span,
+        arcs.table,
+        arcs.real,
+        arcs.solid,
+        arcs.edges,
+        path.real,
+        path.whole,
+    )
     length = _proven(
-        u, v, count, ends.letters, ends.row, arcs.disk, arcs.span, arcs.real, arcs.whole,
-        arcs.letters, path.real, path.whole, path.word,
-    )  # fmt: skip
+        u,
+        v,
+        count,
+        ends.letters,
+        ends.row,
+        arcs.disk,
+        arcs.span,
+        arcs.real,
+        arcs.whole,
+        arcs.letters,
+        path.real,
+        path.whole,
+        path.word,
+    )
     return length, low, count - 1
 
 
@@ -193,9 +230,18 @@ def pull_one(ends: Ends, point: Ints, slits: Slits, arcs: Arcs) -> tuple[float, 
 
 @kernel
 def _tightened(
-    count: int, of: Ints, row: Ints, disk: Floats, span: Ints, table: Ints, real: Floats,
-    solid: Floats, edges: Floats, at: Floats, on: Ints,
-) -> int:  # fmt: skip
+    count: int,
+    of: Ints,
+    row: Ints,
+    disk: Floats,
+    span: Ints,
+    table: Ints,
+    real: Floats,
+    solid: Floats,
+    edges: Floats,
+    at: Floats,
+    on: Ints,
+) -> int:
     """How many nodes a path has when it is pulled taut; 0 where it could not be.
 
     Parameters
@@ -232,9 +278,12 @@ def _tightened(
                 _copy(k - 1, k, at, on)
             on[i + 1, NODE], at[i + 1, ARRIVING], at[i + 1, LEAVING] = new, angle, angle
             _note(
-                i + 1, disk[new, CX] + disk[new, RADIUS] * math.cos(angle),
-                disk[new, CY] + disk[new, RADIUS] * math.sin(angle), at[i, STRIP], at,
-            )  # fmt: skip
+                i + 1,
+                disk[new, CX] + disk[new, RADIUS] * math.cos(angle),
+                disk[new, CY] + disk[new, RADIUS] * math.sin(angle),
+                at[i, STRIP],
+                at,
+            )
             count += 1
             continue
         if i > 0:
@@ -285,10 +334,23 @@ def _facing(node: int, ux: float, uy: float) -> float:
 
 @kernel
 def _named(
-    u: int, v: int, bends: int, from_: int, to: int, place: Floats, cell: Ints, obstacle: Ints,
-    line_x: Floats, gate: Floats, corner: Ints, of: Ints, row: Ints, disk: Floats, at: Floats,
+    u: int,
+    v: int,
+    bends: int,
+    from_: int,
+    to: int,
+    place: Floats,
+    cell: Ints,
+    obstacle: Ints,
+    line_x: Floats,
+    gate: Floats,
+    corner: Ints,
+    of: Ints,
+    row: Ints,
+    disk: Floats,
+    at: Floats,
     on: Ints,
-) -> int:  # fmt: skip
+) -> int:
     """The directed arcs that the bends of a string name, between its two ends; how many, 0 where
     that is not known."""
     if bends and gate[corner[bends - 1, 0], LOW] == gate[corner[bends - 1, 0], HIGH]:
@@ -342,9 +404,18 @@ def _named(
 
 @kernel
 def _standing_out(
-    o: int, left: bool, x: float, y: float, ux: float, uy: float, a: int, b: int, of: Ints,
-    row: Ints, disk: Floats,
-) -> tuple[int, float]:  # fmt: skip
+    o: int,
+    left: bool,
+    x: float,
+    y: float,
+    ux: float,
+    uy: float,
+    a: int,
+    b: int,
+    of: Ints,
+    row: Ints,
+    disk: Floats,
+) -> tuple[int, float]:
     """The directed arc of an obstacle that stands out farthest to one side of a line through (x, y)
     along (ux, uy), and how far; -1 if there is none but those of nodes a and b."""
     side = 1.0 if left else -1.0
@@ -368,9 +439,17 @@ def _standing_out(
 
 @kernel
 def _between(
-    a: int, b: int, i: int, of: Ints, row: Ints, disk: Floats, span: Ints, solid: Floats,
-    edges: Floats, at: Floats,
-) -> tuple[int, float]:  # fmt: skip
+    a: int,
+    b: int,
+    i: int,
+    of: Ints,
+    row: Ints,
+    disk: Floats,
+    span: Ints,
+    solid: Floats,
+    edges: Floats,
+    at: Floats,
+) -> tuple[int, float]:
     """The directed arc that a path from node a to node b, number i and the one after it, has to
     pass in between, -1 if it is not known; and the angle at which it stands out."""
     ra = 0.0 if span[a, OWNER] < 0 else disk[a, RADIUS] * (1.0 - 2.0 * (a % 2))
@@ -394,9 +473,15 @@ def _between(
             if math.hypot(cx - t * ux, cy - t * uy) >= solid[o, ROUND] - TOUCH * solid[o, ROUND]:
                 continue
         elif not enters_polygon(
-            px, py, qx, qy, edges, int(solid[o, FIRST_EDGE]), int(solid[o, AFTER_EDGES]),
+            px,
+            py,
+            qx,
+            qy,
+            edges,
+            int(solid[o, FIRST_EDGE]),
+            int(solid[o, AFTER_EDGES]),
             solid[o, GROWTH],
-        ):  # fmt: skip
+        ):
             continue
         if span[a, OWNER] == o:
             left = a % 2 == 1
@@ -418,9 +503,20 @@ def _between(
 
 @kernel
 def _proven(
-    u: int, v: int, count: int, letters: Ints, row: Ints, disk: Floats, span: Ints, real: Floats,
-    whole: Ints, written: Ints, at: Floats, on: Ints, word: Ints,
-) -> float:  # fmt: skip
+    u: int,
+    v: int,
+    count: int,
+    letters: Ints,
+    row: Ints,
+    disk: Floats,
+    span: Ints,
+    real: Floats,
+    whole: Ints,
+    written: Ints,
+    at: Floats,
+    on: Ints,
+    word: Ints,
+) -> float:
     """Length of a path of so many nodes if it is taut and has the word of the leg from u to v;
     else `NOT_PULLED`.
 

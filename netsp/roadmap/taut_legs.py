@@ -235,9 +235,11 @@ class TautLegs:
         """The tethers of vertices, by one search; fewer when the flag is set."""
         paths, (_, point) = self.paths, self._ends
         found = paths.tethers(
-            point[vertices].tolist(), [self.signatures[v] for v in vertices],
-            float(self.planar[vertices].max()), stop,
-        )  # fmt: skip
+            point[vertices].tolist(),
+            [self.signatures[v] for v in vertices],
+            float(self.planar[vertices].max()),
+            stop,
+        )
         return {
             v: path_along(0, pieces, paths.tangents.target, paths.arcs)
             for v, pieces in zip(vertices, found, strict=True)

@@ -190,9 +190,15 @@ class _Place(TautPaths):
         self._trie = Trie.root(limit)
         nowhere = np.zeros(len(self.tangents.target))
         return run_explore(
-            self.tangents, 1, self._trie, margin=self.outline.margin, rule=ALL, keep=True,
-            toward=(0, nowhere), cap=MOST_STEPS,
-        )  # fmt: skip
+            self.tangents,
+            1,
+            self._trie,
+            margin=self.outline.margin,
+            rule=ALL,
+            keep=True,
+            toward=(0, nowhere),
+            cap=MOST_STEPS,
+        )
 
     def along(self, found: Found, hit: int) -> TautTether:
         """The tether of a path found."""

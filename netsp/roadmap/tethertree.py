@@ -77,9 +77,17 @@ class GrowingTree:
         """Add the tethers of all vertices, from vertex 0, the base, to each; those that could not
         be pulled. Unfinished when the flag is set."""
         self._whole, self._real, self._size = _grown(
-            ends, point, slits, arcs, self._whole, self._real, self._size, self._last, self._slid,
+            ends,
+            point,
+            slits,
+            arcs,
+            self._whole,
+            self._real,
+            self._size,
+            self._last,
+            self._slid,
             stop,
-        )  # fmt: skip
+        )
         missing = np.flatnonzero(self._last < 0)
         self._last[missing] = 0
         return missing
@@ -87,24 +95,44 @@ class GrowingTree:
     def add(self, vertex: int, path: Path, arcs: Arcs) -> None:
         """Add the tether of a vertex, a path of nodes and departures and the angles slid there."""
         self._whole, self._real, self._size = _grafted(
-            vertex, len(path.whole) - 1, path.whole, path.real, arcs, self._whole, self._real,
-            self._size, self._last, self._slid,
-        )  # fmt: skip
+            vertex,
+            len(path.whole) - 1,
+            path.whole,
+            path.real,
+            arcs,
+            self._whole,
+            self._real,
+            self._size,
+            self._last,
+            self._slid,
+        )
 
     def tree(self) -> TetherTree:
         """What has grown."""
         whole, real = self._whole[: self._size], self._real[: self._size]
         return TetherTree(
-            whole[:, AT].copy(), whole[:, PARENT].copy(), real[:, TURNED].copy(),
-            real[:, REACHED].copy(), self._last, self._slid,
-        )  # fmt: skip
+            whole[:, AT].copy(),
+            whole[:, PARENT].copy(),
+            real[:, TURNED].copy(),
+            real[:, REACHED].copy(),
+            self._last,
+            self._slid,
+        )
 
 
 @kernel
 def _grown(
-    ends: Ends, point: Ints, slits: Slits, arcs: Arcs, whole: Ints, real: Floats, size: int,
-    last: Ints, slid: Floats, stop: Ints,
-) -> tuple[Ints, Floats, int]:  # fmt: skip
+    ends: Ends,
+    point: Ints,
+    slits: Slits,
+    arcs: Arcs,
+    whole: Ints,
+    real: Floats,
+    size: int,
+    last: Ints,
+    slid: Floats,
+    stop: Ints,
+) -> tuple[Ints, Floats, int]:
     longest = longest_word(ends.row)
     room, path = room_for(longest, slits), path_for(longest)
     for v in range(1, len(point)):
@@ -122,9 +150,17 @@ def _grown(
 
 @kernel
 def _grafted(
-    v: int, count: int, on: Ints, at: Floats, arcs: Arcs, whole: Ints, real: Floats, size: int,
-    last: Ints, slid: Floats,
-) -> tuple[Ints, Floats, int]:  # fmt: skip
+    v: int,
+    count: int,
+    on: Ints,
+    at: Floats,
+    arcs: Arcs,
+    whole: Ints,
+    real: Floats,
+    size: int,
+    last: Ints,
+    slid: Floats,
+) -> tuple[Ints, Floats, int]:
     """The tree with the tether of vertex v, which takes so many tangents: `Path.whole` and
     `Path.real`."""
     bend, by, reached = 0, 0.0, 0.0

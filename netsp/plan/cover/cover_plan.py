@@ -151,11 +151,14 @@ def cover(
         _check(standoff, farthest, clearance, share, incidence, tether_length)
         check_bounds(
             Mission(
-                scene="-", anchor=anchor, start=start or anchor, tether_length=ENDLESS,
+                scene="-",
+                anchor=anchor,
+                start=start or anchor,
+                tether_length=ENDLESS,
                 waypoints=(MissionWaypoint(position=anchor),),
             ),
             scene,
-        )  # fmt: skip
+        )
         field = clock.bounded("measuring distances in the scene", scene.field)
         base = field.free_point(anchor, "anchor")
         first = base if start is None else field.free_point(start, "start")
@@ -166,18 +169,30 @@ def cover(
         )
         patches = coarser(fine, camera.patch)
         mission = Mission(
-            scene="-", name=scene.name, anchor=anchor, start=tuple(first.tolist()),
-            waypoints=(MissionWaypoint(position=anchor),), clearance=clearance, camera=camera,
-            inspect=inspect, tether_length=tether_length or ENDLESS,
-        )  # fmt: skip
+            scene="-",
+            name=scene.name,
+            anchor=anchor,
+            start=tuple(first.tolist()),
+            waypoints=(MissionWaypoint(position=anchor),),
+            clearance=clearance,
+            camera=camera,
+            inspect=inspect,
+            tether_length=tether_length or ENDLESS,
+        )
         reach = clock.bounded(
             "finding where the robot gets to",
             lambda: _Reach.of(mission, scene, field, patches, standoff),
         )
         viewer = Viewer(
-            field, patches, camera, standoff, clearance, math.radians(incidence), farthest,
+            field,
+            patches,
+            camera,
+            standoff,
+            clearance,
+            math.radians(incidence),
+            farthest,
             reach.allowed,
-        )  # fmt: skip
+        )
         looking = clock.part(LOOKING)
         found = viewpoints_of(viewer, np.random.default_rng(seed), looking, tell)
         if not len(found) or not found.sees.any():
@@ -191,9 +206,13 @@ def cover(
 
 
 def _check(
-    standoff: float, farthest: float, clearance: float, share: float, incidence: float,
+    standoff: float,
+    farthest: float,
+    clearance: float,
+    share: float,
+    incidence: float,
     tether_length: float | None,
-) -> None:  # fmt: skip
+) -> None:
     positive = {"standoff": standoff, "farthest": farthest, "share": share, "incidence": incidence}
     if tether_length is not None:
         positive["tether_length"] = tether_length
@@ -275,9 +294,14 @@ class _Reach:
 
 
 def _made(
-    mission: Mission, scene: Scene, patches: Patches, found: Viewpoints, choice: Choice,
-    reach: _Reach, share: float,
-) -> Cover:  # fmt: skip
+    mission: Mission,
+    scene: Scene,
+    patches: Patches,
+    found: Viewpoints,
+    choice: Choice,
+    reach: _Reach,
+    share: float,
+) -> Cover:
     chosen = found.only(choice.chosen)
     length = mission.tether_length
     if length == ENDLESS:
@@ -288,19 +312,24 @@ def _made(
     own = [_viewpoint(found, k) for k in choice.chosen]
     waypoints = tuple(
         MissionWaypoint(
-            position=v.position, heading=v.heading,
+            position=v.position,
+            heading=v.heading,
             alternatives=tuple(_viewpoint(found, k) for k in others),
         )
         for v, others in zip(own, others_of, strict=True)
-    )  # fmt: skip
+    )
     areas = patches.areas
     visible: Bools = np.asarray(found.sees.any(axis=0))
     return Cover(
-        mission.model_copy(update={"waypoints": waypoints, "tether_length": length}), chosen,
-        patches, len(found), choice.bound,
+        mission.model_copy(update={"waypoints": waypoints, "tether_length": length}),
+        chosen,
+        patches,
+        len(found),
+        choice.bound,
         float(areas[chosen.sees.any(axis=0)].sum() / areas.sum()),
-        float(areas[visible].sum() / areas.sum()), visible,
-    )  # fmt: skip
+        float(areas[visible].sum() / areas.sum()),
+        visible,
+    )
 
 
 def _viewpoint(found: Viewpoints, k: int) -> Viewpoint:

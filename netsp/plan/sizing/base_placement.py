@@ -44,9 +44,18 @@ HAIR = 1e-9
 """Relative rounding of distances."""
 
 HEAD = (
-    "rank", "name", "x", "y", "z", "shortest_tether", "lower_bound", "lower_bound_of",
-    "length", "status", "why",
-)  # fmt: skip
+    "rank",
+    "name",
+    "x",
+    "y",
+    "z",
+    "shortest_tether",
+    "lower_bound",
+    "lower_bound_of",
+    "length",
+    "status",
+    "why",
+)
 """Columns of a ranking."""
 
 
@@ -150,16 +159,23 @@ class BaseSearch(Drawn):
         """
         rows = [
             {
-                "name": c.name, "position": list(c.position),
+                "name": c.name,
+                "position": list(c.position),
                 "shortest_tether": _finite(c.shortest_tether),
-                "lower_bound": _finite(c.bound.length), "lower_bound_of": c.bound.scope.value,
+                "lower_bound": _finite(c.bound.length),
+                "lower_bound_of": c.bound.scope.value,
                 "length": c.length,
-                "status": None if c.status is None else c.status.value, "why": c.why or None,
+                "status": None if c.status is None else c.status.value,
+                "why": c.why or None,
             }
             for c in self.candidates
-        ]  # fmt: skip
-        data = {"problem": self.problem.name, "units": self.problem.units, "proven": self.proven,
-                "candidates": rows}  # fmt: skip
+        ]
+        data = {
+            "problem": self.problem.name,
+            "units": self.problem.units,
+            "proven": self.proven,
+            "candidates": rows,
+        }
         return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
     def to_csv(self) -> str:
@@ -175,11 +191,18 @@ class BaseSearch(Drawn):
         table.writerow(HEAD)
         for k, c in enumerate(self.candidates, 1):
             table.writerow(
-                [k, cell(c.name), *(f"{v:.9g}" for v in c.position), f"{c.shortest_tether:.9g}",
-                 f"{c.bound.length:.9g}", c.bound.scope.value,
-                 "" if c.length is None else f"{c.length:.9g}",
-                 "" if c.status is None else c.status.value, c.why]
-            )  # fmt: skip
+                [
+                    k,
+                    cell(c.name),
+                    *(f"{v:.9g}" for v in c.position),
+                    f"{c.shortest_tether:.9g}",
+                    f"{c.bound.length:.9g}",
+                    c.bound.scope.value,
+                    "" if c.length is None else f"{c.length:.9g}",
+                    "" if c.status is None else c.status.value,
+                    c.why,
+                ]
+            )
         return text.getvalue()
 
     def save(self, file: str | Path) -> None:
@@ -247,9 +270,14 @@ def best_base(
 
 
 def _solved(
-    problem: Problem, rated: list[Candidate], clock: Clock, *, every: bool, seed: int,
+    problem: Problem,
+    rated: list[Candidate],
+    clock: Clock,
+    *,
+    every: bool,
+    seed: int,
     on_candidate: Callable[[Candidate, int], None] | None,
-) -> BaseSearch:  # fmt: skip
+) -> BaseSearch:
     """Solve from the candidates, the most promising first, until none can be better."""
     order = sorted(range(len(rated)), key=lambda k: (rated[k].lower_bound, k))
     best: Solution | None = None
@@ -281,9 +309,11 @@ def _solved(
     ranking = sorted(
         rated, key=lambda c: (not c.possible, c.length is None, c.length or c.lower_bound)
     )
-    proven = best is not None and all(
-        _worse(c, best) for c in ranking if c.possible and c.length != best.length
-    ) and ranking[0].status is Status.OPTIMAL  # fmt: skip
+    proven = (
+        best is not None
+        and all(_worse(c, best) for c in ranking if c.possible and c.length != best.length)
+        and ranking[0].status is Status.OPTIMAL
+    )
     return BaseSearch(problem, tuple(ranking), best, proven)
 
 
@@ -358,9 +388,10 @@ def _rated(
         if shortest > problem.tether_length * (1.0 + 1e-12):
             goal = problem.goal_label(farthest)
             why = (
-                f"{goal} cannot be reached" if np.isinf(shortest)
+                f"{goal} cannot be reached"
+                if np.isinf(shortest)
                 else f"{goal} needs a tether of {shortest:.6g}"
-            )  # fmt: skip
+            )
             out.append(Candidate(position, name, shortest, np.inf, why=why))
             continue
         bound = _tour_bound(problem, to, between, clock, seed)
@@ -417,11 +448,13 @@ def shortest_paths(problem: Problem, places: Floats) -> tuple[Floats, Floats]:
     reach = 10.0 * float(np.ptp(flat, axis=0).max() + problem.tether_length)
     plain = Problem(
         **{
-            **data, "base": tuple(flat[0]), "tether_length": reach,
+            **data,
+            "base": tuple(flat[0]),
+            "tether_length": reach,
             "goals": [tuple(p) for p in flat[1:]] or [tuple(flat[0] + 1e-3 * reach)],
             "bounds": problem.bounds,
         }
-    )  # fmt: skip
+    )
     sources = sorted(set(which[: len(goals)].tolist()))
     found = ContactGraph(build_outline(plain)).lengths(sources)
     row = {s: k for k, s in enumerate(sources)}
@@ -441,9 +474,7 @@ def _hardest(problem: Problem, to: Floats) -> int:
     return int(max(nearest, key=lambda k: to[k]))
 
 
-def _tour_bound(
-    problem: Problem, to: Floats, between: Floats, clock: Clock, seed: int
-) -> float:  # fmt: skip
+def _tour_bound(problem: Problem, to: Floats, between: Floats, clock: Clock, seed: int) -> float:
     """No tour from a place is shorter than the travelling salesperson's over shortest paths, one
     goal of each choice, in any order."""
     within = np.flatnonzero(np.isfinite(to))

@@ -68,8 +68,9 @@ def over_grid(text: str, problem: Problem) -> Floats:
         low, high = np.array(problem.bounds[:2]), np.array(problem.bounds[2:])
     else:
         held = [problem.points[:, :2]]
-        held += [np.array(o.shape(problem.clearance).bounds).reshape(2, 2)
-                 for o in problem.obstacles]  # fmt: skip
+        held += [
+            np.array(o.shape(problem.clearance).bounds).reshape(2, 2) for o in problem.obstacles
+        ]
         xy = np.vstack(held)
         low, high = xy.min(0), xy.max(0)
     x, y = np.meshgrid(np.linspace(low[0], high[0], across), np.linspace(low[1], high[1], up))

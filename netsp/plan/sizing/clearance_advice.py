@@ -96,9 +96,13 @@ def clearance_room(problem: Problem) -> ClearanceRoom | None:
 
 
 def clearance_advice(
-    clearance: float, units: str, policy: ClearancePolicy | None = None, *, margin: float = 0.0,
+    clearance: float,
+    units: str,
+    policy: ClearancePolicy | None = None,
+    *,
+    margin: float = 0.0,
     room: ClearanceRoom | None = None,
-) -> str | None:  # fmt: skip
+) -> str | None:
     """Return a warning if a plan has too little clearance to be flown.
 
     Parameters

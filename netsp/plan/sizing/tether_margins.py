@@ -170,9 +170,14 @@ def _stop(
     length = paths.length(0, goal + 1, word)
     turning = _turning(tether[:, :2])
     return StopMargin(
-        goal, problem.goal_name(goal), length, problem.tether_length - length, turning,
-        tension_ratio(friction, turning), _nearest(problem, tether),
-    )  # fmt: skip
+        goal,
+        problem.goal_name(goal),
+        length,
+        problem.tether_length - length,
+        turning,
+        tension_ratio(friction, turning),
+        _nearest(problem, tether),
+    )
 
 
 def _turning(xy: Floats) -> float:

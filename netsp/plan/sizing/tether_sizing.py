@@ -167,14 +167,22 @@ class TetherCurve(Drawn):
             Object with the steps in a list.
         """
         steps = [
-            {**vars(s), "lower_bound_of": s.bound.scope.value, "status": s.status.value,
-             "order": list(s.order)}
+            {
+                **vars(s),
+                "lower_bound_of": s.bound.scope.value,
+                "status": s.status.value,
+                "order": list(s.order),
+            }
             for s in self.steps
-        ]  # fmt: skip
+        ]
         data = {
-            "problem": self.name, "units": self.units, "shortest_tether": self.shortest,
-            "needed_by_goal": self.needs, "whole": self.whole, "steps": steps,
-        }  # fmt: skip
+            "problem": self.name,
+            "units": self.units,
+            "shortest_tether": self.shortest,
+            "needed_by_goal": self.needs,
+            "whole": self.whole,
+            "steps": steps,
+        }
         return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
     def to_csv(self) -> str:
@@ -192,10 +200,16 @@ class TetherCurve(Drawn):
         )
         for s in self.steps:
             table.writerow(
-                [f"{s.tether:.9g}", f"{s.until:.9g}", f"{s.length:.9g}",
-                 f"{s.bound.length:.9g}", s.bound.scope.value, s.status.value,
-                 " ".join(map(str, s.order))]
-            )  # fmt: skip
+                [
+                    f"{s.tether:.9g}",
+                    f"{s.until:.9g}",
+                    f"{s.length:.9g}",
+                    f"{s.bound.length:.9g}",
+                    s.bound.scope.value,
+                    s.status.value,
+                    " ".join(map(str, s.order)),
+                ]
+            )
         return text.getvalue()
 
     def save(self, file: str | Path) -> None:
@@ -300,13 +314,20 @@ def _staircase(
         needs = float(graph.tethers[tour].max())
         # a longer tether never makes the shortest tour longer
         bound = min(max(bound, result.lower_bound or 0.0), result.length)
-        step = Step(needs, limit, result.length, bound, result.status,
-                    tuple(int(g) - 1 for g in graph.goal[tour[1:]]))  # fmt: skip
+        step = Step(
+            needs,
+            limit,
+            result.length,
+            bound,
+            result.status,
+            tuple(int(g) - 1 for g in graph.goal[tour[1:]]),
+        )
         limit = needs
         if curve and step.length <= curve[-1].length * (1.0 + SAME):
             before = curve.pop()
-            step = Step(needs, before.until, before.length, before.lower_bound, before.status,
-                        step.order)  # fmt: skip
+            step = Step(
+                needs, before.until, before.length, before.lower_bound, before.status, step.order
+            )
         curve.append(step)
         if on_step is not None:
             on_step(step)
