@@ -140,10 +140,12 @@ class Board:
                     self._one_way[pair] = v < w
         self._find_ways(every)
         self.legs = {
-            (v, w): path for (v, w), path in every.items()
+            (v, w): path
+            for (v, w), path in every.items()
             if along(path) < self._home[v] + self._home[w]
-            or self._via.get(v) == w or self._via.get(w) == v
-        }  # fmt: skip
+            or self._via.get(v) == w
+            or self._via.get(w) == v
+        }
         return whole
 
     def _own_way(self, v: int) -> Floats | None:
@@ -190,8 +192,9 @@ class Board:
         count = len(self.water.mission.waypoints)
         found = {
             int(places.waypoint[s.point])
-            for s, far in zip(self.states.all, self._home, strict=False) if np.isfinite(far)
-        }  # fmt: skip
+            for s, far in zip(self.states.all, self._home, strict=False)
+            if np.isfinite(far)
+        }
         return {n for n in found if n < count}
 
     def path(self, v: int, w: int) -> Floats:
@@ -431,11 +434,14 @@ class Board:
                 s = states.all[state]
                 stops.append(
                     Stop(
-                        int(places.waypoint[s.point]), int(places.choice[s.point]),
-                        () if word is None else water.words.letters(word), tether.length, path,
+                        int(places.waypoint[s.point]),
+                        int(places.choice[s.point]),
+                        () if word is None else water.words.letters(word),
+                        tether.length,
+                        path,
                         longest,
                     )
-                )  # fmt: skip
+                )
             before = state
         free = word == at_home and alike(tether, water.laid, delta)
         return Driven(list(tour), stops, path, total, free, fault or astray)

@@ -131,9 +131,11 @@ def complex_of(
         for j in range(ny):
             for k in range(nz):
                 d = distance(
-                    field, low[0] + (i + 0.5) * cell, low[1] + (j + 0.5) * cell,
+                    field,
+                    low[0] + (i + 0.5) * cell,
+                    low[1] + (j + 0.5) * cell,
                     low[2] + (k + 0.5) * cell,
-                )  # fmt: skip
+                )
                 room[i, j, k] = d
                 if d >= LEAST_ROOM * cell:
                     flags[i, j, k] = FREE

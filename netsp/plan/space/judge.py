@@ -45,9 +45,12 @@ ROUNDING = 1e-6
 
 
 def verify_mission(
-    mission: Mission, *, scene: Scene | None = None, field: DistanceField | None = None,
+    mission: Mission,
+    *,
+    scene: Scene | None = None,
+    field: DistanceField | None = None,
     water: Water | None = None,
-) -> Verification:  # fmt: skip
+) -> Verification:
     """Judge a planned mission.
 
     Checks that the tour leads from the start through the first waypoints and home, clear of solids;
@@ -137,10 +140,15 @@ class _Judge:
         if not within.passed:  # nothing is known of the water there
             return [self._joined(), within, self._length(), self._bounds()]
         return [
-            self._joined(), within, self._left_out(), self._clear(), *self._words(),
+            self._joined(),
+            within,
+            self._left_out(),
+            self._clear(),
+            *self._words(),
             *self._tethers(),
-            self._length(), self._bounds(),
-        ]  # fmt: skip
+            self._length(),
+            self._bounds(),
+        ]
 
     @cached_property
     def legs(self) -> list[Floats]:
@@ -177,13 +185,15 @@ class _Judge:
         if len(set(given)) < len(given):
             twice = next(n for n in given if given.count(n) > 1)
             return Check(
-                "leads through the waypoints and home", False,
+                "leads through the waypoints and home",
+                False,
                 f"two stops say that they are waypoint #{twice} of the file",
-            )  # fmt: skip
+            )
         return Check(
-            "leads through the waypoints and home", good,
+            "leads through the waypoints and home",
+            good,
             told if good else f"a leg begins {off:.3g} m from where the one before it ended",
-        )  # fmt: skip
+        )
 
     def _left_out(self) -> Check:
         """Only waypoints that no tether reaches within what plans may use may be missing; where the
@@ -214,9 +224,10 @@ class _Judge:
         if room < mission.clearance and not tight:
             near = float(self.field.distance(np.vstack([mission.places, self.legs[0][:1]])).min())
             told += (
-                f"; a waypoint or the start is {near:.3g} m from it" if near < mission.clearance
+                f"; a waypoint or the start is {near:.3g} m from it"
+                if near < mission.clearance
                 else f"; pulled taut, corners may be half of delta ({mission.delta:g}) nearer"
-            )  # fmt: skip
+            )
         if tight:
             told += f", which {self._name(tight[0])} does not keep within half of delta"
         return Check(
@@ -240,16 +251,22 @@ class _Judge:
         certain = "" if words.exact else "; other words may be of the same class, too"
         return [
             Check(
-                "words at the stops", not wrong,
-                f"all as stated{certain}" if not wrong else
-                f"{wrong[0]}" + (f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""),
+                "words at the stops",
+                not wrong,
+                f"all as stated{certain}"
+                if not wrong
+                else f"{wrong[0]}" + (f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""),
             ),
             Check(
-                "empty word at the end", broken is None and word == (),
-                "contractible" if broken is None and word == () else
-                "no word" if broken is not None else f"{list(word)}",
+                "empty word at the end",
+                broken is None and word == (),
+                "contractible"
+                if broken is None and word == ()
+                else "no word"
+                if broken is not None
+                else f"{list(word)}",
             ),
-        ]  # fmt: skip
+        ]
 
     def _tethers(self) -> list[Check]:
         model, laid = self.water.model, self.water.laid
@@ -274,28 +291,33 @@ class _Judge:
         name = "home" if where == len(self.tour.stops) else f"stop {where}"
         return [
             Check(
-                "within the tether's length", longest <= limit * (1.0 + ROUNDING),
+                "within the tether's length",
+                longest <= limit * (1.0 + ROUNDING),
                 f"longest {longest:.3f} of {limit:g} m, on the way to {name}",
             ),
             Check(
-                "tethers as long as stated", not off,
-                "all" if not off else
-                f"{off[0]}" + (f", and {len(off) - 1} more" if len(off) > 1 else ""),
+                "tethers as long as stated",
+                not off,
+                "all"
+                if not off
+                else f"{off[0]}" + (f", and {len(off) - 1} more" if len(off) > 1 else ""),
             ),
             Check(
-                "free at home", left <= FREE * self.mission.delta,
+                "free at home",
+                left <= FREE * self.mission.delta,
                 f"{max(left, 0.0):.3f} m longer than at the start",
             ),
-        ]  # fmt: skip
+        ]
 
     def _length(self) -> Check:
         length = sum(float(polylines.length(leg)) for leg in self.legs)
         stated = self.tour.length
         good = abs(length - stated) <= ROUNDING * (1.0 + stated)
         return Check(
-            "length as stated", good,
+            "length as stated",
+            good,
             f"{stated:.6g} m" if good else f"the path is {length:.6g} m long, stated {stated:.6g}",
-        )  # fmt: skip
+        )
 
     def _bounds(self) -> Check:
         tour, faults = self.tour, []

@@ -286,17 +286,21 @@ class RepairPlanner(PredictivePlanner):
         state = MissionState(position=in_file(here[None])[0], tether=in_file(line))
         rest = mission.model_copy(
             update={
-                "state": state, "tour": None,
+                "state": state,
+                "tour": None,
                 "waypoints": tuple(
                     mission.waypoints[k] for k in self._left if not self._is_lost(k)
                 ),
                 "tether_length": self.limit,
             }
-        )  # fmt: skip
+        )
         return plan(
-            rest, field=self.scene, grid=self.grid, time_limit=self.options.planning_limit,
+            rest,
+            field=self.scene,
+            grid=self.grid,
+            time_limit=self.options.planning_limit,
             seed=self.options.seed,
-        )  # fmt: skip
+        )
 
     def _inside(self, place: Floats) -> bool:
         return float(self.scene.distance(place)) < DIP * self.mission.delta
@@ -334,9 +338,13 @@ class RepairPlanner(PredictivePlanner):
         self._splice(tour, stops, in_file(rest.legs[-1][0]), waypoints, left)
 
     def _splice(
-        self, tour: PlannedTour, stops: tuple[PlannedStop, ...], home: tuple[Point3, ...],
-        waypoints: tuple[MissionWaypoint, ...], left: list[int],
-    ) -> None:  # fmt: skip
+        self,
+        tour: PlannedTour,
+        stops: tuple[PlannedStop, ...],
+        home: tuple[Point3, ...],
+        waypoints: tuple[MissionWaypoint, ...],
+        left: list[int],
+    ) -> None:
         """Take stops and waypoints for those that are left, whose numbers were `left`. The file of
         the tour has the first of them begin at the stop before."""
         old, n = self.mission.tour, self.index

@@ -203,10 +203,12 @@ class _Flights:
                 f"flying {name}",
                 lambda: simulate(
                     mission,
-                    scene=self.scene, field=self.water.field, on_step=watch,
+                    scene=self.scene,
+                    field=self.water.field,
+                    on_step=watch,
                     options=PlannerOptions(prepared=False, clock=clock),
                 ),
-            )  # fmt: skip
+            )
         except LimitReachedError:
             return None, False
         return (None, slower) if run.summary["status"] == "interrupted" else (run, False)
@@ -532,18 +534,30 @@ def _offer_given_flight(found: _Incumbents, seed: int) -> None:
 
 
 def _search(
-    found: _Incumbents, clock: Clock, name: str, solver: SolverLike,
-    params: Mapping[str, Any] | None, iteration_limit: int | None, seed: int,
-) -> _Searched:  # fmt: skip
+    found: _Incumbents,
+    clock: Clock,
+    name: str,
+    solver: SolverLike,
+    params: Mapping[str, Any] | None,
+    iteration_limit: int | None,
+    seed: int,
+) -> _Searched:
     """Offer the tours of the plane and along states and legs."""
     flights, out = found.flights, _Searched()
     if clock.up and found.best is not None:
         return out  # the stages before the first plan would overrun the limit
     candidates = plans(
-        flights.mission, scene=flights.scene, water=flights.water, solver=solver, params=params,
-        clock=clock.part(flights.policy.planning_share), iteration_limit=iteration_limit, seed=seed,
-        whole_tether=True, on_progress=flights.tell,
-    )  # fmt: skip
+        flights.mission,
+        scene=flights.scene,
+        water=flights.water,
+        solver=solver,
+        params=params,
+        clock=clock.part(flights.policy.planning_share),
+        iteration_limit=iteration_limit,
+        seed=seed,
+        whole_tether=True,
+        on_progress=flights.tell,
+    )
 
     def next_plan() -> SpacePlan | None:
         return clock.bounded("looking for tours", lambda: next(candidates, None), winds_down=True)
@@ -621,10 +635,11 @@ def _with_bound(best: SolvedMission, bounds: Mapping[frozenset[int], float]) -> 
     proven = whole and LowerBound(bound, Scope.ALL_TOURS).proves(tour.length)
     tour = tour.model_copy(
         update={
-            "bound_of_all": bound, "gap_to_all": relative_gap(tour.length, bound),
+            "bound_of_all": bound,
+            "gap_to_all": relative_gap(tour.length, bound),
             "status": Status.OPTIMAL if proven else tour.status,
         }
-    )  # fmt: skip
+    )
     return replace(best, mission=mission.model_copy(update={"tour": tour}))
 
 
@@ -640,10 +655,13 @@ def _offer_going_on(found: _Incumbents, seed: int) -> None:
         tour = clock.bounded(
             "ordering the waypoints by going straight on",
             lambda: order_by_going_on(
-                mission, water.field, water.grid,
-                clock=clock.part(flights.policy.going_on_share), seed=seed,
+                mission,
+                water.field,
+                water.grid,
+                clock=clock.part(flights.policy.going_on_share),
+                seed=seed,
             ),
-        )  # fmt: skip
+        )
     except (InputError, LimitReachedError):
         return
     rest = tuple(n for n in range(len(mission.waypoints)) if n not in tour)
@@ -667,9 +685,15 @@ def _good(run: Run) -> bool:
 
 
 def tour_of_flight(
-    mission: Mission, order: tuple[int, ...], run: Run, field: DistanceField,
-    water: Water | None = None, bound: float | None = None, seed: int = 0, name: str = GOING_ON,
-) -> SolvedMission | None:  # fmt: skip
+    mission: Mission,
+    order: tuple[int, ...],
+    run: Run,
+    field: DistanceField,
+    water: Water | None = None,
+    bound: float | None = None,
+    seed: int = 0,
+    name: str = GOING_ON,
+) -> SolvedMission | None:
     """Where a robot was on a flight, made the tour of its mission.
 
     Parameters
@@ -717,11 +741,13 @@ def tour_of_flight(
             return None
         planned_stops.append(
             PlannedStop(
-                path=in_file(legs[k]), signature=word, tether_length=stop["tether"],
+                path=in_file(legs[k]),
+                signature=word,
+                tether_length=stop["tether"],
                 longest_tether=max(r.tether for r in parts[k]),
                 given_as=order[visited[k]],
             )
-        )  # fmt: skip
+        )
     length = along(path)
     if bound is not None:
         ends = np.array([leg[-1] for leg in legs[:-1]]).reshape(-1, 3)
@@ -729,11 +755,19 @@ def tour_of_flight(
         short_of_home = float(np.linalg.norm(legs[-1][-1] - np.array(mission.start)))
         bound = min(length, max(0.0, bound - 2.0 * float(off.sum()) - short_of_home))
     tour = PlannedTour(
-        stops=tuple(planned_stops), home=in_file(legs[-1]), status=Status.FEASIBLE, solver=name,
-        seed=seed, length=length, bound_of_all=bound, gap_to_all=relative_gap(length, bound),
-        states=len(visited), legs=len(legs),
-        exact=water.words.exact, unresolved_gaps=water.unresolved_gaps,
-    )  # fmt: skip
+        stops=tuple(planned_stops),
+        home=in_file(legs[-1]),
+        status=Status.FEASIBLE,
+        solver=name,
+        seed=seed,
+        length=length,
+        bound_of_all=bound,
+        gap_to_all=relative_gap(length, bound),
+        states=len(visited),
+        legs=len(legs),
+        exact=water.words.exact,
+        unresolved_gaps=water.unresolved_gaps,
+    )
     chosen = [*visited, *left]
     there = mission.model_copy(
         update={"waypoints": tuple(mission.waypoints[k] for k in chosen), "tour": tour}

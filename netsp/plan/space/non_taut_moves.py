@@ -260,9 +260,13 @@ class Detours:
             yield list(some)
 
     def _driven(
-        self, order: Sequence[int], below: float, clock: Clock,
-        like: Sequence[int] = (), known: Sequence[list[_Line]] = (),
-    ) -> list[list[_Line]] | None:  # fmt: skip
+        self,
+        order: Sequence[int],
+        below: float,
+        clock: Clock,
+        like: Sequence[int] = (),
+        known: Sequence[list[_Line]] = (),
+    ) -> list[list[_Line]] | None:
         """What is kept after each leg of an order, the tour itself at the end; None where none was
         found that is shorter than so many metres. Of an order that begins like one that was driven,
         what was kept by there is taken."""
@@ -285,9 +289,10 @@ class Detours:
             last = k + 1 == len(legs)
             ahead = sorted(
                 (line.length + along(path), i, j)
-                for i, line in enumerate(levels[k]) for j, (path, _) in enumerate(legs[k])
+                for i, line in enumerate(levels[k])
+                for j, (path, _) in enumerate(legs[k])
                 if line.length + along(path) + rest[k + 1] < below
-            )  # fmt: skip
+            )
             kept: list[_Line] = []
             for far, i, j in ahead:
                 if clock.up or len(kept) >= (1 if last else self.ways.effort.tethers):
@@ -365,11 +370,15 @@ class Detours:
         places, letters = self.ways.places, self.ways.water.words.letters
         stops = [
             Stop(
-                int(places.waypoint[leg.place]), int(places.choice[leg.place]), letters(leg.word),
-                leg.tether.length, _path(leg), leg.most,
+                int(places.waypoint[leg.place]),
+                int(places.choice[leg.place]),
+                letters(leg.word),
+                leg.tether.length,
+                _path(leg),
+                leg.most,
             )
             for leg in legs
-        ]  # fmt: skip
+        ]
         return Driven([], stops, _path(home), line.length, True, None)
 
 

@@ -263,10 +263,24 @@ def unresolved_gaps(
     middle, whole = 0.5 * (grid.low + grid.high), float(np.linalg.norm(grid.high - grid.low))
     clock.check(SEARCHING)
     flag, steep = clock.flag, steepness(grid.field)
-    possible = clock.interruptible(lambda: possibly_free(
-        grid.field.arrays, grid.low, grid.high, grid.cell, shape, grid.clearance,
-        steep, middle, middle, 4.0 * whole, middle, 2.0 * whole, 2, flag,
-    ))  # fmt: skip
+    possible = clock.interruptible(
+        lambda: possibly_free(
+            grid.field.arrays,
+            grid.low,
+            grid.high,
+            grid.cell,
+            shape,
+            grid.clearance,
+            steep,
+            middle,
+            middle,
+            4.0 * whole,
+            middle,
+            2.0 * whole,
+            2,
+            flag,
+        )
+    )
     gaps = _gaps_between(grid, free, free, possible, params, clock)
     layers = _single_layers(free) & possible
     if layers.any():
@@ -274,10 +288,11 @@ def unresolved_gaps(
         apart = free & ~binary_dilation(layers, np.ones((3, 3, 3)))
         far = 2.0 * grid.cell
         gaps += [
-            gap for gap in _gaps_between(grid, free, apart, possible, params, clock)
+            gap
+            for gap in _gaps_between(grid, free, apart, possible, params, clock)
             if all(np.linalg.norm(gap.place - known.place) > far for known in gaps)
             and _is_open(grid, gap, params)
-        ]  # fmt: skip
+        ]
     gaps.sort(key=lambda gap: -gap.width)
     return gaps[: params.max_gaps]
 
@@ -470,9 +485,12 @@ def _widest(grid: GapGrid, place: Floats, through: Floats) -> Floats:
 
 
 def resolving_cell(
-    grid: GapGrid, gaps: list[Gap], box_of: Callable[[float], tuple[Floats, Floats, float]],
-    params: GapParams | None = None, clock: Clock | None = None,
-) -> float | None:  # fmt: skip
+    grid: GapGrid,
+    gaps: list[Gap],
+    box_of: Callable[[float], tuple[Floats, Floats, float]],
+    params: GapParams | None = None,
+    clock: Clock | None = None,
+) -> float | None:
     """Return the largest cell size whose grid shows as many of the gaps as possible.
 
     Parameters
@@ -579,9 +597,12 @@ def resolved_on(
 
 
 def resolved(
-    mission: Mission, scene: Scene, field: DistanceField, params: GapParams | None = None,
+    mission: Mission,
+    scene: Scene,
+    field: DistanceField,
+    params: GapParams | None = None,
     clock: Clock | None = None,
-) -> Resolved:  # fmt: skip
+) -> Resolved:
     """Return a mission whose cells show the gaps of its scene, as far as possible.
 
     A cell size that the mission states is kept, and its gaps are only reported. The same holds for

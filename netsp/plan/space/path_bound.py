@@ -72,9 +72,13 @@ class BoundPolicy:
 
 
 def bound_of_all(
-    ways: Ways, reached: list[int], clock: Clock | None, seed: int = 0,
-    params: PotentialParams | None = None, policy: BoundPolicy | None = None,
-) -> float | None:  # fmt: skip
+    ways: Ways,
+    reached: list[int],
+    clock: Clock | None,
+    seed: int = 0,
+    params: PotentialParams | None = None,
+    policy: BoundPolicy | None = None,
+) -> float | None:
     """Return a lower bound on the length of every tour through some waypoints.
 
     The bound holds for tours that go to the waypoints themselves, keep the mission's clearance as

@@ -106,9 +106,12 @@ class Water:
 
     @classmethod
     def within(
-        cls, mission: Mission, field: DistanceField, grid: Grid,
+        cls,
+        mission: Mission,
+        field: DistanceField,
+        grid: Grid,
         bounds: tuple[float, ...] | None = None,
-    ) -> Water:  # fmt: skip
+    ) -> Water:
         """The same where a grid is at hand.
 
         Parameters
@@ -159,10 +162,8 @@ class Water:
         c = self.words.cells
         nx, ny, nz = c.flags.shape
         return np.asarray(
-            free_cells(
-                c.field.arrays, c.low, c.cell, (nx, ny, nz), self.mission.clearance, NEVER
-            )
-        )  # fmt: skip
+            free_cells(c.field.arrays, c.low, c.cell, (nx, ny, nz), self.mission.clearance, NEVER)
+        )
 
     @cached_property
     def everywhere(self) -> Bools:
@@ -182,9 +183,13 @@ class Water:
         return both[0], both[1]
 
     def search(
-        self, robot: bool, cell: int, most: int, within: float | Mapping[int, float],
+        self,
+        robot: bool,
+        cell: int,
+        most: int,
+        within: float | Mapping[int, float],
         stop: Flag = NEVER,
-    ) -> Found:  # fmt: skip
+    ) -> Found:
         """The soonest words of cells, from one of them on.
 
         Parameters
@@ -223,9 +228,20 @@ class Water:
             first, last = np.maximum(root - reach, 0), np.minimum(root + reach, shape - 1)
         room = self.room if robot else self.everywhere
         found, table = shortest_words(
-            cells.flags, room, self.open[robot], words.labels, words.table, words.rules, root,
-            first, last, most, targets, limits, stop,
-        )  # fmt: skip
+            cells.flags,
+            room,
+            self.open[robot],
+            words.labels,
+            words.table,
+            words.rules,
+            root,
+            first,
+            last,
+            most,
+            targets,
+            limits,
+            stop,
+        )
         words.keep(table)
         return Found(*found)
 

@@ -64,9 +64,12 @@ class PotentialParams:
 
     def __post_init__(self) -> None:
         for name, least in (
-            ("min_cells", 64), ("max_cells", self.min_cells), ("growth", 2), ("halvings", 0),
+            ("min_cells", 64),
+            ("max_cells", self.min_cells),
+            ("growth", 2),
+            ("halvings", 0),
             ("rounds", 1),
-        ):  # fmt: skip
+        ):
             value = getattr(self, name)
             if value < least:
                 raise InputError(f"{name}: {value}; expected {least} or more")
@@ -94,9 +97,15 @@ class Region(NamedTuple):
 
 
 def path_bound(
-    field: DistanceField, a: Floats, b: Floats, region: Region, longest: float, cells: int,
-    params: PotentialParams | None = None, clock: Clock | None = None,
-) -> float:  # fmt: skip
+    field: DistanceField,
+    a: Floats,
+    b: Floats,
+    region: Region,
+    longest: float,
+    cells: int,
+    params: PotentialParams | None = None,
+    clock: Clock | None = None,
+) -> float:
     """Return a lower bound on the length of paths between two points.
 
     Parameters
@@ -136,10 +145,24 @@ def path_bound(
     nx, ny, nz = (max(1, math.ceil(s / cell - 1e-9)) for s in size)
     high = low + size
     flag, steep = clock.flag, steepness(field)
-    possible = clock.interruptible(lambda: possibly_free(
-        field.arrays, low, high, cell, (nx, ny, nz), region.room, steep, a, b, longest,
-        region.anchor, region.reach, params.halvings, flag,
-    ))  # fmt: skip
+    possible = clock.interruptible(
+        lambda: possibly_free(
+            field.arrays,
+            low,
+            high,
+            cell,
+            (nx, ny, nz),
+            region.room,
+            steep,
+            a,
+            b,
+            longest,
+            region.anchor,
+            region.reach,
+            params.halvings,
+            flag,
+        )
+    )
     for end in (a, b):
         at = np.clip(((end - low) / cell).astype(np.int64), 0, np.array(possible.shape) - 1)
         possible[tuple(at)] = True
@@ -198,9 +221,15 @@ def _box_of_ellipsoid(a: Floats, b: Floats, longest: float) -> tuple[Floats, Flo
 
 
 def _through(
-    possible: Bools, low: Floats, cell: float, a: Floats, b: Floats, longest: float,
-    params: PotentialParams, stop: Flag,
-) -> float:  # fmt: skip
+    possible: Bools,
+    low: Floats,
+    cell: float,
+    a: Floats,
+    b: Floats,
+    longest: float,
+    params: PotentialParams,
+    stop: Flag,
+) -> float:
     """Return the bound of the potential about one end over possibly free cells; 0 if the flag was
     set before one was proven."""
     straight = float(np.linalg.norm(b - a))
@@ -361,10 +390,21 @@ def has_room(
 
 @kernel
 def possibly_free(
-    field: Field, low: Floats, high: Floats, cell: float, shape: tuple[int, int, int], room: float,
-    steep: float, a: Floats, b: Floats, longest: float, anchor: Floats, reach: float, halvings: int,
+    field: Field,
+    low: Floats,
+    high: Floats,
+    cell: float,
+    shape: tuple[int, int, int],
+    room: float,
+    steep: float,
+    a: Floats,
+    b: Floats,
+    longest: float,
+    anchor: Floats,
+    reach: float,
+    halvings: int,
     stop: Flag,
-) -> Bools:  # fmt: skip
+) -> Bools:
     """Return the mask of the cells that paths from `a` to `b` may pass.
 
     A cell is left out if it is certain that none of its points has enough room and lies within the
@@ -453,9 +493,13 @@ def arrival(u: Floats, edges: npt.NDArray[np.uint8], p: int, q: int, r: int, ste
 
 @kernel
 def marched(
-    edges: npt.NDArray[np.uint8], start: Bools, cell: float, slow: Singles, most: float,
+    edges: npt.NDArray[np.uint8],
+    start: Bools,
+    cell: float,
+    slow: Singles,
+    most: float,
     stop: Flag,
-) -> Floats:  # fmt: skip
+) -> Floats:
     """Return the distances of corners from `start` by fast marching, up to `most`, with a queue of
     buckets. Once the flag `stop` is set, the distances are incomplete."""
     nx, ny, nz = edges.shape

@@ -248,9 +248,14 @@ def wall_corners(point: Floats, normal: Floats, anchor: Floats, far: float) -> t
 
 
 def tours_of_plan(
-    water: Water, scene: Scene, places: Places, clock: Clock, seed: int = 0,
-    params: PlaneParams | None = None, whole_tether: bool = False,
-) -> Iterator[Driven]:  # fmt: skip
+    water: Water,
+    scene: Scene,
+    places: Places,
+    clock: Clock,
+    seed: int = 0,
+    params: PlaneParams | None = None,
+    whole_tether: bool = False,
+) -> Iterator[Driven]:
     """Drive the shortest tours of the plane in a scene of upright prisms.
 
     Parameters
@@ -325,9 +330,10 @@ class _PlaneTour:
         if not needed <= set(goals.tolist()) or not set(goals.tolist()) - needed:
             return None
         roadmap = TautRoadmap(
-            self._problem(points[goals], share), max_classes=self.params.max_classes,
+            self._problem(points[goals], share),
+            max_classes=self.params.max_classes,
             time_limit=clock.part(0.5),
-        )  # fmt: skip
+        )
         graph = roadmap.to_travel_graph()
         place = np.r_[-1, goals][graph.cluster]
         home = self._vertex(roadmap, graph, place == start, water.laid.nodes) if away else 0
@@ -354,13 +360,13 @@ class _PlaneTour:
         room = float(self.water.field.distance(np.vstack([goals, mission.anchor])).min())
         bounds = self.scene.bounds
         return Problem(
-            base=mission.anchor, obstacles=obstacles,
+            base=mission.anchor,
+            obstacles=obstacles,
             goals=tuple(Goal(position=(x, y, z)) for x, y, z in goals.tolist()),
             tether_length=share * mission.tether_length,
-            clearance=growth
-            + max(0.0, min(mission.clearance, (1.0 - UPRIGHT_TOLERANCE) * room)),
+            clearance=growth + max(0.0, min(mission.clearance, (1.0 - UPRIGHT_TOLERANCE) * room)),
             bounds=None if bounds is None else (bounds[0], bounds[1], bounds[3], bounds[4]),
-        )  # fmt: skip
+        )
 
     def _in_reach(self, points: Floats, goals: Ints, share: float) -> Ints:
         """Return the indices of the goals that the tether reaches in some class."""
@@ -377,9 +383,14 @@ class _PlaneTour:
 
 
 def _solved(
-    graph: TravelGraph, place: Ints, places: Places, home: int, begin: int | None, clock: Clock,
+    graph: TravelGraph,
+    place: Ints,
+    places: Places,
+    home: int,
+    begin: int | None,
+    clock: Clock,
     seed: int,
-) -> tuple[list[int], bool] | None:  # fmt: skip
+) -> tuple[list[int], bool] | None:
     """Return the vertices of the shortest tour that ends at `home` and begins at `begin`, or at
     `home` if `begin` is None, and whether it is proven to be the shortest."""
     count = len(places)
@@ -389,9 +400,10 @@ def _solved(
             return None
         return list(result.tour[1:]), result.status is Status.OPTIMAL
     others = [
-        v for v in range(1, len(graph))
+        v
+        for v in range(1, len(graph))
         if 0 <= place[v] < count and (place[v] != places.begin or v == begin)
-    ]  # fmt: skip
+    ]
     rows = np.array([home, *others])
     waypoint = places.waypoint[place[others]]
     cluster = np.r_[0, 1 + np.unique(waypoint, return_inverse=True)[1]]

@@ -203,19 +203,28 @@ class SpacePlan:
         tour = PlannedTour(
             stops=tuple(
                 PlannedStop(
-                    path=in_file(stop.path), signature=stop.word,
-                    tether_length=stop.tether, longest_tether=stop.most, given_as=stop.waypoint,
+                    path=in_file(stop.path),
+                    signature=stop.word,
+                    tether_length=stop.tether,
+                    longest_tether=stop.most,
+                    given_as=stop.waypoint,
                 )
                 for stop in self.stops
             ),
-            home=in_file(self.home), status=self._status(bound),
-            solver=solver if self.kind in (TAUT_LEGS, DETOURS) else self.kind, seed=seed,
-            length=self.length, lower_bound=result.lower_bound,
+            home=in_file(self.home),
+            status=self._status(bound),
+            solver=solver if self.kind in (TAUT_LEGS, DETOURS) else self.kind,
+            seed=seed,
+            length=self.length,
+            lower_bound=result.lower_bound,
             gap=relative_gap(self.length, result.lower_bound),
-            bound_of_all=bound, gap_to_all=relative_gap(self.length, bound),
-            states=self.states, legs=self.legs, exact=self.water.words.exact,
+            bound_of_all=bound,
+            gap_to_all=relative_gap(self.length, bound),
+            states=self.states,
+            legs=self.legs,
+            exact=self.water.words.exact,
             unresolved_gaps=self.water.unresolved_gaps,
-        )  # fmt: skip
+        )
         all_of = self.mission.waypoints
         waypoints = (
             *(all_of[stop.waypoint].at(stop.choice) for stop in self.stops),
@@ -281,9 +290,17 @@ def plan(
     kept: SpacePlan | None = None
     with until_interrupt(time_limit) as clock:
         for found in plans(
-            mission, scene=scene, field=field, grid=grid, solver=solver, params=params,
-            clock=clock, iteration_limit=iteration_limit, seed=seed, on_progress=on_progress,
-        ):  # fmt: skip
+            mission,
+            scene=scene,
+            field=field,
+            grid=grid,
+            solver=solver,
+            params=params,
+            clock=clock,
+            iteration_limit=iteration_limit,
+            seed=seed,
+            on_progress=on_progress,
+        ):
             if kept is None or found.replaces(kept):
                 verdict = verify_mission(found.planned(), scene=scene, water=found.water)
                 kept = found if verdict else kept
@@ -354,9 +371,7 @@ def plans(
         A moving anchor; waypoints in solids; no tether that reaches any waypoint.
     """
     check_plannable(mission, solver, params, seed)
-    how = {
-        "solver": solver, "seed": seed, "params": params, "iteration_limit": iteration_limit
-    }  # fmt: skip
+    how = {"solver": solver, "seed": seed, "params": params, "iteration_limit": iteration_limit}
     if water is None:
         if field is None or grid is None:
             scene = scene or mission.load_scene()
@@ -365,10 +380,14 @@ def plans(
 
 
 def water_of(
-    mission: Mission, clock: Clock, *, scene: Scene | None = None,
-    field: DistanceField | None = None, grid: Grid | None = None,
+    mission: Mission,
+    clock: Clock,
+    *,
+    scene: Scene | None = None,
+    field: DistanceField | None = None,
+    grid: Grid | None = None,
     tell: Callable[[str], None] | None = None,
-) -> Water:  # fmt: skip
+) -> Water:
     """Make the water of a mission for a plan: check the mission, find the gaps that its grid does
     not show, refine the grid where that shows them, and find the words of the scene.
 
@@ -453,11 +472,19 @@ def _plan_of(water: Water, places: Places, driven: Driven, kind: str) -> SpacePl
     visited = {stop.waypoint for stop in driven.stops}
     unreached = tuple(n for n in range(len(water.mission.waypoints)) if n not in visited)
     return SpacePlan(
-        water.mission, tuple(driven.stops), driven.home, driven.length,
-        Result(None, driven.length, None, Status.FEASIBLE), len(driven.stops),
-        len(driven.stops) + 1, unreached, driven.free, water,
-        Ways(water, places, Effort.of(len(places))), kind,
-    )  # fmt: skip
+        water.mission,
+        tuple(driven.stops),
+        driven.home,
+        driven.length,
+        Result(None, driven.length, None, Status.FEASIBLE),
+        len(driven.stops),
+        len(driven.stops) + 1,
+        unreached,
+        driven.free,
+        water,
+        Ways(water, places, Effort.of(len(places))),
+        kind,
+    )
 
 
 def check_plannable(
@@ -491,9 +518,13 @@ def _silent(_: str) -> None:
 
 
 def _planned(
-    water: Water, scene: Scene | None, clock: Clock, tell: Callable[[str], None],
-    how: dict[str, Any], whole_tether: bool,
-) -> Iterator[SpacePlan]:  # fmt: skip
+    water: Water,
+    scene: Scene | None,
+    clock: Clock,
+    tell: Callable[[str], None],
+    how: dict[str, Any],
+    whole_tether: bool,
+) -> Iterator[SpacePlan]:
     mission, field = water.mission, water.field
     places = Places.of(mission, field)
     # a robot that is farther out than the share may still come back
@@ -536,9 +567,19 @@ def _planned(
         visited = {stop.waypoint for stop in driven.stops}
         unreached = tuple(n for n in range(len(mission.waypoints)) if n not in visited)
         return SpacePlan(
-            mission, tuple(driven.stops), driven.home, driven.length, result, len(states.all),
-            len(board.legs), unreached, driven.free, water, ways, kind,
-        )  # fmt: skip
+            mission,
+            tuple(driven.stops),
+            driven.home,
+            driven.length,
+            result,
+            len(states.all),
+            len(board.legs),
+            unreached,
+            driven.free,
+            water,
+            ways,
+            kind,
+        )
 
     ways.prepare_all(clock, tell)
     tell("trees of legs")
@@ -604,9 +645,12 @@ def _try_out(solver: SolverLike, params: Mapping[str, Any] | None, seed: int) ->
         )
     costs = np.ones((3, 3)) - np.eye(3)
     solve_graph(
-        TravelGraph.from_costs(costs, [0, 1, 2]), solver, params=params, seed=seed,
+        TravelGraph.from_costs(costs, [0, 1, 2]),
+        solver,
+        params=params,
+        seed=seed,
         iteration_limit=1,
-    )  # fmt: skip
+    )
 
 
 def _better(
@@ -619,9 +663,13 @@ def _better(
 
 
 def _best_driven(
-    board: Board, clock: Clock, tell: Callable[[str], None],
-    best: tuple[Result, Driven] | None, share: float, how: dict[str, Any],
-) -> tuple[Result, Driven] | None:  # fmt: skip
+    board: Board,
+    clock: Clock,
+    tell: Callable[[str], None],
+    best: tuple[Result, Driven] | None,
+    share: float,
+    how: dict[str, Any],
+) -> tuple[Result, Driven] | None:
     """The best tour that was driven without fault. As long as there is time, the graph is solved
     again without the legs that were at fault; then the tour goes by way of the start there."""
     again, found = 0, None

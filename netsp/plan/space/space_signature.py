@@ -77,9 +77,15 @@ class SpaceSignature:
 
     @classmethod
     def of(
-        cls, scene: DistanceField, low: npt.ArrayLike, high: npt.ArrayLike, cell: float,
-        root: npt.ArrayLike, *, tolerance: float = TOLERANCE,
-    ) -> SpaceSignature:  # fmt: skip
+        cls,
+        scene: DistanceField,
+        low: npt.ArrayLike,
+        high: npt.ArrayLike,
+        cell: float,
+        root: npt.ArrayLike,
+        *,
+        tolerance: float = TOLERANCE,
+    ) -> SpaceSignature:
         """The words of a box in a scene.
 
         Parameters
@@ -152,9 +158,15 @@ class SpaceSignature:
         point = np.asarray(root, dtype=float)
         everywhere = np.ones(cells.flags.shape, dtype=np.uint8)
         at = held(
-            cells.field.arrays, cells.low, cells.cell, cells.flags, everywhere, point,
-            tolerance, tolerance,
-        )  # fmt: skip
+            cells.field.arrays,
+            cells.low,
+            cells.cell,
+            cells.flags,
+            everywhere,
+            point,
+            tolerance,
+            tolerance,
+        )
         if at < 0:
             raise InputError(
                 f"anchor: no free cell of {cells.cell:g} m is in sight of {shown(point)}; "
@@ -164,9 +176,7 @@ class SpaceSignature:
         stop = abandoned()
         far, order = distances(cells.flags, begin, stop)
         none = packed([])
-        labels, table, generators = labelled(
-            cells.flags, far, order, empty_table(), none, stop
-        )  # fmt: skip
+        labels, table, generators = labelled(cells.flags, far, order, empty_table(), none, stop)
         end_if_abandoned()
         if generators > MOST_GENERATORS:
             raise InputError(
@@ -227,9 +237,15 @@ class SpaceSignature:
         """
         c = self.cells
         at = held(
-            c.field.arrays, c.low, c.cell, c.flags, self.known, np.asarray(point, dtype=float),
-            self.tolerance, self.tolerance,
-        )  # fmt: skip
+            c.field.arrays,
+            c.low,
+            c.cell,
+            c.flags,
+            self.known,
+            np.asarray(point, dtype=float),
+            self.tolerance,
+            self.tolerance,
+        )
         return None if at < 0 else int(at)
 
     def word(self, path: npt.ArrayLike, *, closed: bool = False) -> Word:
@@ -306,9 +322,18 @@ class SpaceSignature:
         """
         c = self.cells
         number, table, where = walked(
-            c.field.arrays, c.low, c.cell, c.flags, self.labels, self.known, self.table,
-            self.rules, np.ascontiguousarray(line), self.tolerance, self.tolerance,
-        )  # fmt: skip
+            c.field.arrays,
+            c.low,
+            c.cell,
+            c.flags,
+            self.labels,
+            self.known,
+            self.table,
+            self.rules,
+            np.ascontiguousarray(line),
+            self.tolerance,
+            self.tolerance,
+        )
         self.keep(table)
         return (None if number < 0 else int(number)), where
 

@@ -76,14 +76,24 @@ class Effort:
             # around a row of piles, a way is twice as long as the distance: tours were within
             # 0.03 % of the proven shortest among prisms with these (benchmarks/space.py)
             return cls(
-                words=5, states=(7, 14, 28), ways=6, farther=2.2, detours=(0.02, 0.06, 0.15, 0.35),
-                sides=8, tethers=8,
-            )  # fmt: skip
+                words=5,
+                states=(7, 14, 28),
+                ways=6,
+                farther=2.2,
+                detours=(0.02, 0.06, 0.15, 0.35),
+                sides=8,
+                tethers=8,
+            )
         if waypoints <= 100:
             return cls(
-                words=4, states=(5, 10, 16, 32), ways=4, farther=1.5, detours=(0.02, 0.1),
-                sides=6, tethers=12,
-            )  # fmt: skip
+                words=4,
+                states=(5, 10, 16, 32),
+                ways=4,
+                farther=1.5,
+                detours=(0.02, 0.1),
+                sides=6,
+                tethers=12,
+            )
         return cls(
             words=3, states=(5, 10), ways=4, farther=1.5, detours=(0.02, 0.1), sides=6, tethers=4
         )

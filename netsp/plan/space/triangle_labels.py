@@ -284,9 +284,12 @@ def square_beside(flags: Flags, edge: int, n: int) -> tuple[int, int, int, int, 
     at = (i * ny + j) * nz + k
     a, b = (normal + 1) % 3, (normal + 2) % 3
     return (
-        1, 3 * at + a, 3 * upper_end(at, a, ny, nz) + b, 3 * upper_end(at, b, ny, nz) + a,
+        1,
+        3 * at + a,
+        3 * upper_end(at, a, ny, nz) + b,
+        3 * upper_end(at, b, ny, nz) + a,
         3 * at + b,
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -299,9 +302,11 @@ def through(
     if counts == 0:
         return -1, 0, table
     unknown = (
-        int(labels[low] == UNKNOWN) + int(labels[right] == UNKNOWN) + int(labels[top] == UNKNOWN)
+        int(labels[low] == UNKNOWN)
+        + int(labels[right] == UNKNOWN)
+        + int(labels[top] == UNKNOWN)
         + int(labels[left] == UNKNOWN)
-    )  # fmt: skip
+    )
     if unknown != 1:
         return -1, 0, table
     # low right = left top
@@ -327,9 +332,13 @@ def through(
 
 @kernel
 def relations(
-    flags: Flags, labels: Labels, order: npt.NDArray[np.int32], table: Table, rules: Rules,
+    flags: Flags,
+    labels: Labels,
+    order: npt.NDArray[np.int32],
+    table: Table,
+    rules: Rules,
     stop: Flag,
-) -> tuple[Ints, Table]:  # fmt: skip
+) -> tuple[Ints, Table]:
     """Return the numbers of the words around squares that are not the empty word, each once. Ends
     early once `stop` is set."""
     _nx, ny, nz = flags.shape

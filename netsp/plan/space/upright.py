@@ -65,9 +65,11 @@ def bound_of_upright(
     max_length = mission.tether_length * (1.0 + 1e-6) + laid
     try:
         problem = Problem(
-            base=mission.start, goals=places.points[some].tolist(), obstacles=tuple(obstacles),
+            base=mission.start,
+            goals=places.points[some].tolist(),
+            obstacles=tuple(obstacles),
             tether_length=max_length,
-        )  # fmt: skip
+        )
         bound = solve(problem, time_limit=clock).bound
     except NetspError:
         return None  # no bound in the plane, so none in space

@@ -91,9 +91,13 @@ def order_by_going_on(
     instance = Instance.of(graph)
     _, warm = best_classes(np.array(given), instance.start, instance.costs)
     result = solve_graph(
-        graph, "lns", time_limit=clock, iteration_limit=ITERATIONS, seed=seed,
+        graph,
+        "lns",
+        time_limit=clock,
+        iteration_limit=ITERATIONS,
+        seed=seed,
         warm_start=[int(v) for v in instance.original(warm)],
-    )  # fmt: skip
+    )
     assert result.tour is not None
     return tuple(points[v] for v in result.tour[1:])
 

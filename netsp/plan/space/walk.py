@@ -90,9 +90,15 @@ def centre_of(low: Floats, cell: float, i: int, j: int, k: int) -> Floats:
 
 @kernel
 def held(
-    field: Field, low: Floats, cell: float, flags: Flags, known: Flags, p: Floats,
-    fine: float, into: float,
-) -> int:  # fmt: skip
+    field: Field,
+    low: Floats,
+    cell: float,
+    flags: Flags,
+    known: Flags,
+    p: Floats,
+    fine: float,
+    into: float,
+) -> int:
     """The nearest cell that a point sees, of those that are known; -1 if there is none. It depends
     on the point alone."""
     nx, ny, nz = flags.shape
@@ -119,9 +125,18 @@ def held(
 
 @kernel
 def moved(
-    field: Field, low: Floats, cell: float, flags: Flags, labels: Labels, p: Floats,
-    begin: int, end: int, ahead: Floats, fine: float, into: float,
-) -> tuple[int, Ints]:  # fmt: skip
+    field: Field,
+    low: Floats,
+    cell: float,
+    flags: Flags,
+    labels: Labels,
+    p: Floats,
+    begin: int,
+    end: int,
+    ahead: Floats,
+    fine: float,
+    into: float,
+) -> tuple[int, Ints]:
     """From one cell to another that a point takes hold of, along edges that it sees.
 
     Parameters
@@ -199,9 +214,18 @@ def place_of(cell: int, middle: Ints, ny: int, nz: int) -> int:
 
 @kernel
 def walked(
-    field: Field, low: Floats, cell: float, flags: Flags, labels: Labels, known: Flags,
-    table: Table, rules: Rules, path: Floats, fine: float, into: float,
-) -> tuple[int, Table, Floats]:  # fmt: skip
+    field: Field,
+    low: Floats,
+    cell: float,
+    flags: Flags,
+    labels: Labels,
+    known: Flags,
+    table: Table,
+    rules: Rules,
+    path: Floats,
+    fine: float,
+    into: float,
+) -> tuple[int, Table, Floats]:
     """The word of a path (k, 3): its number, the table, and where it could not be told any further
     (a number of -1) or the path's end."""
     _nx, ny, nz = flags.shape
@@ -263,9 +287,16 @@ def walked(
 
 @kernel
 def closer(
-    field: Field, low: Floats, cell: float, flags: Flags, labels: Labels, p: Floats, hold: int,
-    fine: float, into: float,
-) -> tuple[int, int]:  # fmt: skip
+    field: Field,
+    low: Floats,
+    cell: float,
+    flags: Flags,
+    labels: Labels,
+    p: Floats,
+    hold: int,
+    fine: float,
+    into: float,
+) -> tuple[int, int]:
     """The neighbour of a cell that is nearest to a point, if that is nearer and can be taken hold
     of, and the edge to it (as of `moved`); -1 if there is none."""
     _nx, ny, nz = flags.shape

@@ -62,9 +62,20 @@ class Found(NamedTuple):
 
 @kernel
 def shortest_words(
-    flags: Flags, room: Bools, open_: Bools, labels: Labels, table: Table, rules: Rules,
-    root: Ints, first: Ints, last: Ints, most: int, targets: Ints, limits: Ints, stop: Ints,
-) -> tuple[Found, Table]:  # fmt: skip
+    flags: Flags,
+    room: Bools,
+    open_: Bools,
+    labels: Labels,
+    table: Table,
+    rules: Rules,
+    root: Ints,
+    first: Ints,
+    last: Ints,
+    most: int,
+    targets: Ints,
+    limits: Ints,
+    stop: Ints,
+) -> tuple[Found, Table]:
     """Return the `most` soonest words of the cells of a box that are on the way to some targets.
 
     About an open cell everything is free and of one class, so only those steps are taken that lead
@@ -193,9 +204,18 @@ def shortest_words(
 
 @kernel
 def word_after(
-    labels: Labels, table: Table, rules: Rules, word: int, i: int, j: int, k: int, ny: int, nz: int,
-    step: int, order: int,
-) -> tuple[int, Table]:  # fmt: skip
+    labels: Labels,
+    table: Table,
+    rules: Rules,
+    word: int,
+    i: int,
+    j: int,
+    k: int,
+    ny: int,
+    nz: int,
+    step: int,
+    order: int,
+) -> tuple[int, Table]:
     """A word after one step, along edges in an order of `staircase`; -1 where one is unknown."""
     n, a, b, c = axes_of(step)
     cell = (i * ny + j) * nz + k
