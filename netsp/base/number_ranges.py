@@ -32,6 +32,14 @@ def check_positive(policy: Any) -> None:
     _check(policy, math.nextafter(0.0, 1.0), "a positive number")
 
 
+def check_shares(policy: Any, *names: str) -> None:
+    """Raise InputError, which names the field, if one of some fields is not from 0 to 1."""
+    for name in names:
+        value = getattr(policy, name)
+        if not (isinstance(value, Real) and 0.0 <= float(value) <= 1.0):
+            raise InputError(f"{name}: expected a number from 0 to 1, got {value!r}")
+
+
 def _check(policy: Any, least: float, expected: str) -> None:
     for field in fields(policy):
         if field.type in ("int", "float", int, float):
