@@ -28,7 +28,7 @@ from table import ROOT, head, heading, row
 
 from netsp import Problem
 from netsp.app.state import Document
-from netsp.model.random_worlds import reachable_world
+from netsp.plan.random_worlds import reachable_world
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
 

@@ -12,7 +12,7 @@ import numpy as np
 from table import head, heading, row
 
 from netsp import Problem, solve, verify
-from netsp.model.random_worlds import reachable_world
+from netsp.plan.random_worlds import reachable_world
 
 CASES = ((12, 1, 6), (16, 2, 8), (20, 3, 10), (20, 4, 40), (30, 5, 20), (50, 6, 40))
 """Goals, seed, precedences."""

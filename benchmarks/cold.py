@@ -149,7 +149,7 @@ def limited_cpu_s(folder: Path, cache: Path) -> float:
 
 def random_cpu_s(goals: int, seed: int, folder: Path, cache: Path) -> float:
     """Return the CPU seconds of solving a random world with the tether of `netsp world`."""
-    from netsp.model.random_worlds import random_world
+    from netsp.plan.random_worlds import random_world
 
     problem = folder / "world.json"
     world = random_world(seed, goals=goals, tether_length=300.0)

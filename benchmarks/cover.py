@@ -17,11 +17,11 @@ from sites import mission_of
 from table import ROOT, head, heading, row
 
 from netsp.online import Scene
-from netsp.online.equipment import Camera
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
 from netsp.plan.cover import cover
 from netsp.plan.space.mission_solver import seconds_until_home, solve_mission
+from netsp.world.mission.equipment import Camera
+from netsp.world.mission.mission import Mission
+from netsp.world.simulator.mission_run import simulate
 
 CAMERA: dict[str, Any] = {"camera": Camera(range=2.5, patch=0.25), "standoff": 1.2}
 SITES = ("ring", "linked rings", "hull", "tunnel")

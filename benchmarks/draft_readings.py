@@ -1,4 +1,4 @@
-"""Readings of the draft's listing (`netsp.online.planner.react_draft`), flown in the basin.
+"""Readings of the draft's listing (`netsp.world.planner.react_draft`), flown in the basin.
 
     python benchmarks/draft_readings.py [MISSION] [--keep]
 
@@ -16,13 +16,13 @@ from table import ROOT, head, row
 
 from netsp.base.arrays import Floats
 from netsp.base.geometry import polylines
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
-from netsp.online.paths.refine import RefineParams
-from netsp.online.planner import PlannerOptions
-from netsp.online.planner.pivots import Pivots
-from netsp.online.planner.planner import Planner
-from netsp.online.planner.react_draft import ReactDraftPlanner
+from netsp.world.mission.mission import Mission
+from netsp.world.paths.refine import RefineParams
+from netsp.world.planner import PlannerOptions
+from netsp.world.planner.pivots import Pivots
+from netsp.world.planner.planner import Planner
+from netsp.world.planner.react_draft import ReactDraftPlanner
+from netsp.world.simulator.mission_run import simulate
 from netsp.world.tether import Tether
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from table import head, heading, row
 
 from netsp import Problem, Solution, solve
-from netsp.model.random_worlds import random_world
 from netsp.online.execute import ExecutionOptions, Surprises, execute
 from netsp.online.execute.execution_log import Execution
+from netsp.plan.random_worlds import random_world
 
 SPEED = 1.0
 

@@ -20,7 +20,7 @@ from netsp import Problem, Solution
 from netsp.exchange.missions.leg_times import leg_times, target_times
 from netsp.exchange.missions.mission_files import HOLD, altitude, start_of
 from netsp.exchange.missions.waypoints import waypoints_of
-from netsp.online.execute.tour_plan import HOME, legs_of
+from netsp.plan.tour_plan import HOME, legs_of
 from tests.autopilot import Earth
 from tests.test_autopilot_recordings import log, track
 

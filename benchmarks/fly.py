@@ -29,12 +29,10 @@ from table import ROOT, head, heading, row
 from netsp import Circle, Problem, solve
 from netsp.base.errors import InputError, NetspError
 from netsp.base.geometry import polylines
-from netsp.model.random_worlds import reachable_world
 from netsp.model.solution import Solution
 from netsp.online.execute.events import Surprises
 from netsp.online.execute.execution_log import Execution, ExecutionOptions, ExecutionRow
 from netsp.online.execute.run_record import RunRecord
-from netsp.online.execute.tour_plan import legs_of
 from netsp.online.fly.flight_rehearsal import rehearse
 from netsp.online.fly.flight_time import predicted_flight
 from netsp.online.fly.resume import from_record, read_run
@@ -48,6 +46,8 @@ from netsp.online.link.mavlink_messages import Listener
 from netsp.online.link.modes import mode_name
 from netsp.online.link.session import Session
 from netsp.online.link.udp import UdpLink, messages_in
+from netsp.plan.random_worlds import reachable_world
+from netsp.plan.tour_plan import legs_of
 from netsp.world.scene.scene import scene_of
 from netsp.world.tether import GeodesicTether
 from tests.ardusub import BINARY, HOME, ArduSub

@@ -9,7 +9,7 @@
     python benchmarks/frontier.py --peers             other people's solvers on the same graphs
 
 Worlds: 500 x 500, 20 circles of radius 10 to 30 (`--many`: 50 of radius 10 to 20), seeds from 0
-(`netsp.model.random_worlds`). A time is that of `netsp.solve` with `auto`: roadmap, legs and proof.
+(`netsp.plan.random_worlds`). A time is that of `netsp.solve` with `auto`: roadmap, legs and proof.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from table import head, heading, row
 
 from netsp import Problem, Status, solve, solve_graph, travel_graph, verify
 from netsp.base.errors import NetspError
-from netsp.model.random_worlds import random_world
+from netsp.plan.random_worlds import random_world
 from netsp.view.report.figures import performance
 
 CELLS = [

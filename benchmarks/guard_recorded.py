@@ -35,7 +35,7 @@ from netsp.online.guard.stream import replayed
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_guard import Guard, GuardOptions
 from netsp.online.link.geo_frame import Frame
-from netsp.online.mission import Mission
+from netsp.world.mission.mission import Mission
 
 WARNED_S = 60.0
 """Time before a loop closes in which a warning counts for it, s."""

@@ -18,10 +18,10 @@ from netsp.online import Scene
 from netsp.online.guard.space_site import SpaceSite
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_guard import Guard, GuardOptions
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
-from netsp.online.run_log import LogRow
 from netsp.plan.space.mission_solver import solve_mission
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.run_log import LogRow
+from netsp.world.simulator.mission_run import simulate
 
 
 def beside_flight(

@@ -18,13 +18,13 @@ from table import ROOT
 
 from netsp import solve
 from netsp.model.problem import Problem
-from netsp.model.random_worlds import reachable_world
 from netsp.online.execute.execution_log import ExecutionOptions
 from netsp.online.execute.tour_execution import execute
 from netsp.online.guard.loops import loops_in
 from netsp.online.guard.plane import PlaneSite
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_belief import Strands
+from netsp.plan.random_worlds import reachable_world
 
 NOISE, DRIFT, DRIFT_S, SPEED, DT = 0.3, 0.5, 100.0, 0.5, 0.1
 VELOCITY_NOISE = 0.1

@@ -17,7 +17,7 @@ from table import ROOT, head, heading, row
 
 from netsp import Problem
 from netsp.hsignature import Word
-from netsp.model.random_worlds import random_world
+from netsp.plan.random_worlds import random_world
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.taut import TautRoadmap
 from netsp.roadmap.taut_by_word import NOT_PULLED

@@ -2,7 +2,7 @@
 
     python benchmarks/library_worlds.py        write the problems (they are committed)
 
-Random, clustered and harbour worlds are those of `netsp.model.random_worlds`; wind farms, jetties,
+Random, clustered and harbour worlds are those of `netsp.plan.random_worlds`; wind farms, jetties,
 jacket sections and mazes are built here, with goals at what is inspected. All draws are of
 `random.Random`; lengths are rounded to millimetres, or a thousandth of the unit.
 """
@@ -18,7 +18,7 @@ import numpy as np
 from table import ROOT
 
 from netsp.model.problem import Circle, Goal, Obstacle, Polygon, Problem
-from netsp.model.random_worlds import reachable_world
+from netsp.plan.random_worlds import reachable_world
 from netsp.roadmap.outline import build_outline
 from netsp.roadmap.shortest import ContactGraph
 
@@ -82,7 +82,7 @@ def recipes() -> Iterator[Recipe]:
 
 
 def drawn(family: str, goals: int, tether: float, obstacles: int) -> Callable[[str, int], Problem]:
-    """A world of `netsp.model.random_worlds`."""
+    """A world of `netsp.plan.random_worlds`."""
 
     def make(name: str, number: int) -> Problem:
         problem, _ = reachable_world(

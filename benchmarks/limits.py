@@ -31,7 +31,7 @@ from table import head, heading, row
 
 from netsp import Circle, Problem, solve
 from netsp.base.errors import InputError, NetspError
-from netsp.model.random_worlds import random_world
+from netsp.plan.random_worlds import random_world
 from netsp.plan.solver_table import SOLVERS
 
 
@@ -159,8 +159,8 @@ def sites(missions: list[str]) -> Iterator[tuple[str, int, float, str, str]]:
     answer) for every solver on a small problem, and for missions."""
     sys.path.insert(0, str(Path(__file__).parents[1]))
     from netsp import verify
-    from netsp.online.mission import Mission
     from netsp.plan.space.mission_solver import solve_mission
+    from netsp.world.mission.mission import Mission
     from tests.clock_sites import watched
 
     problem = random_world(3, goals=10, tether_length=300.0)

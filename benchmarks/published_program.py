@@ -14,7 +14,7 @@ import os
 from table import head, heading, row
 
 from netsp import TravelGraph, solve_graph
-from netsp.model.random_worlds import reachable_world
+from netsp.plan.random_worlds import reachable_world
 from netsp.plan.solve_problem import travel_graph
 
 CELLS = ((5, 200.0), (5, 300.0), (10, 200.0), (10, 250.0), (10, 300.0), (20, 200.0), (20, 300.0))

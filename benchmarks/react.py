@@ -18,11 +18,11 @@ import numpy as np
 from table import RESULTS, head, heading, row, source
 
 from netsp.online import Scene
-from netsp.online.equipment import Camera
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
-from netsp.online.paths.refine import RefineParams
-from netsp.online.planner import PlannerOptions
+from netsp.world.mission.equipment import Camera
+from netsp.world.mission.mission import Mission
+from netsp.world.paths.refine import RefineParams
+from netsp.world.planner import PlannerOptions
+from netsp.world.simulator.mission_run import simulate
 
 HERE = Path(__file__).parent.parent / "missions"
 PLANNERS = ("none", "react", "react-draft", "react-thresholds", "predictive")

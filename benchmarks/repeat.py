@@ -20,7 +20,7 @@ from table import ROOT, head, heading, row
 SCRIPT = """
 import json, sys
 from netsp import solve
-from netsp.model.random_worlds import random_world
+from netsp.plan.random_worlds import random_world
 for task in json.loads(sys.argv[1]):
     seed, goals, tether, solver, limit = task
     problem = random_world(seed, goals=goals, tether_length=tether)

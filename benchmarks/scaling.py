@@ -27,7 +27,7 @@ from table import head, heading, row
 from netsp import Status, solve_graph
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.model.problem import Problem
-from netsp.model.random_worlds import random_world
+from netsp.plan.random_worlds import random_world
 from netsp.roadmap.taut import TautRoadmap
 from netsp.view.pictures.style import SERIES, save
 

@@ -19,10 +19,10 @@ from table import ROOT, head, heading, row
 
 from netsp.base.geometry import polylines
 from netsp.online import Scene
-from netsp.online.mission import Mission
-from netsp.online.mission_run import grid_of, simulate
-from netsp.online.paths.tree import ShortestTree, taut
+from netsp.world.mission.mission import Mission
+from netsp.world.paths.tree import ShortestTree, taut
 from netsp.world.scene.field import pushed_out
+from netsp.world.simulator.mission_run import grid_of, simulate
 
 SHARE = 1.1
 """Tether over the longest of the shortest."""

@@ -21,7 +21,7 @@ from table import head, heading, row
 from netsp import Problem, Status, solve, verify
 from netsp.exchange.maps import Projection, read_site
 from netsp.exchange.maps.options import Looking
-from netsp.model.random_worlds import reachable_world
+from netsp.plan.random_worlds import reachable_world
 from netsp.plan.sizing import best_base, tether_curve, tether_margins
 from netsp.plan.sizing.candidates import over_grid
 

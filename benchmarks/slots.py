@@ -19,13 +19,13 @@ from table import head, row
 
 from netsp.base.arrays import Floats
 from netsp.base.clock import Clock
-from netsp.online.mission import Mission
 from netsp.plan.space.mission_solver import solve_mission
 from netsp.plan.space.path_bound import bound_of_all
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import Water
 from netsp.plan.space.space_legs import Ways
 from netsp.plan.space.states import Effort
+from netsp.world.mission.mission import Mission
 from netsp.world.scene.scene import Scene
 
 BOUNDS = (-6.0, -7.0, -2.0, 6.0, 7.0, 2.0)

@@ -3,7 +3,7 @@
     python benchmarks/solvers.py              Table I by both backends, heuristics, anneal's speed
     python benchmarks/solvers.py --no-cbc     without the slow backend
 
-Worlds: 500 x 500, 20 circles of radius 10 to 30, seeds 0 to 9 (`netsp.model.random_worlds`), exact
+Worlds: 500 x 500, 20 circles of radius 10 to 30, seeds 0 to 9 (`netsp.plan.random_worlds`), exact
 roadmap. Every tour is verified.
 """
 
@@ -21,8 +21,8 @@ from table import head, heading, row
 
 from netsp import Problem, Status, TravelGraph, solve_graph, travel_graph, verify
 from netsp.gtsp.travel.result import Result
-from netsp.model.random_worlds import random_world
 from netsp.plan.answer import to_solution
+from netsp.plan.random_worlds import random_world
 from netsp.plan.solver_table import SOLVERS
 
 GOALS = (5, 10, 15, 20)

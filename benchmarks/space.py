@@ -34,11 +34,8 @@ from netsp import Problem, solve
 from netsp.base.clock import Clock
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.hsignature.rays import signature
-from netsp.model.random_worlds import reachable_world
 from netsp.online import Scene
-from netsp.online.mission import Mission
-from netsp.online.mission_run import grid_of, simulate
-from netsp.online.run_log import Run
+from netsp.plan.random_worlds import reachable_world
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.judge import verify_mission
 from netsp.plan.space.mission_solver import (
@@ -55,8 +52,11 @@ from netsp.plan.space.space_signature import SpaceSignature
 from netsp.plan.space.upright import bound_of_upright
 from netsp.plan.space.visit_order import order_by_going_on
 from netsp.roadmap.explain_unreachable import shortest_tethers
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.run_log import Run
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import scene_of
+from netsp.world.simulator.mission_run import grid_of, simulate
 
 MISSIONS = ("basin", "pipes", "jacket")
 LONGER_PEN = "net pen, 24 m of tether"

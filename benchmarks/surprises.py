@@ -25,9 +25,9 @@ from table import ROOT, head, heading, row
 
 from netsp import Circle, Problem, Solution, solve
 from netsp.base.errors import NetspError
-from netsp.model.random_worlds import random_world
 from netsp.online.execute import ExecutionOptions, Surprises, execute
 from netsp.online.execute.execution_log import Execution
+from netsp.plan.random_worlds import random_world
 from netsp.world.tether.resolution import suggested_delta
 
 KINDS = (

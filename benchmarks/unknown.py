@@ -14,10 +14,10 @@ import numpy as np
 from table import head, heading, row
 
 from netsp.online import Scene
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
-from netsp.online.run_log import Run
-from netsp.online.surprises import SceneSurprises
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.run_log import Run
+from netsp.world.simulator.mission_run import simulate
+from netsp.world.simulator.surprises import SceneSurprises
 
 PILES = Scene.model_validate({
     "solids": [

@@ -17,15 +17,15 @@ from netsp.online.execute.events import Event, Surprises
 from netsp.online.execute.execution_files import write_execution
 from netsp.online.execute.execution_log import ExecutionOptions
 from netsp.online.execute.tour_execution import execute
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
-from netsp.online.run_log import read_run, write_run
 from netsp.plan.space.mission_solver import solve_mission
 from netsp.view.pictures import style
 from netsp.view.pictures.animation import save_animation
 from netsp.view.pictures.film import film_of_mission, film_of_plan, steps_of
 from netsp.view.pictures.moments import moments_of_flight, moments_of_plan
 from netsp.view.report.opened import opened
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.run_log import read_run, write_run
+from netsp.world.simulator.mission_run import simulate
 from tests.pages import unpacked
 from tests.worlds import FEW_CELLS
 

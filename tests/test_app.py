@@ -34,11 +34,11 @@ from netsp.model.problem import Origin
 from netsp.online.execute.events import Event, Surprises
 from netsp.online.execute.execution_files import write_execution
 from netsp.online.execute.tour_execution import execute
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
-from netsp.online.run_log import write_run
 from netsp.plan.sizing.tether_margins import margins
 from netsp.study.paths import measure_path
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.run_log import write_run
+from netsp.world.simulator.mission_run import simulate
 
 testclient = pytest.importorskip("starlette.testclient")
 

@@ -11,7 +11,7 @@ from netsp.gtsp.limits import Limits
 from netsp.gtsp.neighbourhood import beside_tour
 from netsp.gtsp.travel.graph import least_tethers
 from netsp.mip.mip_solver import MipRun
-from netsp.model.random_worlds import random_world
+from netsp.plan.random_worlds import random_world
 from tests.test_contract import random_graph
 
 

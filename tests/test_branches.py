@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from netsp import Circle, Polygon, Problem
 from netsp.base.clock import NEVER, Clock
 from netsp.base.errors import InfeasibleError, LimitReachedError
-from netsp.model.random_worlds import FAMILIES, random_world
+from netsp.plan.random_worlds import FAMILIES, random_world
 from netsp.roadmap import taut_legs as legs_of
 from netsp.roadmap.branches import OPEN
 from netsp.roadmap.taut import TautRoadmap

@@ -20,9 +20,9 @@ from netsp.base.errors import InputError, LimitReachedError, MemoryLimitError
 from netsp.base.ram import ask, available
 from netsp.mip.cutpool import IDLE, CutPool
 from netsp.mip.cuts import Cut
-from netsp.model.random_worlds import random_world, reachable_world
-from netsp.online.mission import Mission
+from netsp.plan.random_worlds import random_world, reachable_world
 from netsp.plan.space.mission_solver import MissionPolicy, solve_mission
+from netsp.world.mission.mission import Mission
 from netsp.world.scene.scene import Scene
 from tests.clock_sites import watched
 

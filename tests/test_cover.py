@@ -13,13 +13,13 @@ from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.command.main import main
 from netsp.online import Scene
-from netsp.online.coverage import Coverage, patches_of
-from netsp.online.equipment import Camera
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
 from netsp.plan.cover import cover
 from netsp.plan.cover.choose import by_program, choose, greedy, merged, pruned, simple_bound
 from netsp.plan.cover.viewpoints import Viewer, coarser, spread
+from netsp.world.mission.equipment import Camera
+from netsp.world.mission.mission import Mission
+from netsp.world.simulator.coverage import Coverage, patches_of
+from netsp.world.simulator.mission_run import simulate
 
 RING = Scene(name="ring", solids=[{"torus": {
     "center": [0, 0, -4], "axis": [0, 1, 0], "major_radius": 1.5, "minor_radius": 0.3,

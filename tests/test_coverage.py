@@ -7,8 +7,8 @@ import pytest
 
 from netsp import InputError
 from netsp.online import Scene
-from netsp.online.coverage import Coverage, divided, patches_of
-from netsp.online.equipment import Camera
+from netsp.world.mission.equipment import Camera
+from netsp.world.simulator.coverage import Coverage, divided, patches_of
 
 BALL = {"name": "ball", "sphere": {"center": [0, 0, 0], "radius": 1.0}}
 PLACES = np.array([[-5.0, -5, -5], [5, 5, 5]])

@@ -12,7 +12,7 @@ import pytest
 import netsp
 from netsp import Problem, Solution
 from netsp.command.schema import FORMATS
-from netsp.online.mission import Mission
+from netsp.world.mission.mission import Mission
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "benchmarks"))

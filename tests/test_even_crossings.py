@@ -33,7 +33,7 @@ from netsp.mip.mip_solver import solve
 from netsp.mip.parity_cuts import odd_letters, parity_cuts
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
-from netsp.model.random_worlds import random_world
+from netsp.plan.random_worlds import random_world
 from tests.brute import brute_tour
 from tests.test_blossoms import all_legs, tours_as_points
 from tests.test_contract import random_graph

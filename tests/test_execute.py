@@ -12,12 +12,12 @@ import pytest
 from netsp import Circle, InputError, Problem, Solution, solve
 from netsp.command.main import main
 from netsp.gtsp.travel.result import Result
-from netsp.model.random_worlds import random_world
 from netsp.model.solution import Status
 from netsp.online.execute import ExecutionOptions, Surprises, execute
-from netsp.online.execute.tour_plan import HOME, legs_of
 from netsp.online.execute.tour_repair import broken
-from netsp.online.vehicle import make_vehicle
+from netsp.plan.random_worlds import random_world
+from netsp.plan.tour_plan import HOME, legs_of
+from netsp.world.vehicle import make_vehicle
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
 FAST = ExecutionOptions(speed=1.0)

@@ -12,8 +12,8 @@ from netsp.command.main import main
 from netsp.exchange.missions import Projection
 from netsp.exchange.missions.mission_export import export_mission
 from netsp.exchange.missions.mission_files import Settings
-from netsp.online.mission import Mission
 from netsp.plan.space.space_plan import plan
+from netsp.world.mission.mission import Mission
 
 SCENE = {
     "schema_version": 1, "bounds": [-1, -4, -4, 9, 4, 1],

@@ -17,10 +17,10 @@ from netsp.online.guard.state_file import restore, save
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_guard import Guard, GuardOptions
 from netsp.online.guard.winding import closing, loops_of
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
 from netsp.plan.space.mission_solver import solve_mission
+from netsp.world.mission.mission import Mission
 from netsp.world.scene.scene import Scene
+from netsp.world.simulator.mission_run import simulate
 from tests.worlds import FEW_CELLS
 
 EXACT = GuardOptions(noise=0.0, drift=0.0)

@@ -15,7 +15,7 @@ from netsp.base.compiled.rng import seeded, uniform
 from netsp.gtsp.cost_matrix import MEASURE_AT_ONCE
 from netsp.gtsp.search import Instance
 from netsp.hsignature import concatenate, entangled, signature
-from netsp.model.random_worlds import random_world as papers_world
+from netsp.plan.random_worlds import random_world as papers_world
 from netsp.plan.solve_problem import travel_graph
 from netsp.plan.solver_table import ROADMAPS
 from tests.brute import brute_tour

@@ -22,9 +22,9 @@ from netsp.exchange.missions import Projection, export
 from netsp.exchange.missions.mission_files import Settings
 from netsp.online.execute import ExecutionOptions, Surprises, execute
 from netsp.online.execute.events import changed
-from netsp.online.mission import Mission
 from netsp.view.pictures import style
 from netsp.view.pictures.style import literal
+from netsp.world.mission.mission import Mission
 
 ROOT = Path(__file__).parent.parent
 SMALL = str(ROOT / "problems" / "known" / "triangle.json")

@@ -17,8 +17,8 @@ from netsp.exchange.missions.leg_times import SmoothMove, VehicleMotion, leg_tim
 from netsp.exchange.missions.mission_files import Settings, altitude, predicted_s, start_of
 from netsp.exchange.missions.waypoints import Waypoint, waypoints_of
 from netsp.online.execute.execution_log import ExecutionRow
-from netsp.online.execute.tour_plan import HOME, legs_of
 from netsp.online.fly.flight_time import FlightClock, FlightTime, predicted_flight
+from netsp.plan.tour_plan import HOME, legs_of
 from tests.autopilot import Earth
 from tests.test_autopilot_recordings import log, track
 

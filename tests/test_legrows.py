@@ -24,7 +24,7 @@ from netsp.mip.parity_cuts import odd_letters
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
 from netsp.model.problem import State
-from netsp.model.random_worlds import random_world
+from netsp.plan.random_worlds import random_world
 from netsp.roadmap.from_state import graph_from_state
 from tests.test_contract import random_graph
 from tests.test_even_crossings import small

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from netsp import InputError
 from netsp.online import GeodesicTether
-from netsp.online.equipment import TetherPhysics
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
+from netsp.world.mission.equipment import TetherPhysics
+from netsp.world.mission.mission import Mission
+from netsp.world.simulator.mission_run import simulate
 from netsp.world.tether.load import payout, payout_along, pull_on_robot, turning
 from tests.test_simulate import POST, ring
 

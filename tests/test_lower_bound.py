@@ -23,10 +23,10 @@ from netsp.command.progress_table import ProgressTable, summary
 from netsp.gtsp.gtsplib.tour_file import tour_text
 from netsp.gtsp.travel.result import Progress, Result, of_part
 from netsp.model.bound_scope import LowerBound, Scope, above_shortest, gap_of, strongest
-from netsp.model.random_worlds import reachable_world
 from netsp.model.solution import Status, proof, scope_of
 from netsp.plan import auto, exact
 from netsp.plan import solve_problem as by_name
+from netsp.plan.random_worlds import reachable_world
 from netsp.study.library.records import Record
 from netsp.view.pictures.problem_picture import _title, save_trace
 from netsp.view.report.page import _cells_table, _rows_link

@@ -15,7 +15,7 @@ from netsp.gtsp.limits import Limits
 from netsp.gtsp.searching import SearchingRun
 from netsp.mip.merging import classes_of, merge, merged
 from netsp.mip.mip_solver import solve_merged
-from netsp.model.random_worlds import random_world
+from netsp.plan.random_worlds import random_world
 from tests.brute import brute_tour
 from tests.test_contract import random_graph
 

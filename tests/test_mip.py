@@ -42,8 +42,8 @@ from netsp.mip.subtours import (
     goal_cuts,
     strongest_cut,
 )
-from netsp.model.random_worlds import random_world as far_world
 from netsp.model.solution import Status
+from netsp.plan.random_worlds import random_world as far_world
 from netsp.roadmap.taut import TautRoadmap
 from tests.brute import brute_tour as brute
 from tests.test_contract import random_graph

@@ -10,11 +10,6 @@ from netsp.base.errors import InputError, LimitReachedError
 from netsp.base.geometry import polylines
 from netsp.command.main import main
 from netsp.online import Scene
-from netsp.online.equipment import Camera
-from netsp.online.mission import Mission, MissionState, MissionWaypoint, Viewpoint
-from netsp.online.mission_run import simulate
-from netsp.online.planner import PlannerOptions
-from netsp.online.surprises import SceneSurprises
 from netsp.plan.cover import cover
 from netsp.plan.space.flown import words_of_flight
 from netsp.plan.space.judge import verify_mission
@@ -23,6 +18,11 @@ from netsp.plan.space.mission_solver import solve_mission
 from netsp.plan.space.path_bound import bound_of_all
 from netsp.plan.space.planning_context import Water, has_room
 from netsp.plan.space.space_plan import plan
+from netsp.world.mission.equipment import Camera
+from netsp.world.mission.mission import Mission, MissionState, MissionWaypoint, Viewpoint
+from netsp.world.planner import PlannerOptions
+from netsp.world.simulator.mission_run import simulate
+from netsp.world.simulator.surprises import SceneSurprises
 from tests.test_tour import written
 from tests.worlds import FEW_CELLS
 

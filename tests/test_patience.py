@@ -12,7 +12,7 @@ from netsp.command import patience
 from netsp.command.main import main
 from netsp.command.patience import Patience, span
 from netsp.command.stages import Stages
-from netsp.model.random_worlds import random_world
+from netsp.plan.random_worlds import random_world
 from netsp.roadmap import explain_unreachable
 from netsp.roadmap.explain_unreachable import shortest_tethers
 

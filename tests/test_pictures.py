@@ -12,9 +12,9 @@ from netsp import Problem, TravelGraph, solve, travel_graph
 from netsp.model.bound_scope import LowerBound, Scope, above_shortest
 from netsp.online import Scene
 from netsp.online.execute import execute
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
 from netsp.view.pictures import style
+from netsp.world.mission.mission import Mission
+from netsp.world.simulator.mission_run import simulate
 
 ROOT = Path(__file__).resolve().parent.parent
 

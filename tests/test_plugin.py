@@ -19,12 +19,12 @@ from netsp.command.main import main
 from netsp.gtsp.params import read_params
 from netsp.gtsp.travel.result import Result
 from netsp.online import GeodesicTether, Scene
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
-from netsp.online.planner import Planner
 from netsp.study.compare.rows import read_rows
 from netsp.study.compare.study import Study
 from netsp.study.compare.study_run import compare
+from netsp.world.mission.mission import Mission
+from netsp.world.planner import Planner
+from netsp.world.simulator.mission_run import simulate
 
 ROOT = Path(__file__).resolve().parent.parent
 WHARF = ROOT / "problems" / "wharf.json"

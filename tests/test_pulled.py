@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from netsp import Circle, Polygon, Problem
 from netsp.base.errors import NetspError
 from netsp.hsignature import signature
-from netsp.model.random_worlds import FAMILIES, random_world
+from netsp.plan.random_worlds import FAMILIES, random_world
 from netsp.roadmap.outline import is_free
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.taut import TautRoadmap

@@ -9,16 +9,16 @@ from hypothesis import strategies as st
 
 from netsp import InputError
 from netsp.online import Scene
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
-from netsp.online.planner import PLANNERS, PlannerOptions, make_planner
-from netsp.online.planner.pivots import Pivots
-from netsp.online.planner.react_draft import (
+from netsp.world.mission.mission import Mission
+from netsp.world.planner import PLANNERS, PlannerOptions, make_planner
+from netsp.world.planner.pivots import Pivots
+from netsp.world.planner.react_draft import (
     DraftRule,
     ReactDraftPlanner,
     ReactThresholdsPlanner,
 )
-from netsp.online.planner.react_planner import ReactPlanner
+from netsp.world.planner.react_planner import ReactPlanner
+from netsp.world.simulator.mission_run import simulate
 
 LIMIT = 10.0
 POST = Scene(solids=[{"post": {"center": [0, 0], "radius": 0.5}}], bounds=(-4, -4, -1, 4, 4, 1))

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from netsp import InputError
 from netsp.base.geometry import polylines
 from netsp.online import Scene
-from netsp.online.paths.refine import (
+from netsp.world.paths.refine import (
     REFINEMENTS,
     RefineParams,
     clear,
@@ -16,9 +16,9 @@ from netsp.online.paths.refine import (
     refined,
     smoothed,
 )
-from netsp.online.paths.sampled import OMPL_PLANNERS, SampledPaths
-from netsp.online.paths.tree import Grid, homotopic, taut
-from netsp.online.planner import PlannerOptions, make_planner
+from netsp.world.paths.sampled import OMPL_PLANNERS, SampledPaths
+from netsp.world.paths.tree import Grid, homotopic, taut
+from netsp.world.planner import PlannerOptions, make_planner
 
 POST = Scene(solids=[{"post": {"center": [0, 0], "radius": 0.5}}], bounds=(-3, -3, -1, 3, 3, 1))
 FIELD = POST.field()

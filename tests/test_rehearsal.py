@@ -60,7 +60,7 @@ from netsp.online.guard import live
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_guard import Guard
 from netsp.online.link.geo_frame import Frame
-from netsp.online.mission import Mission
+from netsp.world.mission.mission import Mission
 from netsp.model.problem import Problem
 
 opened = []

@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from netsp.base.compiled import interpretation
 from netsp.base.compiled.compile_policy import CompilePolicy, compiled_by, everything_compiled
 from netsp.online import Scene
-from netsp.online.coverage import Surface, View, mark, nearest
-from netsp.online.paths.standoff import sees
-from netsp.online.paths.tree import all_see, free_cells, grow, states_of, way
+from netsp.world.paths.standoff import sees
+from netsp.world.paths.tree import all_see, free_cells, grow, states_of, way
 from netsp.world.scene import packing, sampling
 from netsp.world.scene.sites import point_sites
+from netsp.world.simulator.coverage import Surface, View, mark, nearest
 
 SOLIDS = (
     {"name": "ball", "sphere": {"center": [0, 0, 0], "radius": 1.0}},

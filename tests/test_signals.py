@@ -13,8 +13,8 @@ import pytest
 from netsp import Problem, solve
 from netsp.command.main import COMMANDS, main
 from netsp.online.fly.flight_rehearsal import rehearse
-from netsp.online.mission import Mission
 from netsp.plan.space.space_plan import plan
+from netsp.world.mission.mission import Mission
 from tests.test_tour import written
 
 ROOT = Path(__file__).parent.parent
@@ -84,7 +84,7 @@ RUNS = {
     "solve mission, late": ("solve mission.json -o out.json", "plan/space/space_legs.py", 0),
     "order": ("order mission.json -o out.json", "world/scene/seams.py", 130),
     "app": ("app p.json --no-browser --port 0", "app/server.py", 130),
-    "cover": ("cover scene.json --anchor 0,0,0 -o out.json", "online/coverage.py", 0),
+    "cover": ("cover scene.json --anchor 0,0,0 -o out.json", "world/simulator/coverage.py", 0),
     "verify": ("verify p.json s.json", "judge/tour_checks.py", 130),
     "verify mission": ("verify planned.json", "plan/space/judge.py", 0),
     "margins": ("margins p.json s.json -o out.json", "plan/sizing/tether_margins.py", 130),
@@ -94,7 +94,7 @@ RUNS = {
     "tether": ("tether p.json -o out.csv", "plan/sizing/tether_sizing.py", 130),
     "gtsp": (f"gtsp {ROOT}/examples/7ring28.gtsp -o out.tour", "gtsp/search/local_search.py", 0),
     "world": ("world --goals 9 -o out.json", "worlds.py", 130),
-    "simulate": ("simulate mission.json --quiet", "online/simulation.py", 4),
+    "simulate": ("simulate mission.json --quiet", "world/simulator/simulation.py", 4),
     "execute": ("execute p.json s.json -o out", "online/execute/tour_execution.py", 130),
     "execute mission": ("execute planned.json -o out", "plan/space/judge.py", 130),
     "fly": ("fly p.json s.json --link udpin:{port} -o out", "online/fly/flight_rehearsal.py", 130),

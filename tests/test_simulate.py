@@ -17,16 +17,16 @@ from netsp import InputError
 from netsp.base.geometry import polylines
 from netsp.command.main import main
 from netsp.online import Scene
-from netsp.online.equipment import PositionSensor
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
-from netsp.online.paths.tree import STEPS, Grid, ShortestTree, grow, states_of, taut, way
-from netsp.online.planner import PLANNERS, PlannerOptions
-from netsp.online.planner.predictive import WORTH, PredictivePlanner
-from netsp.online.run_log import describe_run
-from netsp.online.sensing import Positions
-from netsp.online.vehicle.kinematic import advance
+from netsp.world.mission.equipment import PositionSensor
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.run_log import describe_run
+from netsp.world.paths.tree import STEPS, Grid, ShortestTree, grow, states_of, taut, way
+from netsp.world.planner import PLANNERS, PlannerOptions
+from netsp.world.planner.predictive import WORTH, PredictivePlanner
 from netsp.world.scene.field import pushed_out
+from netsp.world.simulator.mission_run import simulate
+from netsp.world.simulator.sensing import Positions
+from netsp.world.vehicle.kinematic import advance
 from tests.pages import unpacked
 
 MISSIONS = Path(__file__).parent.parent / "missions"

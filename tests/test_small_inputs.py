@@ -20,8 +20,8 @@ from netsp.model.problem import State
 from netsp.model.solution import LARGEST, tension_ratio
 from netsp.online.guard.plane import PlaneSite
 from netsp.online.guard.state_file import MAX_LETTERS, GuardState
-from netsp.online.mission import Mission
 from netsp.plan.sizing.tether_margins import margins
+from netsp.world.mission.mission import Mission
 from netsp.world.tether.taut_tether import Tether, strand_of
 
 LONG_NUMBER = "1" * 5001

@@ -54,7 +54,6 @@ from netsp.hsignature.words import concatenate, cyclically_reduced, entangled, i
 from netsp.model.bound_scope import LowerBound, Scope
 from netsp.model.solution import Status
 from netsp.online.execute.temporary_obstacles import lasting, passing
-from netsp.online.execute.tour_plan import HOME, Leg
 from netsp.online.execute.tour_repair import broken, outside, reachable
 from netsp.online.fly.preflight_checks import ready
 from netsp.online.fly.stopped import RefusedError
@@ -75,6 +74,7 @@ from netsp.online.guard.site import Loop
 from netsp.online.guard.telemetry import Fix
 from netsp.online.link.vehicle_kind import VehicleKind
 from netsp.plan.cover.choose import greedy, pruned, simple_bound
+from netsp.plan.tour_plan import HOME, Leg
 
 # words
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from netsp import Circle, InfeasibleError, InputError, Problem, solve, solve_graph, verify
 from netsp.base.clock import Clock
 from netsp.model.problem import State
-from netsp.model.random_worlds import random_world
+from netsp.plan.random_worlds import random_world
 from netsp.plan.solver_table import SOLVERS
 from netsp.roadmap.from_state import graph_from_state
 

@@ -15,8 +15,6 @@ from matplotlib.figure import Figure
 from netsp import Circle, Problem, solve
 from netsp.online.execute.events import Event, Surprises
 from netsp.online.execute.tour_execution import execute
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
 from netsp.study.compare.rows import read_rows
 from netsp.study.compare.study import Study
 from netsp.study.compare.study_run import compare
@@ -30,7 +28,9 @@ from netsp.view.pictures.problem_picture import draw
 from netsp.view.pictures.scene_picture import Stops, figure_of, save
 from netsp.view.report import figures
 from netsp.view.report.stats import best_lengths, cells, methods
+from netsp.world.mission.mission import Mission
 from netsp.world.scene.scene import Scene
+from netsp.world.simulator.mission_run import simulate
 from tests.pages import unpacked
 
 ROOT = Path(__file__).parent.parent

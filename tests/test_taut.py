@@ -23,7 +23,7 @@ from netsp import (
 from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
 from netsp.hsignature import crossings, is_looping, reduce, signature
-from netsp.model.random_worlds import random_world as papers_world
+from netsp.plan.random_worlds import random_world as papers_world
 from netsp.roadmap.taut import TautRoadmap
 from tests.brute import BruteForce
 from tests.worlds import random_world, small_worlds

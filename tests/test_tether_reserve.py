@@ -14,10 +14,10 @@ from netsp.online.execute import ExecutionOptions, Surprises, execute
 from netsp.online.execute.execution_log import describe_execution
 from netsp.online.execute.tether_limits import RESOLUTION, describe_limits, limit_periods, overruns
 from netsp.online.execute.tether_reserve import ReservePolicy
-from netsp.online.execute.tour_plan import HOME
 from netsp.online.execute.tour_repair import repair, reserved_limit
 from netsp.online.fly import tour_flight
 from netsp.online.fly.tour_flight import fly
+from netsp.plan.tour_plan import HOME
 from netsp.world.scene.scene import scene_of
 from netsp.world.tether import GeodesicTether
 from tests.simulated_session import SimulatedSession

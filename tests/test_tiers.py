@@ -52,7 +52,7 @@ from netsp.base.errors import InputError
 from netsp.gtsp.dp import label_kernels, walks
 from netsp.mip import parity_cuts
 from netsp.model.problem import Problem
-from netsp.model.random_worlds import FAMILIES, random_world
+from netsp.plan.random_worlds import FAMILIES, random_world
 from netsp.plan.solve_problem import solve, travel_graph
 from netsp.roadmap import branches, outline, tangents, taut_legs
 from tests.fresh_modules import fresh_module
@@ -537,7 +537,7 @@ from netsp.base.compiled.compile_policy import everything_compiled
 from netsp.base.compiled.kernel import all_kernels
 from netsp.model.problem import Problem
 from netsp.plan.solve_problem import solve
-from netsp.model.random_worlds import random_world
+from netsp.plan.random_worlds import random_world
 
 with everything_compiled():
     solve(Problem.load("problems/wharf.json"))

@@ -14,16 +14,16 @@ from netsp.base.clock import Clock, until_interrupt, whole_or_interrupted
 from netsp.base.geometry import polylines
 from netsp.command.main import main
 from netsp.model.solution import Status
-from netsp.online.laid import present_tether
-from netsp.online.mission import Mission
-from netsp.online.mission_run import grid_of, simulate
-from netsp.online.planned_tour import in_file
-from netsp.online.planner.predictive import PredictivePlanner
 from netsp.plan.space.flown import words_of_flight
 from netsp.plan.space.judge import verify_mission
 from netsp.plan.space.mission_solver import seconds_until_home, solve_mission
 from netsp.plan.space.path_bound import bound_of_all
 from netsp.plan.space.space_plan import plan
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.planned_tour import in_file
+from netsp.world.planner.predictive import PredictivePlanner
+from netsp.world.simulator.laid_tether import present_tether
+from netsp.world.simulator.mission_run import grid_of, simulate
 from netsp.world.tether import GeodesicTether
 from tests.worlds import FEW_CELLS
 

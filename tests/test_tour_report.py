@@ -11,7 +11,7 @@ import pytest
 from netsp import Problem, Solution
 from netsp.command.main import main
 from netsp.roadmap.paths import TautPaths
-from netsp.view.report.wording import Passage, back_from, listed, passages
+from netsp.world.side_names import Passage, back_from, listed, passages
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")

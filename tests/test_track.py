@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 
 from netsp import InputError
 from netsp.online import Scene
-from netsp.online.anchor_track import Track
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
-from netsp.online.run_log import describe_run
 from netsp.plan.space.mission_solver import solve_mission
 from netsp.view.pictures.mission_picture import save_runs, tethers_along
+from netsp.world.mission.anchor_track import Track
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.run_log import describe_run
+from netsp.world.simulator.mission_run import simulate
 
 PILES = Scene(
     solids=[

@@ -13,13 +13,13 @@ from netsp import InputError
 from netsp.base.errors import interrupted
 from netsp.command.main import main
 from netsp.online import Scene
-from netsp.online.mission import Mission
-from netsp.online.mission_run import simulate
-from netsp.online.ranging import Ranging, cast, fan
-from netsp.online.run_log import describe_run
-from netsp.online.surprises import SceneSurprises, changed, moved
-from netsp.online.surroundings import Surroundings
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.run_log import describe_run
 from netsp.world.scene.scene import Solid
+from netsp.world.simulator.mission_run import simulate
+from netsp.world.simulator.ranging import Ranging, cast, fan
+from netsp.world.simulator.surprises import SceneSurprises, changed, moved
+from netsp.world.simulator.surroundings import Surroundings
 
 ROOT = Path(__file__).parent.parent
 PILES = Scene(

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError
-from netsp.online.current import Water
-from netsp.online.vehicle import VEHICLES, make_vehicle
-from netsp.online.vehicle.control import HORIZON, PredictiveControl, solve_positive, within
-from netsp.online.vehicle.dynamics import (
+from netsp.world.simulator.current import Water
+from netsp.world.vehicle import VEHICLES, make_vehicle
+from netsp.world.vehicle.control import HORIZON, PredictiveControl, solve_positive, within
+from netsp.world.vehicle.dynamics import (
     ALLOCATION,
     INERTIA,
     THRUST,
@@ -19,7 +19,7 @@ from netsp.online.vehicle.dynamics import (
     linearised,
     step,
 )
-from netsp.online.vehicle.kinematic import KinematicVehicle, turned
+from netsp.world.vehicle.kinematic import KinematicVehicle, turned
 
 STILL = np.zeros(3)
 

@@ -22,8 +22,8 @@ from netsp.mip.parity_paths import beyond, ways_from_base
 from netsp.mip.prices import Prices
 from netsp.mip.program import Duals, duals_of_relaxation
 from netsp.mip.reducedcosts import reduced_costs
-from netsp.model.random_worlds import random_world
 from netsp.model.solution import Status
+from netsp.plan.random_worlds import random_world
 from tests.test_blossoms import some_cut
 from tests.test_contract import random_graph
 from tests.worlds import costs_of

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from netsp import InputError, Problem, solve
 from netsp.command.main import main
-from netsp.model.random_worlds import FAMILIES, random_world, reachable_world
+from netsp.plan.random_worlds import FAMILIES, random_world, reachable_world
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -125,7 +125,7 @@ def test_netsp_world_writes_a_problem_that_solve_reads(tmp_path, capsys):
     ],
 )
 def test_bad_worlds_are_told_in_one_line(args, said, capsys, monkeypatch):
-    monkeypatch.setattr("netsp.model.random_worlds.ATTEMPTS", 3)  # of 50, each as much in vain
+    monkeypatch.setattr("netsp.plan.random_worlds.ATTEMPTS", 3)  # of 50, each as much in vain
     assert main(["world", *args]) == 2
     err = capsys.readouterr().err
     assert said in err

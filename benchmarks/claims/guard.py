@@ -95,8 +95,8 @@ def in_space() -> tuple[str, bool]:
     from guard_space import beside_flight
     from sites import shipped
 
-    from netsp.online.mission_run import simulate
     from netsp.plan.space.mission_solver import solve_mission
+    from netsp.world.simulator.mission_run import simulate
 
     mission, scene = shipped("basin")
     found = solve_mission(mission, scene=scene)

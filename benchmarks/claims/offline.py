@@ -32,7 +32,7 @@ def proofs(
 def bounds() -> tuple[str, bool]:
     """Runs stopped early, whose bound must not exceed the optimum."""
     from netsp import solve_graph, travel_graph
-    from netsp.model.random_worlds import random_world
+    from netsp.plan.random_worlds import random_world
 
     worst, runs = -np.inf, 0
     for seed in range(10):
@@ -50,7 +50,7 @@ def restricted_bounds() -> tuple[str, bool]:
     optimum over all classes, although the optimum over the classes kept does."""
     from netsp import solve, solve_graph, travel_graph
     from netsp.model.bound_scope import LowerBound, Scope
-    from netsp.model.random_worlds import reachable_world
+    from netsp.plan.random_worlds import reachable_world
 
     above = rows = longer = 0
     for seed in range(8):
@@ -208,7 +208,7 @@ def reduced_as_published() -> tuple[str, bool]:
 def published_program() -> tuple[str, bool]:
     """`mip-2017` beside `mip` on a world of ten goals at tether 200."""
     from netsp import solve_graph
-    from netsp.model.random_worlds import reachable_world
+    from netsp.plan.random_worlds import reachable_world
     from netsp.plan.solve_problem import travel_graph
 
     world, _ = reachable_world(0, goals=10, tether_length=200.0, obstacles=(1, 20))

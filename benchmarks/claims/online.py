@@ -132,7 +132,7 @@ def mission(name: str, replan_s: float) -> Iterator[Claim]:
     def fly() -> dict[str, float]:
         import react
 
-        from netsp.online.mission import Mission
+        from netsp.world.mission.mission import Mission
 
         there = Mission.load(ROOT / "missions" / f"{name}.json")
         scene = there.load_scene()
@@ -159,8 +159,8 @@ def mission(name: str, replan_s: float) -> Iterator[Claim]:
 
 def from_a_ship() -> tuple[str, bool]:
     """The shipped mission whose anchor moves, by both vehicles."""
-    from netsp.online.mission import Mission
-    from netsp.online.mission_run import simulate
+    from netsp.world.mission.mission import Mission
+    from netsp.world.simulator.mission_run import simulate
 
     there = Mission.load(ROOT / "missions" / "ship.json")
     shown, good = [], True
@@ -217,7 +217,7 @@ def windy(names: tuple[str, ...] = ("basin",)) -> tuple[str, bool]:
     """`predictive` with the BlueROV2 in a current with gusts."""
     import react
 
-    from netsp.online.mission import Mission
+    from netsp.world.mission.mission import Mission
 
     over, visited, count = 0.0, 0, 0
     for name in names:
@@ -248,7 +248,7 @@ def papers_planner() -> tuple[str, bool]:
     """Fly the basin with the paper's planner: the published seconds, and CPU of its plans."""
     import react
 
-    from netsp.online.mission import Mission
+    from netsp.world.mission.mission import Mission
 
     there = Mission.load(ROOT / "missions" / "basin.json")
     scene = there.load_scene()

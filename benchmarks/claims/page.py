@@ -42,9 +42,9 @@ def small() -> tuple[str, bool]:
 
     from sites import shipped
 
-    from netsp.online.mission_run import simulate
     from netsp.view.pictures.film import film_of_flight
     from netsp.view.pictures.film_page import FRAMES, save_page
+    from netsp.world.simulator.mission_run import simulate
 
     mission, scene = shipped("basin")
     with tempfile.TemporaryDirectory() as folder:

@@ -81,9 +81,9 @@ def no_worse() -> tuple[str, bool]:
     """A mission in its planned order, solved again in two seconds."""
     from sites import shipped
 
-    from netsp.online.mission_run import simulate
     from netsp.plan.space.judge import verify_mission
     from netsp.plan.space.mission_solver import seconds_until_home, solve_mission
+    from netsp.world.simulator.mission_run import simulate
 
     mission, scene = shipped("basin")
     ordered = solve_mission(mission, scene=scene, time_limit=10.0).mission
@@ -100,8 +100,8 @@ def solved(name: str, longest: float, saved: float) -> Claim:
     def measure() -> tuple[str, bool]:
         from sites import SITES, mission_of, shipped
 
-        from netsp.online.mission_run import simulate
         from netsp.plan.space.mission_solver import seconds_until_home, solve_mission
+        from netsp.world.simulator.mission_run import simulate
 
         mission, scene = mission_of(name) if name in SITES else shipped(name)
         found = solve_mission(mission, scene=scene)
@@ -124,8 +124,8 @@ def seen(name: str) -> Claim:
         import cover as bench
         from sites import mission_of
 
-        from netsp.online.mission_run import simulate
         from netsp.plan.cover import cover
+        from netsp.world.simulator.mission_run import simulate
 
         mission, scene = mission_of(name)
         found = cover(scene, anchor=mission.anchor, start=mission.start, **bench.CAMERA)
@@ -145,9 +145,9 @@ def mended() -> tuple[str, bool]:
     from sites import mission_of
 
     from netsp.base.geometry import polylines
-    from netsp.online.mission_run import simulate
-    from netsp.online.surprises import SceneSurprises
     from netsp.plan.space.space_plan import plan
+    from netsp.world.simulator.mission_run import simulate
+    from netsp.world.simulator.surprises import SceneSurprises
 
     mission, scene = mission_of("ring")
     planned = plan(mission, scene=scene).planned()

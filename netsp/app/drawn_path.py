@@ -8,10 +8,10 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
+from netsp.base.field_types import checked_argument, is_index
+from netsp.base.validated import shown
 from netsp.exchange.maps.path_file import path_to_geojson
-from netsp.model.field_types import checked_argument, is_index
 from netsp.model.problem import Problem
-from netsp.model.validated import shown
 from netsp.roadmap.tether_classes import Tethers
 from netsp.study.compare.path_comparison import order_length
 from netsp.study.paths import PathMeasures, measure_path

@@ -12,9 +12,9 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 from netsp.base.errors import InputError, UnansweredError
+from netsp.base.validated import shown
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
-from netsp.model.validated import shown
 
 LONGEST_NAME = 200
 """Bytes: file systems take 255, and what is not saved yet is kept under a longer one."""

@@ -39,10 +39,10 @@ from netsp.app.shown import Shown
 from netsp.app.solving import Worker
 from netsp.app.state import Document
 from netsp.base.errors import InputError, NetspError, UnansweredError
-from netsp.model.field_types import checked_argument, is_index
+from netsp.base.field_types import checked_argument, is_index
+from netsp.base.validated import parse_json_object, shown
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
-from netsp.model.validated import parse_json_object, shown
 
 STATIC = Path(__file__).parent / "static"
 

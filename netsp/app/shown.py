@@ -13,9 +13,9 @@ from netsp.app.solving import told_bound
 from netsp.base.errors import InputError
 from netsp.base.files import csv_rows, read_text
 from netsp.base.geometry import polylines
+from netsp.base.validated import parse_json_object
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
-from netsp.model.validated import parse_json_object
 from netsp.world.scene.scene import Scene, scene_of
 
 FRAMES = 240
@@ -170,10 +170,10 @@ def _of_execution(place: Path, problem: Problem, solution: Solution) -> Shown:
 
 def _of_mission(place: Path) -> Shown:
     """A mission that was flown; the tether is worked out again along the way."""
-    from netsp.online.anchor_track import Track
-    from netsp.online.laid import present_tether
-    from netsp.online.mission import Mission
-    from netsp.online.mission_run import grid_of
+    from netsp.world.mission.anchor_track import Track
+    from netsp.world.mission.mission import Mission
+    from netsp.world.simulator.laid_tether import present_tether
+    from netsp.world.simulator.mission_run import grid_of
     from netsp.world.tether import GeodesicTether
 
     mission = Mission.load(place / "mission.json")

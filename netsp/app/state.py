@@ -15,8 +15,8 @@ from typing import Any
 
 from netsp.base.errors import InputError
 from netsp.base.files import read_text, write_text
+from netsp.base.validated import parse_json_object, read_model, shown
 from netsp.model.problem import Problem
-from netsp.model.validated import parse_json_object, read_model, shown
 
 EMPTY: dict[str, Any] = {
     "schema_version": 1, "name": "new", "base": [0.0, 0.0, 0.0], "goals": [], "obstacles": [],

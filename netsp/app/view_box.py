@@ -12,8 +12,8 @@ from types import TracebackType
 from typing import Self
 
 from netsp.base.errors import InputError
+from netsp.base.field_types import checked_argument
 from netsp.base.files import write_text
-from netsp.model.field_types import checked_argument
 from netsp.model.problem import Problem
 
 

@@ -19,9 +19,9 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats
 from netsp.base.errors import InputError
+from netsp.base.field_types import LARGEST
 from netsp.base.files import csv_lines, read_bytes, read_gzip
-from netsp.model.field_types import LARGEST
-from netsp.model.validated import parse_json, shown
+from netsp.base.validated import parse_json, shown
 
 UNITS = {
     "m": 1.0, "km": 1e3, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "us-ft": 1200.0 / 3937.0,

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import ClassVar, Self
 
 from netsp.base.errors import InputError
-from netsp.model.validated import Model, read_model, shown
+from netsp.base.validated import Model, read_model, shown
 
 STANDARD = "-"
 """The name of a file that stands for standard input, or output."""

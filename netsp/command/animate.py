@@ -121,13 +121,13 @@ def _film(source: str, problem_file: str | None, count: int) -> Film:
 
         return opened(source, problem_file).film(count)
     if not Path(source).is_dir():
-        from netsp.online.mission import Mission
         from netsp.view.pictures.film import film_of_mission
+        from netsp.world.mission.mission import Mission
 
         mission = Mission.load(source)
         return film_of_mission(mission, mission.load_scene(), count)
-    from netsp.online.run_log import read_run
     from netsp.view.pictures.film import film_of_flight
+    from netsp.world.mission.run_log import read_run
 
     run = read_run(source)
     try:

@@ -11,11 +11,11 @@ EXAMPLE = """netsp completion bash > ~/.local/share/bash-completion/completions/
 def _names(command: str) -> dict[str, list[str]]:
     """Names that options of a command take; those of other packages are among them."""
     from netsp.exchange.missions.mission_files import FORMATS
-    from netsp.model.random_worlds import FAMILIES
-    from netsp.online.planner import PLANNERS
-    from netsp.online.vehicle import VEHICLES
+    from netsp.plan.random_worlds import FAMILIES
     from netsp.plan.solver_table import ROADMAPS, SOLVERS
+    from netsp.world.planner import PLANNERS
     from netsp.world.tether import TETHERS
+    from netsp.world.vehicle import VEHICLES
 
     planners = list(PLANNERS) if command == "simulate" else ["repair", "none"]
     return {

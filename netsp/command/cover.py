@@ -16,8 +16,8 @@ from netsp.command.command_clock import command_clock
 from netsp.command.types import check_writable, length, natural, seconds, vector
 
 if TYPE_CHECKING:
-    from netsp.online.equipment import Camera
     from netsp.plan.cover import Cover
+    from netsp.world.mission.equipment import Camera
 
 EXAMPLE = "netsp cover scenes/jetty.json --anchor=-3,-3,-1 -o mission.json"
 
@@ -133,7 +133,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _camera(text: str, patch: float) -> Camera:
     """From ``RANGE[,FIELD[,TILT]]``."""
-    from netsp.online.equipment import Camera
+    from netsp.world.mission.equipment import Camera
 
     names = ("range", "field_of_view", "tilt")
     try:

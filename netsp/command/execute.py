@@ -95,10 +95,10 @@ def run(args: argparse.Namespace) -> int:
 def _mission(args: argparse.Namespace) -> int:
     """Of a planned mission in space."""
     from netsp.command.flight import fly
-    from netsp.online.mission import Mission
-    from netsp.online.mission_limits import check_names
-    from netsp.online.planner import PlannerOptions
-    from netsp.online.surprises import SceneSurprises
+    from netsp.world.mission.mission import Mission
+    from netsp.world.mission.mission_limits import check_names
+    from netsp.world.planner import PlannerOptions
+    from netsp.world.simulator.surprises import SceneSurprises
 
     for name, flag in (("solution", "SOLUTION"), ("speed", "--speed"), ("delta", "--delta"),
                        ("reserve", "--reserve")):  # fmt: skip

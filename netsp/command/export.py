@@ -180,7 +180,7 @@ def _mission(args: argparse.Namespace) -> int:
         format_of,
         predicted_s,
     )
-    from netsp.online.mission import Mission
+    from netsp.world.mission.mission import Mission
 
     mission = Mission.load(args.solution)
     kind = format_of(args.output, args.format)

@@ -14,11 +14,11 @@ from netsp.command.types import check_writable
 
 if TYPE_CHECKING:
     from netsp.base.clock import Clock
-    from netsp.online.mission import Mission
-    from netsp.online.planner import Planner
-    from netsp.online.run_log import LogRow, Run
-    from netsp.online.surprises import SceneSurprises
+    from netsp.world.mission.mission import Mission
+    from netsp.world.mission.run_log import LogRow, Run
+    from netsp.world.planner import Planner
     from netsp.world.scene.scene import Scene
+    from netsp.world.simulator.surprises import SceneSurprises
 
 
 WRITTEN = ("log.csv", "summary.json", "mission.json", "run.png", "run.html")
@@ -61,8 +61,8 @@ def _flown(
 ) -> list[Run]:  # fmt: skip
     from netsp.base.files import output_folder
     from netsp.command.plot_scene import note_scene, tell, warn_of_scene
-    from netsp.online.mission_run import simulate
-    from netsp.online.run_log import describe_run, write_run
+    from netsp.world.mission.run_log import describe_run, write_run
+    from netsp.world.simulator.mission_run import simulate
     from netsp.world.tether import GeodesicTether
 
     show = not quiet and sys.stderr.isatty()
@@ -146,7 +146,7 @@ def until_stopped(
 
 def show_mission(mission: Mission, units: str) -> Callable[[LogRow, Planner], None]:
     """Shows how a mission goes, in one line."""
-    from netsp.online.simulation import STEP
+    from netsp.world.simulator.simulation import STEP
 
     count = len(mission.waypoints)
 

@@ -412,7 +412,7 @@ def _watched(problem: Problem, page: Page, speed: float) -> Callable[[ExecutionR
 def print_targets(problem: Problem, solution: Solution, frame: Frame) -> None:
     """What would be sent, in its order."""
     from netsp.exchange.missions.mission_files import altitude
-    from netsp.online.execute.tour_plan import HOME, legs_of
+    from netsp.plan.tour_plan import HOME, legs_of
 
     head = ("latitude", "longitude", "above home") if frame.is_global else ("north", "east", "down")
     print(f"{'target':>6}  {head[0]:>12} {head[1]:>12} {head[2]:>10}  what")

@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
     from netsp.model.problem import Problem
     from netsp.online.guard.tether_guard import Guard, GuardOptions
     from netsp.online.link.geo_frame import Frame
-    from netsp.online.mission import Mission
+    from netsp.world.mission.mission import Mission
 
     told_of = Mission.load(args.site) if is_mission(args.site) else Problem.load(args.site)
     options = GuardOptions(args.noise, args.drift, args.speed)

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from netsp.judge import Verification
     from netsp.model.problem import Problem
     from netsp.model.solution import Solution
-    from netsp.online.mission import Mission
     from netsp.plan.space.mission_solver import SolvedMission
+    from netsp.world.mission.mission import Mission
 
 
 def json_flag(p: argparse.ArgumentParser) -> None:

@@ -110,10 +110,10 @@ def _mission(args: argparse.Namespace) -> int:
     ):  # fmt: skip
         if getattr(args, name) is not None:
             raise InputError(f"{flag}: {args.problem} is a mission; expected nothing beside it")
-    from netsp.online.mission import Mission
     from netsp.view.pictures import style
     from netsp.view.pictures.mission_picture import save_mission
     from netsp.view.pictures.scene_picture import INTERACTIVE
+    from netsp.world.mission.mission import Mission
 
     style.check_format(args.output, INTERACTIVE)
     mission = Mission.load(args.problem)
@@ -124,7 +124,7 @@ def _mission(args: argparse.Namespace) -> int:
 def is_scene(path: str) -> bool:
     """A file that describes a scene rather than a problem: by its fields."""
     from netsp.base.files import read_text
-    from netsp.model.validated import kind_of, parse_json_object
+    from netsp.base.validated import kind_of, parse_json_object
 
     data = parse_json_object(read_text(path), path)
     if kind_of(data) not in (None, "problem", "scene"):

@@ -13,9 +13,9 @@ from netsp.base.axes import read_path
 from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
 from netsp.command import messages
-from netsp.online.mission_limits import MOST_NODES
 from netsp.view.pictures import scene_picture as pictures
 from netsp.view.pictures import style
+from netsp.world.mission.mission_limits import MOST_NODES
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
 from netsp.world.tether import GeodesicTether, Tether, make_tether

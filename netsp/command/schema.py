@@ -11,10 +11,10 @@ FORMATS = {
     "problem": "netsp.model.problem:Problem",
     "solution": "netsp.model.solution:Solution",
     "scene": "netsp.world.scene.scene:Scene",
-    "mission": "netsp.online.mission:Mission",
+    "mission": "netsp.world.mission.mission:Mission",
     "surprises": "netsp.online.execute.events:Surprises",
     "run-state": "netsp.online.execute.run_record:RunState",
-    "scene-surprises": "netsp.online.surprises:SceneSurprises",
+    "scene-surprises": "netsp.world.simulator.surprises:SceneSurprises",
     "study": "netsp.study.compare.study:Study",
 }
 """Format → where its model lives."""

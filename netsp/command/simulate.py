@@ -77,11 +77,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fly the mission, write what happened, and return the exit code."""
     from netsp.command.flight import fly
-    from netsp.online.mission import Mission
-    from netsp.online.mission_limits import check_names
-    from netsp.online.paths.refine import RefineParams
-    from netsp.online.planner import PLANNERS, PlannerOptions
-    from netsp.online.surprises import SceneSurprises
+    from netsp.world.mission.mission import Mission
+    from netsp.world.mission.mission_limits import check_names
+    from netsp.world.paths.refine import RefineParams
+    from netsp.world.planner import PLANNERS, PlannerOptions
+    from netsp.world.simulator.surprises import SceneSurprises
 
     mission = Mission.load(args.mission)
     changes: dict[str, object] = {}

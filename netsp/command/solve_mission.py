@@ -19,8 +19,8 @@ from netsp.command.command_clock import command_clock
 from netsp.command.types import check_writable
 
 if TYPE_CHECKING:
-    from netsp.online.mission import Mission
     from netsp.plan.space.mission_solver import SolvedMission
+    from netsp.world.mission.mission import Mission
     from netsp.world.scene.scene import Scene
 
 TIME_LIMIT = 60.0
@@ -39,7 +39,7 @@ def is_mission(file: str) -> bool:
     """Whether a file is a mission, be it one that lacks a field or has it misspelt; what cannot be
     read is left to who reads problems."""
     from netsp.base.files import read_text
-    from netsp.model.validated import MARKS, kind_of, parse_json_object
+    from netsp.base.validated import MARKS, kind_of, parse_json_object
 
     try:
         data = parse_json_object(read_text(file), file)
@@ -66,7 +66,7 @@ def solve(
     """Plan the mission, write it, and return the exit code."""
     check_writable(output, plot, inputs=(file,))
     from netsp.base.files import read_text, write_text
-    from netsp.online.mission import Mission
+    from netsp.world.mission.mission import Mission
 
     if plot:
         from netsp.view.pictures import style

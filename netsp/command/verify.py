@@ -132,8 +132,8 @@ def _mission(args: argparse.Namespace) -> int:
         if getattr(args, name):
             raise InputError(f"{flag}: is for problems, and {args.problem} is a mission")
     from netsp.command.interrupts import until_interrupted
-    from netsp.online.mission import Mission
     from netsp.plan.space.judge import verify_mission
+    from netsp.world.mission.mission import Mission
 
     verdict = until_interrupted(
         "judging the tour", lambda: verify_mission(Mission.load(args.problem))
@@ -149,7 +149,7 @@ PATH_ENDINGS = (".csv", ".csv.gz", ".gpx", ".geojson", ".tlog", ".bin")
 def _is_path(file: str) -> bool:
     """Return whether a file holds a path; any other is left to the reader of solutions."""
     from netsp.base.files import read_text
-    from netsp.model.validated import parse_json_object
+    from netsp.base.validated import parse_json_object
 
     if file.lower().endswith(PATH_ENDINGS):
         return True

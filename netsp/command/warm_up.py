@@ -155,18 +155,18 @@ def steps() -> Iterator[Step]:
     from netsp.mip.parity_cuts import odd_letters
     from netsp.mip.prices import Prices
     from netsp.mip.program import Duals
-    from netsp.model.random_worlds import random_world
     from netsp.online import ReactTether, Scene
-    from netsp.online.equipment import TetherPhysics
     from netsp.online.fly.flight_rehearsal import rehearse
     from netsp.online.guard.guard_rehearsal import rehearse as watched
-    from netsp.online.mission import Mission
-    from netsp.online.mission_run import simulate
+    from netsp.plan.random_worlds import random_world
     from netsp.plan.solve_problem import solve, solve_graph, travel_graph
     from netsp.plan.solver_table import SOLVERS
     from netsp.plan.space.mission_solver import solve_mission
+    from netsp.world.mission.equipment import TetherPhysics
+    from netsp.world.mission.mission import Mission
     from netsp.world.scene import voxels
     from netsp.world.scene.field import DistanceField
+    from netsp.world.simulator.mission_run import simulate
 
     problem = random_world(1, goals=9, tether_length=450.0)
     polygons = random_world(1, family="harbour", goals=4, tether_length=250.0)

@@ -50,7 +50,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Draw a world, write it, and return the exit code."""
     from netsp.base.files import write_text
-    from netsp.model.random_worlds import reachable_world
+    from netsp.plan.random_worlds import reachable_world
 
     check_writable(args.output, args.plot)
     if args.plot:

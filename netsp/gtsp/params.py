@@ -12,7 +12,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 import numpy as np
 
 from netsp.base.errors import InputError
-from netsp.model.validated import shown
+from netsp.base.validated import shown
 
 P = TypeVar("P")
 

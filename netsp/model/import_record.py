@@ -8,8 +8,8 @@ from typing import Annotated, Literal, Self, cast
 from pydantic import Field, model_validator
 
 from netsp.base.errors import counted
-from netsp.model.field_types import Name, Number, Positive
-from netsp.model.validated import Model
+from netsp.base.field_types import Name, Number, Positive
+from netsp.base.validated import Model
 
 UsedAs = Literal["base", "candidate", "goal", "obstacle", "bounds", "path", "floor"]
 """Kinds of use of a feature of a map."""

@@ -29,15 +29,7 @@ from pydantic import (
 
 from netsp.base.arrays import Bools, Ints
 from netsp.base.errors import InputError, counted
-from netsp.base.files import FileModel
-from netsp.base.geometry.polygons import (
-    check_polygon,
-    polygon_interior_point,
-    polygon_signed_distance,
-)
-from netsp.base.reprs import Drawn
-from netsp.model.arrangement import clusters_of, complaint_of, precedences_of
-from netsp.model.field_types import (
+from netsp.base.field_types import (
     POINT3_SCHEMA,
     Integer,
     Name,
@@ -49,9 +41,17 @@ from netsp.model.field_types import (
     checked_argument,
     checked_number,
 )
+from netsp.base.files import FileModel
+from netsp.base.geometry.polygons import (
+    check_polygon,
+    polygon_interior_point,
+    polygon_signed_distance,
+)
+from netsp.base.reprs import Drawn
+from netsp.base.validated import Model, explain, read_model, shown
+from netsp.model.arrangement import clusters_of, complaint_of, precedences_of
 from netsp.model.import_record import Site
 from netsp.model.shorthand import Inspection, written_out
-from netsp.model.validated import Model, explain, read_model, shown
 
 if TYPE_CHECKING:
     import shapely

@@ -14,9 +14,9 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, ValidationError
 
+from netsp.base.field_types import Integer, Name, Number, Point2, Positive
 from netsp.base.geometry.polygons import check_polygon
-from netsp.model.field_types import Integer, Name, Number, Point2, Positive
-from netsp.model.validated import Model, explain, shown
+from netsp.base.validated import Model, explain, shown
 
 MOST_VIEWPOINTS = 1000
 """About one structure at one depth."""

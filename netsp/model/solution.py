@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import ConfigDict, Field, model_validator
 
 from netsp.base.data_frames import frame_of
+from netsp.base.field_types import LARGEST, Name, NonNegative, Number, PathPoint, Total
 from netsp.base.files import FileModel
 from netsp.base.reprs import Drawn
+from netsp.base.validated import Model
 from netsp.model.bound_scope import LowerBound, Scope, above_shortest
-from netsp.model.field_types import LARGEST, Name, NonNegative, Number, PathPoint, Total
-from netsp.model.validated import Model
 
 if TYPE_CHECKING:
     import pandas

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from netsp.base.errors import InputError
+from netsp.base.validated import shown
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.params import read_params
 from netsp.gtsp.solver_run import SolverRun
@@ -21,7 +22,6 @@ from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
 from netsp.model.solution import Status
-from netsp.model.validated import shown
 
 OFFERED = ("params", "limits", "time", "iterations", "rng", "warm_start")
 """What a solver may ask for by name: its options, the limits, and each field of them."""

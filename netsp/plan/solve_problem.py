@@ -12,17 +12,17 @@ import numpy as np
 
 from netsp.base.clock import Clock, TimeLimit, until_interrupt
 from netsp.base.errors import InputError, LimitReachedError
+from netsp.base.field_types import checked_argument
 from netsp.base.registry import foreign, load
+from netsp.base.validated import shown
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.params import NoParams, read_params
 from netsp.gtsp.travel.baseless import BaselessGraph
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import OnProgress, Progress, Result
 from netsp.model.bound_scope import Scope
-from netsp.model.field_types import checked_argument
 from netsp.model.problem import Problem
 from netsp.model.solution import MAX_FRICTION, ProblemReference, Solution, Timings, max_turning
-from netsp.model.validated import shown
 from netsp.plan import without_base
 from netsp.plan.answer import to_solution
 from netsp.plan.custom import call, read_options, whole_numbers

@@ -14,8 +14,8 @@ import numpy as np
 
 from netsp.base.arrays import Bools, ComparesArrays, Floats
 from netsp.base.errors import NetspError
+from netsp.base.field_types import checked_argument
 from netsp.hsignature import Word, invert, reduce
-from netsp.model.field_types import checked_argument
 from netsp.model.problem import Goal, Problem
 from netsp.roadmap.explore import ALL, Found, run_explore
 from netsp.roadmap.outline import STAND_OFF, Outline, build_outline, pushed_out

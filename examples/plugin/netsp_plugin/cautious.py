@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from netsp.online.planner import Planner
+from netsp.world.planner import Planner
 
 SHARE = 0.8
 

@@ -11,9 +11,9 @@ from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 
 from netsp.base.errors import InputError
+from netsp.base.validated import shown
 from netsp.exchange.maps.chart_classes import chart_kind
 from netsp.exchange.maps.feature import Feature
-from netsp.model.validated import shown
 
 SHAPES = {
     "base": ("Point",),

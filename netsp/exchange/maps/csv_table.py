@@ -10,8 +10,8 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.axes import MAP_PAIRS, Quantity, read_table
 from netsp.base.errors import InputError
+from netsp.base.validated import shown
 from netsp.exchange.maps.projection import Projection
-from netsp.model.validated import shown
 
 
 def from_table(

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from netsp.base.errors import InputError
-from netsp.model.field_types import LARGEST
-from netsp.model.validated import shown
+from netsp.base.field_types import LARGEST
+from netsp.base.validated import shown
 
 Tag = tuple[int, str]
 """Group code and value; text is Latin-1, one character for each byte of the file."""

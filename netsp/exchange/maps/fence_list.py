@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from netsp.base.axes import decode_text
 from netsp.base.errors import InputError
 from netsp.base.files import read_bytes
+from netsp.base.validated import shown
 from netsp.exchange.maps.feature import Feature, Map, Unread
 from netsp.exchange.maps.mission_commands import FENCE, RALLY, ItemFeatures, add_polygon
 from netsp.exchange.maps.waypoint_list import is_waypoint_list, read_waypoint_list
-from netsp.model.validated import shown
 
 if TYPE_CHECKING:
     import shapely

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from netsp.base.errors import InputError, UnansweredError
 from netsp.base.files import read_text
+from netsp.base.validated import parse_json_object, shown
 from netsp.exchange.maps.feature import Feature, Map, Unread, with_tags
-from netsp.model.validated import parse_json_object, shown
 
 if TYPE_CHECKING:
     import shapely

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from netsp.base.errors import counted
-from netsp.model.field_types import checked_argument
+from netsp.base.field_types import checked_argument
 from netsp.model.problem import Problem
 
 MAX_LISTED = 3

@@ -10,9 +10,9 @@ from xml.etree import ElementTree
 
 from netsp.base.errors import InputError, counted
 from netsp.base.files import read_bytes
+from netsp.base.validated import shown
 from netsp.exchange.maps.feature import Feature, Map, Unread
 from netsp.exchange.maps.time_stamps import seconds_of
-from netsp.model.validated import shown
 
 MAX_HEIGHT = 12_000.0
 """Largest height or depth in a file, metres; no place on the earth exceeds it."""

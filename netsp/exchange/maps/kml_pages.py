@@ -24,10 +24,10 @@ import numpy as np
 
 from netsp.base.errors import InputError
 from netsp.base.files import MOST_BYTES, read_bytes
+from netsp.base.validated import shown
 from netsp.exchange.maps.feature import Change, Feature, Map, Unread, change_notes, with_tags
 from netsp.exchange.maps.vector import MOST_FEATURES
 from netsp.exchange.maps.wkb_shapes import ShapeError, area_of, ring_of
-from netsp.model.validated import shown
 
 if TYPE_CHECKING:
     import shapely

@@ -20,11 +20,11 @@ from pydantic import Field, ValidationError
 
 from netsp.base.arrays import Bools, Floats
 from netsp.base.errors import InputError, counted
+from netsp.base.field_types import Number, Positive
 from netsp.base.files import check_file, read_text
+from netsp.base.validated import Model, explain, shown
 from netsp.exchange.maps.drawn_shapes import simple_polygons
-from netsp.model.field_types import Number, Positive
 from netsp.model.problem import Problem
-from netsp.model.validated import Model, explain, shown
 
 if TYPE_CHECKING:
     import shapely

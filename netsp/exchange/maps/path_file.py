@@ -18,13 +18,13 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.axes import Quantity, Table, read_path, read_table
 from netsp.base.errors import InputError
+from netsp.base.field_types import LARGEST
 from netsp.base.files import read_text
+from netsp.base.validated import parse_json_object, shown
 from netsp.exchange.maps.gpx import read_gpx
 from netsp.exchange.maps.projection import Projection
 from netsp.exchange.maps.time_stamps import NO_VALUES, TimeStamps, seconds_of
-from netsp.model.field_types import LARGEST
 from netsp.model.problem import Problem
-from netsp.model.validated import parse_json_object, shown
 
 ENDINGS = (".csv", ".csv.gz", ".txt", ".json", ".geojson", ".gpx")
 """Endings of files with paths."""

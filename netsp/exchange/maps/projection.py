@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
-from netsp.model.field_types import checked_argument
-from netsp.model.validated import shown
+from netsp.base.field_types import checked_argument
+from netsp.base.validated import shown
 
 if TYPE_CHECKING:
     from netsp.model.problem import Problem

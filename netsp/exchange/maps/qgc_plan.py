@@ -7,6 +7,7 @@ from typing import Any
 
 from netsp.base.errors import InputError, counted
 from netsp.base.files import read_text
+from netsp.base.validated import parse_json_object, shown
 from netsp.exchange.maps.feature import Feature, Map, Unread
 from netsp.exchange.maps.mission_commands import (
     COMMANDS,
@@ -19,7 +20,6 @@ from netsp.exchange.maps.mission_commands import (
     add_polygon,
     features_of_items,
 )
-from netsp.model.validated import parse_json_object, shown
 
 LONGEST = 1e9
 """Bound on numbers of a plan; larger ones are damage."""

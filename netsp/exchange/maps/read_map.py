@@ -19,7 +19,9 @@ from pydantic import ValidationError
 from netsp.base import progress
 from netsp.base.axes import UNITS, column
 from netsp.base.errors import InputError, UnansweredError, counted
+from netsp.base.field_types import checked_number
 from netsp.base.geometry.polygons import union
+from netsp.base.validated import explain, shown
 from netsp.exchange.maps.chart_classes import (
     DEPTH_AREAS,
     EQUIPMENT,
@@ -66,10 +68,8 @@ from netsp.exchange.maps.qgc_plan import is_plan, read_plan
 from netsp.exchange.maps.sea_floor import SeaFloor
 from netsp.exchange.maps.vector import in_degrees, read_vector
 from netsp.exchange.maps.waypoint_list import is_waypoint_list, read_waypoint_list
-from netsp.model.field_types import checked_number
 from netsp.model.import_record import KIND_COLUMNS, MAX_NAMED, CropCircle, Site, UsedAs
 from netsp.model.problem import Problem
-from netsp.model.validated import explain, shown
 
 if TYPE_CHECKING:
     import shapely

@@ -12,7 +12,7 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
 from netsp.base.files import write_text
-from netsp.model.validated import shown
+from netsp.base.validated import shown
 
 if TYPE_CHECKING:
     import shapely

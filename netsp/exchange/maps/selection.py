@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING
 
 from netsp.base.errors import InputError
-from netsp.model.validated import shown
+from netsp.base.validated import shown
 
 if TYPE_CHECKING:
     import shapely

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 
 from netsp.base.axes import Column
 from netsp.base.errors import InputError
-from netsp.model.validated import shown
+from netsp.base.validated import shown
 
 NO_VALUES = (
     "", "nan", "-nan", "null", "none", "na", "n/a", "<null>", "#n/a", "#nv", "inf", "+inf", "-inf",

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from netsp.base.errors import InputError
 from netsp.base.files import read_text
+from netsp.base.validated import shown
 from netsp.exchange.maps.feature import Map
 from netsp.exchange.maps.mission_commands import ABOVE_SEA, MissionItem, add_home, features_of_items
-from netsp.model.validated import shown
 
 HEAD = re.compile(r"QGC\s+WPL\s+1[0-9]0\s*")
 

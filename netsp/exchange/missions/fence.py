@@ -16,7 +16,7 @@ import shapely
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
-from netsp.model.field_types import Point2
+from netsp.base.field_types import Point2
 from netsp.model.problem import Circle, Polygon, Problem
 
 GROWTH_STEPS = 8

@@ -16,7 +16,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from netsp.base.errors import InputError
 from netsp.model.problem import Circle, Problem
-from netsp.online.execute.tour_plan import HOME
+from netsp.plan.tour_plan import HOME
 
 if TYPE_CHECKING:
     from netsp.base.arrays import Floats

@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 
 from netsp.base.errors import InputError
-from netsp.model.field_types import Point3
+from netsp.base.field_types import Point3
 
 GRAVITY = 9.80665
 """Acceleration of gravity, m/s²; ArduPilot states horizontal acceleration as an angle of lean."""

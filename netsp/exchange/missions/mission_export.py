@@ -17,6 +17,7 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
+from netsp.base.field_types import Point3, checked_argument
 from netsp.base.geometry import polylines
 from netsp.exchange.maps.projection import Projection
 from netsp.exchange.missions.mission_files import (
@@ -28,11 +29,10 @@ from netsp.exchange.missions.mission_files import (
     write_page,
 )
 from netsp.exchange.missions.waypoints import STRAIGHT, Waypoint, turn
-from netsp.model.field_types import Point3, checked_argument
 from netsp.model.problem import Goal, Problem
-from netsp.online.execute.tour_plan import HOME
-from netsp.online.mission import Mission
 from netsp.plan.space.planning_context import Water
+from netsp.plan.tour_plan import HOME
+from netsp.world.mission.mission import Mission
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
 

@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from netsp.base.errors import InputError
+from netsp.base.field_types import checked_argument, checked_instance
 from netsp.base.files import cell, write_bytes, write_text
 from netsp.exchange.maps.projection import Projection
 from netsp.exchange.missions.cockpit_mission import cockpit_mission
@@ -32,10 +33,9 @@ from netsp.exchange.missions.fence import Fence, FencePolicy, fence_of
 from netsp.exchange.missions.kml import kml_of, kmz_of
 from netsp.exchange.missions.leg_times import VehicleMotion, leg_times
 from netsp.exchange.missions.waypoints import Waypoint, waypoints_of
-from netsp.model.field_types import checked_argument, checked_instance
 from netsp.model.problem import Circle, Problem
 from netsp.model.solution import Solution
-from netsp.online.execute.tour_plan import HOME
+from netsp.plan.tour_plan import HOME
 
 SHALLOWEST = 0.1
 """Metres of depth that the least altitude stands for."""

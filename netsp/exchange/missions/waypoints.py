@@ -19,7 +19,7 @@ from netsp.base.errors import InputError
 from netsp.hsignature import Word, concatenate, crossings, signature
 from netsp.model.problem import Circle, Problem
 from netsp.model.solution import Solution
-from netsp.online.execute.tour_plan import HOME, legs_of
+from netsp.plan.tour_plan import HOME, legs_of
 
 Mark = tuple[int | None, Word, float]
 """Goal, word and tether of a waypoint, as in `Waypoint`."""

@@ -17,9 +17,9 @@ from netsp.base.arrays import ComparesArrays, Floats, Ints
 from netsp.base.errors import InputError
 from netsp.base.files import read_text
 from netsp.base.ram import ask
+from netsp.base.validated import shown
 from netsp.gtsp.gtsplib.metrics import METRICS
 from netsp.gtsp.travel.graph import TravelGraph
-from netsp.model.validated import shown
 
 SYMMETRIC, ASYMMETRIC = ("GTSP", "TSP"), ("AGTSP", "ATSP")
 """Types of problem; a TSP is a GTSP whose clusters are its vertices."""

@@ -8,10 +8,10 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from netsp.base.errors import InputError
+from netsp.base.field_types import NonNegative, Point2, Point3, Positive, checked_integer, is_index
 from netsp.base.files import FileModel
-from netsp.model.field_types import NonNegative, Point2, Point3, Positive, checked_integer, is_index
+from netsp.base.validated import Model, shown
 from netsp.model.problem import WIDEST, Circle, GoalLike, Obstacle, Polygon, Problem
-from netsp.model.validated import Model, shown
 
 
 def _which(value: Any) -> Any:

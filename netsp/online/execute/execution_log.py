@@ -10,9 +10,9 @@ import numpy as np
 from netsp.base.arrays import Bools, Floats
 from netsp.base.data_frames import frame_of
 from netsp.base.errors import counted
+from netsp.base.field_types import Point3
 from netsp.base.reprs import Drawn
 from netsp.hsignature import Word
-from netsp.model.field_types import Point3
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
 from netsp.online.execute.tether_limits import (
@@ -23,8 +23,8 @@ from netsp.online.execute.tether_limits import (
     overruns,
 )
 from netsp.online.execute.tether_reserve import ReservePolicy
-from netsp.online.execute.tour_plan import HOME
 from netsp.online.execute.tour_repair import REPLAN_S
+from netsp.plan.tour_plan import HOME
 
 if TYPE_CHECKING:
     import pandas
@@ -39,7 +39,7 @@ class ExecutionOptions:
     speed : float
         Of the vehicle, length units per second.
     vehicle : str
-        One of `netsp.online.vehicle.VEHICLES`.
+        One of `netsp.world.vehicle.VEHICLES`.
     reach : float
         A goal this near counts as visited by a vehicle with dynamics.
     delta : float, optional

@@ -12,8 +12,8 @@ from netsp.base.compiled.compile_policy import compiles, everything_compiled
 from netsp.base.compiled.kernel import runs_compiled
 from netsp.gtsp.dp.label_kernels import extend
 from netsp.model.problem import Circle, Goal, Problem, State
-from netsp.model.random_worlds import random_world
 from netsp.online.execute.tour_repair import repair
+from netsp.plan.random_worlds import random_world
 from netsp.plan.solve_problem import solve_graph
 from netsp.roadmap.from_state import graph_from_state
 

@@ -16,11 +16,11 @@ from pydantic import ConfigDict, Field
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
+from netsp.base.field_types import Integer, NonNegative, Point3
 from netsp.base.files import FileModel, make_folder, write_text
-from netsp.model.field_types import Integer, NonNegative, Point3
+from netsp.base.validated import Model
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
-from netsp.model.validated import Model
 from netsp.online.execute.execution_log import ExecutionRow
 
 LOG, STATE, PROBLEM, SOLUTION = "log.csv", "state.json", "problem.json", "solution.json"

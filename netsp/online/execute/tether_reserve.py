@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from netsp.model.field_types import checked_argument
+from netsp.base.field_types import checked_argument
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
 

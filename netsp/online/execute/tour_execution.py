@@ -12,13 +12,12 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError, interrupted
+from netsp.base.field_types import LARGEST, checked_argument, checked_instance
 from netsp.base.geometry import polylines
 from netsp.hsignature import signature
 from netsp.judge import verify
-from netsp.model.field_types import LARGEST, checked_argument, checked_instance
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution, Status
-from netsp.online.current import Water
 from netsp.online.execute.detour_around import aside
 from netsp.online.execute.events import Event, Surprises, changed, index_of
 from netsp.online.execute.execution_log import (
@@ -32,13 +31,14 @@ from netsp.online.execute.repair_warm_up import make_ready, should_make_ready
 from netsp.online.execute.run_record import Begun, LeftOut, RunRecord, RunState
 from netsp.online.execute.tether_limits import RESOLUTION
 from netsp.online.execute.tether_reserve import ReservedLimit
-from netsp.online.execute.tour_plan import HOME, Leg, legs_of
 from netsp.online.execute.tour_repair import Repair, broken, reachable, repair, reserved_limit
-from netsp.online.vehicle import Vehicle, make_vehicle
+from netsp.plan.tour_plan import HOME, Leg, legs_of
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.scene.scene import scene_of
+from netsp.world.simulator.current import Water
 from netsp.world.tether import GeodesicTether, Tether
 from netsp.world.tether.resolution import coarsest_delta, suggested_delta
+from netsp.world.vehicle import Vehicle, make_vehicle
 
 HOLD_STEP = 0.1
 """Seconds between two rows of the log while the robot holds its place."""

@@ -24,9 +24,9 @@ from netsp.hsignature import concatenate, crossings, signature
 from netsp.model.problem import Circle, Goal, Problem, State
 from netsp.model.solution import Status
 from netsp.online.execute.tether_reserve import ReservedLimit
-from netsp.online.execute.tour_plan import HOME, Leg, legs_of
 from netsp.plan.answer import to_solution
 from netsp.plan.solve_problem import solve_graph
+from netsp.plan.tour_plan import HOME, Leg, legs_of
 from netsp.roadmap.explain_unreachable import explain_unreached
 from netsp.roadmap.from_state import FAR, GraphFromState, graph_from_state
 from netsp.roadmap.paths import TautPaths, UnknownPathError

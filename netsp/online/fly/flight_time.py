@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from netsp.base.arrays import Floats
+from netsp.base.field_types import Point3
 from netsp.exchange.missions.leg_times import VehicleMotion, target_times
 from netsp.exchange.missions.mission_files import altitude
-from netsp.model.field_types import Point3
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
 from netsp.online.execute.execution_log import ExecutionRow
-from netsp.online.execute.tour_plan import legs_of
 from netsp.online.fly.flight_policy import FlightPolicy
+from netsp.plan.tour_plan import legs_of
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class FlightTime:
     Attributes
     ----------
     goals
-        Goal of each leg in the order of the tour, `netsp.online.execute.tour_plan.HOME` for the
+        Goal of each leg in the order of the tour, `netsp.plan.tour_plan.HOME` for the
         base.
     leg_s
         Time of each leg, s.

@@ -11,7 +11,7 @@ from typing import BinaryIO, TextIO
 from pydantic import ValidationError
 
 from netsp.base.errors import InputError
-from netsp.model.validated import explain, parse_json_object
+from netsp.base.validated import explain, parse_json_object
 from netsp.online.execute.events import Event
 
 MAX_LINE = 100_000

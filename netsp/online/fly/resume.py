@@ -22,11 +22,11 @@ from netsp.model.problem import Circle, Goal, Problem
 from netsp.model.solution import Solution
 from netsp.online.execute.run_record import PROBLEM, SOLUTION, STATE, Begun, RunState
 from netsp.online.execute.tether_reserve import ReservePolicy
-from netsp.online.execute.tour_plan import HOME, legs_of
 from netsp.online.execute.tour_repair import outside
 from netsp.online.fly.flight_policy import FlightPolicy
 from netsp.online.fly.stopped import RefusedError
 from netsp.online.guard.state_file import GuardState
+from netsp.plan.tour_plan import HOME, legs_of
 from netsp.roadmap.from_state import FAR
 from netsp.roadmap.paths import TautPaths, UnknownPathError
 

@@ -14,8 +14,8 @@ import math
 import numpy as np
 
 from netsp.base.arrays import Floats
+from netsp.base.field_types import Point3
 from netsp.exchange.missions.mission_files import altitude
-from netsp.model.field_types import Point3
 from netsp.online.execute.tour_execution import StopsFlightError
 from netsp.online.fly.flight_policy import FlightPolicy
 from netsp.online.fly.leg_corridor import LegCorridor
@@ -33,7 +33,7 @@ LOOK_S = 0.05
 
 
 class LinkedVehicle:
-    """Drives a vehicle over a link; see `netsp.online.vehicle.Vehicle`.
+    """Drives a vehicle over a link; see `netsp.world.vehicle.Vehicle`.
 
     Parameters
     ----------

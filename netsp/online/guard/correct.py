@@ -13,7 +13,7 @@ from netsp.hsignature import Word
 from netsp.model.problem import Problem
 from netsp.online.execute.events import index_of
 from netsp.roadmap.tether_classes import Tethers
-from netsp.view.report.wording import AXES
+from netsp.world.side_names import AXES
 
 SIDES = {"north": 0, "east": 2, "south": 4, "west": 6}
 """Where in `WINDS`; `AXES` has the same order."""

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from netsp.base.errors import InputError
-from netsp.model.validated import shown
+from netsp.base.validated import shown
 from netsp.online.guard.message_tally import MessageTally
 from netsp.online.guard.telemetry import Fix
 from netsp.online.link.geo_frame import Frame

@@ -14,7 +14,7 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
-from netsp.model.field_types import Point3
+from netsp.base.field_types import Point3
 
 
 @dataclass(frozen=True)

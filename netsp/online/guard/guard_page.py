@@ -22,7 +22,7 @@ from netsp.base.errors import InputError
 from netsp.model.problem import Problem
 from netsp.online.guard.site import Site
 from netsp.online.guard.site_files import site_of
-from netsp.online.mission import Mission
+from netsp.world.mission.mission import Mission
 
 STATIC = Path(__file__).parent / "static"
 

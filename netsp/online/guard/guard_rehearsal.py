@@ -18,7 +18,7 @@ from netsp.online.guard.site import Site
 from netsp.online.guard.space_site import SpaceSite
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_guard import Guard
-from netsp.online.mission import Mission
+from netsp.world.mission.mission import Mission
 from netsp.world.scene.scene import Scene
 
 _PLANE = {

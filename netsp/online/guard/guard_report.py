@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from netsp.base.arrays import ComparesArrays, Floats
+from netsp.base.field_types import Point3
 from netsp.hsignature import Word
-from netsp.model.field_types import Point3
 from netsp.online.guard.alarms import Alarm
 
 

@@ -17,8 +17,8 @@ from netsp.online.guard.loops import closed_by, loops_in
 from netsp.online.guard.site import LONGER, ROUNDS, Letters, Loop
 from netsp.online.guard.skip_free_water import leap
 from netsp.roadmap.tether_classes import Tethers
-from netsp.view.report.wording import listed, passages, side
 from netsp.world.scene.scene import scene_of
+from netsp.world.side_names import listed, passages, side
 from netsp.world.tether import GeodesicTether, Tether
 from netsp.world.tether.resolution import coarsest_delta, suggested_delta
 

@@ -16,7 +16,7 @@ from netsp.model.problem import Problem
 from netsp.online.guard.position_track import GAP
 from netsp.online.guard.telemetry import Fix
 from netsp.online.link.vehicle_clock import ClockPolicy
-from netsp.online.mission import Mission
+from netsp.world.mission.mission import Mission
 
 
 @dataclass(frozen=True)

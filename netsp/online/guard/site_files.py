@@ -6,7 +6,7 @@ from netsp.base.errors import InputError
 from netsp.model.problem import Problem
 from netsp.online.guard.plane import PlaneSite
 from netsp.online.guard.site import Site
-from netsp.online.mission import Mission
+from netsp.world.mission.mission import Mission
 
 
 def site_of(given: Problem | Mission | Site) -> Site:

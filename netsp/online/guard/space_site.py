@@ -12,19 +12,19 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
+from netsp.base.field_types import is_index
 from netsp.base.geometry import polylines
 from netsp.hsignature import Word
-from netsp.model.field_types import is_index
 from netsp.online.guard.correct import least_changed
 from netsp.online.guard.silhouettes import silhouette
 from netsp.online.guard.site import LONGER, ROUNDS, Letters, Loop, beside
 from netsp.online.guard.winding import TOUCHING, closing, loops_of
-from netsp.online.mission import Mission
 from netsp.plan.space.planning_context import Water, along
 from netsp.plan.space.space_signature import SpaceSignature
-from netsp.view.report.wording import AXES
+from netsp.world.mission.mission import Mission
 from netsp.world.scene.field import pushed_out
 from netsp.world.scene.scene import Scene
+from netsp.world.side_names import AXES
 from netsp.world.tether import Tether
 
 MOST_WAYS = 12

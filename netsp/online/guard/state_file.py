@@ -13,10 +13,10 @@ from pydantic import ConfigDict, Field
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
+from netsp.base.field_types import Point3
 from netsp.base.files import FileModel, write_text
+from netsp.base.validated import Model
 from netsp.hsignature import Word
-from netsp.model.field_types import Point3
-from netsp.model.validated import Model
 from netsp.online.guard.site import LONGER, ROUNDS, Site
 from netsp.online.guard.tether_guard import Guard
 from netsp.world.tether import Tether

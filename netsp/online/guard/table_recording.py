@@ -10,9 +10,9 @@ import numpy as np
 
 from netsp.base.axes import Quantity, Table, read_table
 from netsp.base.errors import InputError
+from netsp.base.field_types import Point3
+from netsp.base.validated import shown
 from netsp.exchange.maps.time_stamps import NO_VALUES, TimeStamps
-from netsp.model.field_types import Point3
-from netsp.model.validated import shown
 from netsp.online.guard.message_tally import MessageTally
 from netsp.online.guard.recording_checks import RecordingPolicy, in_order_of_time
 from netsp.online.guard.telemetry import Fix

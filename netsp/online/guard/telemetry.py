@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from netsp.model.field_types import Point3
+from netsp.base.field_types import Point3
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
+from netsp.base.field_types import Point3, checked_argument
 from netsp.hsignature import Word
-from netsp.model.field_types import Point3, checked_argument
 from netsp.model.problem import Problem
 from netsp.online.guard import reasons
 from netsp.online.guard.alarms import Alarm, Alarms
@@ -27,7 +27,7 @@ from netsp.online.guard.site import Loop, Site
 from netsp.online.guard.site_files import site_of
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_belief import Strand, Strands
-from netsp.online.mission import Mission
+from netsp.world.mission.mission import Mission
 from netsp.world.tether import Tether
 
 LEFT_OF_NOISE = 0.4

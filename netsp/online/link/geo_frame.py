@@ -12,10 +12,10 @@ import math
 import numpy as np
 
 from netsp.base.errors import InputError
+from netsp.base.field_types import Point3
 from netsp.exchange.maps.projection import Projection
-from netsp.model.field_types import Point3
 from netsp.model.problem import Problem
-from netsp.online.mission import Mission
+from netsp.world.mission.mission import Mission
 
 DEGREE = 1e-7
 """Of MAVLink's whole numbers for degrees."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import fields, replace
 from typing import Any
 
-from netsp.model.field_types import Point3
+from netsp.base.field_types import Point3
 from netsp.online.guard.telemetry import Fix
 from netsp.online.link.geo_frame import Frame
 from netsp.online.link.modes import mode_name

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from netsp.base.arrays import Floats
-from netsp.model.field_types import Point3
+from netsp.base.field_types import Point3
 from netsp.online.guard.telemetry import Fix
 from netsp.online.link.dialect import dialect
 from netsp.online.link.geo_frame import Frame

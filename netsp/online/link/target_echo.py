@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from netsp.model.field_types import Point3
+from netsp.base.field_types import Point3
 from netsp.online.link.geo_frame import DEGREE, Frame
 
 METRES_PER_UNIT = 0.011131884502145034

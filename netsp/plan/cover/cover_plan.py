@@ -11,20 +11,20 @@ import numpy as np
 from netsp.base.arrays import Bools, ComparesArrays, Floats
 from netsp.base.clock import TimeLimit, until_interrupt
 from netsp.base.errors import InputError
+from netsp.base.field_types import Point3, checked_argument
 from netsp.base.geometry import polylines
-from netsp.model.field_types import Point3, checked_argument
-from netsp.online.coverage import Patches, patches_of
-from netsp.online.equipment import Camera
-from netsp.online.mission import Mission, MissionWaypoint, Viewpoint
-from netsp.online.mission_limits import check_bounds
-from netsp.online.mission_run import grid_of
-from netsp.online.paths.tree import Grid, ShortestTree, taut
 from netsp.plan.cover.choose import Choice, choose
 from netsp.plan.cover.viewpoint_swaps import alternatives
 from netsp.plan.cover.viewpoints import Viewer, Viewpoints, coarser, viewpoints_of
+from netsp.world.mission.equipment import Camera
+from netsp.world.mission.mission import Mission, MissionWaypoint, Viewpoint
+from netsp.world.mission.mission_limits import check_bounds
+from netsp.world.paths.tree import Grid, ShortestTree, taut
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
 from netsp.world.scene.surfaces import extent
+from netsp.world.simulator.coverage import Patches, patches_of
+from netsp.world.simulator.mission_run import grid_of
 
 LOOKING = 0.6
 """Of the time left, what the search for viewpoints may take; the rest is for choosing."""

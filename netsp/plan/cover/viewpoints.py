@@ -1,8 +1,8 @@
 """Places to look at a structure from, and what is seen from each.
 
 A viewpoint is a place and a heading; how far the camera is tilted follows as on a flight, where it
-has the nearest patch in the middle as far as its tilt allows (`netsp.online.coverage`), so that
-what is planned is what `netsp simulate` counts. Patches are spread evenly, and before each the
+has the nearest patch in the middle as far as its tilt allows (`netsp.world.simulator.coverage`), so
+that what is planned is what `netsp simulate` counts. Patches are spread evenly, and before each the
 robot stands off along the normal; where that place is taken or does not show it, at other angles
 and distances.
 """
@@ -17,9 +17,9 @@ import numpy as np
 
 from netsp.base.arrays import Bools, ComparesArrays, Floats, Ints
 from netsp.base.clock import Clock
-from netsp.online.coverage import Coverage, Patches
-from netsp.online.equipment import Camera
+from netsp.world.mission.equipment import Camera
 from netsp.world.scene.field import DistanceField
+from netsp.world.simulator.coverage import Coverage, Patches
 
 SPACING = 0.25
 """Of the width that the camera sees at the stand-off: from one patch that is stood before to the

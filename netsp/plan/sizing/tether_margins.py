@@ -20,7 +20,7 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.data_frames import frame_of
 from netsp.base.errors import InputError, NetspError
-from netsp.model.field_types import checked_argument
+from netsp.base.field_types import checked_argument
 from netsp.model.problem import Circle, Problem
 from netsp.model.solution import MAX_FRICTION, Solution, tension_ratio
 from netsp.roadmap.paths import TautPaths

@@ -30,13 +30,13 @@ from netsp.base.arrays import Floats
 from netsp.base.clock import Clock, TimeLimit, until_interrupt
 from netsp.base.data_frames import frame_of
 from netsp.base.errors import InputError, LimitReachedError
+from netsp.base.field_types import checked_argument
 from netsp.base.files import write_text
 from netsp.base.reprs import Drawn
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.kept import with_classes_left_out
 from netsp.gtsp.travel.result import Result
 from netsp.model.bound_scope import LowerBound, Scope
-from netsp.model.field_types import checked_argument
 from netsp.model.problem import Problem
 from netsp.model.solution import Status
 from netsp.plan.solve_problem import solve_graph, travel_graph

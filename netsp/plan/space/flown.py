@@ -9,9 +9,9 @@ import numpy as np
 
 from netsp.base.errors import InputError
 from netsp.hsignature import Word
-from netsp.online.planned_tour import PlannedTour
-from netsp.online.run_log import Run
 from netsp.plan.space.planning_context import Water
+from netsp.world.mission.planned_tour import PlannedTour
+from netsp.world.mission.run_log import Run
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
 

@@ -12,12 +12,12 @@ import numpy as np
 
 from netsp.base.clock import Clock
 from netsp.base.geometry import polylines
-from netsp.online.planner import PlannerOptions
-from netsp.online.planner.planner import DONE
-from netsp.online.planner.predictive import PredictivePlanner
 from netsp.plan.space.board import Driven
 from netsp.plan.space.driven_legs import LegTo, drive_legs
 from netsp.plan.space.planning_context import Water
+from netsp.world.planner import PlannerOptions
+from netsp.world.planner.planner import DONE
+from netsp.world.planner.predictive import PredictivePlanner
 
 MAX_PATHS = 8
 """Largest number of paths of the planner per waypoint; a planner that needs more makes no

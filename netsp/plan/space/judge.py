@@ -20,12 +20,12 @@ from netsp.gtsp.travel.result import relative_gap
 from netsp.judge import Check, Verification
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
 from netsp.model.solution import Status
-from netsp.online.mission import Mission
-from netsp.online.mission_limits import check_bounds, check_size
-from netsp.online.paths.tree import ShortestTree
-from netsp.online.planned_tour import PlannedTour
-from netsp.online.planner.planner import FREE
 from netsp.plan.space.planning_context import Water, has_room, least_room
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.mission_limits import check_bounds, check_size
+from netsp.world.mission.planned_tour import PlannedTour
+from netsp.world.paths.tree import ShortestTree
+from netsp.world.planner.planner import FREE
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
 from netsp.world.tether import GeodesicTether

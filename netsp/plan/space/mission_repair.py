@@ -18,15 +18,15 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError, LimitReachedError, interrupted
+from netsp.base.field_types import Point3
 from netsp.base.geometry import polylines
-from netsp.model.field_types import Point3
-from netsp.online.mission import Mission, MissionState, MissionWaypoint
-from netsp.online.paths.tree import ShortestTree
-from netsp.online.planned_tour import PlannedStop, PlannedTour, in_file
-from netsp.online.planner.planner import HOLD, Command, Tethers
-from netsp.online.planner.predictive import PredictivePlanner
 from netsp.plan.space.planning_context import DIP, stride
 from netsp.plan.space.space_plan import SpacePlan, plan
+from netsp.world.mission.mission import Mission, MissionState, MissionWaypoint
+from netsp.world.mission.planned_tour import PlannedStop, PlannedTour, in_file
+from netsp.world.paths.tree import ShortestTree
+from netsp.world.planner.planner import HOLD, Command, Tethers
+from netsp.world.planner.predictive import PredictivePlanner
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.tether import Tether
 

@@ -25,12 +25,6 @@ from netsp.base.errors import InputError, LimitReachedError
 from netsp.gtsp.travel.result import relative_gap
 from netsp.model.bound_scope import LowerBound, Scope
 from netsp.model.solution import Status
-from netsp.online.mission import Mission
-from netsp.online.mission_limits import check_tether
-from netsp.online.mission_run import simulate
-from netsp.online.planned_tour import PlannedStop, PlannedTour, in_file
-from netsp.online.planner import PlannerOptions
-from netsp.online.run_log import LogRow, Run
 from netsp.plan.solve_problem import SolverLike
 from netsp.plan.space.judge import verify_mission
 from netsp.plan.space.non_taut_moves import SAVED
@@ -53,8 +47,14 @@ from netsp.plan.space.space_plan import (
 )
 from netsp.plan.space.upright import bound_of_upright
 from netsp.plan.space.visit_order import order_by_going_on
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.mission_limits import check_tether
+from netsp.world.mission.planned_tour import PlannedStop, PlannedTour, in_file
+from netsp.world.mission.run_log import LogRow, Run
+from netsp.world.planner import PlannerOptions
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
+from netsp.world.simulator.mission_run import simulate
 
 GOING_ON = "going-straight-on"
 """Value of `solver` in tours that were found by going straight on."""

@@ -16,14 +16,14 @@ import numpy as np
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock, end_if_abandoned
 from netsp.base.errors import InputError, LimitReachedError
-from netsp.online.mission import Mission
-from netsp.online.mission_run import grid_box
-from netsp.online.paths.tree import Grid
-from netsp.online.planned_tour import UnresolvedGap
 from netsp.plan.space.cells import LEAST_ROOM
 from netsp.plan.space.potential import possibly_free, steepness
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.planned_tour import UnresolvedGap
+from netsp.world.paths.tree import Grid
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
+from netsp.world.simulator.mission_run import grid_box
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class GapGrid:
     def of(
         cls, field: DistanceField, box: tuple[Floats, Floats, float], clearance: float
     ) -> GapGrid:
-        """Return the cells of a grid (`netsp.online.mission_run.grid_box`).
+        """Return the cells of a grid (`netsp.world.simulator.mission_run.grid_box`).
 
         Parameters
         ----------

@@ -8,8 +8,8 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.errors import InputError
-from netsp.online.mission import Mission
 from netsp.plan.space.planning_context import DIP
+from netsp.world.mission.mission import Mission
 from netsp.world.scene.field import DistanceField
 
 

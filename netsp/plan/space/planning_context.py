@@ -12,19 +12,19 @@ import numpy as np
 from netsp.base.arrays import Bools, Floats
 from netsp.base.clock import NEVER, Flag, end_if_abandoned
 from netsp.base.geometry import polylines
-from netsp.online.laid import first_tether, present_tether
-from netsp.online.mission import Mission
-from netsp.online.mission_run import grid_of
-from netsp.online.paths.standoff import beside
-from netsp.online.paths.tree import OPEN as ALL_FREE
-from netsp.online.paths.tree import Grid, free_cells, states_of, taut
-from netsp.online.planned_tour import UnresolvedGap
 from netsp.plan.space.cells import FREE, OPEN
 from netsp.plan.space.passages import Resolved
 from netsp.plan.space.space_signature import SpaceSignature
 from netsp.plan.space.word_search import NONE, Found, shortest_words, way_back
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.planned_tour import UnresolvedGap
+from netsp.world.paths.standoff import beside
+from netsp.world.paths.tree import OPEN as ALL_FREE
+from netsp.world.paths.tree import Grid, free_cells, states_of, taut
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.scene.scene import Scene
+from netsp.world.simulator.laid_tether import first_tether, present_tether
+from netsp.world.simulator.mission_run import grid_of
 from netsp.world.tether import GeodesicTether, Tether
 from netsp.world.tether.resolution import THINNEST
 
@@ -59,7 +59,7 @@ class Water:
     field : DistanceField
         The scene.
     grid : Grid
-        Of `netsp.online.mission_run.grid_of`: the box and the size of cells.
+        Of `netsp.world.simulator.mission_run.grid_of`: the box and the size of cells.
     words : SpaceSignature
         Its classes of paths, in the tether's water.
     model : GeodesicTether

@@ -22,7 +22,6 @@ from netsp.gtsp.travel.graph import TravelGraph
 from netsp.hsignature.rays import signature
 from netsp.model.problem import Circle, Goal, Polygon, Problem
 from netsp.model.solution import Status
-from netsp.online.mission import Mission
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.board import Driven
 from netsp.plan.space.driven_legs import LegTo, drive_legs
@@ -31,6 +30,7 @@ from netsp.plan.space.planning_context import SHARE, Water
 from netsp.roadmap.explain_unreachable import shortest_tethers
 from netsp.roadmap.from_state import from_state
 from netsp.roadmap.taut import TautRoadmap
+from netsp.world.mission.mission import Mission
 from netsp.world.scene.scene import Scene
 from netsp.world.scene.shapes import (
     Box,

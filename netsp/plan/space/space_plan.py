@@ -30,11 +30,6 @@ from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result, relative_gap
 from netsp.model.bound_scope import LowerBound, Scope
 from netsp.model.solution import Status
-from netsp.online.mission import Mission
-from netsp.online.mission_limits import check_bounds, check_size, check_tether
-from netsp.online.mission_run import grid_of
-from netsp.online.paths.tree import Grid
-from netsp.online.planned_tour import PlannedStop, PlannedTour, in_file
 from netsp.plan.solve_problem import SolverLike, solve_graph
 from netsp.plan.solver_table import SOLVERS
 from netsp.plan.space.board import Board, Driven, Stop, with_status
@@ -49,8 +44,13 @@ from netsp.plan.space.short_orders import short_order_tour
 from netsp.plan.space.space_legs import Growth, Ways
 from netsp.plan.space.states import Effort, first_states, states_with_room
 from netsp.plan.space.trees import states_of_trees
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.mission_limits import check_bounds, check_size, check_tether
+from netsp.world.mission.planned_tour import PlannedStop, PlannedTour, in_file
+from netsp.world.paths.tree import Grid
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
+from netsp.world.simulator.mission_run import grid_of
 
 ROUNDING = 1e-9
 """Share of a length."""

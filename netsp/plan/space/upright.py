@@ -16,11 +16,11 @@ from netsp.base.errors import NetspError
 from netsp.base.geometry import polylines
 from netsp.model.bound_scope import Scope
 from netsp.model.problem import Circle, Polygon, Problem
-from netsp.online.mission import Mission
 from netsp.plan.solve_problem import solve
 from netsp.plan.space.cross_sections import Depths, cross_sections, level_range
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import DEEPEST, DIP, Water
+from netsp.world.mission.mission import Mission
 
 ROUNDING = 1e-9
 """Relative reduction of the bound, which covers the rounding of lengths."""

@@ -20,11 +20,11 @@ from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
 from netsp.gtsp.search import Instance, best_classes
 from netsp.gtsp.travel.graph import TravelGraph
-from netsp.online.mission import Mission
-from netsp.online.paths.tree import Grid, ShortestTree, taut
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.planning_context import SHARE, straight, stride
 from netsp.plan.space.states import alike
+from netsp.world.mission.mission import Mission
+from netsp.world.paths.tree import Grid, ShortestTree, taut
 from netsp.world.scene.field import DistanceField
 from netsp.world.tether import GeodesicTether, Tether
 

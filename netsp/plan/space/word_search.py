@@ -17,7 +17,6 @@ from netsp.base.arrays import Bools, Ints
 from netsp.base.compiled.dynamic_array import more_int_rows
 from netsp.base.compiled.kernel import kernel
 from netsp.hsignature.wordtable import Rules, Table, times, times_inverse
-from netsp.online.paths.tree import ONWARD
 from netsp.plan.space.cells import FREE
 from netsp.plan.space.triangle_labels import (
     BUCKETS,
@@ -31,6 +30,7 @@ from netsp.plan.space.triangle_labels import (
     nth_axis,
     staircase,
 )
+from netsp.world.paths.tree import ONWARD
 
 NONE = -1
 """Word of a slot that is empty."""
@@ -79,7 +79,7 @@ def shortest_words(
     """Return the `most` soonest words of the cells of a box that are on the way to some targets.
 
     About an open cell everything is free and of one class, so only those steps are taken that lead
-    further on (`netsp.online.paths.tree`): the other cells beside it are reached as soon around it.
+    further on (`netsp.world.paths.tree`): the other cells beside it are reached as soon around it.
 
     Parameters
     ----------

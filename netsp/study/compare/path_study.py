@@ -9,9 +9,9 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, ValidationError
 
 from netsp.base.errors import InputError
+from netsp.base.field_types import Name, NonNegative, Positive
 from netsp.base.files import read_text
-from netsp.model.field_types import Name, NonNegative, Positive
-from netsp.model.validated import Model, explain
+from netsp.base.validated import Model, explain
 
 
 class StudyPath(Model):

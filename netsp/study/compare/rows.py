@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from netsp.base.errors import InputError
+from netsp.base.field_types import LARGEST
 from netsp.base.files import STANDARD, read_bytes, read_gzip
-from netsp.model.field_types import LARGEST
 
 SCHEMA = "netsp-trial/1"
 TrialRow = dict[str, Any]

@@ -14,10 +14,10 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from netsp.base.errors import InputError
+from netsp.base.field_types import Integer, Name, Number, Positive
 from netsp.base.files import read_text
-from netsp.model.field_types import Integer, Name, Number, Positive
-from netsp.model.random_worlds import FAMILIES
-from netsp.model.validated import Model, explain
+from netsp.base.validated import Model, explain
+from netsp.plan.random_worlds import FAMILIES
 from netsp.plan.solve_problem import check_solver
 from netsp.plan.solver_table import ROADMAPS, SOLVERS
 
@@ -30,7 +30,7 @@ MOST_TRIALS = 500_000
 
 
 class Worlds(Model):
-    """Random worlds `first` to `first + count - 1` of a family (`netsp.model.random_worlds`)."""
+    """Random worlds `first` to `first + count - 1` of a family (`netsp.plan.random_worlds`)."""
 
     family: Annotated[str, Field(description="of random worlds")] = "icra2017"
     count: Annotated[Whole, Field(description="worlds per cell")] = 10
@@ -233,7 +233,7 @@ class Trial:
     Attributes
     ----------
     world
-        Arguments of `netsp.model.random_worlds.reachable_world`.
+        Arguments of `netsp.plan.random_worlds.reachable_world`.
     roadmap
         Name, label, options.
     solver

@@ -29,7 +29,7 @@ MOST_POINTS = 200
 
 @functools.lru_cache(maxsize=4)
 def _world(recipe: tuple[tuple[str, Any], ...]) -> tuple[Problem, int]:
-    from netsp.model.random_worlds import reachable_world
+    from netsp.plan.random_worlds import reachable_world
 
     return reachable_world(**dict(recipe))
 

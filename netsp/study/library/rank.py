@@ -21,13 +21,13 @@ from pydantic import Field
 
 from netsp.base.clock import Clock, until_interrupt
 from netsp.base.errors import InputError, NetspError
+from netsp.base.field_types import Name, NonNegative, Total
 from netsp.base.files import read_text
 from netsp.base.registry import foreign
+from netsp.base.validated import Model, read_model
 from netsp.judge import verify
-from netsp.model.field_types import Name, NonNegative, Total
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
-from netsp.model.validated import Model, read_model
 from netsp.study.library.records import SAME, Library
 
 LATE, LATE_S = 1.1, 5.0

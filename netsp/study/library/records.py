@@ -13,14 +13,14 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import ConfigDict, Field
 
 from netsp.base.errors import InputError, VerificationError
+from netsp.base.field_types import Name, NonNegative, Total
 from netsp.base.files import FileModel, write_text
+from netsp.base.validated import Model
 from netsp.hsignature import Word
 from netsp.judge import Verification, verify
 from netsp.model.bound_scope import LowerBound, Scope, gap_of, strongest
-from netsp.model.field_types import Name, NonNegative, Total
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
-from netsp.model.validated import Model
 
 RECORDS = "records.json"
 

@@ -14,12 +14,12 @@ import numpy.typing as npt
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
+from netsp.base.field_types import checked_argument
 from netsp.base.geometry import polylines
+from netsp.base.validated import shown
 from netsp.hsignature import Word, concatenate, crossings, entangled, reduce
 from netsp.judge.stringpull import StringPuller
-from netsp.model.field_types import checked_argument
 from netsp.model.problem import Problem
-from netsp.model.validated import shown
 from netsp.study.paths.carried_tether import CarriedTether
 from netsp.study.paths.free_route import FreeSpace, Route, Stretch
 from netsp.study.paths.goal_visits import Passing, passings

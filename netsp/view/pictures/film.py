@@ -12,8 +12,6 @@ from netsp.base.arrays import Floats
 from netsp.base.geometry import polylines
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
-from netsp.online.mission import Mission
-from netsp.online.run_log import Run
 from netsp.view.pictures.mission_picture import title_of
 from netsp.view.pictures.moments import (
     Moment,
@@ -22,6 +20,8 @@ from netsp.view.pictures.moments import (
     moments_of_plan,
     moments_of_run,
 )
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.run_log import Run
 from netsp.world.scene.scene import Scene
 
 

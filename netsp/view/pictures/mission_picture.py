@@ -12,14 +12,14 @@ import numpy.typing as npt
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import counted
-from netsp.online.anchor_track import Track
-from netsp.online.laid import present_tether
-from netsp.online.mission import Mission
-from netsp.online.mission_run import grid_of
-from netsp.online.run_log import Run
 from netsp.view.pictures import style
 from netsp.view.pictures.scene_picture import Stops, draw_space, save
+from netsp.world.mission.anchor_track import Track
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.run_log import Run
 from netsp.world.scene.scene import Scene
+from netsp.world.simulator.laid_tether import present_tether
+from netsp.world.simulator.mission_run import grid_of
 from netsp.world.tether import GeodesicTether, Tether
 
 DASHES = ("-", "-.")

@@ -13,13 +13,13 @@ from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
-from netsp.online.execute.tour_plan import HOME
-from netsp.online.laid import present_tether
-from netsp.online.mission import Mission
-from netsp.online.mission_run import grid_of
-from netsp.online.run_log import Run
+from netsp.plan.tour_plan import HOME
 from netsp.view.pictures.mission_picture import path_of, tethers_along
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.run_log import Run
 from netsp.world.scene.scene import Scene, scene_of
+from netsp.world.simulator.laid_tether import present_tether
+from netsp.world.simulator.mission_run import grid_of
 from netsp.world.tether import GeodesicTether
 from netsp.world.tether.resolution import suggested_delta
 

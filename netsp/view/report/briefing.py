@@ -14,10 +14,10 @@ from netsp.judge import Verification
 from netsp.model.import_record import Site
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution, Status
-from netsp.online.execute.tour_plan import legs_of
 from netsp.plan.sizing.tether_margins import Margins, margins
+from netsp.plan.tour_plan import legs_of
 from netsp.roadmap.paths import TautPaths
-from netsp.view.report.wording import Passage, back_from, bearing, listed, passages
+from netsp.world.side_names import Passage, back_from, bearing, listed, passages
 
 STYLE = """
 .ok { color: #2b8a3e } .bad { color: #c92a2a } .wide { overflow-x: auto }

@@ -16,16 +16,16 @@ from netsp.base.arrays import Floats
 from netsp.base.errors import InputError, counted
 from netsp.base.files import read_text, write_text
 from netsp.base.geometry import polylines
+from netsp.base.validated import parse_json_object
 from netsp.model.bound_scope import LowerBound, Scope, above_shortest
 from netsp.model.solution import Status
-from netsp.model.validated import parse_json_object
-from netsp.online.mission import Mission
-from netsp.online.planned_tour import PlannedTour
 from netsp.plan.space.judge import verify_mission
 from netsp.view.pictures import style
 from netsp.view.pictures.scene_picture import Stops, figure_of
 from netsp.view.report import briefing, run_page
 from netsp.view.report.page import STYLE
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.planned_tour import PlannedTour
 from netsp.world.scene.scene import Scene
 
 

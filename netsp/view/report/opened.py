@@ -16,14 +16,14 @@ from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
 from netsp.base.files import read_text
 from netsp.base.geometry import polylines
+from netsp.base.validated import parse_json
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
-from netsp.model.validated import parse_json
-from netsp.online.execute.tour_plan import HOME
-from netsp.online.run_log import check_log
+from netsp.plan.tour_plan import HOME
 from netsp.view.pictures.film import Film, film_of_plan, film_of_run
 from netsp.view.pictures.moments import CANCELLED, LEFT_OUT, VISITED
 from netsp.view.report import run_page
+from netsp.world.mission.run_log import check_log
 
 
 @dataclass(frozen=True)

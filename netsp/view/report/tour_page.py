@@ -18,7 +18,7 @@ from netsp.judge import verify
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution, Status
 from netsp.online.execute.tether_limits import describe_limits, limit_periods, overruns
-from netsp.online.execute.tour_plan import HOME
+from netsp.plan.tour_plan import HOME
 from netsp.view.report import briefing, chart, moving, run_page
 from netsp.view.report.opened import Opened, json_of, opened
 from netsp.view.report.page import STYLE

@@ -11,7 +11,7 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError, counted
 from netsp.base.files import MOST_BYTES, read_bytes
-from netsp.model.validated import shown
+from netsp.base.validated import shown
 from netsp.world.scene.point_clouds import PointCloud, cloud_of_fields, coordinate_fields
 
 _TYPES = {("F", 4): "<f4", ("F", 8): "<f8"} | {

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError, counted
 from netsp.base.files import read_bytes
-from netsp.model.validated import shown
+from netsp.base.validated import shown
 
 Corners = npt.NDArray[np.int64]
 

@@ -16,10 +16,10 @@ from pydantic import ConfigDict, Field, model_validator
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
+from netsp.base.field_types import Name, NonNegative, Number, Point2, Positive
 from netsp.base.files import FileModel, read_text
-from netsp.model.field_types import Name, NonNegative, Number, Point2, Positive
+from netsp.base.validated import Model
 from netsp.model.problem import Circle, Problem
-from netsp.model.validated import Model
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.grid import VoxelGrid
 from netsp.world.scene.readers import Placement, read_cloud_file, read_mesh_file

@@ -10,10 +10,10 @@ import numpy.typing as npt
 from pydantic import Field, model_validator
 
 from netsp.base.arrays import Floats
+from netsp.base.field_types import NonNegative, Number, Point2, Point3, Positive
 from netsp.base.geometry.polygons import polygon_thickness
-from netsp.model.field_types import NonNegative, Number, Point2, Point3, Positive
+from netsp.base.validated import Model
 from netsp.model.problem import Polygon
-from netsp.model.validated import Model
 from netsp.world.scene import solids as kinds
 
 SolidRow = tuple[int, list[float]]

@@ -1,0 +1,179 @@
+"""Field types of all file formats: checked numbers, points and names, for pydantic models."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Any, TypeGuard
+
+import numpy as np
+from pydantic import BeforeValidator, Field, WithJsonSchema
+
+from netsp.base.errors import InputError
+from netsp.base.validated import shown
+
+LARGEST = 1e12
+"""Largest coordinate, radius or length in absolute value."""
+
+LARGEST_TOTAL = 1e6 * LARGEST
+"""Largest sum of lengths that a solution states."""
+
+SMALLEST = 1e-100
+"""Smallest length or radius: squares of less underflow."""
+
+
+def checked_number(value: Any, most: float = LARGEST) -> Any:
+    """Numbers only: no strings, no booleans; numpy scalars are welcome."""
+    real = isinstance(value, int | float | np.integer | np.floating)
+    if isinstance(value, bool | np.bool_ | np.timedelta64) or not real:
+        raise ValueError(f"expected a number, got {shown(value)}")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ValueError(f"expected a finite number, got {shown(value)}")
+    if abs(number) > most:
+        raise ValueError(f"expected a magnitude of at most {most:g}, got {shown(value)}")
+    return number
+
+
+def checked_integer(value: Any) -> int:
+    """Whole numbers only: no strings, no booleans, no fractions; of numpy, too."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise ValueError(f"expected a whole number, got {shown(value)}")
+    return int(value)
+
+
+def is_index(value: object, count: int) -> TypeGuard[int]:
+    """Whether it is a whole number from 0 on and below a count; truth values are none.
+
+    Parameters
+    ----------
+    value : object
+        Anything.
+    count : int
+        Of what is numbered.
+
+    Returns
+    -------
+    bool
+        Whether it is.
+    """
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    return whole and 0 <= int(value) < count  # type: ignore[call-overload]
+
+
+def _size(value: Any) -> Any:
+    """A length or radius: squares of the smallest underflow."""
+    number = checked_number(value)
+    if 0.0 < number < SMALLEST:
+        raise ValueError(f"expected at least {SMALLEST:g}, got {shown(value)}")
+    return number
+
+
+def checked_argument(name: str, value: Any, low: float, high: float = LARGEST) -> float:
+    """An argument of a call as a number within limits; InputError, that names it, for all else."""
+    try:
+        number = float(checked_number(value))
+    except ValueError as error:
+        raise InputError(f"{name}: {error}") from None
+    if not low <= number <= high:
+        limits = f"at least {low:g}" if high == LARGEST else f"{low:g} to {high:g}"
+        raise InputError(f"{name}: expected {limits}, got {shown(value)}")
+    return number
+
+
+def checked_instance(name: str, value: object, kind: type) -> None:
+    """InputError, that names the argument, unless a value is of a kind."""
+    if not isinstance(value, kind):
+        raise InputError(f"{name}: expected a {kind.__name__}, got {shown(value)}")
+
+
+SPACES = dict.fromkeys(map(ord, "\u00a0\u3000\u200c\u200d"), " ")
+"""Spaces and joiners of ordinary names in some scripts, which Python does not call printable."""
+
+
+def _name(value: Any) -> Any:
+    """Names are shown in one line."""
+    plain = isinstance(value, str) and value.translate(SPACES).isprintable()
+    if isinstance(value, str) and (len(value) > 200 or not plain):
+        raise ValueError(f"expected a name of at most 200 printable characters, got {shown(value)}")
+    return value
+
+
+def _coordinates(value: Any, sizes: tuple[int, ...], most: float = LARGEST) -> tuple[float, ...]:
+    text = " or ".join(("[x, y]" if k == 2 else "[x, y, z]") for k in sizes)
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) not in sizes:
+        raise ValueError(f"expected {text}, got {shown(value)}")
+    return tuple(checked_number(v, most) for v in value)
+
+
+def _point3(value: Any, most: float = LARGEST) -> tuple[float, ...]:
+    xyz = _coordinates(value, (2, 3), most)
+    return xyz if len(xyz) == 3 else (*xyz, 0.0)
+
+
+def _track_point(value: Any) -> tuple[float, ...]:
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 4:
+        raise ValueError(f"expected [t, x, y, z], got {shown(value)}")
+    return tuple(checked_number(v) for v in value)
+
+
+Name = Annotated[str, BeforeValidator(_name)]
+
+# Validators of two parameters stand behind a lambda: pydantic would hand its own information about
+# the field to the second.
+
+
+Number = Annotated[float, BeforeValidator(lambda v: checked_number(v))]
+
+
+Total = Annotated[float, BeforeValidator(lambda v: checked_number(v, LARGEST_TOTAL))]
+"""A sum of lengths."""
+
+
+Integer = Annotated[int, BeforeValidator(checked_integer)]
+
+
+Positive = Annotated[float, Field(gt=0), BeforeValidator(_size)]
+
+
+NonNegative = Annotated[float, Field(ge=0), BeforeValidator(lambda v: checked_number(v))]
+
+
+Point2 = Annotated[
+    tuple[float, float],
+    BeforeValidator(lambda v: _coordinates(v, (2,))),
+    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}),
+]
+
+
+POINT3_SCHEMA = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3}
+
+
+Point3 = Annotated[
+    tuple[float, float, float],
+    BeforeValidator(lambda v: _point3(v)),
+    WithJsonSchema(POINT3_SCHEMA),
+]
+
+
+TrackPoint = Annotated[
+    tuple[float, float, float, float],
+    BeforeValidator(lambda v: _track_point(v)),
+    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 4, "maxItems": 4}),
+]
+"""A time in seconds, and where something is then."""
+
+
+PathPoint = Annotated[
+    tuple[float, float, float],
+    BeforeValidator(lambda v: _point3(v, LARGEST_TOTAL)),
+    WithJsonSchema(POINT3_SCHEMA),
+]
+"""Of a drawn path, which may pass beyond the outermost coordinate of a problem."""

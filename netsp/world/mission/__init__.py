@@ -1,0 +1,1 @@
+"""Missions in three dimensions: their files, equipment, limits, plans and run logs."""

@@ -1,0 +1,175 @@
+"""What a mission's robot carries: camera, tether and sensors, as its file has them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from netsp.base.arrays import Floats
+from netsp.base.field_types import NonNegative, Number, Positive
+from netsp.base.validated import Model
+from netsp.model.solution import max_turning
+from netsp.world.tether.load import Load
+
+SEA_WATER = 1025.0
+"""kg / m^3."""
+
+
+class Camera(Model):
+    """What the robot sees with.
+
+    Attributes
+    ----------
+    range : float
+        Metres.
+    field_of_view : float
+        Full angle, degrees.
+    tilt : float
+        Maximum angle that it turns up or down, degrees.
+    patch : float
+        Metres; pieces of surface that coverage is counted in.
+    """
+
+    range: Annotated[Positive, Field(description="range of sight, m")] = 2.0
+    field_of_view: Annotated[
+        Annotated[float, Field(gt=0.0, lt=180.0)],
+        Field(description="full angle of the square field of view, degrees"),
+    ] = 70.0
+    tilt: Annotated[
+        Annotated[float, Field(ge=0.0, le=90.0)],
+        Field(description="maximum angle that it turns up or down, degrees"),
+    ] = 90.0
+    patch: Annotated[Positive, Field(description="edge of the patches that are counted, m")] = 0.1
+
+
+class TetherPhysics(Model):
+    """What a tether needs beyond its taut length; all of it is nothing by default. See
+    `netsp.world.tether.load` for the formulas and their sources.
+
+    Attributes
+    ----------
+    slack : float
+        Share of the taut length that is out beyond it.
+    diameter : float
+        Metres; with 0 the water does not act on the tether.
+    drag_coefficient : float
+        Of a cylinder across the flow.
+    tension : float
+        Newtons, that the tether is held with at the anchor.
+    friction : float
+        Coefficient of friction at contacts.
+    max_tension_ratio : float or None
+        Most that friction may multiply the tension by, from anchor to robot; None for no limit.
+    pulls_vehicle : bool
+        Whether tension and drag act on a vehicle with dynamics.
+    """
+
+    slack: Annotated[
+        Annotated[NonNegative, Field(le=1.0)],
+        Field(description="share of the taut length that is out beyond it"),
+    ] = 0.0
+    diameter: Annotated[
+        Annotated[NonNegative, Field(le=1.0)],
+        Field(description="of the tether, m; with 0 the water does not act on it"),
+    ] = 0.0
+    drag_coefficient: Annotated[NonNegative, Field(description="of a cylinder across the flow")] = (
+        1.2
+    )
+    tension: Annotated[
+        Positive, Field(description="that the tether is held with at the anchor, N")
+    ] = 10.0
+    friction: Annotated[
+        Annotated[NonNegative, Field(le=10.0)],
+        Field(description="coefficient of friction at contacts"),
+    ] = 0.0
+    max_tension_ratio: Annotated[
+        Annotated[Number, Field(gt=1.0, le=1e6)] | None,
+        Field(description="most that friction may multiply the tension by; null for no limit"),
+    ] = None
+    pulls_vehicle: Annotated[
+        bool, Field(description="whether tension and drag act on a vehicle with dynamics")
+    ] = False
+
+    def load(self, water: Floats) -> Load:
+        """What acts on the tether in moving water.
+
+        Parameters
+        ----------
+        water : ndarray, shape (3,)
+            Its velocity, m/s.
+
+        Returns
+        -------
+        Load
+            For `netsp.world.tether.load`.
+        """
+        drag = 0.5 * SEA_WATER * self.drag_coefficient * self.diameter
+        x, y, z = (float(v) for v in water)
+        return Load(self.slack, drag, x, y, z, self.tension)
+
+    @property
+    def max_turning(self) -> float:
+        """Sum of turning angles (rad) at which friction reaches its limit."""
+        return max_turning(self.friction, self.max_tension_ratio)
+
+
+class PositionSensor(Model):
+    """How the robot's position is known: by default exactly and at once.
+
+    Attributes
+    ----------
+    noise : float
+        Standard deviation along each axis, metres.
+    delay : float
+        Age of a position when it arrives, seconds.
+    """
+
+    noise: Annotated[
+        Annotated[NonNegative, Field(le=100.0)],
+        Field(description="standard deviation along each axis, m"),
+    ] = 0.0
+    delay: Annotated[
+        Annotated[NonNegative, Field(le=60.0)],
+        Field(description="age of a position when it arrives, s"),
+    ] = 0.0
+
+    def reserve(self, speed: float) -> float:
+        """How far from where it is thought the robot may be: three standard deviations, and what it
+        travels until it is known.
+
+        Parameters
+        ----------
+        speed : float
+            Of the robot, m/s.
+
+        Returns
+        -------
+        float
+            Metres.
+        """
+        return 3.0 * self.noise + self.delay * speed
+
+
+class RangeSensor(Model):
+    """A forward-looking range sensor, as a scanning sonar: it looks along the path.
+
+    Attributes
+    ----------
+    range : float
+        Metres.
+    field_of_view : float
+        Full angle of its cone, degrees.
+    noise : float
+        Standard deviation of a range, metres.
+    """
+
+    range: Annotated[Positive, Field(description="farthest that it sees, m")] = 5.0
+    field_of_view: Annotated[
+        Annotated[float, Field(gt=0.0, le=180.0)],
+        Field(description="full angle of its cone, degrees"),
+    ] = 120.0
+    noise: Annotated[
+        Annotated[NonNegative, Field(le=1.0)],
+        Field(description="standard deviation of a range, m"),
+    ] = 0.0

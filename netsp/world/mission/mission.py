@@ -1,0 +1,447 @@
+"""A mission: what a robot on a tether is to visit in a scene, and within what limits."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    WithJsonSchema,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.base.field_types import (
+    POINT3_SCHEMA,
+    Name,
+    NonNegative,
+    Number,
+    Point3,
+    Positive,
+    TrackPoint,
+)
+from netsp.base.files import FileModel, read_text
+from netsp.base.validated import Model
+from netsp.world.mission.equipment import Camera, PositionSensor, RangeSensor, TetherPhysics
+from netsp.world.mission.planned_tour import PathField, PlannedTour
+from netsp.world.scene.field import DistanceField, pushed_out
+from netsp.world.scene.scene import Scene
+
+TURN_TIME = 30.0
+"""Seconds that are given to turn to a heading."""
+
+MOST_DWELL = 86400.0
+"""Seconds; a day at one waypoint is taken for a mistake of units."""
+
+
+class Viewpoint(Model):
+    """A place and a heading that serve as well as a waypoint's own.
+
+    Attributes
+    ----------
+    position : (x, y, z)
+        Metres.
+    heading : float or None
+        Degrees from the x axis towards the y axis.
+    """
+
+    position: Annotated[Point3, Field(description="(x, y, z), m")]
+    heading: Annotated[
+        Annotated[Number, Field(ge=-360.0, le=360.0)] | None,
+        Field(description="degrees from the x axis towards y; null for any"),
+    ] = None
+
+
+class MissionState(Model):
+    """Where a robot is that is under way, and how its tether lies.
+
+    Attributes
+    ----------
+    position : (x, y, z)
+        Of the robot, metres.
+    tether : tuple of (x, y, z)
+        A line of its class from the anchor to the robot, taut or not, metres.
+    """
+
+    position: Annotated[Point3, Field(description="(x, y, z) of the robot, m")]
+    tether: Annotated[
+        PathField,
+        Field(description="line from the anchor to the robot along which its tether lies, m"),
+    ]
+
+
+class MissionWaypoint(Model):
+    """A place to visit, and what to do there.
+
+    Attributes
+    ----------
+    position : (x, y, z)
+        Metres.
+    heading : float or None
+        Degrees from the x axis towards the y axis, to be turned to before the robot goes on.
+    dwell : float
+        Seconds to stay there, at that heading.
+    alternatives : tuple of Viewpoint
+        Other places that would do as well: `netsp.plan.space.space_plan` chooses, all else goes to
+        `position`.
+    """
+
+    position: Annotated[Point3, Field(description="(x, y, z) to reach, m")]
+    heading: Annotated[
+        Annotated[Number, Field(ge=-360.0, le=360.0)] | None,
+        Field(description="to turn to there, degrees from the x axis towards y; null for any"),
+    ] = None
+    dwell: Annotated[
+        Annotated[NonNegative, Field(le=MOST_DWELL)],
+        Field(description="seconds to stay there, at that heading"),
+    ] = 0.0
+    alternatives: Annotated[
+        tuple[Viewpoint, ...], Field(description="other places that would do as well")
+    ] = ()
+
+    @property
+    def longest_stay(self) -> float:
+        """Seconds that the robot may spend there."""
+        return self.dwell + (0.0 if self.heading is None else TURN_TIME)
+
+    @model_serializer(mode="wrap")
+    def _plain(self, handler: SerializerFunctionWrapHandler) -> Any:
+        """A bare position where there is nothing else to say."""
+        if self.heading is None and not self.dwell and not self.alternatives:
+            return self.position
+        told = handler(self)
+        if not self.alternatives:
+            del told["alternatives"]
+        return told
+
+    def at(self, choice: int) -> MissionWaypoint:
+        """The same waypoint with one of its alternatives in the place of its own.
+
+        Parameters
+        ----------
+        choice : int
+            Number of the alternative, from 1 on; 0 for what it has.
+
+        Returns
+        -------
+        MissionWaypoint
+            What was its own place is among its alternatives.
+        """
+        if choice == 0:
+            return self
+        own = Viewpoint(position=self.position, heading=self.heading)
+        chosen, rest = self.alternatives[choice - 1], list(self.alternatives)
+        rest[choice - 1] = own
+        return self.model_copy(
+            update={
+                "position": chosen.position, "heading": chosen.heading, "alternatives": tuple(rest)
+            }
+        )  # fmt: skip
+
+
+def _waypoint(value: Any) -> Any:
+    return value if isinstance(value, dict | MissionWaypoint) else {"position": value}
+
+
+WaypointLike = Annotated[
+    MissionWaypoint,
+    BeforeValidator(_waypoint),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                POINT3_SCHEMA,
+                {
+                    "type": "object",
+                    "properties": {
+                        "position": {**POINT3_SCHEMA, "description": "(x, y, z) to reach, m"},
+                        "heading": {
+                            "anyOf": [
+                                {"type": "number", "minimum": -360, "maximum": 360},
+                                {"type": "null"},
+                            ],
+                            "default": None,
+                            "description": "to turn to there, degrees from the x axis towards y",
+                        },
+                        "dwell": {
+                            "type": "number", "minimum": 0, "maximum": MOST_DWELL, "default": 0,
+                            "description": "seconds to stay there, at that heading",
+                        },
+                        "alternatives": {
+                            "type": "array", "items": Viewpoint.model_json_schema(), "default": [],
+                            "description": "other places that would do as well",
+                        },
+                    },
+                    "required": ["position"],
+                    "additionalProperties": False,
+                },
+            ]
+        }
+    ),
+]  # fmt: skip
+
+
+class Mission(FileModel):
+    """Waypoints to visit in their order.
+
+    Attributes
+    ----------
+    scene : str
+        Scene file, relative to the mission file.
+    anchor : (x, y, z)
+        Where the tether is fixed, metres.
+    track : tuple of (t, x, y, z)
+        Where the anchor goes, on a ship or a second vehicle: seconds since the start, ascending,
+        and metres; straight and steady from `anchor` at 0 s on. By default it stays.
+    start : (x, y, z)
+        Where the robot starts, and where it comes home to, metres; with a track, as far from the
+        anchor at the end as at the start where there is room for it, else at the anchor.
+    state : MissionState or None
+        Where the robot is by now, and how its tether lies; None for the start, with the tether laid
+        out to it. Waypoints are those that are left to visit.
+    waypoints : tuple of MissionWaypoint
+        To be visited in this order; a bare ``[x, y, z]`` is accepted.
+    tether_length : float
+        Metres of taut tether that must never be exceeded.
+    clearance : float
+        Metres that the robot keeps from solids, where it can.
+    reach : float
+        Metres; a waypoint this near counts as visited.
+    speed : float
+        Metres per second.
+    camera : Camera or None
+        What coverage is counted for; none without.
+    inspect : tuple of str or None
+        Names of the solids to be seen, by default all.
+    current : (x, y, z)
+        A steady current, m/s; a kinematic vehicle does not feel it.
+    gusts : float
+        Standard deviation of what comes and goes on top, m/s.
+    sensor : PositionSensor
+        How the planner knows where the robot is; by default exactly.
+    range_sensor : RangeSensor or None
+        How the planner gets to know what is not on the map; None where it is told of every change.
+    tether : TetherPhysics
+        What the tether needs beyond its taut length; by default nothing.
+    delta : float
+        Resolution of the tether, metres.
+    cell : float or None
+        Of the grid that paths are sought on, metres; None for 0.2 m, or as much more as two million
+        cells ask for.
+    tour : PlannedTour or None
+        How the robot is to get from waypoint to waypoint (`netsp.plan.space.mission_solver`), which
+        `predictive` keeps to; None to leave it to the planner.
+
+    Raises
+    ------
+    InputError
+        From `load`, in one line.
+    """
+
+    file_kind: ClassVar[str] = "mission"
+
+    model_config = ConfigDict(title="netsp mission")
+
+    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
+    name: Annotated[Name, Field(description="of the mission")] = "mission"
+    scene: Annotated[str, Field(description="scene file, relative to this one")]
+    anchor: Annotated[Point3, Field(description="(x, y, z) where the tether is fixed, m")]
+    start: Annotated[
+        Point3, Field(description="(x, y, z) where the robot starts and comes home to, m")
+    ]
+    track: Annotated[
+        tuple[TrackPoint, ...],
+        Field(description="(t, x, y, z) of a moving anchor after 0 s, s and m; none: it stays"),
+    ] = ()
+    state: Annotated[
+        MissionState | None,
+        Field(description="where the robot is by now and how its tether lies; null: at the start"),
+    ] = None
+    waypoints: Annotated[
+        Annotated[tuple[WaypointLike, ...], Field(min_length=1)],
+        Field(description="(x, y, z) to reach in this order, m, or objects with more to do there"),
+    ]
+    tether_length: Annotated[Positive, Field(description="maximum length of the taut tether, m")]
+    clearance: Annotated[
+        NonNegative, Field(description="distance that paths keep from all solids, m")
+    ] = 0.2
+    reach: Annotated[
+        Positive, Field(description="distance at which a waypoint counts as reached, m")
+    ] = 0.1
+    speed: Annotated[Positive, Field(description="of the robot, m/s")] = 0.3
+    camera: Annotated[Camera | None, Field(description="what it sees with; null for none")] = None
+    inspect: Annotated[
+        Annotated[tuple[Name, ...], Field(min_length=1)] | None,
+        Field(description="names of the solids whose surface counts; null for all"),
+    ] = None
+    current: Annotated[Point3, Field(description="(x, y, z) of the water, m/s")] = (0.0, 0.0, 0.0)
+    gusts: Annotated[
+        NonNegative, Field(description="standard deviation of the current about its mean, m/s")
+    ] = 0.0
+    sensor: Annotated[
+        PositionSensor, Field(description="noise and delay of positions; none by default")
+    ] = PositionSensor()
+    range_sensor: Annotated[
+        RangeSensor | None,
+        Field(description="that sees solids which are not on the map; null: all changes are told"),
+    ] = None
+    tether: Annotated[
+        TetherPhysics, Field(description="slack, drag and friction of the tether; none by default")
+    ] = TetherPhysics()
+    delta: Annotated[Positive, Field(description="resolution of the tether, m")] = 0.1
+    cell: Annotated[
+        Positive | None,
+        Field(
+            description="of the grid on which paths are sought, m; null for 0.2, or more where the "
+            "site is large"
+        ),
+    ] = None
+    tour: Annotated[
+        PlannedTour | None,
+        Field(description="that was planned through these waypoints; null: it is left to planners"),
+    ] = None
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a mission file; the scene's name becomes relative to the working directory.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Mission
+            The mission.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read or is not valid, in one line.
+        """
+        mission = cls.from_json(read_text(path), source=str(path))
+        return mission.model_copy(update={"scene": str(Path(path).parent / mission.scene)})
+
+    @field_validator("track")
+    @classmethod
+    def _in_order(cls, rows: tuple[TrackPoint, ...]) -> tuple[TrackPoint, ...]:
+        times = [0.0, *(row[0] for row in rows)]
+        for k, (before, after) in enumerate(pairwise(times)):
+            if after <= before:
+                raise ValueError(
+                    f"expected ascending times after 0 s, got {after:g} s in row {k} after "
+                    f"{before:g} s"
+                )
+        return rows
+
+    @model_validator(mode="after")
+    def _state_fits(self) -> Self:
+        if self.state is None:
+            return self
+        if self.track:
+            raise ValueError("state: is for a fixed anchor; expected no track beside it")
+        line = self.state.tether
+        for name, end, place in (
+            ("begins", line[0], self.anchor), ("ends", line[-1], self.state.position)
+        ):  # fmt: skip
+            off = float(np.linalg.norm(np.array(end) - place))
+            if off > self.reach:
+                raise ValueError(
+                    f"state.tether: {name} {off:.2f} m from "
+                    f"{'the anchor' if name == 'begins' else 'the robot'}; expected no more than "
+                    f"{self.reach:g}"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _tour_fits(self) -> Self:
+        if self.tour is not None:
+            wrong = self.tour.against(self.begin, self.start, self.places, self.reach)
+            if wrong is not None:
+                raise ValueError(f"tour.{wrong}")
+        return self
+
+    @property
+    def begin(self) -> Point3:
+        """Where the robot is when the mission begins, metres."""
+        return self.start if self.state is None else self.state.position
+
+    @property
+    def places(self) -> Floats:
+        """(n, 3) where the waypoints are, metres."""
+        return np.array([w.position for w in self.waypoints]).reshape(-1, 3)
+
+    @property
+    def every_place(self) -> Floats:
+        """(n, 3) anchor, start, waypoints and their alternatives, where a moving anchor goes, and
+        the tether of a state, metres."""
+        track = np.array(self.track).reshape(-1, 4)[:, 1:]
+        others = [v.position for w in self.waypoints for v in w.alternatives]
+        line = () if self.state is None else self.state.tether
+        return np.vstack(
+            [
+                self.anchor, self.start, self.places, np.array(others).reshape(-1, 3), track,
+                np.array(line).reshape(-1, 3),
+            ]
+        )  # fmt: skip
+
+    def checked_waypoints(self, field: DistanceField, *, snap: bool = False) -> Self:
+        """The mission with every waypoint outside of solids.
+
+        Parameters
+        ----------
+        field : DistanceField
+            The scene.
+        snap : bool
+            Move waypoints inside solids out to the clearance.
+
+        Returns
+        -------
+        Mission
+            The mission, with waypoints moved where needed.
+
+        Raises
+        ------
+        InputError
+            Waypoints inside solids, with their numbers, without `snap`.
+        """
+        points = self.places
+        inside = np.flatnonzero(field.distance(points) < 0.0)
+        if not len(inside):
+            return self
+        if not snap:
+            raise InputError(
+                f"waypoints {', '.join(f'#{k}' for k in inside[:10])}"
+                f"{' …' if len(inside) > 10 else ''} lie inside a solid; expected points in the "
+                "water, or snap"
+            )
+        points[inside] = pushed_out(field, points[inside], self.clearance)
+        moved = tuple(
+            w.model_copy(update={"position": tuple(p)})
+            for w, p in zip(self.waypoints, points.tolist(), strict=True)
+        )
+        return self.model_copy(update={"waypoints": moved})
+
+    def load_scene(self) -> Scene:
+        """The scene it takes place in.
+
+        Returns
+        -------
+        Scene
+            The scene.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read or is not valid, in one line.
+        """
+        return Scene.load(self.scene)

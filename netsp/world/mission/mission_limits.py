@@ -1,0 +1,169 @@
+"""What a mission may ask for: names that exist, and sizes that end."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from netsp.base.errors import InputError
+from netsp.base.geometry import polylines
+from netsp.world.mission.anchor_track import Track
+from netsp.world.mission.mission import Mission
+from netsp.world.planner import PLANNERS
+from netsp.world.scene.scene import Scene
+from netsp.world.simulator.simulation import STEP
+from netsp.world.tether import TETHERS
+from netsp.world.vehicle import VEHICLES
+
+FARTHEST = 1000.0
+"""A waypoint may be so many tether lengths from the anchor."""
+
+MOST_STEPS, MOST_NODES = 5_000_000, 200_000
+"""Steps of a run, and nodes of a tether, beyond which a mission is taken for a mistake of units."""
+
+MOST_CURRENT = 20.0
+"""m/s: no sea is faster; rather a mistake of units."""
+
+MOST_SAG_RATIO = 20.0
+"""Drag on a whole tether over its tension, beyond which a current is taken for a mistake."""
+
+
+def check_names(planner: object, vehicle: object, tether: object) -> None:
+    """Refuse a name that no record has, before a scene is read, which takes longer.
+
+    Parameters
+    ----------
+    planner, vehicle, tether : str or callable
+        As of `simulate`.
+
+    Raises
+    ------
+    InputError
+        No record has that name.
+    """
+    for known, name in ((PLANNERS, planner), (VEHICLES, vehicle), (TETHERS, tether)):
+        if not callable(name):
+            known.named(name)
+
+
+def check_bounds(mission: Mission, scene: Scene) -> None:
+    """Refuse places beyond the bounds of a scene: nothing is known of the water there.
+
+    Parameters
+    ----------
+    mission : Mission
+        Its anchor, start, state, waypoints and their alternatives count.
+    scene : Scene
+        Its bounds count.
+
+    Raises
+    ------
+    InputError
+        One of them is outside; says which, and where.
+    """
+    if scene.bounds is None:
+        return
+    low, high = np.array(scene.bounds[:3]), np.array(scene.bounds[3:])
+    named = [("anchor", mission.anchor), ("start", mission.start)]
+    named += [] if mission.state is None else [("state.position", mission.state.position)]
+    for k, w in enumerate(mission.waypoints):
+        named.append((f"waypoints[{k}]", w.position))
+        named += [
+            (f"waypoints[{k}].alternatives[{c}]", v.position) for c, v in enumerate(w.alternatives)
+        ]
+    for name, place in named:
+        if (np.array(place) < low).any() or (np.array(place) > high).any():
+            shown = ", ".join(f"{v:g}" for v in place)
+            raise InputError(
+                f"{name}: ({shown}) lies outside of the scene's bounds "
+                f"{[float(v) for v in scene.bounds]}; expected a place within, or wider bounds"
+            )
+
+
+def check_tether(mission: Mission, length: float) -> None:
+    """Refuse a tether that does not lead from the anchor to where the robot begins.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission.
+    length : float
+        Of the taut tether there, metres.
+
+    Raises
+    ------
+    InputError
+        It is longer than the mission's tether.
+    """
+    if length > mission.tether_length:
+        raise InputError(
+            f"tether_length: {mission.tether_length:g} is shorter than the path from anchor to "
+            f"start, {length:.4g}"
+        )
+
+
+def check_size(mission: Mission) -> None:
+    """InputError for a mission that would take for ever, or whose measures make no sense."""
+    for name, value in (("delta", mission.delta), ("reach", mission.reach)):
+        if value > mission.tether_length:
+            raise InputError(
+                f"{name}: {value:g} is more than the tether_length {mission.tether_length:g}; "
+                "expected far less: mixed units?"
+            )
+    places = mission.every_place[1:]
+    track = Track.of(mission)
+    if track is not None:
+        k = int(track.speeds.argmax())
+        if track.speed >= mission.speed:
+            raise InputError(
+                f"track[{k}]: the anchor moves at {track.speed:.3g} m/s, the robot at "
+                f"{mission.speed:g}: it would outrun the tether; expected a slower one"
+            )
+        if track.end / STEP > MOST_STEPS:
+            raise InputError(
+                f"track: its {track.end:g} s take more than {MOST_STEPS:g} steps of {STEP:g} s"
+            )
+    far = float(np.abs(places - np.array(mission.anchor)).max())
+    if far > FARTHEST * mission.tether_length:
+        raise InputError(
+            f"waypoints: one is {far:g} from the anchor; expected at most {FARTHEST:g} times the "
+            f"tether_length {mission.tether_length:g}: mixed units?"
+        )
+    steps = polylines.length(places[: len(mission.waypoints) + 1]) / (mission.speed * STEP)
+    if steps > MOST_STEPS:
+        raise InputError(
+            f"speed: {mission.speed:g} takes {steps:.2g} steps of {STEP:g} s for the waypoints; "
+            f"expected at most {MOST_STEPS:g}"
+        )
+    stays = sum(w.dwell for w in mission.waypoints) / STEP
+    if stays > MOST_STEPS:
+        raise InputError(
+            f"waypoints: dwell takes {stays:.2g} steps of {STEP:g} s in all; expected at most "
+            f"{MOST_STEPS:g}"
+        )
+    sensor = mission.sensor
+    reserve = sensor.reserve(mission.speed)
+    if reserve > 0.5 * mission.tether_length:
+        raise InputError(
+            f"sensor: noise {sensor.noise:g} and delay {sensor.delay:g} ask for {reserve:.3g} m of "
+            f"tether in reserve; expected at most half of the tether_length "
+            f"{mission.tether_length:g}"
+        )
+    load = mission.tether.load(np.array(mission.current))
+    speed = float(np.linalg.norm(mission.current)) + 3.0 * mission.gusts
+    if speed > MOST_CURRENT:
+        raise InputError(
+            f"current, gusts: water of {speed:g} m/s; expected at most {MOST_CURRENT:g}: mixed "
+            "units?"
+        )
+    sag = load.drag * speed**2 * mission.tether_length / load.tension
+    if sag > MOST_SAG_RATIO:
+        raise InputError(
+            f"current: {speed:g} m/s pulls on {mission.tether_length:g} m of tether with {sag:.3g} "
+            f"times its tension of {load.tension:g} N; expected at most {MOST_SAG_RATIO:g}: mixed "
+            "units?"
+        )
+    if mission.tether_length / mission.delta > MOST_NODES:
+        raise InputError(
+            f"delta: {mission.delta:g} makes {mission.tether_length / mission.delta:.2g} nodes of "
+            f"a tether; expected at most {MOST_NODES:g}"
+        )

@@ -1,0 +1,275 @@
+"""A tour that was planned for a mission: how the robot is to get from stop to stop."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from netsp.base.arrays import Floats
+from netsp.base.field_types import Name, NonNegative, Point3
+from netsp.base.geometry import polylines
+from netsp.base.validated import Model
+from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
+from netsp.model.solution import Status
+
+PathField = Annotated[tuple[Point3, ...], Field(min_length=2)]
+
+
+class PlannedStop(Model):
+    """One stop of a tour.
+
+    Attributes
+    ----------
+    path : tuple of (x, y, z)
+        From the stop before, or the start, to the waypoint, metres.
+    signature : tuple of int
+        Word of the tether there (`netsp.plan.space.space_signature`), among the letters of this
+        mission.
+    tether_length : float
+        Of the taut tether there, metres.
+    longest_tether : float
+        Of the taut tether on the way there, metres.
+    given_as : int or None
+        Number of the waypoint in the mission that was planned.
+    """
+
+    path: Annotated[PathField, Field(description="from the stop before to the waypoint, m")]
+    signature: Annotated[tuple[int, ...], Field(description="word of the tether there")] = ()
+    tether_length: Annotated[NonNegative, Field(description="of the taut tether there, m")]
+    longest_tether: Annotated[NonNegative, Field(description="of tether on the way there, m")]
+    given_as: Annotated[
+        Annotated[int, Field(ge=0)] | None,
+        Field(description="number of the waypoint in the mission that was planned"),
+    ] = None
+
+
+class UnresolvedGap(Model):
+    """Passage that the robot fits through but the grid of a mission does not show.
+
+    Attributes
+    ----------
+    position : (x, y, z)
+        Middle of the passage, metres.
+    width : float
+        Twice the distance of `position` from solids, metres.
+    """
+
+    position: Annotated[Point3, Field(description="(x, y, z) in the middle of it, m")]
+    width: Annotated[NonNegative, Field(description="twice the distance from solids there, m")]
+
+    def __str__(self) -> str:
+        """Return width and place, as in "0.24 m at (0, 1.5, -2)"."""
+        return f"{self.width:.2g} m at ({', '.join(f'{v:.3g}' for v in self.position)})"
+
+
+def _within(gap: Any) -> bool:
+    """Return whether a gap from a file proves that a tour is the shortest."""
+    return isinstance(gap, int | float) and gap <= OPTIMALITY_TOLERANCE
+
+
+class PlannedTour(Model):
+    """A tour through the first waypoints of a mission, and what is known of it.
+
+    Attributes
+    ----------
+    stops : tuple of PlannedStop
+        One for each waypoint of the mission, in its order; waypoints that no tether reaches come
+        after all others and have none.
+    home : tuple of (x, y, z)
+        From the last stop back to the start, metres.
+    status : Status
+        `optimal` if `bound_of_all` proves that no tour to these waypoints is shorter, in any class
+        of the tether; `optimal_of_states` if the tour is the shortest along the states and legs
+        that were found.
+    solver : str
+        Name of the solver.
+    seed : int
+        Of all that was random.
+    length : float
+        Of the tour, metres.
+    lower_bound : float or None
+        Of tours along the states and legs that were found, metres.
+    gap : float or None
+        (length - lower_bound) / length.
+    bound_of_all : float or None
+        Certified lower bound on all tours to these waypoints, in any class of the tether
+        (`netsp.plan.space.path_bound`).
+    gap_to_all : float or None
+        (length - bound_of_all) / length.
+    states : int
+        In how many ways the tether was found to hang at the waypoints.
+    legs : int
+        How many legs between these were driven.
+    exact : bool
+        Whether different words always belong to different classes of paths through the mission's
+        cells. It does not cover gaps that the grid does not show, nor the tour's length.
+    unresolved_gaps : tuple of UnresolvedGap, or None
+        Passages that the robot fits through but the grid does not show. No tour through them was
+        considered; `bound_of_all` also holds for such tours. None if there was no time to search
+        for them.
+    """
+
+    stops: Annotated[
+        tuple[PlannedStop, ...],
+        Field(description="one for each of the first waypoints; the others are not reached"),
+    ]
+    home: Annotated[PathField, Field(description="from the last stop to the start, m")]
+    status: Annotated[
+        Status,
+        Field(
+            description="optimal: no tour is shorter, by bound_of_all; optimal_of_states: none "
+            "along the states and legs that were found"
+        ),
+    ]
+    solver: Annotated[Name, Field(description="name of the solver")]
+    seed: Annotated[int, Field(description="of all that was random")] = 0
+    length: Annotated[NonNegative, Field(description="of the tour, m")]
+    lower_bound: Annotated[
+        NonNegative | None,
+        Field(description="of tours along the states and legs that were found, m"),
+    ] = None
+    gap: Annotated[NonNegative | None, Field(description="(length - lower_bound) / length")] = None
+    bound_of_all: Annotated[
+        NonNegative | None,
+        Field(description="no tour to these waypoints is shorter, in any class of the tether, m"),
+    ] = None
+    gap_to_all: Annotated[
+        NonNegative | None, Field(description="(length - bound_of_all) / length")
+    ] = None
+    states: Annotated[
+        Annotated[int, Field(ge=0)],
+        Field(description="ways in which the tether was found to hang at the waypoints"),
+    ] = 0
+    legs: Annotated[
+        Annotated[int, Field(ge=0)], Field(description="legs between these that were driven")
+    ] = 0
+    exact: Annotated[
+        bool,
+        Field(description="whether words that differ are of different classes among the cells"),
+    ] = True
+    unresolved_gaps: Annotated[
+        tuple[UnresolvedGap, ...] | None,
+        Field(
+            description="passages with room for the robot that the cells do not show; missing if "
+            "they were not searched for"
+        ),
+    ] = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _older(cls, data: Any) -> Any:
+        """Read `optimal` of older files as `optimal_of_states` if only the states prove it."""
+        if isinstance(data, dict) and data.get("status") == Status.OPTIMAL.value:
+            of_all, of_states = data.get("gap_to_all"), data.get("gap")
+            if not _within(of_all) and _within(of_states):
+                return {**data, "status": Status.OPTIMAL_OF_STATES.value}
+        return data
+
+    def leg(self, index: int) -> Floats | None:
+        """How the robot gets to a waypoint.
+
+        Parameters
+        ----------
+        index : int
+            The waypoint.
+
+        Returns
+        -------
+        ndarray of shape (k, 3), or None
+            The path from the stop before, metres; None where the tour does not go there.
+        """
+        return np.array(self.stops[index].path) if index < len(self.stops) else None
+
+    @property
+    def line(self) -> Floats:
+        """(n, 3) the whole tour, metres."""
+        legs = [*(stop.path for stop in self.stops), self.home]
+        return np.vstack([legs[0][:1], *(leg[1:] for leg in legs)])
+
+    @property
+    def longest_tether(self) -> float:
+        """Of the tether all along, but for the way home, metres."""
+        return max((stop.longest_tether for stop in self.stops), default=0.0)
+
+    def mended(self) -> PlannedTour:
+        """The same paths, of which nothing is proven any more, and their length.
+
+        Returns
+        -------
+        PlannedTour
+            Feasible, without bounds.
+        """
+        legs = [*(stop.path for stop in self.stops), self.home]
+        return self.model_copy(
+            update={
+                "length": float(sum(polylines.length(np.array(leg)) for leg in legs)),
+                "status": Status.FEASIBLE, "lower_bound": None, "gap": None,
+                "bound_of_all": None, "gap_to_all": None,
+            }
+        )  # fmt: skip
+
+    def against(self, begin: Point3, start: Point3, places: Floats, tolerance: float) -> str | None:
+        """What does not match the mission that the tour is part of.
+
+        Parameters
+        ----------
+        begin : (x, y, z)
+            Where the robot is when the mission begins, metres.
+        start : (x, y, z)
+            Where it comes home to, metres.
+        places : ndarray, shape (n, 3)
+            Its waypoints, metres.
+        tolerance : float
+            Metres that ends of paths may be off.
+
+        Returns
+        -------
+        str or None
+            One line that names the field, the value and what was expected.
+        """
+        if len(self.stops) > len(places):
+            return (
+                f"stops: {len(self.stops)} of them; expected no more than there are waypoints, "
+                f"{len(places)}"
+            )
+        here = np.array(begin)
+        for k, stop in enumerate(self.stops):
+            for name, place, end in (("begins", here, 0), ("ends", places[k], -1)):
+                off = float(np.linalg.norm(np.array(stop.path[end]) - place))
+                if off > tolerance:
+                    return (
+                        f"stops[{k}].path: {name} {off:.2f} m from "
+                        f"{'waypoint' if end else 'the stop before'}"
+                        f"{f' #{k}' if end else ''}; expected no more than {tolerance:g}"
+                    )
+            here = places[k]
+        for name, place, end in (("begins", here, 0), ("ends", np.array(start), -1)):
+            off = float(np.linalg.norm(np.array(self.home[end]) - place))
+            if off > tolerance:
+                where = "the start" if end else "the last stop"
+                return f"home: {name} {off:.2f} m from {where}; expected no more than {tolerance:g}"
+        return None
+
+
+def in_file(path: Floats) -> tuple[Point3, ...]:
+    """A path as a tour's file has it: without points on the line between their neighbours.
+
+    Parameters
+    ----------
+    path : ndarray, shape (k, 3)
+        Metres.
+
+    Returns
+    -------
+    tuple of (x, y, z)
+        The same path.
+    """
+    keep = [0]
+    for k in range(1, len(path) - 1):
+        a, b, c = path[keep[-1]], path[k], path[k + 1]
+        if polylines.length(np.array([a, b, c])) > np.linalg.norm(c - a) + 1e-9:
+            keep.append(k)
+    # a path that leads nowhere has both of its ends, too
+    return tuple((x, y, z) for x, y, z in path[[*keep, max(len(path) - 1, 0)]].tolist())

@@ -1,0 +1,386 @@
+"""The log of a run, and its files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from netsp.base.data_frames import frame_of
+from netsp.base.errors import InputError
+from netsp.base.field_types import LARGEST
+from netsp.base.files import csv_rows, read_text
+from netsp.base.reprs import Drawn
+from netsp.base.validated import parse_json_object, shown
+from netsp.world.mission.mission import Mission
+from netsp.world.scene.scene import Scene
+from netsp.world.tether import Tether
+from netsp.world.tether.strand import WIDTH
+
+if TYPE_CHECKING:
+    import pandas
+
+
+@dataclass(frozen=True)
+class LogRow:
+    """One step of a run.
+
+    Parameters
+    ----------
+    time : float
+        Seconds since the start.
+    x : float
+        Position, metres.
+    y : float
+        Position, metres.
+    z : float
+        Position, metres, up.
+    yaw : float
+        Heading, radians.
+    waypoint : int
+        The waypoint that is next.
+    mode : str
+        As of `netsp.world.planner.Command`.
+    tether : float
+        Length of the taut tether, metres.
+    payout : float
+        Length that must be out, with slack and sag: what the limit is about, metres.
+    turning : float
+        Sum of the angles by which the tether turns at its contacts, radians.
+    coverage : float
+        Share of the surface seen.
+    coverage_through : float
+        The same as if nothing stood in between.
+    replan_s : float
+        Seconds of CPU that planning took.
+    limit : float
+        Metres that must not be exceeded.
+    shortening : bool
+        Whether the limit was lowered below the tether, which has not been short enough since.
+    """
+
+    time: float
+    x: float
+    y: float
+    z: float
+    yaw: float
+    waypoint: int
+    mode: str
+    tether: float
+    payout: float
+    turning: float
+    coverage: float
+    coverage_through: float
+    replan_s: float
+    limit: float
+    shortening: bool
+
+
+@dataclass(frozen=True, repr=False)
+class Run(Drawn):
+    """What came of a mission.
+
+    Parameters
+    ----------
+    mission : Mission
+        What was flown.
+    planner : str
+        Name of the planner.
+    log : tuple of LogRow
+        One row per step.
+    tether : Tether
+        At the end.
+    summary : dict
+        The numbers (`netsp.world.simulator.summary.summarise`).
+    scene : Scene or None
+        As it was at the end, where it has changed.
+    tethers : tuple of (int, Tether)
+        Row of the log and tether now and then, where the scene has changed.
+    """
+
+    picture: ClassVar[str] = "netsp.view.pictures.mission_picture:draw_run"
+
+    mission: Mission
+    planner: str
+    log: tuple[LogRow, ...]
+    tether: Tether
+    summary: dict[str, Any]
+    scene: Scene | None = None
+    tethers: tuple[tuple[int, Tether], ...] = ()
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Return the log as a pandas DataFrame, a row per step and a column per field of `LogRow`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            In the order of time.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        return frame_of(self.log)
+
+    def __repr__(self) -> str:
+        """In a line."""
+        s = self.summary
+        return (
+            f"<Run of {s['mission']!r} by {self.planner}: {s['visited']} of {s['waypoints']} "
+            f"waypoints in {s['inspection_s']:.1f} s, longest tether {s['longest_tether']:.4g} "
+            f"of {s['tether_length']:g}>"
+        )
+
+
+def write_run(run: Run, folder: str | Path) -> None:
+    """Write log.csv, summary.json and mission.json into a folder, which is made.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    folder : str or Path
+        The folder.
+
+    Raises
+    ------
+    InputError
+        It cannot be written.
+    """
+    place = Path(folder)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        text = io.StringIO()
+        table = csv.DictWriter(text, fieldnames=list(LogRow.__dataclass_fields__))
+        table.writeheader()
+        table.writerows({k: _short(v) for k, v in asdict(r).items()} for r in run.log)
+        (place / "log.csv").write_text(text.getvalue(), encoding="utf-8")
+        summary = json.dumps(run.summary, indent=1, allow_nan=False)
+        (place / "summary.json").write_text(summary + "\n", encoding="utf-8")
+        data = run.mission.model_dump(mode="json")
+        # a mission file names its scene from where it lies itself
+        data["scene"] = Path(os.path.relpath(data["scene"], place)).as_posix()
+        mission = json.dumps(data, indent=1)
+        (place / "mission.json").write_text(mission + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None
+
+
+FINITE = ("time", "x", "y", "z", "tether", "limit")
+"""Columns of every log whose numbers are drawn."""
+
+
+def check_log(rows: Sequence[dict[str, str]], file: Path) -> None:
+    """InputError for rows of a log with a number that is none, or times that do not go on.
+
+    Parameters
+    ----------
+    rows : sequence of dict
+        Of log.csv, of a flight or of a tour that was carried out.
+    file : Path
+        Where they are from.
+
+    Raises
+    ------
+    InputError
+        Naming line, column and value.
+    """
+    before = -math.inf
+    for number, row in enumerate(rows, 2):
+        for column in FINITE:
+            try:
+                value = float(row[column])
+            except (KeyError, TypeError, ValueError):
+                value = math.nan
+            if not abs(value) < LARGEST:
+                raise InputError(
+                    f"{file}: line {number}: {column}: expected a number, got "
+                    f"{shown(row.get(column))}"
+                )
+        if float(row["time"]) < before:
+            raise InputError(f"{file}: line {number}: time: expected no less than {before:g}")
+        before = float(row["time"])
+    if before <= 0.0:
+        raise InputError(f"{file}: time: expected a run of more than 0 s")
+
+
+def read_run(folder: str | Path) -> Run:
+    """A run from its files. How its tether hung is a matter of driving it again; here it is
+    straight.
+
+    Parameters
+    ----------
+    folder : str or Path
+        As of `write_run`.
+
+    Returns
+    -------
+    Run
+        As it was.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be read or are damaged; a run whose map changed: how its tether hung
+        meanwhile is not kept.
+    """
+    place = Path(folder)
+    mission = Mission.load(place / "mission.json")
+    summary = parse_json_object(read_text(place / "summary.json"), str(place / "summary.json"))
+    file = place / "log.csv"
+    rows = csv_rows(read_text(file), str(file))
+    try:
+        log = tuple(LogRow(**{k: _KINDS[k](v) for k, v in row.items()}) for row in rows)
+        planner = str(summary["planner"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{folder}: a file of the run is damaged: {error}") from None
+    if not log:
+        raise InputError(f"{file}: holds no row")
+    check_log(rows, file)
+    if summary.get("surprises"):
+        raise InputError(
+            f"{folder}: the map changed during this run, and how its tether hung meanwhile is not "
+            "kept; expected a run without surprises"
+        )
+    strand = np.zeros((2, WIDTH))
+    strand[:, :3] = mission.anchor, (log[-1].x, log[-1].y, log[-1].z)
+    return Run(mission, planner, log, Tether(strand, log[-1].tether), summary)
+
+
+def _yes(text: str) -> bool:
+    return text == "True"
+
+
+_KINDS: dict[str, Callable[[str], Any]] = {
+    **dict.fromkeys(LogRow.__dataclass_fields__, float), "waypoint": int, "mode": str,
+    "shortening": _yes,
+}  # fmt: skip
+"""What the columns of log.csv hold."""
+
+
+def _short(value: Any) -> Any:
+    return round(value, 5) if isinstance(value, float) else value
+
+
+def describe_run(run: Run, units: str) -> str:
+    """A run in a few lines.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    units : str
+        Name of the unit of length.
+
+    Returns
+    -------
+    str
+        The lines.
+    """
+    s = run.summary
+    lines = [
+        f"mission  {s['mission']}, planner {s['planner']}: {s['status']}",
+        f"visited  {s['visited']} of {s['waypoints']} waypoints",
+        f"time     {s['inspection_s']:.1f} s{_way_home(s['home'])}",
+        f"home     {_home(s['home'], units)}",
+        f"tether   longest {s['longest_tether']:.3f} of {s['tether_length']:g} {units}, "
+        f"over the limit for {s['exceedance_s']:.1f} s"
+        + (f", shortened for {s['shortening_s']:.1f} s to a new one" if s["shortening_s"] else ""),
+        f"planning {s['replans']} times, median {1e3 * s['replan_median_s']:.1f} ms, worst "
+        f"{1e3 * s['replan_worst_s']:.0f} ms",
+    ]
+    if s["longest_payout"] > s["longest_tether"] * (1.0 + 1e-9):
+        lines.insert(4, f"payout   at most {s['longest_payout']:.3f} {units}, with slack and sag")
+    if (words := s.get("words")) is not None and words["as_planned"] is not None:
+        home = words["home"]
+        lines.append(
+            f"classes  as planned at {words['as_planned']} of {len(words['stops'])} stops; "
+            + (
+                "none told at home"
+                if home is None
+                else "empty at home"
+                if not home
+                else f"NOT empty at home: {home}"
+            )
+        )
+    if s["friction"] is not None:
+        lines.append(
+            f"friction multiplies the tension by {s['friction']['most_tension_ratio']:.2f} at most "
+            f"(turning {s['friction']['most_turning_deg']:.0f}°), over the limit for "
+            f"{s['friction']['over_s']:.1f} s"
+        )
+    if s["surprises"] is not None:
+        found = s["surprises"]
+        lines.append(
+            f"surprise {found['happened']} events happened"
+            + (f", {found['held_back']} had no room" if found["held_back"] else "")
+            + (f"; the sensor found {found['found']} solids" if found["found"] else "")
+        )
+    for r in s.get("repairs", ()):
+        done = {
+            "kept": "kept", "local": "mended", "replan": "the rest planned anew",
+            "legs": "left to be found leg by leg",
+        }  # fmt: skip
+        lines.append(
+            f"repair   at {r['time']:.1f} s: {done[r['response']]} in {r['planning_s']:.2f} s, "
+            f"{r['reason']}"
+        )
+    if s["contacts"]:
+        lines.append(f"contact  with solids: {s['contacts']} times")
+    if s["waited_s"]:
+        lines.append(f"waited   {s['waited_s']:.1f} s for the anchor to come nearer")
+    if s["defects"]:
+        lines.append(f"defect   planning failed {s['defects']} times; please report the mission")
+    if s["coverage"] is not None:
+        lines.insert(
+            5,
+            f"seen     {100 * s['coverage']:.1f} % of the surface "
+            f"({100 * s['coverage_through']:.1f} % if nothing stood in between)",
+        )
+    if s["control_worst_s"] > 0.0:
+        lines.append(
+            f"control  median {1e3 * s['control_median_s']:.1f} ms, worst "
+            f"{1e3 * s['control_worst_s']:.0f} ms; "
+            f"{s['inspection_s'] / s['wall_s']:.0f} x real time"
+        )
+    lines += [
+        f"stalled  at {stall['time']:.1f} s, on the way "
+        + ("home" if stall["waypoint"] == s["waypoints"] else f"to waypoint #{stall['waypoint']}")
+        for stall in s["stalls"][:5]
+    ]
+    lines += [
+        f"left out waypoint #{_given(s, left['waypoint'])}: {left['reason']}"
+        for left in s["left_out"][:5]
+    ]
+    if len(s["left_out"]) > 5:
+        lines.append(f"         and {len(s['left_out']) - 5} more")
+    return "\n".join(lines)
+
+
+def _given(summary: dict[str, Any], waypoint: int) -> int:
+    """The number of a waypoint in the mission before anything was planned anew."""
+    given = summary.get("given_as")
+    return waypoint if given is None else int(given[waypoint])
+
+
+def _way_home(home: dict[str, Any]) -> str:
+    if not home["seconds"]:
+        return ""
+    return f", and {home['seconds']:.1f} s {'home' if home['reached'] else 'on the way home'}"
+
+
+def _home(home: dict[str, Any], units: str) -> str:
+    if not home["reached"]:
+        return f"not reached{': ' if home['reason'] else ''}{home['reason'] or ''}"
+    if home["tether_free"]:
+        return "reached, tether free"
+    return f"reached, tether NOT free: {home['left']:.2f} {units} left"

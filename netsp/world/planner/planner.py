@@ -1,0 +1,708 @@
+"""What all planners share: waypoints, where they are in them, and a path to follow."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.clock import Clock
+from netsp.base.compiled.kernel import runs_compiled
+from netsp.base.errors import interrupted
+from netsp.base.geometry import polylines
+from netsp.world.mission.anchor_track import Track
+from netsp.world.mission.mission import Mission, MissionWaypoint
+from netsp.world.paths.refine import RefineParams, refined, stepped
+from netsp.world.paths.sampled import SampledPaths
+from netsp.world.paths.standoff import beside
+from netsp.world.paths.tree import Grid, Paths, ShortestTree, grow, taut
+from netsp.world.scene.field import DistanceField
+from netsp.world.tether import GeodesicTether, ReactTether, Tether
+from netsp.world.tether.load import Load, payout, payout_along
+from netsp.world.tether.resolution import THINNEST
+
+Tethers = GeodesicTether | ReactTether
+
+FREE = 0.1
+"""A tether so many delta longer than as it was laid when the mission began is not free."""
+
+ROOM = 0.7
+"""Of the clearance, that a path must keep when the map changes."""
+
+MOST_HOLDS = 20
+"""Steps that a planner may fail at one waypoint before it is left out."""
+
+NORMAL, RECOVERY, WAIT, DWELL, HOME, HOLD, DONE = (
+    "normal", "recovery", "wait", "dwell", "home", "hold", "done",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Command:
+    """Where to go now.
+
+    Parameters
+    ----------
+    path : ndarray, shape (k, 3)
+        Points to pass in this order, the first one next; metres.
+    mode : {"normal", "recovery", "wait", "dwell", "home", "hold", "done"}
+        What the robot is doing.
+    replan_s : float
+        Seconds of CPU that planning took in this step.
+    """
+
+    path: Floats
+    mode: str
+    replan_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class PlannerOptions:
+    """How paths are found.
+
+    Parameters
+    ----------
+    paths : str
+        ``tree``, or one of OMPL's planners (`netsp.world.paths.sampled`).
+    refine : {"none", "paper", "gradient"}, optional
+        See `netsp.world.paths.refine`; by default `paper` for the paper's planners and `none` for
+        the others, whose paths keep the clearance from the start.
+    seed : int
+        Of what is random in either.
+    refine_params : RefineParams
+        Options of the paper's refinement.
+    pivot_spacing : float, optional
+        Distance between pivots along a tether for the paper's planners, metres; more than 0. By
+        default 0.25 m, or one cell if a cell is larger.
+    looks : int
+        How often `predictive` simulates the tether ahead for one plan; then the best path so far is
+        taken, and the first if there is none yet.
+    metres : float
+        Of paths along which it does so, likewise.
+    planning_limit : float
+        Seconds that `repair` may take to plan the rest of a tour; the robot holds its place.
+    prepared : bool
+        Whether shortest paths to all waypoints are found before the mission, which takes seconds
+        where there are many. Otherwise, and where kernels are interpreted, each is found when it is
+        needed.
+    clock : Clock, optional
+        When it is up, planning ends as at Ctrl-C, and so does the mission.
+    """
+
+    paths: str = "tree"
+    refine: str | None = None
+    seed: int = 0
+    refine_params: RefineParams = field(default_factory=RefineParams)
+    pivot_spacing: float | None = None
+    looks: int = 10
+    metres: float = 15.0
+    planning_limit: float = 10.0
+    prepared: bool = True
+    clock: Clock | None = None
+
+
+@dataclass
+class Planner:
+    """Follows the waypoints of a mission. Planners are derived from it.
+
+    Parameters
+    ----------
+    mission : Mission
+        What is flown.
+    scene : DistanceField
+        The map.
+    tethers : TetherModel
+        The tether model that the planner believes.
+    grid : Grid
+        The grid that paths are sought on.
+    options : PlannerOptions
+        How paths are found.
+    laid : Tether
+        The tether when the mission began.
+    index : int
+        The waypoint that is next; their number on the way home.
+    mode : str
+        As of `Command`.
+    path : ndarray, shape (k, 3)
+        The path that is followed.
+    left_out : list of (int, str)
+        Waypoints left out, with the reason.
+    defects : list of str
+        What went wrong in planning that never should, one text each time.
+    reached : list of int
+        Waypoints visited.
+    home : bool
+        Whether the robot is back at the start.
+    not_home : str or None
+        Why it has given up getting there.
+    now : float
+        Seconds since the start; whoever runs the mission keeps it up to date.
+    caught : float
+        Metres of tether that are out beyond what the map explains.
+    trail : ndarray, shape (n, 3)
+        The way that the tether was laid along, where it is known.
+    given : list of int
+        What number each waypoint had when the mission began; those added come after all others.
+    """
+
+    mission: Mission
+    scene: DistanceField
+    tethers: Tethers
+    grid: Grid
+    options: PlannerOptions = field(default_factory=PlannerOptions)
+    laid: Tether | None = None
+    index: int = 0
+    mode: str = NORMAL
+    path: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    left_out: list[tuple[int, str]] = field(default_factory=list)
+    defects: list[str] = field(default_factory=list)
+    reached: list[int] = field(default_factory=list)
+    home: bool = False
+    not_home: str | None = None
+    now: float = 0.0
+    caught: float = 0.0
+    trail: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    given: list[int] = field(default_factory=list)
+    _held: int = 0
+
+    name = "none"
+    refine = "none"
+
+    @cached_property
+    def load(self) -> Load:
+        """What acts on the tether: the steady current, and gusts of three standard deviations from
+        any side."""
+        load = self.mission.tether.load(np.array(self.mission.current))
+        return load._replace(gusts=3.0 * self.mission.gusts)
+
+    @cached_property
+    def reserve(self) -> float:
+        """Metres of tether to be kept for what positions are wrong by."""
+        return self.mission.sensor.reserve(self.mission.speed)
+
+    @property
+    def loaded(self) -> bool:
+        """Whether the tether needs more than its taut length, or may turn by so much only."""
+        physics = self.mission.tether
+        return physics.slack > 0.0 or physics.diameter > 0.0 or math.isfinite(physics.max_turning)
+
+    def payout(self, tether: Tether) -> float:
+        """Length that must be out for a tether to lie as it does: what the limit is about.
+
+        Parameters
+        ----------
+        tether : Tether
+            As the model has it.
+
+        Returns
+        -------
+        float
+            Metres.
+        """
+        if not self.loaded:
+            return tether.length
+        if isinstance(self.tethers, GeodesicTether):
+            return payout(tether, self.load)
+        return payout_along(tether.nodes, self.load)
+
+    def __post_init__(self) -> None:
+        """Waypoints have their own numbers at first."""
+        self.given = list(range(len(self.mission.waypoints)))
+
+    def add_waypoint(self, waypoint: MissionWaypoint) -> None:
+        """Visit one more, after all others.
+
+        Parameters
+        ----------
+        waypoint : MissionWaypoint
+            The waypoint.
+        """
+        if self.done:
+            return
+        if self.homeward:
+            self.path, self.mode = self.path[:0], NORMAL
+        self.given.append(max(self.given, default=-1) + 1)
+        waypoints = (*self.mission.waypoints, waypoint)
+        self.mission = self.mission.model_copy(update={"waypoints": waypoints})
+
+    def cancel_waypoint(self, number: int) -> int | None:
+        """Do not visit one, if it is still to be visited.
+
+        Parameters
+        ----------
+        number : int
+            That it was given.
+
+        Returns
+        -------
+        int or None
+            What number it had by now; None where the robot has been there already.
+        """
+        k = self.given.index(number) if number in self.given else -1
+        if k < self.index or self.done:
+            return None
+        del self.given[k]
+        waypoints = (*self.mission.waypoints[:k], *self.mission.waypoints[k + 1 :])
+        self.mission = self.mission.model_copy(update={"waypoints": waypoints})
+        if k == self.index:
+            self.path, self.mode = self.path[:0], NORMAL
+        return k
+
+    def take_limit(self, limit: float) -> None:
+        """Keep to another length of tether from now on.
+
+        Parameters
+        ----------
+        limit : float
+            Metres.
+        """
+        self.mission = self.mission.model_copy(update={"tether_length": limit})
+
+    def carried_off(self) -> None:
+        """The robot is not where it was: what was planned does not begin there."""
+        self.path = self.path[:0]
+
+    @property
+    def flown(self) -> Mission:
+        """The mission as it was flown, for a file."""
+        return self.mission
+
+    def told(self) -> dict[str, Any]:
+        """What it adds to the summary of a run.
+
+        Returns
+        -------
+        dict
+            Numbers by name.
+        """
+        changed = self.given != list(range(len(self.given)))
+        return {"given_as": self.given} if changed else {}
+
+    @property
+    def waypoint(self) -> Floats:
+        """(3,) the waypoint that is next; on the way home where that is."""
+        return self.home_now if self.homeward else self.mission.places[self.index]
+
+    @cached_property
+    def track(self) -> Track | None:
+        """Where a moving anchor goes."""
+        return Track.of(self.mission)
+
+    @property
+    def anchor_moves(self) -> bool:
+        """Whether the anchor is on its way."""
+        return self.track is not None and self.now < self.track.end
+
+    @property
+    def home_now(self) -> Floats:
+        """(3,) the start; of a moving anchor as far from it as when the mission began, where that
+        is in the water and in sight of it, else the anchor."""
+        start = np.array(self.mission.start)
+        if self.track is None:
+            return start
+        anchor = self.track(self.now)
+        home = anchor + start - np.array(self.mission.anchor)
+        room = min(self.mission.clearance, float(self.scene.distance(start)))
+        free = self.scene.distance(home) >= room and self.scene.line_of_sight(anchor, home)
+        return home if free else anchor
+
+    @property
+    def laid_now(self) -> Tether:
+        """The tether as it is to lie at home."""
+        assert self.laid is not None
+        if self.track is None:
+            return self.laid
+        return self.tethers.start(self.track(self.now), self.home_now)
+
+    @property
+    def homeward(self) -> bool:
+        """Whether all waypoints are visited or left out: what is left is the way home."""
+        return self.index >= len(self.mission.waypoints)
+
+    @property
+    def done(self) -> bool:
+        """Whether the robot is home, or has given up getting there."""
+        return self.index > len(self.mission.waypoints)
+
+    def step(self, robot: Floats, tether: Tether) -> Command:
+        """What to do now.
+
+        Never raises: where no plan is found the robot holds its place or leaves the waypoint out,
+        with the reason.
+
+        Parameters
+        ----------
+        robot : ndarray, shape (3,)
+            Position of the robot, metres.
+        tether : Tether
+            The tether as the model has it.
+
+        Returns
+        -------
+        Command
+            Where to go.
+        """
+        self._advance(robot, tether)
+        self._follow_home(robot)
+        if self.done:
+            return Command(np.array([robot]), DONE)
+        begin = time.process_time()
+        planned, before = False, -1
+        while not self.done and before < len(self.left_out):
+            before = len(self.left_out)
+            try:
+                plan = self.plan_home if self.homeward else self.plan
+                planned = plan(robot, tether) or planned
+            except Exception as error:  # a vehicle in the water must not be left without a command
+                if interrupted(error):
+                    raise KeyboardInterrupt from error
+                return self._hold(robot, error, time.process_time() - begin)
+        spent = time.process_time() - begin if planned else 0.0
+        if self.done:
+            return Command(np.array([robot]), DONE, spent)
+        return Command(self.path if len(self.path) else np.array([robot]), self.mode, spent)
+
+    def take_map(
+        self, scene: DistanceField, tethers: Tethers, box: Floats, robot: Floats, tether: Tether
+    ) -> None:
+        """Go by another map from now on. A path that no longer keeps off solids is forgotten.
+
+        Parameters
+        ----------
+        scene : DistanceField
+            The map.
+        tethers : TetherModel
+            The tether model in it.
+        box : ndarray, shape (2, 3)
+            Within which it is another, metres.
+        robot : ndarray, shape (3,)
+            Position of the robot, metres.
+        tether : Tether
+            The tether in it.
+        """
+        del tether
+        self.scene, self.tethers, self.grid = scene, tethers, self.grid.over(scene, box)
+        if len(self.path) and not self.keeps_off(np.vstack([robot, self.path])):
+            self.path = self.path[:0]
+
+    def keeps_off(self, path: Floats) -> bool:
+        """Whether a path keeps off all solids of the map.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            From the robot on, metres.
+
+        Returns
+        -------
+        bool
+            Whether it does, by most of the clearance, or of what its ends have of it.
+        """
+        line = polylines.dense(path, 0.5 * self.grid.cell)
+        room = min(self.mission.clearance, float(self.scene.distance(path[[0, -1]]).min()))
+        return not len(line) or bool(self.scene.distance(line).min() >= ROOM * room)
+
+    def hear_of_payout(self, more: float, trail: Floats) -> None:
+        """How much more tether is out than the map explains.
+
+        Parameters
+        ----------
+        more : float
+            Metres; something that is not on the map has caught the tether.
+        trail : ndarray, shape (n, 3)
+            The way from the anchor to the robot on which the tether was laid: whoever goes back
+            along it frees the tether of whatever has caught it.
+        """
+        self.caught, self.trail = more, trail
+
+    def _hold(self, robot: Floats, error: Exception, spent: float) -> Command:
+        """Stay, and try again at the next step; leave the waypoint out after a while."""
+        self._held += 1
+        self.defects.append(f"{type(error).__name__}: {error}")
+        if self._held > MOST_HOLDS:
+            self.leave_out(f"a defect of netsp ended planning ({self.defects[-1]})")
+        return Command(np.array([robot]), HOLD, spent)
+
+    def warm_up(self, robot: Floats, tether: Tether) -> None:
+        """Load what is compiled, so that the first plan takes no longer than the others.
+
+        Parameters
+        ----------
+        robot : ndarray, shape (3,)
+            Position of the robot, metres.
+        tether : Tether
+            The tether as the model has it.
+        """
+        del tether
+        self.prepare()
+        path = self.paths(robot[None]).path(0)
+        if path is not None:
+            self.pulled(path)
+
+    def prepare(self) -> None:
+        """Find the shortest paths to all waypoints, and home, from everywhere, before the mission:
+        they depend on the map alone.
+
+        Where kernels are interpreted, this does nothing: finding the paths that are needed takes
+        less time than finding all of them."""
+        if self.options.paths == "tree" and self.options.prepared and runs_compiled(grow):
+            home = [] if self.track is not None else [np.array(self.mission.start)]
+            self.grid.prepare([*self.mission.places, *home])
+
+    def plan(self, robot: Floats, tether: Tether) -> bool:
+        """Set `path` and `mode`; here, on to the waypoint whatever the tether.
+
+        Parameters
+        ----------
+        robot : ndarray, shape (3,)
+            Position of the robot, metres.
+        tether : Tether
+            The tether as the model has it.
+
+        Returns
+        -------
+        bool
+            Whether anything had to be planned.
+        """
+        del tether
+        return False if len(self.path) else self.go_on(robot)
+
+    def plan_home(self, robot: Floats, tether: Tether) -> bool:
+        """Set `path` and `mode` for the way home, after the last waypoint; here, straight to the
+        start whatever the tether.
+
+        Parameters
+        ----------
+        robot : ndarray, shape (3,)
+            Position of the robot, metres.
+        tether : Tether
+            The tether as the model has it.
+
+        Returns
+        -------
+        bool
+            Whether anything had to be planned.
+        """
+        del tether
+        if len(self.path):
+            return False
+        planned = self.go_on(robot)
+        self.mode = HOME
+        return planned
+
+    def ends_here(self, tether: Tether) -> bool:
+        """Whether the mission may end now that the robot is home; else the way home is planned
+        again.
+
+        Parameters
+        ----------
+        tether : Tether
+            The tether as the model has it.
+
+        Returns
+        -------
+        bool
+            Whether it may; here always.
+        """
+        del tether
+        return True
+
+    def back_along(self, tether: Tether) -> Floats:
+        """The way back along a tether to the anchor, and on to the start as the tether was laid
+        there: whoever goes it has the tether free at its end.
+
+        Parameters
+        ----------
+        tether : Tether
+            The tether as the model has it.
+
+        Returns
+        -------
+        ndarray, shape (k, 3)
+            From the robot to the start, at the clearance where there is room, metres.
+        """
+        line = np.vstack([tether.nodes[::-1], self.laid_now.nodes[1:]])
+        return beside(self.scene, polylines.points_along(line, self.fine), self.mission.clearance)
+
+    @property
+    def fine(self) -> float:
+        """Metres between points of the way back along a tether: the model may lose a solid of twice
+        that thickness."""
+        return min(self.grid.cell, 0.5 * THINNEST * self.mission.delta)
+
+    def go_on(self, robot: Floats) -> bool:
+        """Go straight to the waypoint, or along the shortest path round what is between.
+
+        Parameters
+        ----------
+        robot : ndarray, shape (3,)
+            Position of the robot, metres.
+
+        Returns
+        -------
+        bool
+            Whether a path had to be sought.
+        """
+        straight = np.array([robot, self.waypoint])
+        if self.is_free(straight):
+            self.path = straight[1:]
+            return False
+        path = self.paths(robot[None]).path(0)
+        if path is None:
+            self.leave_out("no free path to it")
+        else:
+            self.path = self.refined(self.pulled(path))[1:]
+        return True
+
+    def paths(self, points: Floats) -> Paths:
+        """Short paths to the waypoint.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n, 3)
+            Where they start, metres.
+
+        Returns
+        -------
+        Paths
+            A path from each of them.
+        """
+        if self.options.paths == "tree":
+            return ShortestTree(self.grid, self.waypoint, points)
+        seed = 1000 * self.options.seed + self.index
+        return SampledPaths(self.options.paths, self.grid, self.waypoint, points, seed)
+
+    def refined(self, path: Floats) -> Floats:
+        """A path made safer and smoother, as the options have it.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            The path, metres.
+
+        Returns
+        -------
+        ndarray, shape (m, 3)
+            The refined path, metres.
+        """
+        name = self.options.refine or self.refine
+        if name == "none":
+            return path
+        rng = np.random.default_rng([self.options.seed, self.index])
+        even = polylines.points_along(path, self.grid.cell)
+        params = self.options.refine_params
+        return refined(name, self.scene, even, self.mission.clearance, rng, params)
+
+    def refined_once(self, path: Floats, number: int) -> Floats:
+        """Refine a path once, even if the result is not free; only `paper` differs from `refined`.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            The path, metres.
+        number : int
+            Number of the path, which seeds the random moves.
+
+        Returns
+        -------
+        ndarray, shape (m, 3)
+            The refined path, metres.
+        """
+        if (self.options.refine or self.refine) != "paper" or len(path) < 3:
+            return self.refined(path)
+        rng = np.random.default_rng([self.options.seed, self.index, number])
+        even = polylines.points_along(path, self.grid.cell)
+        params = self.options.refine_params
+        return stepped(self.scene, even, self.mission.clearance, rng, params)
+
+    @property
+    def pivot_spacing(self) -> float:
+        """Distance between pivots along a tether, metres."""
+        return self.options.pivot_spacing or max(self.grid.cell, 0.25)
+
+    def pulled(self, path: Floats) -> Floats:
+        """A path pulled taut in its class, at the clearance.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            The path, metres.
+
+        Returns
+        -------
+        ndarray, shape (m, 3)
+            The taut path, metres.
+        """
+        return taut(self.scene, path, self.mission.clearance, self.mission.delta)
+
+    def is_free(self, path: Floats) -> bool:
+        """Whether a path keeps the clearance, or what its ends have of it.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            The path, metres.
+
+        Returns
+        -------
+        bool
+            Whether it does.
+        """
+        ends = float(self.scene.distance(path).min())
+        room = min(self.mission.clearance, ends) - 1e-3
+        return self.scene.grown(max(0.0, room)).line_of_sight(path[0], path[1], depth=1e-3)
+
+    def _advance(self, robot: Floats, tether: Tether) -> None:
+        """Past the waypoint, when it is reached at the end of the path."""
+        reach = self.mission.reach
+        if self.done or self.mode == WAIT or len(self.path) > 1:
+            return
+        if np.linalg.norm(self.waypoint - robot) <= reach:
+            if self.homeward:
+                if not self.ends_here(tether):
+                    self.path = self.path[:0]
+                    return
+                self.home = True
+            else:
+                self.reached.append(self.index)
+            self._next()
+
+    def _follow_home(self, robot: Floats) -> None:
+        """The way home ends where that is now; it is planned anew where it cannot be led on."""
+        if not self.homeward or self.track is None or not len(self.path):
+            return
+        last = np.array([self.path[-2] if len(self.path) > 1 else robot, self.waypoint])
+        self.path = np.vstack([self.path[:-1], last[1:]]) if self.is_free(last) else self.path[:0]
+
+    def _next(self) -> None:
+        self.index += 1
+        self.path, self.mode, self._held = np.zeros((0, 3)), NORMAL, 0
+
+    def passed(self, count: int) -> None:
+        """The robot has passed points of the path; the last one stays ahead.
+
+        Parameters
+        ----------
+        count : int
+            How many.
+        """
+        self.path = self.path[min(count, max(0, len(self.path) - 1)) :]
+
+    def leave_out(self, reason: str) -> None:
+        """Leave the waypoint that is next out; on the way home, end the mission where the robot is.
+
+        Parameters
+        ----------
+        reason : str
+            Why; it is logged.
+        """
+        if self.homeward:
+            self.not_home = reason
+        else:
+            self.left_out.append((self.index, reason))
+        self._next()

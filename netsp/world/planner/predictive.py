@@ -1,0 +1,585 @@
+"""`predictive`: simulates the tether along the coming path before the robot moves.
+
+So the limit is never exceeded on the path that was planned. A waypoint is left out only when the
+shortest tether to it in every class found is over the limit, or when even the way back to the
+anchor and along that tether does not keep to it; which of both, and by how much, is told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.geometry import polylines
+from netsp.world.mission.mission import MissionWaypoint
+from netsp.world.paths.standoff import beside
+from netsp.world.paths.tree import ever_tauter, homotopic, roughly_taut
+from netsp.world.planner.planner import (
+    FREE,
+    HOME,
+    NORMAL,
+    RECOVERY,
+    WAIT,
+    Planner,
+    Tethers,
+)
+from netsp.world.planner.preview import DEEPEST, MARGIN, Ahead
+from netsp.world.scene.field import DistanceField
+from netsp.world.tether import GeodesicTether, Tether
+
+PIVOTS = 24
+"""At most so many places along the tether to turn at."""
+
+ALIKE = 1.5
+"""Times the reach that a robot may be off a tour, and its tether longer or shorter by, to go on
+along it."""
+
+WORTH = 0.03
+"""Share of a path that must still be to save for another look."""
+
+ROUGH = 0.9
+"""Pulled taut, a path is seldom shorter than this share of what it is roughly pulled."""
+
+COMING_TO_REST = 60
+"""Rounds that a tether gets to come free at home."""
+
+CHECK, LAG = 2.0, 3.0
+"""While the anchor moves: seconds between two looks whether the tether still lasts, and seconds of
+the anchor's way that are kept in reserve, for a robot that is late."""
+
+UNKNOWN, CAUGHT = 0.2, 0.1
+"""Metres of tether kept in reserve where the map may be wrong, and how much more of it than planned
+for makes another plan."""
+
+EVERY, MOST_HOMES = 20, 3
+"""Steps between two looks whether the tether still comes free on the way home, and how often the
+robot goes back from there along a tether that is not."""
+
+PULL, PULLS, FORESEEN = 10, 10, 2.0
+"""Rounds of a pull, how many pulls at most until a tether counts as taut, and how many times what
+a geometric series would still take away is allowed for."""
+
+FAR_OVER = 1.1
+"""Times the limit: a tether that is longer after all these pulls is not pulled any further."""
+
+
+class Candidate(NamedTuple):
+    """A homotopy class of the tether at the waypoint: a tether in it (k, 3), a path that brings it
+    there (m, 3), and that path roughly pulled (n, 3)."""
+
+    tether: Floats
+    path: Floats
+    rough: Floats
+
+
+@dataclass
+class PredictivePlanner(Planner):
+    """`Planner` with look-ahead."""
+
+    _planned: int = field(default=-1)
+    _warned: int = field(default=-1)
+    _asked: int = 0
+    _homes: int = 0
+    _sure: bool = False
+    _looks: int = 0
+    _looked: float = 0.0
+    _checked: float = 0.0
+    _caught_before: float = 0.0
+    _candidates: list[Candidate] = field(default_factory=list)
+
+    name = "predictive"
+
+    def plan(self, robot: Floats, tether: Tether) -> bool:
+        """One path per waypoint, planned when the robot sets out for it."""
+        if (
+            self._planned == self.index
+            and len(self.path)
+            and not self._surprised(tether)
+            and not self._overtaken(robot, tether)
+        ):
+            return False
+        back = None if self.anchor_moves else self._shortened(tether)
+        if back is not None:
+            gone = np.linalg.norm(self.path[-1:] - robot) <= self.mission.reach
+            if not len(self.path) or gone:
+                self.path, self.mode = back[1:], RECOVERY
+                return True
+            return False
+        first = self._planned != self.index
+        self._planned, self._checked = self.index, self.now
+        limit = self.limit
+        leg = self._leg(robot, tether) if first else None
+        if leg is not None and self._fits(tether, leg, limit):
+            self.path, self.mode = leg[1:], NORMAL
+            return True
+        straight = self._straight(robot, tether, limit)
+        if straight is not None:
+            self.path, self.mode = straight[1:], NORMAL
+            return True
+        path, mode = self._shortest_feasible(robot, tether, limit)
+        if path is None and self.anchor_moves:
+            self._wait(robot, tether, limit)
+            return True
+        if path is None:
+            path = self._by_the_anchor(tether, limit)
+        if path is None:
+            return True
+        better = self.refined(path)
+        if better is not path and self._fits(tether, better, limit):
+            path = better
+        self.path, self.mode = path[1:], mode
+        return True
+
+    def _leg(self, robot: Floats, tether: Tether) -> Floats | None:
+        """The leg of the mission's tour, where the robot is where it begins, the tether as the tour
+        has it there, and nothing on the map in the way."""
+        leg, meant = self._planned_leg()
+        if (
+            leg is None
+            or np.linalg.norm(leg[0] - robot) > ALIKE * self.mission.reach
+            or abs(tether.length - (tether.length if meant is None else meant))
+            > ALIKE * (self.mission.reach + self.mission.delta)
+        ):
+            return None
+        # it counts as there a bit before the waypoint, from where a corner may be cut too short
+        for path in (np.vstack([robot, leg[1:]]), np.vstack([robot, leg])):
+            if self.is_free(path[:2]) and self.keeps_off(path):
+                return path
+        return None
+
+    def _planned_leg(self) -> tuple[Floats | None, float | None]:
+        """The tour's leg to the waypoint, and metres of tether where it begins: None where that is
+        whatever there is when the mission begins."""
+        tour = self.mission.tour
+        if tour is None or self.track is not None:
+            return None, None
+        leg = np.array(tour.home) if self.homeward else tour.leg(self.index)
+        before = min(self.index, len(tour.stops)) - 1
+        return leg, None if before < 0 else tour.stops[before].tether_length
+
+    def add_waypoint(self, waypoint: MissionWaypoint) -> None:
+        """See `Planner`."""
+        super().add_waypoint(waypoint)
+        self._planned = -1
+
+    def cancel_waypoint(self, number: int) -> int | None:
+        """See `Planner`; the legs of a tour are no longer those that lead to the others."""
+        k = super().cancel_waypoint(number)
+        if k is not None:
+            self._planned = -1
+            self._without_stop(k)
+        return k
+
+    def take_limit(self, limit: float) -> None:
+        """See `Planner`; where more is out, the robot first goes back along its tether."""
+        shorter = limit < self.mission.tether_length
+        super().take_limit(limit)
+        if shorter:
+            self.path, self._planned = self.path[:0], -1
+
+    def _shortened(self, tether: Tether) -> Floats | None:
+        """The way back along a tether that is too long, as far as need be; None for others."""
+        over = self.payout(tether) - self.limit
+        if over <= 0.0 or self.payout(tether) <= self.mission.tether_length:
+            return None
+        return polylines.part(self.back_along(tether), 0.0, over + self.mission.reach)
+
+    def _without_stop(self, k: int) -> None:
+        """Forget the tour, whose legs would lead to other waypoints."""
+        del k
+        self.mission = self.mission.model_copy(update={"tour": None})
+
+    @property
+    def limit(self) -> float:
+        """Metres of tether that plans may use."""
+        return self.mission.tether_length * (1.0 - MARGIN) - self._kept
+
+    @property
+    def _kept(self) -> float:
+        """Metres of tether kept back: for positions, a moving anchor, what is not on the map."""
+        unknown = 0.0 if self.mission.range_sensor is None else UNKNOWN
+        return self.reserve + self._anchors_way + self.caught + unknown
+
+    @property
+    def _anchors_way(self) -> float:
+        """Metres of tether kept back for a moving anchor."""
+        return LAG * self.track.speed if self.track is not None and self.anchor_moves else 0.0
+
+    @property
+    def _kept_back(self) -> str:
+        return f", of which {self._kept:.2f} m are kept in reserve" if self._kept else ""
+
+    def _surprised(self, tether: Tether) -> bool:
+        """Whether half of the reserve is used up, as in a current: said once for each waypoint."""
+        if (
+            self._warned == self.index
+            or self.payout(tether) + 0.5 * self.reserve
+            <= (1.0 - 0.5 * MARGIN) * self.mission.tether_length
+        ):
+            return False
+        self._warned = self.index
+        return True
+
+    def _overtaken(self, robot: Floats, tether: Tether) -> bool:
+        """Whether a moving anchor asks for another plan: asked now and then, of a robot that waits
+        always, of others when the tether no longer lasts for what is left of the path."""
+        if self.mode == WAIT and not self.anchor_moves:
+            return True
+        if not self.anchor_moves or self.now < self._checked + CHECK:
+            return False
+        self._checked = self.now
+        limit = self.limit + 0.5 * self._anchors_way
+        return self.mode == WAIT or not self._fits(tether, np.vstack([robot, self.path]), limit)
+
+    def _wait(self, robot: Floats, tether: Tether, limit: float) -> None:
+        """For an anchor that comes nearer: where the robot is, as long as the tether lasts there,
+        else back along the tether, which is shorter by more than the anchor can take it along."""
+        self.path, self.mode = robot[None], WAIT
+        if not self._fits(tether, np.array([robot, robot]), limit, 2.0 * CHECK):
+            way = 2.0 * CHECK * self.mission.speed
+            self.path = polylines.part(self.back_along(tether), 0.0, way)[1:]
+
+    def _near_enough(self, robot: Floats, waypoint: Floats) -> Floats:
+        """Where on the straight path the waypoint counts as visited: the tether may fit there only.
+        A fifth of the reach is left for a vehicle that does not stop on the spot."""
+        path = waypoint - robot
+        far = float(np.linalg.norm(path))
+        return waypoint - path * min(1.0, 0.8 * self.mission.reach / max(far, 1e-12))
+
+    def take_map(
+        self, scene: DistanceField, tethers: Tethers, box: Floats, robot: Floats, tether: Tether
+    ) -> None:
+        """See `Planner`; a path on which the tether no longer fits is forgotten, too."""
+        super().take_map(scene, tethers, box, robot, tether)
+        self._sure = False
+        if len(self.path) and not self._fits(tether, np.vstack([robot, self.path]), self.limit):
+            self.path = self.path[:0]
+
+    def hear_of_payout(self, more: float, trail: Floats) -> None:
+        """See `Planner`; a path that was planned for less tether is forgotten."""
+        if more > self._caught_before + CAUGHT:
+            self._caught_before = more
+            self.path = self.path[:0]
+        self._caught_before = min(self._caught_before, more)
+        super().hear_of_payout(more, trail)
+
+    @property
+    def _model(self) -> GeodesicTether:
+        assert isinstance(self.tethers, GeodesicTether)
+        return self.tethers
+
+    def warm_up(self, robot: Floats, tether: Tether) -> None:
+        """See `Planner`."""
+        self.prepare()
+        self._shortest_feasible(robot, tether, self.limit)
+
+    @property
+    def _ahead(self) -> Ahead:
+        """Looks ahead by the map and the clock of now."""
+        return Ahead(
+            self.mission,
+            self._model,
+            self.load if self.loaded else None,
+            self.track if self.anchor_moves else None,
+            self.now,
+        )
+
+    @property
+    def _stay(self) -> float:
+        """Seconds at the end of the path that is planned."""
+        return 0.0 if self.homeward else self.mission.waypoints[self.index].longest_stay
+
+    def _fits(
+        self, tether: Tether, path: Floats, limit: float, staying: float | None = None
+    ) -> bool:
+        """Whether the tether stays within the limit all along a path, and at its end."""
+        self._looks += 1
+        self._looked += polylines.length(path)
+        return self._ahead.fits(tether, path, limit, self._stay if staying is None else staying)
+
+    def _straight(self, robot: Floats, tether: Tether, limit: float) -> Floats | None:
+        """The straight path to the waypoint, or to where it counts as visited, if the tether fits
+        there only."""
+        far = None
+        for end in (self.waypoint, self._near_enough(robot, self.waypoint)):
+            path = np.array([robot, end])
+            if not self.is_free(path):
+                continue
+            if far is None or self.anchor_moves:
+                far, _ = self._ahead.follow(tether, path, limit, self._stay)
+            if polylines.length(path) <= far:
+                return path
+        return None
+
+    def _shortest_feasible(
+        self, robot: Floats, tether: Tether, limit: float
+    ) -> tuple[Floats | None, str]:
+        """The shortest path on which the tether fits: on from the robot, or back along the tether
+        to a pivot and on from there; and as what it counts. One tree serves all pivots.
+
+        What a pivot decides is the class of the tether at the waypoint, and with it its length
+        there. Pivots in a row that lead to one class are taken together; classes over the limit
+        need no more. For the others the path is pulled taut as a whole, the part back along the
+        tether too: there is none shorter in its class. Where the tether is over the limit on that
+        path, as much of the part back along the tether as need be is left as it is.
+        """
+        # the tether back from the robot, finely, off the surfaces; some of its points are pivots
+        nodes = tether.nodes[::-1]
+        along = polylines.along(nodes)
+        back = polylines.points_along(nodes, self.grid.cell)
+        places = np.linspace(0.0, along[-1], len(back))
+        back = beside(self.scene, back, self.mission.clearance)
+        pivots = np.unique(np.linspace(0, len(back) - 1, PIVOTS + 1).round().astype(int))
+        tree = self.paths(back[pivots])
+        onward = {int(i): tree.path(n) for n, i in enumerate(pivots)}
+
+        def taken_back(i: int) -> Floats:
+            """The tether when the robot has followed it back to point i."""
+            passed = int(np.searchsorted(along, places[i] - 1e-9, side="right"))
+            return np.vstack([tether.nodes[: max(1, len(nodes) - passed)], back[i]])
+
+        self._looks, self._looked, self._candidates = 0, 0.0, []
+        if onward[0] is not None:
+            # the shortest path of all: where the tether fits on it, nothing else need be tried
+            path = self.pulled(onward[0])
+            direct = Candidate(np.vstack([tether.nodes, path[1:]]), path, path)
+            self._candidates.append(direct)
+            if not self._over_at_its_end(direct, limit) and self._fits(tether, path, limit):
+                return path, NORMAL
+        classes = []
+        for last in self._classes(back, onward):
+            on = onward[last]
+            assert on is not None
+            path = np.vstack([back[: last + 1], on[1:]])
+            there = np.vstack([taken_back(last), on[1:]])
+            classes.append(Candidate(there, path, self._roughly_pulled(path)))
+        self._candidates += classes
+        best: Floats | None = None
+        least = np.inf
+        for candidate in sorted(classes, key=lambda c: polylines.length(c.rough)):
+            if ROUGH * polylines.length(candidate.rough) >= least or (
+                best is not None and self._looked_enough
+            ):
+                break
+            if self._over_at_its_end(candidate, limit):
+                continue
+            path = self.pulled(candidate.rough)
+            length = polylines.length(path)
+            if length >= least:
+                continue
+            if self._fits(tether, path, limit):
+                best, least = path, length
+                continue
+            found = self._tautest(tether, candidate.path, limit, least)
+            if found is not None:
+                best, least = found, polylines.length(found)
+        return best, RECOVERY
+
+    def _over_at_its_end(self, candidate: Candidate, limit: float) -> bool:
+        """Whether even the taut tether at the end of a path is over the limit, less slack, however
+        near the anchor may have come by then."""
+        if self.track is not None and self.anchor_moves:
+            way = polylines.length(candidate.rough) / self.mission.speed
+            limit += self.track.travelled(self.now, self.now + way)
+        return self._longer_than(candidate.tether, limit / (1.0 + self.mission.tether.slack))
+
+    def _in_time(self, paths: Iterator[Floats]) -> Iterator[Floats]:
+        """The same, as long as there is time."""
+        for path in paths:
+            if self.options.clock is not None and self.options.clock.up:
+                raise KeyboardInterrupt
+            yield path
+
+    @property
+    def _looked_enough(self) -> bool:
+        """Whether the best path so far is to be taken. Looks and their metres are counted and not
+        seconds, so that a plan is the same on every machine."""
+        return self._looks >= self.options.looks or self._looked >= self.options.metres
+
+    def _tautest(
+        self, tether: Tether, line: Floats, limit: float, least: float = np.inf
+    ) -> Floats | None:
+        """Of ever less pulled paths in the class of a line the tautest on which the tether fits:
+        the less of a retreat is saved, the sooner it does. None where none is shorter than
+        `least`."""
+        best = None
+        paths = [p for p in self._in_time(self._ever_tauter(line)) if polylines.length(p) < least]
+        while paths and not (self._looked_enough and (best is not None or least < np.inf)):
+            middle = len(paths) // 2
+            if self._fits(tether, paths[middle], limit):
+                best, paths = paths[middle], paths[middle + 1 :]
+                least = polylines.length(best)
+            else:
+                paths = paths[:middle]
+            if paths and least - polylines.length(paths[-1]) < WORTH * least:
+                break
+        return best
+
+    def plan_home(self, robot: Floats, tether: Tether) -> bool:
+        """The shortest path home on which the tether fits and at whose end it is free: that of the
+        class back along the tether, pulled as far as both hold."""
+        if (
+            len(self.path)
+            and not self._led_astray(robot, tether)
+            and not self._overtaken(robot, tether)
+        ):
+            return False
+        self._checked = self.now
+        if self.caught > CAUGHT:
+            back = polylines.points_along(self.trail[::-1], self.fine)
+            back = np.vstack([back, self.laid_now.nodes[1:]])
+            if self.scene.distance(back).min() > DEEPEST * self.mission.delta:
+                self.path, self.mode, self._sure = back[1:], HOME, False
+                return True
+        path = self._leg_home(robot, tether)
+        if path is None:
+            path = self._direct_home(robot, tether)
+        self._sure = path is not None
+        if path is None:
+            path = self._home_along(tether)
+        self.path, self.mode = path[1:], HOME
+        return True
+
+    def _leg_home(self, robot: Floats, tether: Tether) -> Floats | None:
+        """The way home of the mission's tour, if the tether fits on it and comes free."""
+        leg = self._leg(robot, tether)
+        if leg is None:
+            return None
+        far, end = self._ahead.follow(tether, leg, self.limit, 0.0)
+        return leg if np.isinf(far) and self._is_free(end) else None
+
+    def _direct_home(self, robot: Floats, tether: Tether) -> Floats | None:
+        """The shortest path of all, if it happens to free the tether."""
+        path = self.paths(robot[None]).path(0)
+        if path is None:
+            return None
+        path = self.pulled(path)
+        if self._longer_than(np.vstack([tether.nodes, path[1:]]), self._free_length):
+            return None
+        far, end = self._ahead.follow(tether, path, self.limit, 0.0)
+        return path if np.isinf(far) and self._is_free(end) else None
+
+    def _home_along(self, tether: Tether) -> Floats:
+        """Back along the tether, pulled as far as it fits and comes free."""
+        line = self.back_along(tether)
+        path = self.pulled(line)
+        far, end = self._ahead.follow(tether, path, self.limit, 0.0)
+        if np.isinf(far):
+            self._sure = self._is_free(end)
+        else:
+            found = self._tautest(tether, line, self.limit)
+            path = line if found is None else found
+            self._sure = self._comes_free(tether, path)
+        if not self._sure and path is not line:
+            path, self._sure = line, self._comes_free(tether, line)
+        return path
+
+    def _led_astray(self, robot: Floats, tether: Tether) -> bool:
+        """Whether on what is left of the way home the tether no longer comes free, as when a
+        vehicle that cuts corners has taken it past something. Asked now and then."""
+        self._asked += 1
+        if self._asked % EVERY or not self._sure:
+            return False
+        return not self._comes_free(tether, np.vstack([robot, self.path]))
+
+    def ends_here(self, tether: Tether) -> bool:
+        """At home with the tether not free, the robot goes back along it and comes home again."""
+        if self.caught > CAUGHT and self._homes < MOST_HOMES:
+            self._homes += 1
+            return False
+        here = self._model.update(self.laid_now, tether.robot)
+        length = self._model.relaxed(tether.nodes, COMING_TO_REST).length
+        if length <= here.length + FREE * self.mission.delta or self._homes >= MOST_HOMES:
+            return True
+        self._homes += 1
+        return False
+
+    def _comes_free(self, tether: Tether, path: Floats) -> bool:
+        """Whether the tether lies at the end of a path as at the start of the mission."""
+        points = polylines.dense(path, 5.0 * self.grid.cell)
+        return self._is_free(self._model.drive(tether, points)[0])
+
+    def _is_free(self, tether: Tether) -> bool:
+        """Whether a tether at home comes to lie as at the start of the mission."""
+        return self._model.relaxed(tether.nodes, COMING_TO_REST).length <= self._free_length
+
+    @property
+    def _free_length(self) -> float:
+        """A tether that is no longer is free at home, metres."""
+        return self.laid_now.length + FREE * self.mission.delta
+
+    def _roughly_pulled(self, path: Floats) -> Floats:
+        return roughly_taut(self.scene, path, self.mission.clearance, self.mission.delta)
+
+    def _ever_tauter(self, path: Floats) -> Iterator[Floats]:
+        return ever_tauter(self.scene, path, self.mission.clearance, self.mission.delta)
+
+    def _classes(self, back: Floats, onward: Mapping[int, Floats | None]) -> list[int]:
+        """Pivots in a row often lead to paths of one class: the last of each such row."""
+        out: list[int] = []
+        pivots = list(onward)
+        for i, j in zip(pivots, [*pivots[1:], None], strict=True):
+            path, after = onward[i], None if j is None else onward[j]
+            if path is not None and (
+                j is None
+                or after is None
+                or not homotopic(
+                    self.scene, path, np.vstack([back[i : j + 1], after[1:]]), self.grid.cell
+                )
+            ):
+                out.append(i)
+        return out
+
+    def _longer_than(self, line: Floats, limit: float) -> bool:
+        """Whether a tether that lies along a line is longer even when it is taut, as far as that
+        can be foreseen: what a pull takes away becomes ever less."""
+        tether = self._model.relaxed(line, PULL)
+        length, less = tether.length, np.inf
+        for _ in range(PULLS):
+            if length <= limit:
+                return False
+            tether = self._model.relaxed(tether.nodes, PULL)
+            before, less, length = less, length - tether.length, tether.length
+            ratio = min(less / before, 0.95) if before > 0.0 else 0.0
+            if length - FORESEEN * less * ratio / (1.0 - ratio) > limit:
+                break
+        return length > limit
+
+    def _by_the_anchor(self, tether: Tether, limit: float) -> Floats | None:
+        """Where no path was found: back to the anchor, and on beside the shortest tether that the
+        waypoint has in any class found. None where that does not fit either: the waypoint is then
+        left out, with the reason."""
+        own = self._shortest_tether(limit)
+        if own is None:
+            self.leave_out("no free path to it")
+            return None
+        needs, near = self.payout(own), 0.8 * self.mission.reach
+        if needs - near <= limit:
+            path = np.vstack([self._beside(tether.nodes[::-1]), self._beside(own.nodes)[1:]])
+            for short in (0.0, near):
+                part = polylines.part(path, 0.0, polylines.length(path) - short)
+                if self._fits(tether, part, limit):
+                    return part
+        limits = f"the limit is {self.mission.tether_length:g} m{self._kept_back}"
+        self.leave_out(
+            f"out of reach: it needs {needs:.2f} m of tether, {limits}"
+            if needs - near > limit
+            else f"no path found on which the tether fits, though {needs:.2f} m would do; {limits}"
+        )
+        return None
+
+    def _shortest_tether(self, limit: float) -> Tether | None:
+        """The shortest tether at the waypoint, of all classes that the last search has found."""
+        found: list[Tether] = []
+        for candidate in self._candidates:
+            roughly = self._model.relaxed(candidate.tether, PULLS * PULL)
+            far_over = roughly.length > FAR_OVER * limit and bool(found)
+            found.append(roughly if far_over else self._model.refine(roughly))
+        return min(found, key=lambda t: t.length, default=None)
+
+    def _beside(self, line: Floats) -> Floats:
+        return beside(self.scene, polylines.points_along(line, self.fine), self.mission.clearance)

@@ -1,0 +1,320 @@
+"""What a camera has seen of a structure: patches of its surface, marked as they come into view.
+
+As Amer et al. 2025 (section VI-A) count it, a patch is seen when its centre is within the camera's
+range, its surface faces the camera and it lies within the field of view. They do not ask whether
+something stands in between; here both are counted, with and without.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from netsp.base.arrays import Bools, ComparesArrays, Floats, Ints
+from netsp.base.compiled.interpretation import interprets
+from netsp.base.compiled.kernel import kernel
+from netsp.base.errors import InputError
+from netsp.world.mission.equipment import Camera
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.sampling import Field, lowest_along, lowest_along_each
+from netsp.world.scene.scene import Scene
+from netsp.world.scene.shapes import HalfSpace
+from netsp.world.scene.surfaces import drawn_points, extent, surface_of
+
+MOST_PATCHES = 200_000
+
+
+@dataclass(frozen=True, eq=False)
+class Patches(ComparesArrays):
+    """A surface in pieces.
+
+    Attributes
+    ----------
+    centres, normals
+        (n, 3), normals outward.
+    areas
+        (n,).
+    sides
+        (m, 2) patches that are the two sides of one piece of a sheet, which is seen when either is;
+        the second has no area of its own.
+    """
+
+    centres: Floats
+    normals: Floats
+    areas: Floats
+    sides: Ints
+
+
+def patches_of(
+    scene: Scene, field: DistanceField, size: float, places: Floats,
+    inspect: tuple[str, ...] | None = None,
+) -> Patches:  # fmt: skip
+    """The surface of a scene in triangles with sides of at most `size`, without what lies inside
+    another solid. places : (k, 3); what has no end is taken as far as they reach. inspect : names
+    of the solids to be seen; default all but half spaces and the sea floor.
+
+    Raises
+    ------
+    InputError
+        `inspect` names no solid, or nothing is left to be seen.
+    """
+    low, high = extent(scene, places)
+    solids = scene.all_solids()
+    named = {s.name for s in solids}
+    named |= {n for n in ("mesh", "cloud", "floor") if getattr(scene, n) is not None}
+    for name in inspect or ():
+        if name not in named:
+            raise InputError(f"inspect: expected names of solids, got {name!r}")
+    centres, normals, areas = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0)]
+    pairs = np.zeros((0, 2), dtype=np.int64)
+    own = [
+        (surface_of(s.shape, low, high), Scene(solids=(s,)).field())
+        for s in solids
+        if not isinstance(s.shape, HalfSpace) and (inspect is None or s.name in inspect)
+    ]
+    chosen_meshes = ("mesh",) if inspect is None else inspect  # no floor unless it is asked for
+    own += [(triangles, field) for name, triangles in scene.meshes() if name in chosen_meshes]
+    for (vertices, faces), alone in own:
+        triangles = divided(vertices[faces], size)
+        cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        twice = np.linalg.norm(cross, axis=1)
+        good = twice > 1e-12
+        middle = triangles[good].mean(axis=1)
+        if len(middle):
+            # facets of what is round lie a little inside of it
+            outward = alone.gradient(middle)
+            centres.append(middle - alone.distance(middle)[:, None] * outward)
+            normals.append(outward)
+            areas.append(0.5 * twice[good])
+    if scene.cloud is not None and (inspect is None or "cloud" in inspect):
+        points = drawn_points(scene)
+        sheet = field.distance(points) < -0.5 * (field.voxel or 0.0)
+        for k, side in enumerate(sides_of(field, points)):
+            chosen = sheet if k else np.ones(len(points), dtype=bool)
+            centres.append(side[chosen])
+            normals.append(field.gradient(side[chosen]))
+            areas.append(np.full(int(chosen.sum()), 1.0 - k))
+        cloud = sum(map(len, centres[:-2])) + np.flatnonzero(sheet)
+        pairs = np.column_stack([cloud, sum(map(len, centres[:-1])) + np.arange(len(cloud))])
+    c, n, a = np.vstack(centres), np.vstack(normals), np.concatenate(areas)
+    bare = field.distance(c + 0.1 * size * n) > 0.0 if len(c) else np.zeros(0, dtype=bool)
+    if not a[bare].any():
+        raise InputError(
+            "scene: there is no surface to be seen (half spaces and sea floors do not count); "
+            "expected solids, a mesh or a cloud, and if `inspect` names some, one with a surface"
+        )
+    place = np.cumsum(bare) - 1
+    return Patches(c[bare], n[bare], a[bare], place[pairs[bare[pairs].all(axis=1)]])
+
+
+def sides_of(field: DistanceField, points: Floats) -> tuple[Floats, Floats]:
+    """Points (n, 3) of a cloud on the surface, and on its other side: those of a sheet lie in its
+    middle."""
+    normals = field.gradient(points)
+    out = []
+    for sign in (1.0, -1.0):
+        # from a little beside the middle, where it is plain which side is nearer
+        side = points + sign * 0.5 * (field.voxel or 0.0) * normals
+        for _ in range(3):
+            side = side - field.distance(side)[:, None] * field.gradient(side)
+        out.append(side)
+    return out[0], out[1]
+
+
+def divided(triangles: Floats, size: float) -> Floats:
+    """Triangles (n, 3, 3) halved across their longest sides until none is longer than `size`."""
+    done = []
+    while len(triangles):
+        sides = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
+        small = sides.max(axis=1) <= size
+        done.append(triangles[small])
+        large = triangles[~small]
+        if len(large) > MOST_PATCHES:
+            raise InputError(
+                f"camera.patch: {size:g} makes more than {MOST_PATCHES} patches; expected larger "
+                "ones"
+            )
+        k = sides[~small].argmax(axis=1)
+        row = np.arange(len(large))
+        a, b, c = large[row, k], large[row, (k + 1) % 3], large[row, (k + 2) % 3]
+        m = 0.5 * (a + b)
+        triangles = np.concatenate([np.stack([a, m, c], axis=1), np.stack([m, b, c], axis=1)])
+    return np.concatenate(done) if done else np.zeros((0, 3, 3))
+
+
+class Surface(NamedTuple):
+    """Patches for the kernel: centres and normals (n, 3), and shares of the area (n,)."""
+
+    centres: Floats
+    normals: Floats
+    shares: Floats
+
+
+class View(NamedTuple):
+    """A camera at a place (3,), its heading and pitch (rad), the tangent of half the field of view,
+    which is a square pyramid, its range, and how far off a patch sight of it is asked for (m)."""
+
+    eye: Floats
+    yaw: float
+    pitch: float
+    half: float
+    reach: float
+    off: float
+
+
+class Coverage:
+    """What has been seen so far.
+
+    Attributes
+    ----------
+    seen, seen_through
+        (n,) with and without regard to what stands in between.
+    share, share_through
+        Of the area, the second as the paper counts.
+    """
+
+    def __init__(self, patches: Patches, field: DistanceField, camera: Camera) -> None:
+        self.patches, self.field, self.camera = patches, field, camera
+        self.seen = np.zeros(len(patches.areas), dtype=bool)
+        self.seen_through = self.seen.copy()
+        self.share = self.share_through = 0.0
+        self._shares = patches.areas / patches.areas.sum()
+        self._latest: tuple[Floats, Floats] | None = None
+
+    def look(self, eye: Floats, yaw: float) -> None:
+        """Mark what the camera sees from a place (3,) looking in a horizontal direction (rad), as
+        much up or down as its tilt allows to have the nearest patch in the middle."""
+        near = self._nearest(eye)
+        most = math.radians(self.camera.tilt)
+        pitch = min(max(math.atan2(near[2], math.hypot(near[0], near[1])), -most), most)
+        half = math.tan(math.radians(0.5 * self.camera.field_of_view))
+        open_, through = mark(
+            self.field.arrays,
+            Surface(self.patches.centres, self.patches.normals, self._shares),
+            self.seen,
+            self.seen_through,
+            View(eye, yaw, pitch, half, self.camera.range, 0.1 * self.camera.patch),
+        )
+        self.share += open_
+        self.share_through += through
+        if len(self.patches.sides):
+            a, b = self.patches.sides.T
+            for seen in (self.seen, self.seen_through):
+                seen[a] = seen[b] = seen[a] | seen[b]
+            self.share = float(self._shares @ self.seen)
+            self.share_through = float(self._shares @ self.seen_through)
+
+    def heading(self, eye: Floats, before: float) -> float:
+        """The horizontal direction (rad) of the nearest patch; `before` if it is straight above or
+        below."""
+        near = self._nearest(eye)
+        if math.hypot(near[0], near[1]) < 0.2 * float(np.linalg.norm(near)):
+            return before
+        return math.atan2(near[1], near[0])
+
+    def _nearest(self, eye: Floats) -> Floats:
+        """Return the vector from a place to the nearest patch."""
+        # kept, because `heading` and `look` ask for the same place in turn
+        if self._latest is None or not np.array_equal(self._latest[0], eye):
+            at = nearest(self.patches.centres, eye)
+            self._latest = (np.array(eye), np.asarray(self.patches.centres[at] - eye))
+        return self._latest[1]
+
+
+@kernel
+def nearest(centres: Floats, eye: Floats) -> int:
+    """Which of some points (n, 3) is nearest."""
+    best, at = math.inf, 0
+    for i in range(len(centres)):
+        d = (
+            (centres[i, 0] - eye[0]) ** 2
+            + (centres[i, 1] - eye[1]) ** 2
+            + (centres[i, 2] - eye[2]) ** 2
+        )
+        if d < best:
+            best, at = d, i
+    return at
+
+
+@interprets(nearest)
+def _nearest_in_numpy(centres: Floats, eye: Floats) -> int:
+    """Vectorise `nearest` over all points."""
+    x, y, z = (centres[:, axis] - eye[axis] for axis in range(3))
+    return int(np.argmin(x * x + y * y + z * z)) if len(centres) else 0
+
+
+@kernel
+def mark(
+    field: Field,
+    surface: Surface,
+    seen: Bools,
+    seen_through: Bools,
+    view: View,
+) -> tuple[float, float]:
+    """Mark the patches that are in view. Returns the shares that were new, with and without regard
+    to what stands in between."""
+    centres, normals, shares = surface.centres, surface.normals, surface.shares
+    eye, yaw, pitch, half = view.eye, view.yaw, view.pitch, view.half
+    reach, off = view.reach, view.off
+    new, new_through = 0.0, 0.0
+    cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
+    for i in range(len(centres)):
+        if seen[i]:
+            continue
+        x, y, z = centres[i, 0] - eye[0], centres[i, 1] - eye[1], centres[i, 2] - eye[2]
+        if x * x + y * y + z * z > reach * reach:
+            continue
+        if x * normals[i, 0] + y * normals[i, 1] + z * normals[i, 2] >= 0.0:
+            continue
+        ahead = cp * (cy * x + sy * y) + sp * z
+        left = cy * y - sy * x
+        up = cp * z - sp * (cy * x + sy * y)
+        if ahead <= 0.0 or abs(left) > half * ahead or abs(up) > half * ahead:
+            continue
+        if not seen_through[i]:
+            seen_through[i] = True
+            new_through += shares[i]
+        tx = centres[i, 0] + off * normals[i, 0]
+        ty = centres[i, 1] + off * normals[i, 1]
+        tz = centres[i, 2] + off * normals[i, 2]
+        low, _ = lowest_along(field, eye[0], eye[1], eye[2], tx, ty, tz, 0.5 * off)
+        if low > -0.5 * off:
+            seen[i] = True
+            new += shares[i]
+    return new, new_through
+
+
+@interprets(mark)
+def _mark_in_numpy(
+    field: Field, surface: Surface, seen: Bools, seen_through: Bools, view: View
+) -> tuple[float, float]:
+    """Vectorise `mark` over all patches."""
+    at = np.flatnonzero(~seen)
+    x, y, z = (surface.centres[at, axis] - view.eye[axis] for axis in range(3))
+    nx, ny, nz = (surface.normals[at, axis] for axis in range(3))
+    near = ~(x * x + y * y + z * z > view.reach * view.reach)
+    near &= ~(x * nx + y * ny + z * nz >= 0.0)
+    at, x, y, z = at[near], x[near], y[near], z[near]
+    cy, sy = math.cos(view.yaw), math.sin(view.yaw)
+    cp, sp = math.cos(view.pitch), math.sin(view.pitch)
+    ahead = cp * (cy * x + sy * y) + sp * z
+    left = cy * y - sy * x
+    up = cp * z - sp * (cy * x + sy * y)
+    wide = view.half * ahead
+    at = at[~((ahead <= 0.0) | (abs(left) > wide) | (abs(up) > wide))]
+    fresh = at[~seen_through[at]]
+    seen_through[fresh] = True
+    targets = surface.centres[at] + view.off * surface.normals[at]
+    eyes = np.broadcast_to(view.eye, targets.shape)
+    least = lowest_along_each(field, eyes, targets, 0.5 * view.off)
+    open_ = at[least > -0.5 * view.off]
+    seen[open_] = True
+    return _in_order(surface.shares[open_]), _in_order(surface.shares[fresh])
+
+
+def _in_order(shares: Floats) -> float:
+    """Return the sum of shares, added in order as `mark` does; np.sum adds pairwise."""
+    return float(np.add.accumulate(shares)[-1]) if len(shares) else 0.0

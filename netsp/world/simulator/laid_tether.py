@@ -1,0 +1,110 @@
+"""How the tether lies when a mission begins: laid out at the start, or as it is by now."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.world.mission.mission import Mission
+from netsp.world.paths.tree import Grid, ShortestTree
+from netsp.world.paths.tree import taut as taut_path
+from netsp.world.planner.planner import Tethers
+from netsp.world.scene.field import DistanceField, pushed_out
+from netsp.world.tether import Tether
+
+DEPTH = 0.25
+"""Of delta: the edges of a taut tether dip into surfaces by an eighth of it (docs/tether.md), and
+rounding in a file takes them no farther than this."""
+
+
+def first_tether(mission: Mission, field: DistanceField, model: Tethers, grid: Grid) -> Tether:
+    """The tether with the robot at the start: straight, or along the shortest path from the anchor
+    to a start that it does not see.
+
+    Parameters
+    ----------
+    mission : Mission
+        Its anchor and start count.
+    field : DistanceField
+        The scene's field.
+    model : TetherModel
+        The model of the tether.
+    grid : Grid
+        That paths are sought on.
+
+    Returns
+    -------
+    Tether
+        The tether.
+
+    Raises
+    ------
+    InputError
+        Anchor or start inside a solid, or in different parts of the water.
+    """
+    anchor = field.free_point(mission.anchor, "anchor")
+    start = field.free_point(mission.start, "start")
+    if field.line_of_sight(anchor, start, depth=0.125 * mission.delta):
+        return model.start(anchor, start)
+    path = ShortestTree(grid, start, anchor[None]).path(0)
+    if path is None:
+        raise InputError(
+            f"start: no path in the water leads from the anchor {_shown(anchor)} to "
+            f"{_shown(start)} at the clearance {mission.clearance:g}"
+        )
+    path = taut_path(field, path, 0.0, mission.delta)
+    return model.drive(model.start(anchor, anchor), path[1:])[0]
+
+
+def present_tether(mission: Mission, field: DistanceField, model: Tethers, grid: Grid) -> Tether:
+    """The tether when the mission begins: `first_tether`, or that of its state, pulled taut as if
+    the robot had gone along the line that the state gives.
+
+    Parameters
+    ----------
+    mission : Mission
+        Its anchor, start and state count.
+    field : DistanceField
+        The scene's field.
+    model : TetherModel
+        The model of the tether.
+    grid : Grid
+        That paths are sought on.
+
+    Returns
+    -------
+    Tether
+        The tether.
+
+    Raises
+    ------
+    InputError
+        As of `first_tether`; a state inside a solid, or whose tether passes through one, or is
+        longer than the limit.
+    """
+    if mission.state is None:
+        return first_tether(mission, field, model, grid)
+    anchor = field.free_point(mission.anchor, "anchor")
+    robot = field.free_point(mission.state.position, "state.position")
+    line = np.vstack([anchor, np.array(mission.state.tether)[1:-1].reshape(-1, 3), robot])
+    for k, (a, b) in enumerate(pairwise(line)):
+        if not field.line_of_sight(a, b, depth=DEPTH * mission.delta):
+            raise InputError(
+                f"state.tether: passes through a solid between points {k} and {k + 1}, "
+                f"{_shown(a)} and {_shown(b)}; expected a line in the water"
+            )
+    line[1:-1] = pushed_out(field, line[1:-1], 1e-3)
+    tether = model.drive(model.start(anchor, anchor), line[1:])[0]
+    if tether.length > mission.tether_length:
+        raise InputError(
+            f"state.tether: takes {tether.length:.4g} m when it is taut; expected no more than "
+            f"tether_length, {mission.tether_length:g}"
+        )
+    return tether
+
+
+def _shown(point: Floats) -> str:
+    return f"({', '.join(f'{v:g}' for v in point)})"

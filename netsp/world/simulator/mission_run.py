@@ -1,0 +1,294 @@
+"""Runs a mission: planner, vehicle and tether, step by step, with a log that tells all."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.errors import InputError, interrupted
+from netsp.world.mission.anchor_track import Track
+from netsp.world.mission.mission import TURN_TIME, Mission, MissionWaypoint
+from netsp.world.mission.mission_limits import check_bounds, check_names, check_size, check_tether
+from netsp.world.mission.run_log import LogRow, Run
+from netsp.world.paths.tree import Grid
+from netsp.world.planner import Command, Planner, PlannerOptions, make_planner
+from netsp.world.planner.planner import DONE, DWELL, WAIT
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.scene import Scene
+from netsp.world.scene.surfaces import extent
+from netsp.world.simulator.coverage import Coverage, patches_of
+from netsp.world.simulator.current import Water
+from netsp.world.simulator.laid_tether import first_tether, present_tether
+from netsp.world.simulator.sensing import Positions
+from netsp.world.simulator.simulation import STEP, Simulation
+from netsp.world.simulator.stalls import Stalls
+from netsp.world.simulator.summary import summarise
+from netsp.world.simulator.surprises import SceneSurprises
+from netsp.world.simulator.surroundings import Surroundings
+from netsp.world.tether import GeodesicTether, make_tether
+from netsp.world.vehicle import make_vehicle
+from netsp.world.vehicle.kinematic import turned
+
+CELL, MOST_CELLS = 0.2, 2_000_000
+"""Cells of the grid that paths are sought on, metres, where a mission does not say; larger ones
+where there would be more than so many, so that planning takes no longer than a second."""
+
+HEADING_REACH = math.radians(5.0)
+"""A heading this near counts as taken."""
+
+STUCK = 600.0
+"""Seconds at one waypoint after which it is left out."""
+
+
+def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
+    """The grid that paths are sought on: the scene's bounds, or all there is and some room.
+
+    Parameters
+    ----------
+    mission : Mission
+        Its cell, waypoints and clearance count.
+    scene : Scene
+        Its bounds count.
+    field : DistanceField
+        The scene's field.
+
+    Returns
+    -------
+    Grid
+        The grid.
+
+    Raises
+    ------
+    InputError
+        It would take too much memory; says which cell would not. A cell larger than the site.
+    """
+    low, high, cell = grid_box(mission, scene)
+    return Grid(field, low, high, cell, mission.clearance)
+
+
+def grid_box(mission: Mission, scene: Scene) -> tuple[Floats, Floats, float]:
+    """Return the box of the grid for paths, and the size of its cells.
+
+    Parameters
+    ----------
+    mission : Mission
+        Mission with cell, waypoints and clearance.
+    scene : Scene
+        Scene with bounds.
+
+    Returns
+    -------
+    low, high : ndarray, shape (3,)
+        Corners of the box, metres.
+    cell : float
+        Cell size, metres.
+
+    Raises
+    ------
+    InputError
+        A cell larger than the site.
+    """
+    cell = mission.cell or CELL
+    if scene.bounds is not None:
+        low, high = np.array(scene.bounds[:3]), np.array(scene.bounds[3:])
+    else:
+        low, high = extent(scene, mission.every_place)
+        room = 5.0 * cell + mission.clearance
+        low, high = low - room, high + room
+    if cell > (widest := float((high - low).max())):
+        raise InputError(
+            f"cell: {cell:g} is more than the whole site, {widest:.4g} across; expected far less"
+        )
+    if mission.cell is None:
+        cell = max(CELL, float(np.prod(np.maximum(high - low, CELL)) / MOST_CELLS) ** (1.0 / 3.0))
+    return low, high, cell
+
+
+def simulate(
+    mission: Mission,
+    planner: str | Callable[..., Planner] = "predictive",
+    *,
+    vehicle: str = "kinematic",
+    tether: str | Callable[[DistanceField, float], Any] = "geodesic",
+    options: PlannerOptions | None = None,
+    scene: Scene | None = None,
+    field: DistanceField | None = None,
+    snap: bool = False,
+    surprises: SceneSurprises | None = None,
+    seed: int = 0,
+    on_step: Callable[[LogRow, Planner], None] | None = None,
+) -> Run:
+    """Run a mission.
+
+    Parameters
+    ----------
+    mission : Mission
+        What is flown.
+    planner : str or callable
+        A name (`netsp.world.planner.PLANNERS`), or a callable that makes one, such as a class
+        derived from `Planner`.
+    vehicle : str
+        A name (`netsp.world.vehicle.VEHICLES`).
+    tether : str or callable
+        The model that the planner believes: `geodesic`, `react`, or a callable that makes a
+        `netsp.world.tether.TetherModel` of a field and a resolution; what is logged is the
+        geodesic one.
+    options : PlannerOptions, optional
+        How the planner finds paths.
+    scene : Scene, optional
+        When it is at hand.
+    field : DistanceField, optional
+        When it is at hand.
+    snap : bool
+        Move waypoints out of solids.
+    surprises : SceneSurprises, optional
+        In what the water differs from the map, and when.
+    seed : int
+        Of the gusts, and of the sensors' noise.
+    on_step : callable, optional
+        Called with every row and the planner; a KeyboardInterrupt ends the run, and what was done
+        till then is returned.
+
+    Returns
+    -------
+    Run
+        What came of it.
+
+    Raises
+    ------
+    InputError
+        Before the first step: unknown names, waypoints inside solids, anchor and start in different
+        parts of the water, a tether that is shorter than the path between them.
+    """
+    check_names(planner, vehicle, tether)
+    check_size(mission)
+    track = Track.of(mission)
+    if surprises is not None and tether != "geodesic":
+        raise InputError(f"surprises: tether model {tether!r} has one map only; expected geodesic")
+    if track is not None and tether != "geodesic":
+        raise InputError(f"track: tether model {tether!r} cannot follow it; expected geodesic")
+    scene = scene or mission.load_scene()
+    check_bounds(mission, scene)
+    field = field or scene.field()
+    mission = mission.checked_waypoints(field, snap=snap)
+    tethers = GeodesicTether(field, mission.delta)
+    grid = grid_of(mission, scene, field)
+    laid = first_tether(mission, field, tethers, grid)
+    taut = present_tether(mission, field, tethers, grid)
+    if surprises is not None:
+        surprises.check(scene, "", len(mission.waypoints))
+    if track is not None:
+        track.check(field, mission.delta)
+    check_tether(mission, taut.length)
+    robot = make_vehicle(vehicle, np.array(mission.begin), mission.speed)
+    believed = None if tether == "geodesic" else make_tether(tether, field, mission.delta)
+    chosen = make_planner(planner, mission, field, believed or tethers, grid, options)
+    chosen.laid = laid
+    coverage = None
+    if mission.camera is not None:
+        patches = patches_of(
+            scene, field, mission.camera.patch, mission.every_place, mission.inspect
+        )
+        coverage = Coverage(patches, field, mission.camera)
+    water = Water(mission.current, mission.gusts, seed)
+    chosen.warm_up(robot.position, taut)
+    positions = Positions(mission.sensor, field, robot.position, STEP, seed)
+    if believed is None and not positions.exact:
+        believed = tethers
+    world = Simulation(mission, field, robot, tethers, taut, water, coverage, believed)
+    world.positions, world.track = positions, track
+    if believed is not None:
+        world.believed = present_tether(mission, field, believed, grid)
+    around = None
+    if surprises is not None:
+        around = Surroundings(
+            mission, scene, field.voxels, surprises, np.vstack([taut.nodes, robot.position]), seed
+        )
+        world.model, world.believed, world.tethers_seen = tethers, taut, [(0, taut)]
+    since, stopped, stalls = (0.0, -1), False, Stalls()
+    begin = time.perf_counter()
+    try:
+        while True:
+            before, chosen.now = chosen.index, world.now
+            if around is not None:
+                around.go_on(world, chosen)
+            command = chosen.step(world.robot, world.believed or world.tether)
+            row = world.note(chosen, command)
+            if on_step is not None:
+                on_step(row, chosen)
+            if command.mode == DONE:
+                break
+            if chosen.reached and chosen.index > before and chosen.reached[-1] == before:
+                stay(world, chosen, chosen.mission.waypoints[before], on_step)
+                if chosen.anchor_moves and world.now > row.time:
+                    chosen.path = chosen.path[:0]  # it was planned for another moment
+                    continue
+            if since[1] != chosen.index or command.mode == WAIT:
+                since = (world.now, chosen.index)
+            elif world.now - since[0] > STUCK:
+                chosen.leave_out(f"not reached in {STUCK:g} s")
+                continue
+            if stalls.seen(world, chosen, command):
+                chosen.leave_out(stalls.reason)
+                continue
+            fresh = before != chosen.index or command.replan_s > 0.0 or not world.now
+            passed, moved = world.go(command.path, fresh, chosen.homeward)
+            if moved:
+                chosen.passed(passed)
+            else:
+                chosen.leave_out("the path to it leads through a solid")
+    except (KeyboardInterrupt, SystemError) as error:
+        if not interrupted(error):
+            raise
+        stopped = True
+    wall = time.perf_counter() - begin
+    summary = {**summarise(chosen.mission, chosen, world, wall, stopped), **chosen.told()}
+    summary["stalls"] = stalls.found
+    summary["surprises"] = None if around is None else around.told()
+    return Run(
+        chosen.flown,
+        planner if isinstance(planner, str) else chosen.name,
+        tuple(world.log),
+        world.tether,
+        summary,
+        None if around is None else around.scene_now,
+        tuple(world.tethers_seen),
+    )
+
+
+def stay(
+    world: Simulation,
+    planner: Planner,
+    waypoint: MissionWaypoint,
+    on_step: Callable[[LogRow, Planner], None] | None = None,
+) -> None:
+    """At a waypoint: turn to its heading, for `TURN_TIME` at most, then stay as long as it asks.
+
+    Parameters
+    ----------
+    world : Simulation
+        It is moved on.
+    planner : Planner
+        Already on its way to what is next.
+    waypoint : MissionWaypoint
+        The waypoint.
+    on_step : callable, optional
+        As of `simulate`.
+    """
+    heading = None if waypoint.heading is None else math.radians(waypoint.heading)
+    if heading is None and waypoint.dwell == 0.0:
+        return
+    here, since, arrived = world.vehicle.position, world.now, None
+    while arrived is None or world.now < arrived + waypoint.dwell - 1e-9:
+        world.go(here[None], world.now == since, heading=heading)
+        row = world.note(planner, Command(here[None], DWELL))
+        if on_step is not None:
+            on_step(row, planner)
+        off = 0.0 if heading is None else abs(turned(heading - world.vehicle.yaw))
+        if arrived is None and (off <= HEADING_REACH or world.now - since >= TURN_TIME):
+            arrived = world.now

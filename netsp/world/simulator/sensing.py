@@ -1,0 +1,73 @@
+"""What the planner is told of the robot's position: late, and not quite right."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.world.mission.equipment import PositionSensor
+from netsp.world.scene.field import DistanceField, pushed_out
+
+TRUST = 0.25
+"""Share of a new position that goes into the estimate: the others of the last second or so average
+its noise out. Their age is made up for by the velocity that they show."""
+
+
+class Positions:
+    """Positions measured one step after the other, filtered; never inside a solid.
+
+    An alpha-beta filter (Bar-Shalom, Li & Kirubarajan, "Estimation with Applications to Tracking
+    and Navigation", 2001, section 6.5), with the gain of the velocity that is critically damped.
+
+    Parameters
+    ----------
+    sensor : PositionSensor
+        Its noise and delay.
+    field : DistanceField
+        The map.
+    place : ndarray, shape (3,)
+        Where the robot starts, which is known, metres.
+    step : float
+        Seconds between two positions.
+    seed : int
+        Of the noise.
+    """
+
+    def __init__(
+        self, sensor: PositionSensor, field: DistanceField, place: Floats, step: float, seed: int
+    ) -> None:
+        self.sensor, self.field, self.step = sensor, field, step
+        self._late = round(sensor.delay / step)
+        self._true = [np.array(place, dtype=float)]
+        self._estimate, self._velocity = self._true[0].copy(), np.zeros(3)
+        self._rng = np.random.default_rng([seed, 1])
+
+    @property
+    def exact(self) -> bool:
+        """Whether positions are known exactly and at once."""
+        return self.sensor.noise == 0.0 and self._late == 0
+
+    def __call__(self, place: Floats) -> Floats:
+        """What is thought of where the robot is.
+
+        Parameters
+        ----------
+        place : ndarray, shape (3,)
+            Where it is, metres.
+
+        Returns
+        -------
+        ndarray, shape (3,)
+            Metres.
+        """
+        if self.exact:
+            return place
+        self._true.append(np.array(place, dtype=float))
+        old = self._true[max(0, len(self._true) - 1 - self._late)]
+        measured = old + self.sensor.noise * self._rng.normal(size=3)
+        ahead = self._estimate + self.step * self._velocity
+        off = measured - ahead
+        self._estimate = ahead + TRUST * off
+        self._velocity += TRUST**2 / (2.0 - TRUST) / self.step * off
+        now = self._estimate + self._late * self.step * self._velocity
+        return np.asarray(pushed_out(self.field, now[None], 1e-3)[0])

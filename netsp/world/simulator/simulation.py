@@ -1,0 +1,218 @@
+"""A robot on a tether in a scene, moved on step by step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.world.mission.anchor_track import Track
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.run_log import LogRow
+from netsp.world.planner import Command, Planner
+from netsp.world.planner.planner import HOME, Tethers
+from netsp.world.planner.preview import DEEPEST
+from netsp.world.scene.field import DistanceField, pushed_out
+from netsp.world.simulator.coverage import Coverage
+from netsp.world.simulator.sensing import Positions
+from netsp.world.tether import GeodesicTether, Tether
+from netsp.world.tether.load import Load, payout, pull_on_robot, turning
+from netsp.world.vehicle import Vehicle
+
+STEP = 0.1
+"""Seconds between two decisions of the planner."""
+
+SEEN = 10
+"""Steps between two tethers that are kept for pictures."""
+
+FRAME = 2
+"""Steps between two pictures of the camera."""
+
+LEAST_COURSE = 0.05
+"""m/s: slower motion through the water asks for no heading."""
+
+
+@dataclass
+class Simulation:
+    """A robot on a tether in a scene, moved on step by step.
+
+    Parameters
+    ----------
+    mission : Mission
+        What is flown.
+    scene : DistanceField
+        The map.
+    vehicle : Vehicle
+        The robot.
+    tethers : GeodesicTether
+        The model of the taut tether.
+    tether : Tether
+        The taut tether, by the geodesic model.
+    water : callable
+        Velocity of the water (3,), m/s, at a time in seconds.
+    coverage : Coverage, optional
+        What the camera has seen.
+    model : TetherModel, optional
+        Another model, that the planner believes in.
+    believed : Tether, optional
+        Its tether.
+    positions : Positions, optional
+        What the planner is told of the robot's position.
+    thought : ndarray, shape (3,), optional
+        Where it thinks that the robot is, metres.
+    track : Track, optional
+        Where the anchor goes.
+    now : float
+        Seconds since the start.
+    tethers_seen : list of (int, Tether)
+        Row of the log and tether now and then, where the scene changes; else empty.
+    contacts : int
+        How often the robot has met a solid.
+    shortening : bool
+        Whether the limit was lowered below the tether, which is being shortened.
+    log : list of LogRow
+        One row per step.
+    """
+
+    mission: Mission
+    scene: DistanceField
+    vehicle: Vehicle
+    tethers: GeodesicTether
+    tether: Tether
+    water: Callable[[float], Floats]
+    coverage: Coverage | None = None
+    model: Tethers | None = None
+    believed: Tether | None = None
+    positions: Positions | None = None
+    thought: Floats | None = None
+    track: Track | None = None
+    now: float = 0.0
+    contacts: int = 0
+    shortening: bool = False
+    tethers_seen: list[tuple[int, Tether]] = field(default_factory=list)
+    log: list[LogRow] = field(default_factory=list)
+    _was: Floats | None = None
+
+    def _course(self, path: Floats, yaw: float) -> float:
+        """Heading (rad) along the way through the water: a vehicle is fastest ahead."""
+        leg = path[0] - self.vehicle.position
+        far = float(np.linalg.norm(leg))
+        if far < 1e-6:
+            return yaw
+        x, y, _ = leg * (self.mission.speed / far) - self.water(self.now)
+        return math.atan2(y, x) if math.hypot(x, y) > LEAST_COURSE else yaw
+
+    def _pull(self) -> dict[str, Floats]:
+        """The tether's force on a vehicle that is to feel it."""
+        physics = self.mission.tether
+        if not physics.pulls_vehicle:
+            return {}
+        here, delta = self.vehicle.position, self.tethers.delta
+        velocity = np.zeros(3) if self._was is None else (here - self._was) / STEP
+        return {"pull": pull_on_robot(self.tether, self.load, physics.friction, velocity, delta)}
+
+    @property
+    def load(self) -> Load:
+        """What acts on the tether now."""
+        return self.mission.tether.load(self.water(self.now))
+
+    def note(self, planner: Planner, command: Command) -> LogRow:
+        """Write down where things are.
+
+        Parameters
+        ----------
+        planner : Planner
+            Its waypoint and mode are logged.
+        command : Command
+            What it asked for.
+
+        Returns
+        -------
+        LogRow
+            The row.
+        """
+        x, y, z = (float(v) for v in self.vehicle.position)
+        seen = self.coverage
+        if seen is not None and len(self.log) % FRAME == 0 and command.mode != HOME:
+            seen.look(self.vehicle.position, self.vehicle.yaw)
+        limit, out = self.mission.tether_length, payout(self.tether, self.load)
+        self.shortening = self.shortening and out > limit
+        row = LogRow(
+            round(self.now, 6), x, y, z, self.vehicle.yaw, planner.index, command.mode,
+            self.tether.length, out,
+            turning(self.tether, self.tethers.delta),
+            seen.share if seen else 0.0, seen.share_through if seen else 0.0,
+            command.replan_s, limit, self.shortening,
+        )  # fmt: skip
+        if self.tethers_seen and len(self.log) % SEEN == 0:
+            self.tethers_seen.append((len(self.log), self.tether))
+        self.log.append(row)
+        return row
+
+    def go(
+        self, path: Floats, fresh: bool, homeward: bool = False, heading: float | None = None
+    ) -> tuple[int, bool]:
+        """Take one step along a path; a vehicle that runs into a solid is stopped where it was.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            Points to pass, metres.
+        fresh : bool
+            Whether the path does not continue the one before.
+        homeward : bool
+            Whether the inspection is over: the camera then no longer asks for a heading.
+        heading : float, optional
+            To turn to, radians, whatever the camera asks for.
+
+        Returns
+        -------
+        count : int
+            How many points of the path are behind the robot.
+        moved : bool
+            Whether the vehicle could move.
+        """
+        robot, yaw, moved = self.vehicle.position, self.vehicle.yaw, True
+        pull = self._pull()
+        self._was = robot
+        if heading is not None:
+            yaw = heading
+        elif self.coverage is not None and not homeward:
+            yaw = self.coverage.heading(robot, yaw)
+        elif self.coverage is None:
+            yaw = self._course(path, yaw)
+        points, passed = self.vehicle.go(path, STEP, yaw, self.water(self.now), fresh, **pull)
+        self.now += STEP
+        anchor = None if self.track is None else self.track(self.now)
+        if self.scene.distance(np.array(points)).min() < -DEEPEST * self.tethers.delta:
+            self.vehicle.stop_at(robot)
+            points, passed, moved = [robot], 0, False
+            self.contacts += 1
+        for point in points:
+            self.tether = self.tethers.update(self.tether, point, anchor)
+        told = points
+        if self.positions is not None and not self.positions.exact:
+            self.thought = self.positions(self.vehicle.position)
+            told = [self.thought]
+        if self.model is not None and self.believed is not None:
+            for point in told:
+                self.believed = self._believed_after(point, anchor)
+        return passed, moved
+
+    def _believed_after(self, point: Floats, anchor: Floats | None) -> Tether:
+        """Another model's tether; anchors move in the geodesic one only."""
+        assert self.model is not None
+        assert self.believed is not None
+        if isinstance(self.model, GeodesicTether):
+            # a map that is wrong may have a solid where the robot is
+            point = pushed_out(self.model.field, point[None], 0.0)[0]
+            return self.model.update(self.believed, point, anchor)
+        return self.model.update(self.believed, point)
+
+    @property
+    def robot(self) -> Floats:
+        """(3,) where the planner thinks that the robot is."""
+        return self.vehicle.position if self.thought is None else self.thought

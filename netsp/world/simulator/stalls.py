@@ -1,0 +1,69 @@
+"""Does the robot get on? In a strong current it may not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from netsp.base.geometry import polylines
+from netsp.world.planner import Command, Planner
+from netsp.world.planner.planner import HOLD, WAIT
+from netsp.world.simulator.simulation import Simulation
+
+STALL, PROGRESS = 30.0, 0.05
+"""A robot has stalled when in so many seconds it has not come so many metres nearer."""
+
+
+@dataclass
+class Stalls:
+    """Watches whether the robot gets on: in a strong current it may not.
+
+    Parameters
+    ----------
+    found : list of dict
+        Time (s), waypoint and place of each stall.
+    reason : str
+        Of the last one, in a line.
+    """
+
+    found: list[dict[str, Any]] = field(default_factory=list)
+    reason: str = ""
+    _index: int = -1
+    _least: float = math.inf
+    _since: float = 0.0
+
+    def seen(self, world: Simulation, planner: Planner, command: Command) -> bool:
+        """Whether what is left of the path has not become shorter for `STALL` seconds.
+
+        Parameters
+        ----------
+        world : Simulation
+            As it is.
+        planner : Planner
+            Its waypoint counts.
+        command : Command
+            Its path counts; a path that has been planned anew starts the clock again.
+
+        Returns
+        -------
+        bool
+            Whether the robot has stalled; it is then noted.
+        """
+        here = world.vehicle.position
+        left = polylines.length(np.vstack([here, command.path]))
+        # home may move away as fast as the robot comes after it
+        chasing = command.mode == WAIT or (planner.homeward and planner.anchor_moves)
+        planned = planner.index != self._index or command.replan_s > 0.0
+        if chasing or planned or left < self._least - PROGRESS:
+            self._index, self._least, self._since = planner.index, left, world.now
+            return False
+        if world.now - self._since < STALL or command.mode == HOLD:
+            return False
+        water = float(np.linalg.norm(world.water(world.now)))
+        self.reason = f"stalled: no progress in {STALL:g} s, in water of {water:.2f} m/s"
+        self.found.append({"time": world.now, "waypoint": planner.index, "position": here.tolist()})
+        self._index = -1
+        return True

@@ -1,0 +1,156 @@
+"""The numbers of a run."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.geometry import polylines
+from netsp.model.solution import tension_ratio
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.run_log import LogRow
+from netsp.world.planner import Planner
+from netsp.world.planner.planner import DWELL, FREE, WAIT
+from netsp.world.simulator.simulation import STEP, Simulation
+
+
+def summarise(
+    mission: Mission, planner: Planner, world: Simulation, wall: float, interrupted: bool
+) -> dict[str, Any]:
+    """The numbers of a run, as the papers give them.
+
+    `exceedance_s` is the time in which more tether must be out than there is: the taut length and
+    what slack and sag add to it (`longest_payout`); after the limit itself was lowered below that,
+    the time until it fits is `shortening_s`. `waited_s` is the
+    time in which the robot waited for a moving anchor. `stops` tells of each waypoint visited, with
+    the sum of turning angles and the factor e^(mu theta) that friction multiplies the tension by.
+    `contacts` counts how often the robot met a solid.
+    `recovery_s` is the time to come back to the anchor afterwards, by retracing the tether, or the
+    whole path (the paper does not say which). Both, `path` and what was seen are of the inspection;
+    `home` tells of the leg back to the start that follows it: whether it was `reached` with the
+    tether free, how much longer the tether is there than when the mission began (`left`, m), and
+    how long it took.
+
+    Parameters
+    ----------
+    mission : Mission
+        What was flown.
+    planner : Planner
+        As it is at the end.
+    world : Simulation
+        As it is at the end.
+    wall : float
+        Seconds that the run took.
+    interrupted : bool
+        Whether it was stopped.
+
+    Returns
+    -------
+    dict
+        The numbers by name.
+    """
+    log = world.log
+    # the inspection ends with the row in which the last waypoint is behind the robot
+    before = [
+        n for n, r in enumerate(log) if r.waypoint < len(mission.waypoints) or r.mode == DWELL
+    ]
+    last = before[-1] + 1 if before else 0
+    inspected = log[: last + 1]
+    lengths = np.array([r.tether for r in log])
+    payouts = np.array([r.payout for r in log])
+    turnings = np.array([r.turning for r in log])
+    places = np.array([[r.x, r.y, r.z] for r in inspected])
+    planned = [r.replan_s for r in log if r.replan_s > 0.0]
+    walked = polylines.length(places)
+    inspection = inspected[-1].time if log else 0.0
+    control = world.vehicle.control_s
+    by_tether = inspected[-1].tether / mission.speed if log else 0.0
+    by_path = walked / mission.speed
+    return {
+        "mission": mission.name,
+        "planner": planner.name,
+        "status": "interrupted" if interrupted else "done",
+        "inspection_s": inspection,
+        "recovery_s": {"tether": by_tether, "path": by_path},
+        "total_s": {"tether": inspection + by_tether, "path": inspection + by_path},
+        "path": walked,
+        "tether_length": mission.tether_length,
+        "longest_tether": float(lengths.max(initial=0.0)),
+        "longest_payout": float(payouts.max(initial=0.0)),
+        "exceedance_s": STEP * sum(_over(r) and not r.shortening for r in log),
+        "shortening_s": STEP * sum(r.shortening for r in log),
+        "friction": _friction(mission, turnings),
+        "visited": len(planner.reached),
+        "waypoints": len(mission.waypoints),
+        "contacts": world.contacts,
+        "left_out": [{"waypoint": k, "reason": why} for k, why in planner.left_out],
+        "stops": _stops(mission, planner, log),
+        "waited_s": STEP * sum(r.mode == WAIT for r in log),
+        "home": _home(planner, world, inspection),
+        "defects": len(planner.defects),
+        "replans": len(planned),
+        "replan_median_s": float(np.median(planned)) if planned else 0.0,
+        "replan_worst_s": max(planned, default=0.0),
+        "coverage": log[-1].coverage if world.coverage and log else None,
+        "coverage_through": log[-1].coverage_through if world.coverage and log else None,
+        "control_median_s": float(np.median(control)) if control else 0.0,
+        "control_worst_s": max(control, default=0.0),
+        "wall_s": wall,
+    }
+
+
+def _over(row: LogRow) -> bool:
+    return row.payout > row.limit * (1 + 1e-9)
+
+
+def _home(planner: Planner, world: Simulation, since: float) -> dict[str, Any]:
+    """How the mission ended: `left` is asked once the tether has come to rest."""
+    model, delta = world.tethers, world.tethers.delta
+    as_laid = model.refine(model.update(planner.laid_now, world.vehicle.position)).length
+    left = max(0.0, model.refine(world.tether).length - as_laid)
+    return {
+        "reached": planner.home,
+        "tether_free": planner.home and left <= FREE * delta,
+        "left": left,
+        "seconds": world.now - since if planner.homeward else 0.0,
+        "reason": planner.not_home,
+    }
+
+
+def _stops(mission: Mission, planner: Planner, log: list[LogRow]) -> list[dict[str, Any]]:
+    """The tether at each waypoint visited."""
+    arrival: dict[int, LogRow] = {}
+    passed, visited = 0, set(planner.reached)
+    for row in log:
+        for index in range(passed, row.waypoint):
+            if index in visited:
+                arrival[index] = row
+        passed = max(passed, row.waypoint)
+    mu = mission.tether.friction
+    return [
+        {
+            "waypoint": k,
+            "tether": r.tether,
+            "payout": r.payout,
+            "turning_deg": math.degrees(r.turning),
+            "tension_ratio": tension_ratio(mu, r.turning),
+        }
+        for k, r in arrival.items()
+    ]
+
+
+def _friction(mission: Mission, turnings: Floats) -> dict[str, float] | None:
+    """Turning and tension ratio where they were greatest, and seconds over the limit; None without
+    friction."""
+    physics = mission.tether
+    if physics.friction == 0.0:
+        return None
+    most = float(turnings.max(initial=0.0))
+    return {
+        "most_turning_deg": math.degrees(most),
+        "most_tension_ratio": tension_ratio(physics.friction, most),
+        "over_s": float((turnings > physics.max_turning * (1 + 1e-9)).sum() * STEP),
+    }

@@ -1,0 +1,248 @@
+"""What may change in a scene while a robot is under way: the surprise file of a mission."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import ConfigDict, Field, model_validator
+
+from netsp.base.errors import InputError
+from netsp.base.field_types import Name, NonNegative, Point3, Positive
+from netsp.base.files import FileModel
+from netsp.base.validated import Model
+from netsp.world.mission.mission import Mission, WaypointLike
+from netsp.world.mission.mission_limits import check_bounds
+from netsp.world.scene.field import DistanceField
+from netsp.world.scene.scene import Scene, Solid
+
+KINDS = (
+    "appear", "vanish", "move", "add_waypoint", "cancel_waypoint", "push", "tether_length",
+)  # fmt: skip
+"""What may happen."""
+
+
+class SolidMove(Model):
+    """A solid is somewhere else from now on."""
+
+    solid: Annotated[Name, Field(description="its name")]
+    by: Annotated[Point3, Field(description="(x, y, z) to move it by, m")]
+
+
+class SceneEvent(Model):
+    """Something that happens at a time after the start; one of the other fields says what.
+
+    Attributes
+    ----------
+    time : float
+        Seconds since the start; what happens at 0 was there, or not, from the beginning.
+    appear : Solid or None
+        A solid that is not on the map.
+    vanish : str or None
+        Name of a solid that is not there after all.
+    move : SolidMove or None
+        A solid that moves.
+    add_waypoint : MissionWaypoint or None
+        One more to visit.
+    cancel_waypoint : int or None
+        Number of one that need not be visited, in the order of the mission file; those that were
+        added come after all others.
+    push : (x, y, z) or None
+        How far the robot is carried off, metres.
+    tether_length : float or None
+        What the tether may be from now on, metres.
+    """
+
+    time: Annotated[NonNegative, Field(description="seconds after the start")]
+    appear: Annotated[Solid | None, Field(description="a solid that is there from now on")] = None
+    vanish: Annotated[Name | None, Field(description="name of a solid that is gone")] = None
+    move: Annotated[SolidMove | None, Field(description="a solid that moves")] = None
+    add_waypoint: Annotated[
+        WaypointLike | None, Field(description="one more to visit: (x, y, z), m, or an object")
+    ] = None
+    cancel_waypoint: Annotated[
+        Annotated[int, Field(ge=0)] | None,
+        Field(description="number of a waypoint that need not be visited"),
+    ] = None
+    push: Annotated[
+        Point3 | None, Field(description="(x, y, z) by which the robot is carried off, m")
+    ] = None
+    tether_length: Annotated[
+        Positive | None, Field(description="maximum length of the taut tether from now on, m")
+    ] = None
+
+    @property
+    def of_scene(self) -> bool:
+        """Whether a solid appears, vanishes or moves."""
+        return any(v is not None for v in (self.appear, self.vanish, self.move))
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        given = [k for k in KINDS if getattr(self, k) is not None]
+        if len(given) != 1:
+            raise ValueError(
+                f"expected one of {', '.join(KINDS)}, got {', '.join(given) or 'none'}"
+            )
+        return self
+
+
+class SceneSurprises(FileModel):
+    """The surprise file of a mission.
+
+    >>> text = '{"schema_version": 1, "events": [{"time": 60, "vanish": "pile 3"}]}'
+    >>> SceneSurprises.from_json(text).events[0].vanish
+    'pile 3'
+    """
+
+    file_kind: ClassVar[str] = "scene surprises"
+
+    model_config = ConfigDict(title="netsp scene surprises")
+
+    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
+    events: Annotated[tuple[SceneEvent, ...], Field(description="in any order")]
+
+    def in_order(self) -> list[SceneEvent]:
+        """The events by time.
+
+        Returns
+        -------
+        list of SceneEvent
+            Those of one time as in the file.
+        """
+        return sorted(self.events, key=lambda e: e.time)
+
+    def check(self, scene: Scene, source: str = "", waypoints: int | None = None) -> None:
+        """Refuse events that a scene or a mission cannot have.
+
+        Parameters
+        ----------
+        scene : Scene
+            The map.
+        source : str
+            What messages call these surprises; nothing if it is empty.
+        waypoints : int, optional
+            How many the mission has.
+
+        Raises
+        ------
+        InputError
+            A solid or waypoint that is not there when the event comes, or a name that two would
+            have.
+        """
+        solids = scene.all_solids()
+        for k, event in sorted(enumerate(self.events), key=lambda e: e[1].time):
+            try:
+                solids = changed(solids, event)
+                if waypoints is not None:
+                    waypoints += event.add_waypoint is not None
+                    if (event.cancel_waypoint or 0) >= waypoints:
+                        raise InputError(
+                            f"cancel_waypoint: no waypoint #{event.cancel_waypoint}; expected #0 "
+                            f"to #{waypoints - 1}"
+                        )
+            except InputError as error:
+                where = f"{source}: " if source else ""
+                raise InputError(f"{where}events[{k}]: {error}") from None
+
+    def check_places(
+        self, mission: Mission, scene: Scene, field: DistanceField, source: str = ""
+    ) -> None:
+        """Refuse waypoints that a mission file could not have either, and pushes farther than a
+        tether.
+
+        Parameters
+        ----------
+        mission : Mission
+            What is flown.
+        scene : Scene
+            The map; what has appeared by then does not count.
+        field : DistanceField
+            The scene's field.
+        source : str
+            What messages call these surprises; nothing if it is empty.
+
+        Raises
+        ------
+        InputError
+            A waypoint in a solid or out of bounds; a push of more than twice the tether.
+        """
+        for k, event in enumerate(self.events):
+            where = f"{source}: events[{k}]" if source else f"events[{k}]"
+            if event.add_waypoint is not None:
+                more = mission.model_copy(update={"waypoints": (event.add_waypoint,), "tour": None})
+                try:
+                    check_bounds(more, scene)
+                    more.checked_waypoints(field)
+                except InputError as error:
+                    raise InputError(f"{where}.add_waypoint: {error}") from None
+            if event.push is not None:
+                far = float(np.linalg.norm(event.push))
+                if far > 2.0 * mission.tether_length:
+                    raise InputError(
+                        f"{where}.push: carries the robot {far:.4g} m off; expected at most twice "
+                        f"the tether's length, {2.0 * mission.tether_length:g}"
+                    )
+
+
+def changed(solids: tuple[Solid, ...], event: SceneEvent) -> tuple[Solid, ...]:
+    """The solids after an event.
+
+    Parameters
+    ----------
+    solids : tuple of Solid
+        Before.
+    event : SceneEvent
+        What happens.
+
+    Returns
+    -------
+    tuple of Solid
+        After.
+
+    Raises
+    ------
+    InputError
+        It names a solid that is not there, or one appears by a name that is taken.
+    """
+    if not event.of_scene:
+        return solids
+    names = [s.name for s in solids]
+    if event.appear is not None:
+        if event.appear.name is not None and event.appear.name in names:
+            raise InputError(f"appear: a solid is named {event.appear.name!r} already")
+        return (*solids, event.appear)
+    name = event.vanish if event.move is None else event.move.solid
+    field = "vanish" if event.move is None else "move.solid"
+    if name not in names:
+        known = ", ".join(repr(n) for n in names[:8] if n) or "none with a name"
+        raise InputError(f"{field}: no solid is named {name!r}; there are {known}")
+    which = names.index(name)
+    new = () if event.move is None else (moved(solids[which], event.move.by),)
+    return (*solids[:which], *new, *solids[which + 1 :])
+
+
+def moved(solid: Solid, by: Point3) -> Solid:
+    """A solid somewhere else.
+
+    Parameters
+    ----------
+    solid : Solid
+        The solid.
+    by : (x, y, z)
+        To move it by, metres.
+
+    Returns
+    -------
+    Solid
+        The same solid there.
+    """
+    kind = next(k for k in type(solid).model_fields if getattr(solid, k) is solid.shape)
+    shape = solid.shape.model_dump()
+    update: dict[str, Any] = {
+        key: tuple(v + d for v, d in zip(place, by, strict=False))
+        for key, place in shape.items()
+        if key in ("a", "b", "center", "point")
+    }
+    if "polygon" in shape:
+        update["polygon"] = tuple((x + by[0], y + by[1]) for x, y in shape["polygon"])
+    return solid.model_copy(update={kind: solid.shape.model_copy(update=update)})

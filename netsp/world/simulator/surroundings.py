@@ -1,0 +1,368 @@
+"""What is in the water, and what the planner knows of it: a map that is wrong, and is mended.
+
+The map begins as the scene's file. A solid that is not on it is put there once rays of the range
+sensor have met it, where the mean of what they measured says; a solid that rays pass through comes
+off. Where a mission has no sensor, the planner is told of every change.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.geometry import polylines
+from netsp.world.mission.mission import Mission
+from netsp.world.planner import Planner
+from netsp.world.planner.predictive import CAUGHT
+from netsp.world.scene.field import DistanceField, pushed_out
+from netsp.world.scene.grid import VoxelGrid
+from netsp.world.scene.scene import Scene, Solid
+from netsp.world.simulator.ranging import Ranging, cast
+from netsp.world.simulator.simulation import Simulation
+from netsp.world.simulator.surprises import SceneEvent, SceneSurprises, changed, moved
+from netsp.world.tether import GeodesicTether, Tether
+from netsp.world.tether.load import payout
+
+MET = 3
+"""So many rays must have met a solid before it is put on the map."""
+
+THROUGH, PASSED = 0.1, 5
+"""Metres that a ray goes on inside a solid of the map, and how many such rays of one look show that
+it is not there."""
+
+RECALL, MOST_MOMENTS, EXPLAINED = 50, 40, 0.03
+"""Steps between two moments at which the tether is remembered, and how many of these at most (of
+more, every other one is forgotten); metres within which a tether explains what is out."""
+
+TRAIL, TAKEN_UP = 0.1, 0.9
+"""Metres between points of the robot's trail, and how near to the last but one, as a share of them,
+the robot has gone back."""
+
+ENDLESS = 1e6
+"""Metres that solids without end are taken to reach."""
+
+FAR_OFF = Solid.model_validate({"sphere": {"center": [0.0, 0.0, -1e6], "radius": 1.0}})
+
+EVERY = 3
+"""Steps between two looks."""
+
+
+@dataclass
+class Sighting:
+    """What the sensor has found out about a solid.
+
+    Parameters
+    ----------
+    solid : Solid
+        As it is.
+    count : int
+        Rays that have met it.
+    off : ndarray, shape (3,)
+        Sum of the errors of what they measured, metres.
+    mapped : Solid or None
+        As it is on the map.
+    placed_by : int
+        Rays that its place on the map is the mean of.
+    """
+
+    solid: Solid
+    count: int = 0
+    off: Floats = field(default_factory=lambda: np.zeros(3))
+    mapped: Solid | None = None
+    placed_by: int = 0
+
+    def place(self) -> bool:
+        """Put it on the map where the rays say; whether that is another place than before."""
+        if self.count < max(MET, 4 * self.placed_by):
+            return False
+        x, y, z = (self.off / self.count).tolist()
+        self.mapped, self.placed_by = moved(self.solid, (x, y, z)), self.count
+        return True
+
+
+class Surroundings:
+    """The scene as it is, and as it is known.
+
+    Parameters
+    ----------
+    mission : Mission
+        Its range sensor, delta and clearance count.
+    scene : Scene
+        The map at the beginning.
+    voxels : VoxelGrid or None
+        Of the scene.
+    surprises : SceneSurprises
+        In what the water differs from the map.
+    places : ndarray, shape (k, 3)
+        The tether when the mission begins, metres.
+    seed : int
+        Of the sensor's noise.
+    """
+
+    def __init__(
+        self, mission: Mission, scene: Scene, voxels: VoxelGrid | None,
+        surprises: SceneSurprises, places: Floats, seed: int,
+    ) -> None:  # fmt: skip
+        self.mission, self.scene, self.voxels = mission, scene, voxels
+        sensor = mission.range_sensor
+        self.ranging = None if sensor is None else Ranging(sensor, seed)
+        self.solids = self.mapped = scene.all_solids()
+        self.sightings: list[Sighting] = []
+        self.found: set[str | int] = set()
+        self.due = surprises.in_order()
+        self.happened: list[tuple[float, SceneEvent]] = []
+        self.trail = np.array(places)
+        self.moments: list[tuple[Floats, int]] = []
+        self.times: list[float] = []
+        self._since = 0.0
+        self._steps = 0
+
+    def go_on(self, world: Simulation, planner: Planner) -> None:
+        """Let happen what is due, look, and let the planner know.
+
+        Parameters
+        ----------
+        world : Simulation
+            Its scene and tether become those of the changed water.
+        planner : Planner
+            Its map becomes what is known of it.
+        """
+        here = world.vehicle.position
+        self._leave_trail(here)
+        before = self.mapped
+        told = self._happen(world, planner)
+        if self.ranging is not None:
+            told = self._steps % EVERY == 0 and self._look(world, planner)
+        self._steps += 1
+        if told:
+            self._tell(world, planner, self._other(before))
+        if world.believed is not None:
+            more = payout(world.tether, world.load) - payout(world.believed, world.load)
+            if more > CAUGHT and self._steps % RECALL == 0:
+                assert isinstance(world.model, GeodesicTether)
+                world.believed = self._laid_again(world, world.model)
+                more = payout(world.tether, world.load) - payout(world.believed, world.load)
+            elif self._steps % RECALL == 0:
+                self.moments.append((world.believed.nodes.copy(), len(self.trail)))
+                self.times.append(world.now)
+                if len(self.moments) > MOST_MOMENTS:
+                    self.moments, self.times = self.moments[1::2], self.times[1::2]
+            planner.hear_of_payout(max(0.0, more), self.trail)
+
+    def _leave_trail(self, here: Floats) -> None:
+        """Lengthen the trail, or take up what the robot goes back along."""
+        while len(self.trail) > 2 and np.linalg.norm(here - self.trail[-2]) < TAKEN_UP * TRAIL:
+            self.trail = self.trail[:-1]
+        if np.linalg.norm(here - self.trail[-1]) >= TRAIL:
+            self.trail = np.vstack([self.trail, here])
+
+    def _happen(self, world: Simulation, planner: Planner) -> bool:
+        """What is due happens, but for solids that would stand on the tether, on home or in the
+        anchor's way, or nearer to the robot than its clearance and a second of its way: these wait
+        until there is room."""
+        waiting, before = [], self.solids
+        for event in self.due:
+            if not event.of_scene and event.time <= world.now:
+                self._tell_of(event, world, planner)
+                self.happened.append((world.now, event))
+                continue
+            solids = changed(self.solids, event) if event.time <= world.now else None
+            if solids is None or not self._has_room(world, solids):
+                waiting.append(event)
+                continue
+            self.solids = solids
+            self.happened.append((world.now, event))
+        self.due = waiting
+        if self.solids is before:
+            return False
+        world.scene = self._field(self.solids)
+        world.tethers = GeodesicTether(world.scene, self.mission.delta)
+        world.tether = world.tethers.refine(world.tether)
+        if self.ranging is None:
+            self.mapped = self.solids
+        return True
+
+    def _tell_of(self, event: SceneEvent, world: Simulation, planner: Planner) -> None:
+        """What does not change the scene: other waypoints, or a robot that is carried off, as far
+        as there is water and its tether reaches."""
+        if event.add_waypoint is not None:
+            planner.add_waypoint(event.add_waypoint)
+        elif event.cancel_waypoint is not None:
+            planner.cancel_waypoint(event.cancel_waypoint)
+        elif event.tether_length is not None:
+            limit = event.tether_length
+            world.shortening = payout(world.tether, world.load) > limit
+            self.mission = self.mission.model_copy(update={"tether_length": limit})
+            world.mission = world.mission.model_copy(update={"tether_length": limit})
+            planner.take_limit(limit)
+        elif event.push is not None:
+            start = world.vehicle.position
+            most = max(self.mission.tether_length, world.tether.length)
+            line = np.array([start, start + np.array(event.push)])
+            for point in polylines.dense(line, 0.5 * self.mission.delta):
+                if float(world.scene.distance(point)) < 0.0:
+                    break
+                tether = world.tethers.update(world.tether, point)
+                if tether.length > most:
+                    break
+                world.tether = tether
+                world.vehicle.stop_at(point)
+                if world.believed is not None and isinstance(world.model, GeodesicTether):
+                    world.believed = world.model.update(world.believed, point)
+                self._leave_trail(point)
+            planner.carried_off()
+
+    def _has_room(self, world: Simulation, solids: tuple[Solid, ...]) -> bool:
+        new = [s for s in solids if all(s is not old for old in self.solids)]
+        if not new:
+            return True
+        alone = self.scene.field_with(tuple(new), None)
+        nodes, home = world.tether.nodes, np.array(self.mission.start)
+        if world.track is not None:
+            ahead = world.track.between(world.now, max(world.now, world.track.end))
+            home = ahead + home - np.array(self.mission.anchor)
+            if (
+                alone.distance(polylines.dense(ahead, 0.5)).min(initial=1.0)
+                < self.mission.clearance
+            ):
+                return False
+        return bool(
+            np.min(alone.distance(home)) > self.mission.clearance
+            and alone.distance(world.vehicle.position) > self.mission.clearance + self.mission.speed
+            and alone.distance(polylines.dense(nodes, 0.5 * self.mission.delta)).min(initial=1.0)
+            > self.mission.delta
+        )
+
+    def _field(self, solids: tuple[Solid, ...]) -> DistanceField:
+        if not solids and self.voxels is None:
+            solids = (FAR_OFF,)  # a field needs something
+        return self.scene.field_with(solids, self.voxels)
+
+    def _look(self, world: Simulation, planner: Planner) -> bool:
+        """Look along the path; whether anything is other than on the map."""
+        assert self.ranging is not None
+        here = world.vehicle.position
+        onward = polylines.part(np.vstack([here, planner.path]), 0.0, 1.0)[-1] - here
+        if np.linalg.norm(onward) < 1e-6:
+            onward = np.array([np.cos(world.vehicle.yaw), np.sin(world.vehicle.yaw), 0.0])
+        rays, ranges, off = self.ranging.look(world.scene, here, onward)
+        gone = self._take_off(planner.scene, here, rays, ranges)
+        return self._put_on(world, rays, ranges, off) or gone
+
+    def _put_on(self, world: Simulation, rays: Floats, ranges: Floats, off: Floats) -> bool:
+        """Solids that rays have met and that are not on the map."""
+        met = np.isfinite(ranges)
+        points = world.vehicle.position + rays[met] * (ranges - off)[met, None]
+        which = world.scene.nearest(points)
+        known = {id(s) for s in self.mapped}
+        found = False
+        for n in np.unique(which[which >= 0]).tolist():
+            solid = self.solids[n]
+            if id(solid) in known:
+                continue
+            sighting = next((s for s in self.sightings if s.solid is solid), None)
+            if sighting is None:
+                sighting = Sighting(solid)
+                self.sightings.append(sighting)
+            some = which == n
+            sighting.count += int(some.sum())
+            sighting.off = sighting.off + (rays[met][some] * off[met][some, None]).sum(0)
+            before = sighting.mapped
+            if sighting.place() and sighting.mapped is not None:
+                # whatever has a name is there once
+                name = solid.name
+                kept = tuple(
+                    s for s in self.mapped if s is not before and (name is None or s.name != name)
+                )
+                self.found.add(id(solid) if name is None else name)
+                self.mapped, found = (*kept, sighting.mapped), True
+        return found
+
+    def _take_off(self, known: DistanceField, here: Floats, rays: Floats, ranges: Floats) -> bool:
+        """Solids of the map that rays pass through."""
+        assert self.ranging is not None
+        sensor = self.ranging.sensor
+        expected = cast(known.arrays, here, rays, sensor.range)
+        inside = expected + THROUGH
+        passed = inside + 3.0 * sensor.noise + THROUGH < np.minimum(ranges, sensor.range)
+        points = here + rays[passed] * inside[passed, None]
+        deep = known.distance(points) < -0.25 * THROUGH - 2.0 * sensor.noise
+        which, counts = np.unique(known.nearest(points[deep]), return_counts=True)
+        gone = {int(n) for n, c in zip(which, counts, strict=True) if n >= 0 and c >= PASSED}
+        off = [s for n, s in enumerate(self.mapped) if n in gone]
+        self.mapped = tuple(s for n, s in enumerate(self.mapped) if n not in gone)
+        self.sightings = [s for s in self.sightings if all(s.mapped is not o for o in off)]
+        return bool(off)
+
+    def _other(self, before: tuple[Solid, ...]) -> Floats:
+        """(2, 3) box of all in which the map differs from the one before."""
+        boxes: list[list[list[float]]] = []
+        for some, others in ((before, self.mapped), (self.mapped, before)):
+            for solid in some:
+                if all(solid is not o for o in others):
+                    box = solid.shape.box()
+                    boxes.append([[-ENDLESS] * 3, [ENDLESS] * 3] if box is None else box.tolist())
+        return np.array([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
+
+    def _tell(self, world: Simulation, planner: Planner, box: Floats) -> None:
+        """The planner's map, and the tether in it."""
+        known = self._field(self.mapped)
+        world.model = GeodesicTether(known, self.mission.delta)
+        world.believed = self._laid_again(world, world.model)
+        planner.take_map(known, world.model, box, world.vehicle.position, world.believed)
+
+    def _laid_again(self, world: Simulation, model: GeodesicTether) -> Tether:
+        """The tether in another map, on the side of everything new that explains what is out.
+
+        What was there from the beginning lies on the side that the trail says. What has appeared
+        since lies on the side that the tether was on then, and when that was is not known: of the
+        tethers at earlier moments, each taken on along the trail since, the one is believed whose
+        payout is nearest to the one measured; the earliest where several are as near.
+        """
+        out = payout(world.tether, world.load)
+        best, least = None, np.inf
+        for n, (nodes, count) in enumerate([(self.trail[:1], 1), *self.moments]):
+            if count > len(self.trail):
+                continue  # gone back past it
+            line = np.vstack([nodes, self.trail[count:], world.vehicle.position])
+            line[1:-1] = pushed_out(model.field, line[1:-1], 1e-3)
+            line = np.vstack([self._anchors_way(world, n), line])
+            tether = model.drive(model.relaxed(line[[0, 0]], 1), line[1:])[0]
+            off = abs(payout(tether, world.load) - out)
+            if best is None or off < least - EXPLAINED:
+                best, least, chosen, trail = tether, off, n, line
+            if least <= EXPLAINED:
+                break
+        assert best is not None
+        if chosen:
+            self.trail, self.moments, self.times, self._since = trail, [], [], world.now
+        return best
+
+    def _anchors_way(self, world: Simulation, n: int) -> Floats:
+        """Back from a moving anchor to where it was at a moment."""
+        if world.track is None:
+            return self.trail[:0]
+        since = self._since if n == 0 else self.times[n - 1]
+        return world.track.between(since, world.now)[::-1]
+
+    @property
+    def scene_now(self) -> Scene:
+        """The scene with the solids that are there now."""
+        return self.scene.model_copy(update={"solids": self.solids, "problem": None})
+
+    def told(self) -> dict[str, int]:
+        """What a summary says of it.
+
+        Returns
+        -------
+        dict
+            How many events happened, how many never had room, and how many solids the sensor put on
+            the map.
+        """
+        return {
+            "happened": len(self.happened),
+            "held_back": len(self.due),
+            "found": len(self.found),
+        }

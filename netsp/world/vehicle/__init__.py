@@ -1,0 +1,54 @@
+"""Vehicles by name: what carries out a planner's path in a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.base.registry import Registry, later
+from netsp.world.vehicle.kinematic import KinematicVehicle, Vehicle
+
+
+def _bluerov2(place: npt.NDArray[np.float64], speed: float) -> Vehicle:
+    from netsp.world.vehicle.bluerov2 import BlueRov2
+
+    return BlueRov2(place, speed)
+
+
+VEHICLES: Registry[Callable[[npt.NDArray[np.float64], float], Vehicle]] = Registry(
+    "vehicle",
+    "netsp.vehicles",
+    {"kinematic": KinematicVehicle, "bluerov2": _bluerov2},
+    later,
+)
+"""Name → what makes a vehicle of a place (3,) and a speed."""
+
+
+def make_vehicle(name: str, place: npt.NDArray[np.float64], speed: float) -> Vehicle:
+    """A vehicle by name, at rest.
+
+    Parameters
+    ----------
+    name : str
+        One of `VEHICLES`.
+    place : ndarray, shape (3,)
+        Where it is, metres.
+    speed : float
+        That it is to go at, m/s.
+
+    Returns
+    -------
+    Vehicle
+        The vehicle.
+
+    Raises
+    ------
+    InputError
+        No vehicle has that name.
+    """
+    return VEHICLES.named(name)(place, speed)
+
+
+__all__ = ["VEHICLES", "KinematicVehicle", "Vehicle", "make_vehicle"]

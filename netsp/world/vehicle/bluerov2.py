@@ -1,0 +1,112 @@
+"""A BlueROV2 that follows a path by model-predictive control."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.world.vehicle.control import DT, HORIZON, PredictiveControl
+from netsp.world.vehicle.dynamics import step
+from netsp.world.vehicle.kinematic import advance, turned
+
+LEAD = 0.25
+"""Metres that the point which the vehicle follows runs ahead of it at most."""
+
+FINE = 5
+"""Integration steps of the simulated vehicle in one control step."""
+
+TOP_SPEED = 1.5
+"""m/s, ahead, as Blue Robotics states."""
+
+TRUST = 0.3
+"""Share of what a step drifted more than expected that is put down to the water."""
+
+
+class BlueRov2:
+    """The vehicle, its controller, and what it thinks of the current.
+
+    The controller does not know the water's motion: it infers it from its drift.
+    """
+
+    def __init__(self, place: Floats, speed: float) -> None:
+        self.state = np.zeros(8)
+        self.state[:3] = place
+        self.speed = min(speed, TOP_SPEED)
+        self.control_s: list[float] = []
+        self._control = PredictiveControl()
+        self._carrot = np.array(place, dtype=float)
+        self._drift = np.zeros(3)
+        # what is compiled is loaded before the first step
+        self._control.force(self.state, np.tile(self.state, (HORIZON, 1)), self._drift)
+        self._control = PredictiveControl()
+
+    @property
+    def position(self) -> Floats:
+        """(3,) m."""
+        return self.state[:3].copy()
+
+    @property
+    def yaw(self) -> float:
+        """rad."""
+        return float(self.state[3])
+
+    def go(
+        self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool,
+        pull: Floats | None = None,
+    ) -> tuple[list[Floats], int]:  # fmt: skip
+        """See `netsp.world.vehicle.Vehicle`. Control steps take 0.1 s."""
+        points, behind = [], 0
+        if fresh:
+            self._carrot = self.position
+        for _ in range(max(1, round(seconds / DT))):
+            begin = time.perf_counter()
+            lead = float(np.linalg.norm(self._carrot - self.position))
+            on, passed = advance(
+                self._carrot, path[behind:], min(self.speed * DT, max(0.0, LEAD - lead))
+            )
+            self._carrot = on[-1]
+            behind += passed
+            force = self._control.force(self.state, self._aims(path[behind:], yaw), self._drift)
+            expected = step(self.state, force, self._drift, DT)
+            self.control_s.append(time.perf_counter() - begin)
+            for _ in range(FINE):
+                both = force if pull is None else force + self._in_frame(pull)
+                self.state = step(self.state, both, water, DT / FINE)
+            self._drift += TRUST * (self.state[:3] - expected[:3]) / DT
+            points.append(self.position)
+        return points, behind
+
+    def _in_frame(self, pull: Floats) -> Floats:
+        """A force (3,) of the world as an input (4,) of the vehicle."""
+        c, s = math.cos(self.state[3]), math.sin(self.state[3])
+        return np.array([c * pull[0] + s * pull[1], -s * pull[0] + c * pull[1], pull[2], 0.0])
+
+    def stop_at(self, place: Floats) -> None:
+        """See `netsp.world.vehicle.Vehicle`."""
+        self.state[:3] = place
+        self.state[4:] = 0.0
+        self._carrot = np.array(place)
+
+    def _aims(self, path: Floats, yaw: float) -> Floats:
+        """(HORIZON, 8): where the followed point will be, and how fast, with the heading."""
+        aims = np.zeros((HORIZON, 8))
+        heading = self.state[3] + turned(yaw - self.state[3])
+        c, s = math.cos(heading), math.sin(heading)
+        at, rest = self._carrot, path
+        for k in range(HORIZON):
+            if k > 0:
+                on, passed = advance(at, rest, self.speed * DT)
+                velocity = (on[-1] - at) / DT - self._drift
+                at, rest = on[-1], rest[passed:]
+            else:
+                velocity = -self._drift
+                if len(rest) and (far := float(np.linalg.norm(rest[0] - at))) > 0.0:
+                    velocity = velocity + (rest[0] - at) * (self.speed / far)
+            aims[k, :3], aims[k, 3] = at, heading
+            aims[k, 4] = c * velocity[0] + s * velocity[1]
+            aims[k, 5] = -s * velocity[0] + c * velocity[1]
+            aims[k, 6] = velocity[2]
+        return aims

@@ -1,0 +1,199 @@
+"""Model-predictive control by real-time iteration: one quadratic program per control step.
+
+Diehl, Bock and Schloeder, "A real-time iteration scheme for nonlinear optimization in optimal
+feedback control", SIAM J. Control Optim. 43(5), 2005: the model is linearised along the last
+solution, moved on by one step, and the quadratic program that comes of it is solved once. States
+are eliminated; what is left are 100 thrusts between bounds, and Bertsekas' projected Newton method
+("Projected Newton methods for optimization problems with simple constraints", SIAM J. Control
+Optim. 20(2), 1982) is done in a few steps. Compiled whole, it takes a third of a millisecond; OSQP
+took two and its library crashed beside that of HiGHS. Matrices are multiplied by plain loops: for
+products this small BLAS starts threads that wait for one another, on a busy machine milliseconds.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+from netsp.base.compiled.dynamic_array import write_floats, write_rows
+from netsp.base.compiled.kernel import kernel
+from netsp.world.vehicle.dynamics import ALLOCATION, THRUST, linearised, step_into
+
+HORIZON, DT = 20, 0.1
+"""Steps ahead, and seconds of each."""
+
+STATE_COST = np.array([200.0, 200.0, 200.0, 10.0, 5.0, 5.0, 5.0, 1.0])
+THRUST_COST, CHANGE_COST = 4e-3, 4e-3
+"""Weights of what is squared: errors in m, rad, m/s and rad/s, thrusts in N, and their changes from
+step to step."""
+
+NEWTON_STEPS = 30
+
+
+class PredictiveControl:
+    """Controller with the thrusts (HORIZON, 5) of its last solution, N."""
+
+    def __init__(self) -> None:
+        self.thrusts = np.zeros((HORIZON, 5))
+
+    def force(self, state: Floats, aims: Floats, water: Floats) -> Floats:
+        """The input (4,) for the next step, that thrusters within their limits give.
+
+        Parameters
+        ----------
+        state
+            (8,).
+        aims
+            (HORIZON, 8) where to be after each step.
+        water
+            (3,) what the water is thought to do.
+        """
+        self.thrusts = improved(self.thrusts, state, aims, water, ALLOCATION)
+        return np.asarray(ALLOCATION @ self.thrusts[0])
+
+
+@kernel
+def improved(
+    last: Floats, state: Floats, aims: Floats, water: Floats, allocation: Floats
+) -> Floats:
+    """The thrusts after one iteration, from those (n, m) of the step before."""
+    n, m = last.shape
+    guess = np.empty((n, m))
+    write_rows(guess, last[1:], n - 1)
+    write_floats(guess[-1], last[-1], m)
+    forces = np.zeros((n, 4))
+    for k in range(n):
+        for i in range(m):
+            forces[k] += guess[k, i] * allocation[:, i]
+    states, room = np.empty((n + 1, 8)), np.empty((5, 8))
+    write_floats(states[0], state, 8)
+    for k in range(n):
+        step_into(states[k + 1], states[k], forces[k], water, DT, room)
+    by_state, by_force = linearised(states, forces, water, DT)
+    answer = _answer(by_state, by_force, allocation)
+    hessian, wish = np.zeros((m * n, m * n)), np.zeros(m * n)
+    for k in range(n):
+        for i in range(8):
+            row = answer[8 * k + i, : m * k + m]
+            off = STATE_COST[i] * (states[k + 1, i] - aims[k, i])
+            for a in range(len(row)):
+                wish[a] += off * row[a]
+                _add(STATE_COST[i] * row[a], row[: a + 1], hessian[a])
+    low, high = np.empty(m * n), np.empty(m * n)
+    for k in range(n):
+        for i in range(m):
+            j = m * k + i
+            hessian[j, j] += THRUST_COST + CHANGE_COST
+            before = guess[k - 1, i] if k > 0 else last[0, i]
+            wish[j] += THRUST_COST * guess[k, i] + CHANGE_COST * (guess[k, i] - before)
+            if k + 1 < n:
+                hessian[j, j] += CHANGE_COST
+                hessian[j + m, j] -= CHANGE_COST
+                wish[j] -= CHANGE_COST * (guess[k + 1, i] - guess[k, i])
+            low[j], high[j] = -THRUST - guess[k, i], THRUST - guess[k, i]
+    for j in range(m * n):
+        for a in range(j):
+            hessian[a, j] = hessian[j, a]
+    change = within(hessian, wish, low, high, NEWTON_STEPS)
+    out = np.empty((n, m))
+    for k in range(n):
+        for i in range(m):
+            out[k, i] = min(max(guess[k, i] + change[m * k + i], -THRUST), THRUST)
+    return out
+
+
+@kernel
+def _answer(by_state: Floats, by_force: Floats, allocation: Floats) -> Floats:
+    """(8 n, m n) how the states answer to changes of the thrusts: row block k is the state after
+    step k."""
+    n, m = len(by_state), allocation.shape[1]
+    out = np.zeros((8 * n, m * n))
+    for k in range(n):
+        for i in range(8):
+            row = out[8 * k + i]
+            for j in range(8):
+                if k > 0:
+                    _add(by_state[k, i, j], out[8 * (k - 1) + j, : m * k], row)
+            for j in range(4):
+                _add(by_force[k, i, j], allocation[j], row[m * k : m * k + m])
+    return out
+
+
+@kernel
+def _add(share: float, row: Floats, to: Floats) -> None:
+    """Add so much of a row to the beginning of another."""
+    if share != 0.0:
+        for j in range(len(row)):
+            to[j] += share * row[j]
+
+
+@kernel
+def within(hessian: Floats, slope: Floats, low: Floats, high: Floats, steps: int) -> Floats:
+    """The minimum of x H x / 2 + g x between bounds, H positive definite: projected Newton."""
+    n = len(slope)
+    x = np.minimum(np.maximum(np.zeros(n), low), high)
+    down, value = _slope_and_value(hessian, slope, x)
+    free = np.empty(n, dtype=np.int64)
+    for _ in range(steps):
+        count = 0
+        for j in range(n):
+            if not ((x[j] <= low[j] and down[j] > 0.0) or (x[j] >= high[j] and down[j] < 0.0)):
+                free[count] = j
+                count += 1
+        if count == 0:
+            break
+        part, path = np.empty((count, count)), np.empty(count)
+        for a in range(count):
+            path[a] = -down[free[a]]
+            for b in range(a, count):
+                part[a, b] = hessian[free[a], free[b]]
+        solve_positive(part, path)
+        gain = 0.0
+        for a in range(count):
+            gain += down[free[a]] * path[a]
+        if -gain <= 1e-12 * (1.0 + abs(value)):
+            break
+        share = 1.0
+        while share > 1e-6:
+            tried = x.copy()
+            for a in range(count):
+                j = free[a]
+                tried[j] = min(max(x[j] + share * path[a], low[j]), high[j])
+            new_down, new = _slope_and_value(hessian, slope, tried)
+            promised = 0.0
+            for j in range(n):
+                promised += down[j] * (x[j] - tried[j])
+            if new <= value - 1e-4 * promised:
+                break
+            share *= 0.5
+        if not new < value:
+            break
+        x, value, down = tried, new, new_down
+    return x
+
+
+@kernel
+def _slope_and_value(hessian: Floats, slope: Floats, x: Floats) -> tuple[Floats, float]:
+    """H x + g, and x H x / 2 + g x."""
+    down, value = slope.copy(), 0.0
+    for j in range(len(x)):
+        _add(x[j], hessian[j], down)
+    for j in range(len(x)):
+        value += 0.5 * x[j] * (down[j] + slope[j])
+    return down, value
+
+
+@kernel
+def solve_positive(matrix: Floats, right: Floats) -> None:
+    """Solve a system of equations with a positive definite matrix, of which the upper half counts,
+    in place: U^T D U by rows. BLAS would start threads for it, which takes longer than the sums."""
+    n = len(right)
+    for k in range(n):
+        for i in range(k + 1, n):
+            share = matrix[k, i] / matrix[k, k]
+            _add(-share, matrix[k, i:], matrix[i, i:])
+            right[i] -= share * right[k]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            right[k] -= matrix[k, j] * right[j]
+        right[k] /= matrix[k, k]
