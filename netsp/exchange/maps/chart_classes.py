@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from netsp.exchange.maps.feature import Feature
+from netsp.exchange.maps.word_tables import words
 
-STANDING = frozenset({
-    "BRIDGE", "BUISGL", "CANBNK", "CAUSWY", "COALNE", "CRANES", "DAMCON", "DRYDOC", "DYKCON",
-    "FLODOC", "FORSTC", "FSHFAC", "GATCON", "GRIDRN", "HULKES", "LAKSHR", "LNDARE", "LNDMRK",
-    "LOGPON", "MARCUL", "MORFAC", "OBSTRN", "OFSPLF", "OILBAR", "PILPNT", "PONTON", "PYLONS",
-    "RIVBNK", "SILTNK", "SLCONS", "SLOTOP", "UWTROC", "WRECKS",
-})  # fmt: skip
+STANDING = words(
+    "BRIDGE BUISGL CANBNK CAUSWY COALNE CRANES DAMCON DRYDOC DYKCON FLODOC FORSTC FSHFAC "
+    "GATCON GRIDRN HULKES LAKSHR LNDARE LNDMRK LOGPON MARCUL MORFAC OBSTRN OFSPLF OILBAR "
+    "PILPNT PONTON PYLONS RIVBNK SILTNK SLCONS SLOTOP UWTROC WRECKS"
+)
 """Classes of structures and ground that a tether may catch on."""
 
 BEACONS = frozenset({"BCNCAR", "BCNISD", "BCNLAT", "BCNSAW", "BCNSPP", "BCNWTW"})

@@ -173,9 +173,11 @@ class FloorFeatures:
 
 
 def chart_floor(
-    features: Sequence[Feature], plane: Callable[[shapely.Geometry], Any],
-    window: CropWindow | None, cell: float | None,
-) -> tuple[SeaFloor, FloorFeatures]:  # fmt: skip
+    features: Sequence[Feature],
+    plane: Callable[[shapely.Geometry], Any],
+    window: CropWindow | None,
+    cell: float | None,
+) -> tuple[SeaFloor, FloorFeatures]:
     """Return the sea floor of a chart, and the features that it is made of.
 
     Parameters
@@ -244,9 +246,14 @@ def chart_floor(
         box = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
     side = cell if cell is not None else max(box[2] - box[0], box[3] - box[1]) / FLOOR_CELLS
     floor = sea_floor(
-        areas, np.vstack(contours), land, box, side, soundings=np.vstack(soundings),
+        areas,
+        np.vstack(contours),
+        land,
+        box,
+        side,
+        soundings=np.vstack(soundings),
         dangers=dangers,
-    )  # fmt: skip
+    )
     return floor, found
 
 

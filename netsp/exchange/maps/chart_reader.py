@@ -17,6 +17,7 @@ from netsp.base.files import check_file
 from netsp.exchange.maps.chart_classes import SOUNDINGS
 from netsp.exchange.maps.feature import Feature, Map
 from netsp.exchange.maps.vector import gdal_options, read_plain, read_rows
+from netsp.exchange.maps.word_tables import words
 from netsp.model.import_record import MAX_NAMED
 
 NUMBERED = re.compile(r"\.(\d{3})$")
@@ -54,10 +55,7 @@ HEIGHT_UNITS = {1: "m", 2: "ft"}
 DEPTHS = frozenset({"DRVAL1", "DRVAL2", "VALSOU", "VALDCO", "BURDEP"})
 """Attributes in the unit of depths."""
 
-LENGTHS = frozenset({
-    "ELEVAT", "HEIGHT", "HORCLR", "HORLEN", "HORWID", "VERCCL", "VERCLR", "VERCOP", "VERCSA",
-    "VERLEN",
-})  # fmt: skip
+LENGTHS = words("ELEVAT HEIGHT HORCLR HORLEN HORWID VERCCL VERCLR VERCOP VERCSA VERLEN")
 """Attributes in the unit of heights."""
 
 DATUMS = dict(enumerate((

@@ -39,9 +39,7 @@ class CropWindow:
     radius: float
 
     @classmethod
-    def about(
-        cls, bases: Sequence[Sequence[float]], reach: float, margin: float
-    ) -> CropWindow:  # fmt: skip
+    def about(cls, bases: Sequence[Sequence[float]], reach: float, margin: float) -> CropWindow:
         """Return the window that holds the reach of a tether from each of some bases.
 
         Parameters
@@ -179,6 +177,7 @@ def cropped(
 def _polygons(shape: Any) -> list[Any]:
     """Return the polygons of a shape, without slivers that have no area."""
     return [
-        p for p in getattr(shape, "geoms", [shape])
+        p
+        for p in getattr(shape, "geoms", [shape])
         if p.geom_type == "Polygon" and p.area > MIN_AREA
-    ]  # fmt: skip
+    ]

@@ -37,6 +37,7 @@ from netsp.exchange.maps.vector import (
     shape_from_gdal,
 )
 from netsp.exchange.maps.wkb_shapes import MAX_NESTING, NotFiniteError, ShapeError, collected
+from netsp.exchange.maps.word_tables import words
 
 if TYPE_CHECKING:
     import shapely
@@ -57,32 +58,32 @@ INSUNITS = {
 Units of astronomy (17 to 20) are none of a site.
 """
 
-SHAPES = {
-    "POINT", "LINE", "LWPOLYLINE", "POLYLINE", "CIRCLE", "ARC", "ELLIPSE", "SPLINE", "INSERT",
-    "SOLID", "TRACE", "3DFACE", "HATCH", "MESH", "MLINE",
-}  # fmt: skip
+SHAPES = words(
+    "POINT LINE LWPOLYLINE POLYLINE CIRCLE ARC ELLIPSE SPLINE INSERT SOLID TRACE 3DFACE HATCH "
+    "MESH MLINE"
+)
 """Types of entities that are read."""
 
 TEXTS = {"TEXT", "MTEXT", "ATTRIB", "ATTDEF", "RTEXT", "ARCALIGNEDTEXT"}
 
-WRITING = TEXTS | {
-    "DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION", "LEADER", "MLEADER", "MULTILEADER",
-    "TOLERANCE", "ACAD_TABLE", "SECTIONOBJECT",
-}  # fmt: skip
+WRITING = TEXTS | words(
+    "DIMENSION ARC_DIMENSION LARGE_RADIAL_DIMENSION LEADER MLEADER MULTILEADER TOLERANCE "
+    "ACAD_TABLE SECTIONOBJECT"
+)
 """Types of entities that write on a drawing."""
 
-PICTURES = {
-    "IMAGE", "WIPEOUT", "OLEFRAME", "OLE2FRAME", "PDFUNDERLAY", "DWFUNDERLAY", "DGNUNDERLAY",
-}  # fmt: skip
+PICTURES = frozenset(
+    ["IMAGE", "WIPEOUT", "OLEFRAME", "OLE2FRAME", "PDFUNDERLAY", "DWFUNDERLAY", "DGNUNDERLAY"]
+)
 """Types of entities that show or cover a picture."""
 
 NO_SHAPES = {"VIEWPORT", "LIGHT", "CAMERA", "SUN", "GEOPOSITIONMARKER", "SEQEND", "VERTEX"}
 """Types of entities for display or placement, without a shape of the site."""
 
-SOLIDS = {
-    "3DSOLID", "REGION", "BODY", "SURFACE", "EXTRUDEDSURFACE", "LOFTEDSURFACE", "NURBSURFACE",
-    "PLANESURFACE", "REVOLVEDSURFACE", "SWEPTSURFACE",
-}  # fmt: skip
+SOLIDS = words(
+    "3DSOLID REGION BODY SURFACE EXTRUDEDSURFACE LOFTEDSURFACE NURBSURFACE PLANESURFACE "
+    "REVOLVEDSURFACE SWEPTSURFACE"
+)
 """Types of entities whose shape is in the format of a solid modeller (ACIS)."""
 
 ENDLESS = {"XLINE", "RAY"}
@@ -98,9 +99,10 @@ LABELLED = ("POINT", "CIRCLE", "INSERT")
 """Types of entities that stand for one place, and take the name of a text beside it."""
 
 OPTIONS = {
-    "DXF_MERGE_BLOCK_GEOMETRIES": "FALSE", "DXF_INLINE_BLOCKS": "TRUE",
+    "DXF_MERGE_BLOCK_GEOMETRIES": "FALSE",
+    "DXF_INLINE_BLOCKS": "TRUE",
     "DXF_FEATURE_LIMIT_PER_BLOCK": str(MOST_FEATURES),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -121,9 +123,11 @@ class LabelRule:
 
 
 def read_dxf(
-    file: str | Path, crs: str | None = None, units: str | None = None,
+    file: str | Path,
+    crs: str | None = None,
+    units: str | None = None,
     labels: LabelRule | None = None,
-) -> Map:  # fmt: skip
+) -> Map:
     """Return a DXF drawing as a map.
 
     Parameters
@@ -229,16 +233,21 @@ class _Reader:
         features = self.without_fillings(features, kept)
         features = self.named(features, kept)
         paper = sum(
-            len(records) for name, records in self.drawing.blocks.items()
+            len(records)
+            for name, records in self.drawing.blocks.items()
             if name.lower().startswith(PAPER)
-        )  # fmt: skip
+        )
         if paper:
             self.notes.append(f"{counted(paper, 'record')} of paper space left out")
         return Map(
-            tuple(features), False, self.layers, tuple(self.complaints),
-            notes=(note, *self.notes, *change_notes(self.changes)), unread=tuple(self.unread),
+            tuple(features),
+            False,
+            self.layers,
+            tuple(self.complaints),
+            notes=(note, *self.notes, *change_notes(self.changes)),
+            unread=tuple(self.unread),
             metres=metres,
-        )  # fmt: skip
+        )
 
     # What is no shape of the site
 
@@ -315,8 +324,11 @@ class _Reader:
             return f"its block {self.text(record.get(2))!r} holds itself"
         for block in self.blocks_in(record.get(2)):
             head = self.head(block)
-            inner = (r for r in self.drawing.blocks[self.blocks[block]]
-                     if not self.reason(r, self.text(r.get(8, "0"))))  # fmt: skip
+            inner = (
+                r
+                for r in self.drawing.blocks[self.blocks[block]]
+                if not self.reason(r, self.text(r.get(8, "0")))
+            )
             for part in (head, *inner):
                 if why := part.damage() or shape_damage(part):
                     handle = f" (handle {part.get(5)})" if part.get(5) else ""
@@ -343,9 +355,10 @@ class _Reader:
         name = record.get(2).lower()
         if name not in self.sizes:
             self.sizes[name] = sum(
-                self.size(r) for r in self.drawing.blocks[self.blocks[name]]
+                self.size(r)
+                for r in self.drawing.blocks[self.blocks[name]]
                 if not self.reason(r, self.text(r.get(8, "0")))
-            )  # fmt: skip
+            )
         columns, rows = _array(record)
         return columns * rows * self.sizes[name]
 
@@ -511,11 +524,15 @@ class _Reader:
             shape = whole[0] if len(whole) == 1 else collected(whole)
             out.append(
                 Feature(
-                    where, layer, "", self.properties(record), shape,
+                    where,
+                    layer,
+                    "",
+                    self.properties(record),
+                    shape,
                     folders=() if inner == layer else (inner,),
                     marker=self.marker(entity) if len(groups) == 1 else None,
                 )
-            )  # fmt: skip
+            )
         return out
 
     def properties(self, record: Record) -> dict[str, Any]:
@@ -625,13 +642,13 @@ class _Reader:
             if t not in taken and k not in names:
                 taken.add(t)
                 names[k] = t
-        words = {t: _label(self.text(self.texts[t][2].all_text())) for t in taken}
-        count = Counter(words.values())
+        labels = {t: _label(self.text(self.texts[t][2].all_text())) for t in taken}
+        count = Counter(labels.values())
         out = list(features)
         for k, t in names.items():
-            if words[t] and count[words[t]] == 1:
+            if labels[t] and count[labels[t]] == 1:
                 own = features[k]
-                out[k] = replace(own, properties={**own.properties, "name": words[t]})
+                out[k] = replace(own, properties={**own.properties, "name": labels[t]})
             else:
                 taken.discard(t)
         for t, (where, layer, record) in enumerate(self.texts):

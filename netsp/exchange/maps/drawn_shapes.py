@@ -144,9 +144,11 @@ def spurs_of(
     import shapely
 
     flat = shapely.force_2d(shape)
-    lines = [flat] if "Line" in flat.geom_type else [
-        part.exterior for part in getattr(flat, "geoms", [flat])
-    ]  # fmt: skip
+    lines = (
+        [flat]
+        if "Line" in flat.geom_type
+        else [part.exterior for part in getattr(flat, "geoms", [flat])]
+    )
     if "Line" not in flat.geom_type and flat.is_valid:
         return []
     inside = union(polygons)

@@ -72,9 +72,7 @@ def _of_multiline(record: Record) -> list[Record]:
         )
     corner = np.array([places[11], places[21], places[31]]).T
     mitre = np.array([places[13], places[23], places[33]]).T
-    low, high = (
-        corner + mitre * np.array([[pick(own)] for own in sides]) for pick in (min, max)
-    )  # fmt: skip
+    low, high = (corner + mitre * np.array([[pick(own)] for own in sides]) for pick in (min, max))
     ends = [*range(1, count), *([0] if int(record.number(71)) & CLOSED_MULTILINE else [])]
     shared = [(c, v) for c, v in record.tags if c in (5, 8, 60, 67)]
     out = []
@@ -121,9 +119,11 @@ class ShapeDamageError(Exception):
 def _of_mesh(record: Record) -> Record:
     """Return a MESH, with its corners (10, 20, 30) and faces (90, of 93) before subdivision."""
     corners = list(
-        zip(*([float(v) for c, v in record.tags if c == axis] for axis in (10, 20, 30)),
-            strict=False)
-    )  # fmt: skip
+        zip(
+            *([float(v) for c, v in record.tags if c == axis] for axis in (10, 20, 30)),
+            strict=False,
+        )
+    )
     if len(corners) != int(record.number(92)):
         raise ShapeDamageError(f"expected {int(record.number(92))} corners, got {len(corners)}")
     start = next((k for k, (code, _) in enumerate(record.tags) if code == 93), len(record.tags))
@@ -169,8 +169,16 @@ def _polyface(
     """Return a polyface mesh; faces of many corners become triangles."""
     shared = [(c, v) for c, v in record.tags if c in (5, 8, 60, 67)]
     layer = (8, record.get(8, "0"))
-    head = Record("POLYLINE", [*shared, (66, "1"), (70, str(FLAG_POLYFACE)),
-                               (71, str(len(corners))), (72, str(len(faces)))])  # fmt: skip
+    head = Record(
+        "POLYLINE",
+        [
+            *shared,
+            (66, "1"),
+            (70, str(FLAG_POLYFACE)),
+            (71, str(len(corners))),
+            (72, str(len(faces))),
+        ],
+    )
     for x, y, z in corners:
         head.followers.append(
             Record("VERTEX", [layer, (10, repr(x)), (20, repr(y)), (30, repr(z)), (70, "192")])
@@ -180,8 +188,11 @@ def _polyface(
             raise ShapeDamageError(
                 f"a face of corner {max(face)}; expected 0 to {len(corners) - 1}"
             )
-        fans = [face] if len(face) <= 4 else [[face[0], *face[k : k + 2]]
-                                              for k in range(1, len(face) - 1)]  # fmt: skip
+        fans = (
+            [face]
+            if len(face) <= 4
+            else [[face[0], *face[k : k + 2]] for k in range(1, len(face) - 1)]
+        )
         for fan in fans:
             numbers = [(71 + k, str(i + 1)) for k, i in enumerate(fan)]
             head.followers.append(

@@ -46,9 +46,14 @@ def read_fence_list(file: str | Path) -> Map:
             f"as latitude and longitude, got {len(places)} lines"
         )
     found = ItemFeatures([], [], [], [])
-    found.unread.append(Unread(
-        "fence[0]", FENCE, "where the vehicle goes after a breach of the fence", _point(places[0])
-    ))  # fmt: skip
+    found.unread.append(
+        Unread(
+            "fence[0]",
+            FENCE,
+            "where the vehicle goes after a breach of the fence",
+            _point(places[0]),
+        )
+    )
     add_polygon(found, "fence[1]", places[1:], is_inclusion=True)
     return Map(tuple(found.features), True, found.layers(), (), (), tuple(found.unread))
 

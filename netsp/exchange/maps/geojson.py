@@ -17,9 +17,13 @@ if TYPE_CHECKING:
     import shapely
 
 SHAPES = {
-    "Point": 0, "MultiPoint": 1, "LineString": 1, "MultiLineString": 2, "Polygon": 2,
+    "Point": 0,
+    "MultiPoint": 1,
+    "LineString": 1,
+    "MultiLineString": 2,
+    "Polygon": 2,
     "MultiPolygon": 3,
-}  # fmt: skip
+}
 """How deep the positions lie in the lists of coordinates."""
 
 COLLECTION = "GeometryCollection"
@@ -223,9 +227,14 @@ def _check(coordinates: Any, depth: int, kind: str, where: str, *, degrees: bool
             _check(part, depth - 1, kind, where, degrees=degrees)
         return
     c = coordinates
-    good = isinstance(c, list) and len(c) >= 2 and all(
-        isinstance(v, (int, float)) and not isinstance(v, bool) and -1e12 <= v <= 1e12 for v in c
-    )  # fmt: skip
+    good = (
+        isinstance(c, list)
+        and len(c) >= 2
+        and all(
+            isinstance(v, (int, float)) and not isinstance(v, bool) and -1e12 <= v <= 1e12
+            for v in c
+        )
+    )
     if not good or (degrees and (abs(c[0]) > 180.0 or abs(c[1]) > 90.0)):
         metres = good and "; if these are metres, say in which system with --crs"
         raise InputError(

@@ -37,7 +37,7 @@ def with_depth(problem: Problem, depth: float) -> Problem:
 
 def surface_warning(
     problem: Problem, remedy: str = "give one depth for all with --depth D"
-) -> str | None:  # fmt: skip
+) -> str | None:
     """Return a warning where all goals are at depth 0, as tables and maps without heights have
     them; None otherwise.
 

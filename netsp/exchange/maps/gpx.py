@@ -226,11 +226,13 @@ def _point(element: ElementTree.Element, where: str) -> GpxPoint:
         height = str(0.0 - _number(depth, MAX_HEIGHT, f"{where}: depth"))
     time = _text(element, "time")
     return GpxPoint(
-        latitude, longitude,
-        None if height is None or not height.strip()
+        latitude,
+        longitude,
+        None
+        if height is None or not height.strip()
         else _number(height, MAX_HEIGHT, f"{where}: ele"),
         None if time is None or not time.strip() else seconds_of(time, f"{where}: time"),
-    )  # fmt: skip
+    )
 
 
 def _number(text: str | None, most: float, where: str) -> float:

@@ -44,8 +44,15 @@ MAX_PAGES = 1000
 CONTAINERS = ("Folder", "Document")
 OVERLAYS = ("GroundOverlay", "ScreenOverlay", "PhotoOverlay", "Tour")
 GEOMETRIES = (
-    "Point", "LineString", "LinearRing", "Polygon", "MultiGeometry", "Track", "MultiTrack", "Model",
-)  # fmt: skip
+    "Point",
+    "LineString",
+    "LinearRing",
+    "Polygon",
+    "MultiGeometry",
+    "Track",
+    "MultiTrack",
+    "Model",
+)
 
 PLACES = ("coordinates", "coord")
 """Elements that hold places."""
@@ -112,10 +119,11 @@ class _Archive:
         except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
             raise InputError(f"{file}: cannot be read as a map: {error}") from None
         pages = {
-            path: e for e in entries
+            path: e
+            for e in entries
             if (path := posixpath.normpath(e.filename.replace("\\", "/"))).lower().endswith(".kml")
             and not _is_resource_fork(path)
-        }  # fmt: skip
+        }
         if not pages:
             raise InputError(f"{file}: cannot be read as a map: holds no .kml")
         # doc.kml at the root, else the first page nearest to the root
@@ -128,8 +136,14 @@ class _Archive:
             if entry.file_size > MOST_BYTES:
                 raise InputError(f"{self.file}: unpacks to more than {MOST_BYTES / 2**20:g} MiB")
             return self.archive.read(entry)
-        except (zipfile.BadZipFile, zlib.error, OSError, RuntimeError, NotImplementedError,
-                EOFError) as error:  # fmt: skip
+        except (
+            zipfile.BadZipFile,
+            zlib.error,
+            OSError,
+            RuntimeError,
+            NotImplementedError,
+            EOFError,
+        ) as error:
             raise InputError(f"{self.file}: cannot be read as a map: {path}: {error}") from None
 
 
@@ -182,9 +196,13 @@ class _Reader:
     def map(self) -> Map:
         """Return the map."""
         return Map(
-            tuple(self.features), True, self.layers, tuple(self.complaints),
-            notes=tuple(change_notes(self.changes)), unread=tuple(self.unread),
-        )  # fmt: skip
+            tuple(self.features),
+            True,
+            self.layers,
+            tuple(self.complaints),
+            notes=tuple(change_notes(self.changes)),
+            unread=tuple(self.unread),
+        )
 
     def read_archive(
         self, archive: _Archive, page: str, folders: tuple[str, ...], folder: Path
@@ -193,10 +211,16 @@ class _Reader:
         name = Path(archive.file).name
         self.seen.add(f"{archive.file}\n{page}")
         self.read_page(
-            _Page(f"{name}: {page}" if folders or page != archive.main else name,
-                  archive.read(page), folder, archive, page),
-            folders, is_root=not folders,
-        )  # fmt: skip
+            _Page(
+                f"{name}: {page}" if folders or page != archive.main else name,
+                archive.read(page),
+                folder,
+                archive,
+                page,
+            ),
+            folders,
+            is_root=not folders,
+        )
         if page != archive.main:
             return
         for other in archive.pages:
@@ -304,11 +328,16 @@ class _Reader:
             self.changes += [Change(name, layer, text) for text in changes]
             self.features.append(
                 Feature(
-                    name, layer, element.get("id") or "", properties, shape,
-                    folders=tuple(reversed(at.folders)), is_above_floor=is_above_floor,
+                    name,
+                    layer,
+                    element.get("id") or "",
+                    properties,
+                    shape,
+                    folders=tuple(reversed(at.folders)),
+                    is_above_floor=is_above_floor,
                     kind="path" if part.tag == "Track" else "",
                 )
-            )  # fmt: skip
+            )
 
     def link(self, element: Element, at: _Position, page: _Page) -> None:
         """Read the page of a link, or name the link."""
@@ -458,9 +487,11 @@ def _shape(element: Element, changes: list[str], *, degrees: bool) -> tuple[shap
         rings = [
             _ring(ring, degrees=degrees)
             for boundary in ("outerBoundaryIs", "innerBoundaryIs")
-            for holder in element if holder.tag == boundary
-            for ring in holder if ring.tag == "LinearRing"
-        ]  # fmt: skip
+            for holder in element
+            if holder.tag == boundary
+            for ring in holder
+            if ring.tag == "LinearRing"
+        ]
         outer = next((h for h in element if h.tag == "outerBoundaryIs"), None)
         if outer is None or not rings or not len(rings[0]):
             raise ShapeError("has no coordinates")

@@ -77,8 +77,9 @@ def outlines(
     areas: list[tuple[shapely.Polygon, list[int]]] = []
     open_lines: list[int] = []
     for members in _groups(component[::2]):
-        snapped = [_snapped(lines[k], ends[corner[2 * k]], ends[corner[2 * k + 1]])
-                   for k in members]  # fmt: skip
+        snapped = [
+            _snapped(lines[k], ends[corner[2 * k]], ends[corner[2 * k + 1]]) for k in members
+        ]
         kept = [(k, line) for k, line in zip(members, snapped, strict=True) if line is not None]
         faces = shapely.polygonize([line for _, line in kept])
         whole = union(list(faces.geoms))

@@ -17,9 +17,13 @@ if TYPE_CHECKING:
     import shapely
 
 VISITED = {
-    16: "NAV_WAYPOINT", 17: "NAV_LOITER_UNLIM", 18: "NAV_LOITER_TURNS", 19: "NAV_LOITER_TIME",
-    31: "NAV_LOITER_TO_ALT", 82: "NAV_SPLINE_WAYPOINT",
-}  # fmt: skip
+    16: "NAV_WAYPOINT",
+    17: "NAV_LOITER_UNLIM",
+    18: "NAV_LOITER_TURNS",
+    19: "NAV_LOITER_TIME",
+    31: "NAV_LOITER_TO_ALT",
+    82: "NAV_SPLINE_WAYPOINT",
+}
 """Commands that visit a place: they are goals."""
 
 NOT_VISITED = {
@@ -35,7 +39,7 @@ NOT_VISITED = {
     201: ("DO_SET_ROI", "a place to look at, not to visit"),
     5000: ("NAV_FENCE_RETURN_POINT", "where the vehicle goes after a breach of the fence"),
     5100: ("NAV_RALLY_POINT", "a rally point, for emergencies"),
-}  # fmt: skip
+}
 """Commands with a place that is no goal, and what that is."""
 
 WITHOUT_PLACE = {
@@ -60,9 +64,16 @@ ABOVE_SEA, ABOVE_HOME, ABOVE_TERRAIN = (0, 5), (3, 6), (10, 11)
 """Frames with latitude and longitude, by what altitudes count from."""
 
 FRAME_NAMES = {
-    1: "LOCAL_NED", 2: "MISSION", 4: "LOCAL_ENU", 7: "LOCAL_OFFSET_NED", 8: "BODY_NED",
-    9: "BODY_OFFSET_NED", 12: "BODY_FRD", 20: "LOCAL_FRD", 21: "LOCAL_FLU",
-}  # fmt: skip
+    1: "LOCAL_NED",
+    2: "MISSION",
+    4: "LOCAL_ENU",
+    7: "LOCAL_OFFSET_NED",
+    8: "BODY_NED",
+    9: "BODY_OFFSET_NED",
+    12: "BODY_FRD",
+    20: "LOCAL_FRD",
+    21: "LOCAL_FLU",
+}
 
 MAX_PASS_S = 1.0
 """Longest hold at a bend that is passed, s, in files where other waypoints hold longer: netsp and
@@ -148,9 +159,10 @@ class ItemFeatures:
 
 
 def features_of_items(
-    items: Sequence[MissionItem], home_altitude: float | None,
+    items: Sequence[MissionItem],
+    home_altitude: float | None,
     home: tuple[float, float] | None = None,
-) -> ItemFeatures:  # fmt: skip
+) -> ItemFeatures:
     """Return the features of mission items: goals, fences, and what is neither.
 
     Parameters
@@ -188,9 +200,10 @@ def features_of_items(
             )
             continue
         is_bend = (
-            item.mark is not None and item.mark.get("kind") != "goal" if has_marks
+            item.mark is not None and item.mark.get("kind") != "goal"
+            if has_marks
             else is_passed(item)
-        )  # fmt: skip
+        )
         z = item.place[2]
         if item.frame in ABOVE_TERRAIN:
             if not is_bend:
@@ -221,7 +234,7 @@ def features_of_items(
 
 def _passing_rule(
     stops: Sequence[MissionItem], home: tuple[float, float] | None
-) -> Callable[[MissionItem], bool]:  # fmt: skip
+) -> Callable[[MissionItem], bool]:
     """Return the rule that tells bends from goals by the seconds for which the vehicle holds.
 
     A tour of netsp ends at home, where it holds as long as at its first waypoint and at every bend,
@@ -286,9 +299,10 @@ def _visited(
     point = shapely.Point(*at, 0.0 if z is None else z)
     if is_bend:
         why = (
-            "a bend of the tour, as netsp wrote it" if by_mark
+            "a bend of the tour, as netsp wrote it"
+            if by_mark
             else f"passed: it holds for {item.hold_s:g} s, as at home or less than others"
-        )  # fmt: skip
+        )
         return Feature(item.where, BENDS, "", {"kind": "ignore", "why": why}, point)
     properties = {"kind": "goal", "command": VISITED[item.command]}
     if item.mark is not None and item.mark.get("name") is not None:
@@ -320,9 +334,12 @@ def _fences(items: Sequence[MissionItem], out: ItemFeatures) -> None:
 
 
 def add_polygon(
-    out: ItemFeatures, where: str, corners: Iterable[tuple[float, float] | None], *,
+    out: ItemFeatures,
+    where: str,
+    corners: Iterable[tuple[float, float] | None],
+    *,
     is_inclusion: bool,
-) -> None:  # fmt: skip
+) -> None:
     """Add a polygon of a fence: bounds where the vehicle stays inside, else an obstacle.
 
     Parameters
@@ -347,9 +364,13 @@ def add_polygon(
 
 
 def add_circle(
-    out: ItemFeatures, where: str, center: tuple[float, float] | None, radius: float | None, *,
+    out: ItemFeatures,
+    where: str,
+    center: tuple[float, float] | None,
+    radius: float | None,
+    *,
     is_inclusion: bool,
-) -> None:  # fmt: skip
+) -> None:
     """Add a circle of a fence: bounds where the vehicle stays inside, else an obstacle.
 
     Parameters

@@ -149,14 +149,20 @@ def read_occupancy(
     outline = [_apply(_placing(said, 0), c, r) for c, r in corners]
     straight = said.origin[2] == 0.0
     try:
-        return Problem.model_validate({
-            "name": name or Path(file).stem, "base": tuple(base), "goals": list(goals),
-            "tether_length": tether, "clearance": clearance, "units": "m",
-            "obstacles": [
-                {"polygon": _corners(p), "name": f"W{k}"} for k, p in enumerate(polygons, 1)
-            ],
-            "bounds": [*outline[0], *outline[2]] if straight else outline,
-        })  # fmt: skip
+        return Problem.model_validate(
+            {
+                "name": name or Path(file).stem,
+                "base": tuple(base),
+                "goals": list(goals),
+                "tether_length": tether,
+                "clearance": clearance,
+                "units": "m",
+                "obstacles": [
+                    {"polygon": _corners(p), "name": f"W{k}"} for k, p in enumerate(polygons, 1)
+                ],
+                "bounds": [*outline[0], *outline[2]] if straight else outline,
+            }
+        )
     except ValidationError as error:
         raise InputError(f"{file}: {explain(error)}") from None
 
@@ -192,8 +198,9 @@ def _opened(file: str | Path, resolution: float | None) -> tuple[MapFile, Path]:
         raise InputError(f"{file}: mode: expected trinary or scale, got 'raw'")
     own = {
         k: v if k in ("image", "mode") else _numbers(v)
-        for k, v in data.items() if k in MapFile.model_fields
-    }  # fmt: skip
+        for k, v in data.items()
+        if k in MapFile.model_fields
+    }
     try:
         said = MapFile.model_validate(own)
     except ValidationError as error:
@@ -312,10 +319,12 @@ def _polygons(
     cells = [
         shapely.geometry.shape(shape)
         for shape, _ in rasterio.features.shapes(
-            occupied.astype(np.uint8), mask=occupied, connectivity=4,
+            occupied.astype(np.uint8),
+            mask=occupied,
+            connectivity=4,
             transform=rasterio.Affine(*_placing(said, len(occupied))),
         )
-    ]  # fmt: skip
+    ]
     if not cells:
         return [], []
     if len(cells) > MOST_PIECES:
@@ -327,10 +336,14 @@ def _polygons(
     grown = exact.buffer(GROWN * tolerance, quad_segs=4)
     parts = list(getattr(grown, "geoms", [grown]))
     own = shapely.STRtree(cells)
-    outlines = shapely.union_all([
-        _simplified(p, shapely.union_all([cells[k] for k in own.query(p, "intersects")]), tolerance)
-        for p in parts
-    ])  # fmt: skip
+    outlines = shapely.union_all(
+        [
+            _simplified(
+                p, shapely.union_all([cells[k] for k in own.query(p, "intersects")]), tolerance
+            )
+            for p in parts
+        ]
+    )
     free = [shapely.Point(float(p[0]), float(p[1])) for p in points]
     return simple_polygons(outlines, lambda hole: any(hole.contains(p) for p in free))
 

@@ -170,11 +170,14 @@ def _of_table(file: str | Path, problem: Problem, stem: str) -> FoundPath:
             gaps += 1
             continue
         place = f"{file}: line {number}, point {len(values)}"
-        values.append([
-            _number(table.plain(k, name), f"{place}: {table.title(name)}")
-            * table.columns[name][1].factor + 0.0
-            for name in quantities
-        ])  # fmt: skip
+        values.append(
+            [
+                _number(table.plain(k, name), f"{place}: {table.title(name)}")
+                * table.columns[name][1].factor
+                + 0.0
+                for name in quantities
+            ]
+        )
         if stamps is not None:
             date = table.text(k, "date") if clock == "time" else ""
             where = f"{place}: {table.title(clock)}"
@@ -233,9 +236,7 @@ def _seconds(text: str, where: str) -> float:
     return _number(text, where) if _is_number(text) else seconds_of(text, where)
 
 
-def _of_json(
-    file: str | Path, problem: Problem, stem: str, frame: str | None
-) -> list[FoundPath]:  # fmt: skip
+def _of_json(file: str | Path, problem: Problem, stem: str, frame: str | None) -> list[FoundPath]:
     text = read_text(file).removeprefix("\ufeff")
     if text.lstrip().startswith("["):
         points = read_path(file)
@@ -262,9 +263,11 @@ def _of_geojson(
             f"{shown(data.get('type'))} without one"
         )
     stated = data.get("frame")
-    is_global = (frame or (stated if stated in FRAMES else None) or (
-        "global" if problem.origin is not None else "local"
-    )) == "global"  # fmt: skip
+    is_global = (
+        frame
+        or (stated if stated in FRAMES else None)
+        or ("global" if problem.origin is not None else "local")
+    ) == "global"
     out = []
     for k, (where, coordinates, properties) in enumerate(lines):
         place = f"{file}: {where}" if where else str(file)
@@ -280,9 +283,11 @@ def _of_geojson(
                 )
             points[:, :2] = _to_plane(problem, [(b, a) for a, b in points[:, :2]], place)
         name = properties.get("name")
-        label = name if isinstance(name, str) and name else (
-            stem if len(lines) == 1 else f"{stem} {k + 1}"
-        )  # fmt: skip
+        label = (
+            name
+            if isinstance(name, str) and name
+            else (stem if len(lines) == 1 else f"{stem} {k + 1}")
+        )
         out.append(FoundPath(label, points, _times_of(properties, len(points), place)))
     return out
 
@@ -333,10 +338,14 @@ def _positions(coordinates: Any, where: str) -> list[list[float]]:
     if not isinstance(coordinates, list) or len(coordinates) < 2:
         raise InputError(f"{where}: coordinates: expected two positions or more")
     for k, c in enumerate(coordinates):
-        good = isinstance(c, list) and len(c) >= 2 and all(
-            isinstance(v, int | float) and not isinstance(v, bool) and abs(v) <= LARGEST
-            for v in c[:3]
-        )  # fmt: skip
+        good = (
+            isinstance(c, list)
+            and len(c) >= 2
+            and all(
+                isinstance(v, int | float) and not isinstance(v, bool) and abs(v) <= LARGEST
+                for v in c[:3]
+            )
+        )
         if not good:
             raise InputError(f"{where}: position {k}: expected [x, y] or [x, y, z], got {shown(c)}")
     return coordinates
@@ -367,9 +376,12 @@ def path_to_geojson(name: str, points: Floats, problem: Problem) -> str:
     data: dict[str, Any] = {
         "type": "FeatureCollection",
         **({} if projection is not None else {"frame": "local", "units": problem.units}),
-        "features": [{
-            "type": "Feature", "properties": {"name": name, "problem": problem.name},
-            "geometry": {"type": "LineString", "coordinates": rows.tolist()},
-        }],
-    }  # fmt: skip
+        "features": [
+            {
+                "type": "Feature",
+                "properties": {"name": name, "problem": problem.name},
+                "geometry": {"type": "LineString", "coordinates": rows.tolist()},
+            }
+        ],
+    }
     return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"

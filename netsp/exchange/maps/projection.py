@@ -48,9 +48,13 @@ class Projection:
     """
 
     def __init__(
-        self, latitude: float, longitude: float, heading: float = 0.0,
-        base: tuple[float, float] = (0.0, 0.0), name: str = "origin",
-    ) -> None:  # fmt: skip
+        self,
+        latitude: float,
+        longitude: float,
+        heading: float = 0.0,
+        base: tuple[float, float] = (0.0, 0.0),
+        name: str = "origin",
+    ) -> None:
         self.latitude = checked_argument(f"{name}: latitude", latitude, -90.0, 90.0)
         self.longitude = checked_argument(f"{name}: longitude", longitude, -180.0, 180.0)
         self.heading = checked_argument(f"{name}: heading", heading, -360.0, 360.0)

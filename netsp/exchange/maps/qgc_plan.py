@@ -75,10 +75,14 @@ def read_plan(file: str | Path) -> Map:
             items.append(_item(item, where, str(file)))
         else:
             name = item.get("complexItemType", kind) if isinstance(item, dict) else item
-            complex_items.append(Unread(
-                where, COMMANDS,
-                f"a pattern of QGroundControl ({shown(name)}): break it up into waypoints there",
-            ))  # fmt: skip
+            complex_items.append(
+                Unread(
+                    where,
+                    COMMANDS,
+                    f"a pattern of QGroundControl ({shown(name)}): break it up into waypoints "
+                    "there",
+                )
+            )
     home = mission.get("plannedHomePosition")
     place = [_number(v) for v in home] if isinstance(home, list) else []
     altitude = place[2] if len(place) > 2 else None
@@ -91,9 +95,13 @@ def read_plan(file: str | Path) -> Map:
     found.notes += _fence_notes(_part(own, "fence"))
     _rally(data.get("rallyPoints"), found)
     return Map(
-        tuple(found.features), True, found.layers(),
-        tuple(f"{file}: {c}" for c in found.complaints), tuple(found.notes), tuple(found.unread),
-    )  # fmt: skip
+        tuple(found.features),
+        True,
+        found.layers(),
+        tuple(f"{file}: {c}" for c in found.complaints),
+        tuple(found.notes),
+        tuple(found.unread),
+    )
 
 
 def _fence_notes(fence: dict[str, Any]) -> list[str]:
@@ -155,9 +163,13 @@ def _item(item: dict[str, Any], where: str, file: str) -> MissionItem:
     numbers += [None] * (7 - len(numbers))
     mark = item.get("netsp")
     return MissionItem(
-        where, int(command), int(frame), tuple(numbers[:4]), (numbers[4], numbers[5], numbers[6]),
+        where,
+        int(command),
+        int(frame),
+        tuple(numbers[:4]),
+        (numbers[4], numbers[5], numbers[6]),
         mark if isinstance(mark, dict) else None,
-    )  # fmt: skip
+    )
 
 
 def _lonlat(value: Any) -> tuple[float, float] | None:
@@ -175,16 +187,21 @@ def _fence(fence: Any, found: ItemFeatures, file: str) -> None:
         polygon = _object(polygon, f"{file}: geoFence.polygons[{k}]")
         corners = [_lonlat(c) for c in _list(polygon.get("polygon"), f"{file}: geoFence.polygons")]
         add_polygon(
-            found, f"geoFence.polygons[{k}]", corners,
+            found,
+            f"geoFence.polygons[{k}]",
+            corners,
             is_inclusion=bool(polygon.get("inclusion", True)),
-        )  # fmt: skip
+        )
     for k, circle in enumerate(_list(fence.get("circles"), f"{file}: geoFence.circles")):
         circle = _object(circle, f"{file}: geoFence.circles[{k}]")
         inner = _part(circle, "circle")
         add_circle(
-            found, f"geoFence.circles[{k}]", _lonlat(inner.get("center")),
-            _number(inner.get("radius")), is_inclusion=bool(circle.get("inclusion", True)),
-        )  # fmt: skip
+            found,
+            f"geoFence.circles[{k}]",
+            _lonlat(inner.get("center")),
+            _number(inner.get("radius")),
+            is_inclusion=bool(circle.get("inclusion", True)),
+        )
     old = fence.get("polygon")  # version 1 has one polygon, of inclusion
     if isinstance(old, list) and old:
         add_polygon(found, "geoFence.polygon", [_lonlat(c) for c in old], is_inclusion=True)

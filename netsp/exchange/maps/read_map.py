@@ -78,9 +78,13 @@ SEQUENCE_SUFFIXES = (".geojsonl", ".geojsons", ".geojsonseq", ".ndjson", ".ndgeo
 """Extensions of sequences of GeoJSON texts."""
 
 EARTH_READERS = {
-    ".plan": read_plan, ".waypoints": read_waypoint_list, ".wpl": read_waypoint_list,
-    ".gpx": read_gpx_map, ".fen": read_fence_list, ".ral": read_rally_list,
-}  # fmt: skip
+    ".plan": read_plan,
+    ".waypoints": read_waypoint_list,
+    ".wpl": read_waypoint_list,
+    ".gpx": read_gpx_map,
+    ".fen": read_fence_list,
+    ".ral": read_rally_list,
+}
 """Readers of formats that are in degrees always, by extension."""
 
 MAX_LISTED = 20
@@ -139,8 +143,9 @@ class ImportedSite:
         for goal, feature in zip(self.problem.goals, self.goal_features, strict=True):
             left = problem.goals[kept] if kept < len(problem.goals) else None
             if left is not None and (left.name, left.position[:2]) == (
-                goal.name, goal.position[:2],
-            ):  # fmt: skip
+                goal.name,
+                goal.position[:2],
+            ):
                 kept += 1
                 staying.add("" if feature is None else feature.where)
                 continue
@@ -149,19 +154,23 @@ class ImportedSite:
                 lost[feature.where] = feature.layer
         assert problem.site is not None
         layers = tuple(
-            layer.without_goals([w for w in lost if w not in staying and lost[w] == layer.layer],
-                                reason)
+            layer.without_goals(
+                [w for w in lost if w not in staying and lost[w] == layer.layer], reason
+            )
             for layer in problem.site.imported
-        )  # fmt: skip
+        )
         site = problem.site.model_copy(update={"imported": layers})
         problem = problem.model_copy(update={"site": site})
         return replace(self, problem=problem, left_out=(*self.left_out, *shapes))
 
 
 def import_site(
-    file: str | Path, projection: Projection | None = None, *, options: SiteOptions | None = None,
+    file: str | Path,
+    projection: Projection | None = None,
+    *,
+    options: SiteOptions | None = None,
     name: str | None = None,
-) -> ImportedSite:  # fmt: skip
+) -> ImportedSite:
     """Import the problem of a map, in metres from its base, y to the projection's heading.
 
     Parameters
@@ -215,9 +224,14 @@ def import_site(
 
 
 def read_site(
-    file: str | Path, projection: Projection | None = None, *, options: SiteOptions | None = None,
-    name: str | None = None, on_note: Callable[[str], None] | None = None, **more: Any,
-) -> Problem:  # fmt: skip
+    file: str | Path,
+    projection: Projection | None = None,
+    *,
+    options: SiteOptions | None = None,
+    name: str | None = None,
+    on_note: Callable[[str], None] | None = None,
+    **more: Any,
+) -> Problem:
     """Return the problem of a map, as `import_site`.
 
     Parameters
@@ -400,17 +414,24 @@ class _Site:
         self.goal_features = [goal.get("source") for goal in goals]
         return self._made(
             {
-                "schema_version": 1, "name": name, "base": list(anchor),
-                "goals": [_bare(g) for g in goals], "obstacles": [_bare(o) for o in obstacles],
-                "tether_length": tether, "clearance": clearance,
-                **({"bounds": bounds} if bounds else {}), **self._origin(),
+                "schema_version": 1,
+                "name": name,
+                "base": list(anchor),
+                "goals": [_bare(g) for g in goals],
+                "obstacles": [_bare(o) for o in obstacles],
+                "tether_length": tether,
+                "clearance": clearance,
+                **({"bounds": bounds} if bounds else {}),
+                **self._origin(),
                 "site": Site(
-                    file=Path(self.file).name[:MAX_NAME], imported=self.ledger.records(),
+                    file=Path(self.file).name[:MAX_NAME],
+                    imported=self.ledger.records(),
                     cropped=self.cropped,
                 ),
             },
-            goals, obstacles,
-        )  # fmt: skip
+            goals,
+            obstacles,
+        )
 
     def _made(self, data: dict[str, Any], goals: list[Any], obstacles: list[Any]) -> Problem:
         """A problem; what it complains of is told by the map's own names."""
@@ -755,10 +776,13 @@ class _Site:
         return self._named(out)
 
     def _obstacle(
-        self, feature: Feature, shape: shapely.Geometry,
+        self,
+        feature: Feature,
+        shape: shapely.Geometry,
         area: Callable[[Feature, shapely.Geometry], list[dict[str, Any]]],
-        drawn: dict[str, list[tuple[Feature, shapely.LineString]]], pointlike: list[Feature],
-    ) -> list[dict[str, Any]]:  # fmt: skip
+        drawn: dict[str, list[tuple[Feature, shapely.LineString]]],
+        pointlike: list[Feature],
+    ) -> list[dict[str, Any]]:
         """Return the obstacles of a shape; defer open lines and points without a radius."""
         kind = shape.geom_type
         out: list[dict[str, Any]] = []
@@ -789,9 +813,10 @@ class _Site:
         return out
 
     def _line_work(
-        self, pieces: list[tuple[Feature, shapely.LineString]],
+        self,
+        pieces: list[tuple[Feature, shapely.LineString]],
         area: Callable[[Feature, shapely.Geometry], list[dict[str, Any]]],
-    ) -> list[dict[str, Any]]:  # fmt: skip
+    ) -> list[dict[str, Any]]:
         """Return the obstacles of a layer's open lines: joined outlines, and lines with a width."""
         out: list[dict[str, Any]] = []
         areas, rest = outlines([line for _, line in pieces], self.said.join_tolerance)
@@ -1050,9 +1075,13 @@ class _Site:
         return self.is_chart and feature.layer.upper() in (*DEPTH_AREAS, UNSURVEYED, SOUNDINGS)
 
     def _free_viewpoints(
-        self, goals: list[dict[str, Any]], obstacles: list[dict[str, Any]], anchor: Any,
-        tether: float | None, clearance: float,
-    ) -> list[dict[str, Any]]:  # fmt: skip
+        self,
+        goals: list[dict[str, Any]],
+        obstacles: list[dict[str, Any]],
+        anchor: Any,
+        tether: float | None,
+        clearance: float,
+    ) -> list[dict[str, Any]]:
         """Return the viewpoints with room for the robot; note the others by layer and cause."""
         if not goals:
             return goals
@@ -1155,8 +1184,9 @@ class _Site:
         ring: list[list[float]] = shapely.get_coordinates(polygons[0].exterior)[:-1].tolist()
         islands = [
             {"feature": feature, "name": None, "where": feature.where, **outline_of(polygon)}
-            for hole in holes for polygon in simple_polygons(hole, lambda p: False)[0]
-        ]  # fmt: skip
+            for hole in holes
+            for polygon in simple_polygons(hole, lambda p: False)[0]
+        ]
         if islands:
             self.notes.append(
                 f"{feature.where}: {counted(len(islands), 'hole')} in the bounds: an obstacle each"
@@ -1179,9 +1209,12 @@ class _Site:
             )
 
     def _check_scale(
-        self, goals: list[dict[str, Any]], obstacles: list[dict[str, Any]], anchor: Any,
+        self,
+        goals: list[dict[str, Any]],
+        obstacles: list[dict[str, Any]],
+        anchor: Any,
         tether: float,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """A plane in which a tether would reach everything many times over is one of degrees."""
         if self.map.geographic or not goals:
             return

@@ -112,15 +112,21 @@ class SeaFloor:
 def check_suffix(file: str | Path) -> None:
     """Raise an `InputError` unless a sea floor can be written to a file of this name."""
     if Path(file).suffix.lower() not in SUFFIXES:
-        raise InputError(f"floor: expected a name that ends in {', '.join(SUFFIXES)}, got "
-                         f"{shown(str(file))}")  # fmt: skip
+        raise InputError(
+            f"floor: expected a name that ends in {', '.join(SUFFIXES)}, got {shown(str(file))}"
+        )
 
 
 def sea_floor(
-    areas: Sequence[DepthArea], contours: Floats, land: Sequence[shapely.Geometry],
-    box: tuple[float, float, float, float], cell: float, *, soundings: Floats | None = None,
+    areas: Sequence[DepthArea],
+    contours: Floats,
+    land: Sequence[shapely.Geometry],
+    box: tuple[float, float, float, float],
+    cell: float,
+    *,
+    soundings: Floats | None = None,
     dangers: Sequence[Danger] = (),
-) -> SeaFloor:  # fmt: skip
+) -> SeaFloor:
     """Return the sea floor that a chart's depths give.
 
     Depths are interpolated between soundings and contours, and kept within the range of depths of
@@ -292,10 +298,17 @@ def _save_geotiff(
         warnings.simplefilter("ignore")  # a plane of its own has no place on the map
         try:
             with rasterio.open(
-                str(file), "w", driver="GTiff", height=heights.shape[0], width=heights.shape[1],
-                count=1, dtype="float32", nodata=NO_HEIGHT,
-                transform=from_origin(corner[0], corner[1], cell, cell), compress="deflate",
-            ) as grid:  # fmt: skip
+                str(file),
+                "w",
+                driver="GTiff",
+                height=heights.shape[0],
+                width=heights.shape[1],
+                count=1,
+                dtype="float32",
+                nodata=NO_HEIGHT,
+                transform=from_origin(corner[0], corner[1], cell, cell),
+                compress="deflate",
+            ) as grid:
                 grid.write(heights.astype("float32"), 1)
         except Exception as error:
             raise InputError(f"{file}: cannot be written: {str(error)[:120]}") from None

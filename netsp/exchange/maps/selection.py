@@ -67,17 +67,19 @@ class Selection:
         """
         for word, _ in rules:
             if word not in WORDS:
-                raise InputError(f"--of: expected one of {', '.join(WORDS)} before the =, got "
-                                 f"{shown(word)}")  # fmt: skip
+                raise InputError(
+                    f"--of: expected one of {', '.join(WORDS)} before the =, got {shown(word)}"
+                )
 
         def of(word: str) -> list[str]:
             return [value for own, value in rules if own == word]
 
         return cls(
-            tuple(v.lower() for v in of("layer")), tuple(v.lower() for v in of("name")),
+            tuple(v.lower() for v in of("layer")),
+            tuple(v.lower() for v in of("name")),
             tuple(_box("box", v, "XMIN,YMIN,XMAX,YMAX") for v in of("box")),
             tuple(_box("earth", v, "SOUTH,WEST,NORTH,EAST") for v in of("earth")),
-        )  # fmt: skip
+        )
 
     def takes(self, layer: str, name: str | None) -> bool:
         """Return whether layer and name of a feature fit.
@@ -127,6 +129,7 @@ def _box(word: str, text: str, expected: str) -> Box:
     except ValueError:
         raise InputError(f"--of {word}: expected {expected}, got {shown(text)}") from None
     if not (low_x < high_x and low_y < high_y):
-        raise InputError(f"--of {word}: expected {expected} with the smaller values first, got "
-                         f"{shown(text)}")  # fmt: skip
+        raise InputError(
+            f"--of {word}: expected {expected} with the smaller values first, got {shown(text)}"
+        )
     return low_x, low_y, high_x, high_y

@@ -244,13 +244,20 @@ def _texts(file: str | Path, plain: str | Path, layer: str) -> frozenset[int]:
         return frozenset()
     quoted = layer.replace('"', '\\"')
     _, ids, _, (styles,) = _call(
-        file, [], pyogrio.raw.read, plain, sql=f'SELECT OGR_STYLE FROM "{quoted}"',
-        sql_dialect="OGRSQL", return_fids=True, read_geometry=False,
-    )  # fmt: skip
+        file,
+        [],
+        pyogrio.raw.read,
+        plain,
+        sql=f'SELECT OGR_STYLE FROM "{quoted}"',
+        sql_dialect="OGRSQL",
+        return_fids=True,
+        read_geometry=False,
+    )
     return frozenset(
-        int(number) for number, style in zip(ids, styles, strict=True)
+        int(number)
+        for number, style in zip(ids, styles, strict=True)
         if str(style).startswith("LABEL")
-    )  # fmt: skip
+    )
 
 
 def read_rows(
@@ -414,9 +421,13 @@ class _Found:
     def map(self, geographic: bool) -> Map:
         """Return the map."""
         return Map(
-            tuple(self.features), geographic, self.layers, tuple(self.complaints),
-            notes=(*self.notes, *change_notes(self.changes)), unread=tuple(self.unread),
-        )  # fmt: skip
+            tuple(self.features),
+            geographic,
+            self.layers,
+            tuple(self.complaints),
+            notes=(*self.notes, *change_notes(self.changes)),
+            unread=tuple(self.unread),
+        )
 
 
 def _shore(shape: shapely.Geometry) -> shapely.Geometry:
@@ -425,9 +436,9 @@ def _shore(shape: shapely.Geometry) -> shapely.Geometry:
         return shape
     import shapely
 
-    return collected([
-        shapely.LineString(part.exterior.coords) for part in getattr(shape, "geoms", [shape])
-    ])  # fmt: skip
+    return collected(
+        [shapely.LineString(part.exterior.coords) for part in getattr(shape, "geoms", [shape])]
+    )
 
 
 def shape_from_gdal(data: bytes) -> tuple[shapely.Geometry, tuple[str, ...]]:
@@ -581,9 +592,11 @@ def in_degrees(map_: Map, crs: str, file: str | Path) -> Map:
         except NotFiniteError as error:
             complaints.append(f"{file}: {feature.where}: {error}")
     return replace(
-        map_, features=tuple(features), geographic=crs != LOCAL,
+        map_,
+        features=tuple(features),
+        geographic=crs != LOCAL,
         complaints=(*map_.complaints, *complaints),
-    )  # fmt: skip
+    )
 
 
 def _plain(value: Any) -> Any:

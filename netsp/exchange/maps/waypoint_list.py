@@ -60,9 +60,13 @@ def read_waypoint_list(file: str | Path) -> Map:
     if home is not None:
         add_home(found, home.where, home.lonlat)
     return Map(
-        tuple(found.features), True, found.layers(),
-        tuple(f"{file}: {c}" for c in found.complaints), tuple(found.notes), tuple(found.unread),
-    )  # fmt: skip
+        tuple(found.features),
+        True,
+        found.layers(),
+        tuple(f"{file}: {c}" for c in found.complaints),
+        tuple(found.notes),
+        tuple(found.unread),
+    )
 
 
 def _is_home(item: MissionItem, line: str) -> bool:
@@ -81,6 +85,9 @@ def _row(index: int, line: str, where: str) -> MissionItem:
         raise InputError(f"{where}: expected {COLUMNS} numbers, got {shown(line)}")
     lat, lon, altitude = numbers[8:11]
     return MissionItem(
-        f"waypoints[{index}]", int(numbers[3]), int(numbers[2]), tuple(numbers[4:8]),
+        f"waypoints[{index}]",
+        int(numbers[3]),
+        int(numbers[2]),
+        tuple(numbers[4:8]),
         (lat, lon, altitude),
-    )  # fmt: skip
+    )

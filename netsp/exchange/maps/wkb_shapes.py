@@ -32,9 +32,15 @@ ARCS, COMPOUND_CURVE, CURVE_POLYGON, MULTI_CURVE, MULTI_SURFACE = 8, 9, 10, 11, 
 POLYHEDRAL_SURFACE, TIN, TRIANGLE = 15, 16, 17
 FACES = (POLYHEDRAL_SURFACE, TIN)
 COLLECTIONS = (
-    MULTI_POINT, MULTI_LINE, MULTI_POLYGON, COLLECTION, MULTI_CURVE, MULTI_SURFACE,
-    POLYHEDRAL_SURFACE, TIN,
-)  # fmt: skip
+    MULTI_POINT,
+    MULTI_LINE,
+    MULTI_POLYGON,
+    COLLECTION,
+    MULTI_CURVE,
+    MULTI_SURFACE,
+    POLYHEDRAL_SURFACE,
+    TIN,
+)
 
 CLOSED = "a ring is not closed: closed by its first corner"
 FROM_ABOVE = "made of faces: taken as their outline from above"
@@ -326,9 +332,10 @@ def collected(parts: list[shapely.Geometry]) -> shapely.Geometry:
     simple = [p for part in parts for p in getattr(part, "geoms", [part])]
     kinds = {p.geom_type for p in simple}
     for kind, whole in (
-        ("Point", shapely.MultiPoint), ("LineString", shapely.MultiLineString),
+        ("Point", shapely.MultiPoint),
+        ("LineString", shapely.MultiLineString),
         ("Polygon", shapely.MultiPolygon),
-    ):  # fmt: skip
+    ):
         if kinds == {kind}:
             return whole(simple)
     return shapely.GeometryCollection(parts)

@@ -19,6 +19,11 @@ from netsp.exchange.missions.waypoints import Waypoint
 NAMESPACE = uuid.UUID("bf7570c1-32a1-54d7-ba10-af9107bb67c8")
 """Namespace of waypoint ids; exporting a mission again gives the same ids."""
 
+DESCRIPTION = (
+    "Tour of a tethered vehicle, planned by netsp: keep the order and the places, or the tether "
+    "will be wrapped around something."
+)
+
 MAP_PIXELS = 600.0
 """Width of the map view that shows all waypoints when the mission is opened, pixels."""
 
@@ -30,9 +35,13 @@ MIN_ZOOM, MAX_ZOOM = 2, 19
 
 
 def cockpit_mission(
-    name: str | None, points: Sequence[Waypoint], holds: Sequence[int],
-    altitudes: Sequence[float], projection: Projection, speed: float | None,
-) -> str:  # fmt: skip
+    name: str | None,
+    points: Sequence[Waypoint],
+    holds: Sequence[int],
+    altitudes: Sequence[float],
+    projection: Projection,
+    speed: float | None,
+) -> str:
     """Return the text of a Cockpit mission file.
 
     Parameters
@@ -61,38 +70,43 @@ def cockpit_mission(
     for k, (p, hold, altitude, (lat, lon)) in enumerate(
         zip(points, holds, altitudes, places, strict=True)
     ):
-        waypoints.append({
-            "id": str(uuid.uuid5(NAMESPACE, f"{title} {k}")),
-            "coordinates": [round(float(lat), 9), round(float(lon), 9)],
-            "altitude": altitude,
-            "altitudeReferenceType": "Relative to home",
-            "commands": [_command("MAV_CMD_NAV_WAYPOINT", hold, 0, 0, p.heading or 0)],
-        })  # fmt: skip
+        waypoints.append(
+            {
+                "id": str(uuid.uuid5(NAMESPACE, f"{title} {k}")),
+                "coordinates": [round(float(lat), 9), round(float(lon), 9)],
+                "altitude": altitude,
+                "altitudeReferenceType": "Relative to home",
+                "commands": [_command("MAV_CMD_NAV_WAYPOINT", hold, 0, 0, p.heading or 0)],
+            }
+        )
     if speed is not None:  # older versions do not add it themselves
         waypoints[0]["commands"].append(_command("MAV_CMD_DO_CHANGE_SPEED", 1, speed, -1, 0))
     south, west = (min(float(c[k]) for c in places) for k in (0, 1))
     north, east = (max(float(c[k]) for c in places) for k in (0, 1))
-    return json.dumps(
-        {
-            "version": 0,
-            "name": title,
-            "description": "Tour of a tethered vehicle, planned by netsp: keep the order and the "
-            "places, or the tether will be wrapped around something.",
-            "vehicleType": "MAV_TYPE_SUBMARINE",
-            "createdAt": 0,
-            "updatedAt": 0,
-            "settings": {
-                "mapCenter": [round(0.5 * (south + north), 9), round(0.5 * (west + east), 9)],
-                "zoom": _zoom(points, 0.5 * (south + north)),
-                "currentWaypointAltitude": altitudes[0],
-                "currentWaypointAltitudeRefType": "Relative to home",
-                "defaultCruiseSpeed": 0 if speed is None else speed,
+    return (
+        json.dumps(
+            {
+                "version": 0,
+                "name": title,
+                "description": DESCRIPTION,
+                "vehicleType": "MAV_TYPE_SUBMARINE",
+                "createdAt": 0,
+                "updatedAt": 0,
+                "settings": {
+                    "mapCenter": [round(0.5 * (south + north), 9), round(0.5 * (west + east), 9)],
+                    "zoom": _zoom(points, 0.5 * (south + north)),
+                    "currentWaypointAltitude": altitudes[0],
+                    "currentWaypointAltitudeRefType": "Relative to home",
+                    "defaultCruiseSpeed": 0 if speed is None else speed,
+                },
+                "waypoints": waypoints,
+                "surveys": [],
             },
-            "waypoints": waypoints,
-            "surveys": [],
-        },
-        indent=1, allow_nan=False,
-    ) + "\n"  # fmt: skip
+            indent=1,
+            allow_nan=False,
+        )
+        + "\n"
+    )
 
 
 def _command(name: str, *params: float) -> dict[str, Any]:

@@ -246,9 +246,12 @@ def _is_large(zone: Zone, policy: FencePolicy) -> bool:
 
 
 def _simplified(
-    zone: Zone, obstacle: Circle | Polygon, most: float, line: shapely.LineString,
+    zone: Zone,
+    obstacle: Circle | Polygon,
+    most: float,
+    line: shapely.LineString,
     policy: FencePolicy,
-) -> Zone:  # fmt: skip
+) -> Zone:
     """Return the zone of the fewest bytes found that contains an obstacle and reaches beyond it by
     `most` at most."""
     if isinstance(obstacle, Circle) or most <= 0.0:

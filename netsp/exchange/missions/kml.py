@@ -35,7 +35,7 @@ STYLES = {
     "<PolyStyle><color>a0808080</color></PolyStyle>",
     "path": "<LineStyle><color>ff0080ff</color><width>3</width></LineStyle>",
     "tether": "<LineStyle><color>ff00c0c0</color><width>2</width></LineStyle>",
-}  # fmt: skip
+}
 """Style of each kind of placemark; colours are alpha, blue, green, red."""
 
 
@@ -59,10 +59,15 @@ def kml_of(problem: Problem, points: Sequence[Waypoint], projection: Projection)
     """
     page = _Page(projection)
     base = page.placemark(
-        "base", page.point(problem.base), name="base",
-        data={"tether_length": problem.tether_length, "clearance": problem.clearance,
-              "heading": projection.heading or None},
-    )  # fmt: skip
+        "base",
+        page.point(problem.base),
+        name="base",
+        data={
+            "tether_length": problem.tether_length,
+            "clearance": problem.clearance,
+            "heading": projection.heading or None,
+        },
+    )
     stops = {p.goal: (n, p) for n, p in enumerate((q for q in points if _is_stop(q)), 1)}
     goals = []
     for k, goal in enumerate(problem.goals):
@@ -72,26 +77,31 @@ def kml_of(problem: Problem, points: Sequence[Waypoint], projection: Projection)
             number, stop = stops[k]
             said = f"stop {number}, {said}, taut tether {stop.tether:.2f} {problem.units}"
             data = {"visit": number, "taut_tether": round(stop.tether, 4)}
-        goals.append(page.placemark(
-            "goal", page.point(goal.position), name=goal.name, said=said, data=data
-        ))  # fmt: skip
+        goals.append(
+            page.placemark("goal", page.point(goal.position), name=goal.name, said=said, data=data)
+        )
     obstacles = [
         page.placemark("obstacle", page.polygon(_outline(o)), name=o.name)
         for o in problem.obstacles
     ]
     path = page.placemark("path", page.line([p.position for p in points]), name="tour")
     folders = [
-        page.folder("base", [base]), page.folder("goals", goals),
-        page.folder("obstacles", obstacles), page.folder("path", [path]),
-    ]  # fmt: skip
+        page.folder("base", [base]),
+        page.folder("goals", goals),
+        page.folder("obstacles", obstacles),
+        page.folder("path", [path]),
+    ]
     drawn = list(_tethers(problem, points))
     tethers = [
         page.placemark(
-            "tether", page.line(line.tolist()), hidden=True,
+            "tether",
+            page.line(line.tolist()),
+            hidden=True,
             name=f"tether at stop {number}: {problem.goal_name(goal)}",
         )
-        for number, goal, line in drawn if line is not None
-    ]  # fmt: skip
+        for number, goal, line in drawn
+        if line is not None
+    ]
     missing = [problem.goal_name(goal) for _, goal, line in drawn if line is None]
     said = f"no taut tether was found at {', '.join(missing)}" if missing else ""
     if drawn:
@@ -196,21 +206,28 @@ class _Page:
         )
 
     def placemark(
-        self, style: str, shape: str, *, name: str | None = None, said: str = "",
-        data: dict[str, Any] | None = None, hidden: bool = False,
-    ) -> str:  # fmt: skip
+        self,
+        style: str,
+        shape: str,
+        *,
+        name: str | None = None,
+        said: str = "",
+        data: dict[str, Any] | None = None,
+        hidden: bool = False,
+    ) -> str:
         kind = "path" if style == "tether" else style
         values = {"kind": kind, **{k: v for k, v in (data or {}).items() if v is not None}}
         fields = "".join(
             f"<Data name={quoteattr(k)}><value>{_text(v)}</value></Data>" for k, v in values.items()
         )
         return (
-            "<Placemark>" + ("" if name is None else f"<name>{_text(name)}</name>")
+            "<Placemark>"
+            + ("" if name is None else f"<name>{_text(name)}</name>")
             + ("<visibility>0</visibility>" if hidden else "")
             + (f"<description>{_text(said)}</description>" if said else "")
             + f"<styleUrl>#{style}</styleUrl><ExtendedData>{fields}</ExtendedData>{shape}"
             "</Placemark>\n"
-        )  # fmt: skip
+        )
 
     def folder(
         self, name: str, placemarks: Sequence[str], *, hidden: bool = False, said: str = ""

@@ -296,9 +296,11 @@ class _Follower:
 
 
 def leg_times(
-    places: Sequence[Point3], holds: Sequence[float], speed: float,
+    places: Sequence[Point3],
+    holds: Sequence[float],
+    speed: float,
     motion: VehicleMotion | None = None,
-) -> list[float]:  # fmt: skip
+) -> list[float]:
     """Return the times of the legs of a mission in AUTO, s, each with the hold at its end.
 
     Parameters
@@ -328,9 +330,14 @@ def leg_times(
 
 
 def target_times(
-    places: Sequence[Point3], reach: float, speed: float, motion: VehicleMotion | None = None,
-    *, notice_s: float = 0.0, repeat_s: float = math.inf,
-) -> list[float]:  # fmt: skip
+    places: Sequence[Point3],
+    reach: float,
+    speed: float,
+    motion: VehicleMotion | None = None,
+    *,
+    notice_s: float = 0.0,
+    repeat_s: float = math.inf,
+) -> list[float]:
     """Return the times between targets that are sent in GUIDED, s.
 
     Parameters

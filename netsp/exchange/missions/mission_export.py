@@ -60,10 +60,16 @@ class Exported:
 
 
 def export_mission(
-    mission: Mission, file: str | Path, kind: str, projection: Projection | None = None, *,
-    acceptance: float = 0.0, settings: Settings | None = None, surface: float = 0.0,
+    mission: Mission,
+    file: str | Path,
+    kind: str,
+    projection: Projection | None = None,
+    *,
+    acceptance: float = 0.0,
+    settings: Settings | None = None,
+    surface: float = 0.0,
     scene: Scene | None = None,
-) -> Exported:  # fmt: skip
+) -> Exported:
     """Write a planned mission as a mission file.
 
     Parameters
@@ -144,12 +150,15 @@ def _waypoints(mission: Mission, projection: Projection | None) -> list[Waypoint
         heading = mission.waypoints[k].heading
         out.append(
             Waypoint(
-                stop.path[-1], k, stop.signature, stop.tether_length,
+                stop.path[-1],
+                k,
+                stop.signature,
+                stop.tether_length,
                 # from the x axis towards y, to clockwise from north
                 heading=None if heading is None else (north + 90.0 - heading) % 360.0,
                 stay=math.ceil(mission.waypoints[k].dwell),
             )
-        )  # fmt: skip
+        )
     return [*out, *_bends(tour.home), Waypoint(mission.start, HOME)]
 
 
@@ -243,6 +252,10 @@ def _stand_in(mission: Mission, surface: float) -> Problem:
         for k, (a, b, c) in enumerate(mission.places.tolist())
     )
     return Problem(
-        name=mission.name, base=(x, y, z - surface), goals=goals, obstacles=(),
-        tether_length=mission.tether_length, clearance=mission.clearance,
-    )  # fmt: skip
+        name=mission.name,
+        base=(x, y, z - surface),
+        goals=goals,
+        obstacles=(),
+        tether_length=mission.tether_length,
+        clearance=mission.clearance,
+    )

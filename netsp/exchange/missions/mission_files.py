@@ -82,10 +82,15 @@ class Settings:
 
 
 def export(
-    problem: Problem, solution: Solution, file: str | Path, kind: str,
-    projection: Projection | None = None, *, acceptance: float = 0.0,
+    problem: Problem,
+    solution: Solution,
+    file: str | Path,
+    kind: str,
+    projection: Projection | None = None,
+    *,
+    acceptance: float = 0.0,
     settings: Settings | None = None,
-) -> list[Waypoint]:  # fmt: skip
+) -> list[Waypoint]:
     """Write a solution as a mission file.
 
     Parameters
@@ -292,22 +297,35 @@ def _plan(
     places = projection.to_earth([p.position[:2] for p in points])
     items: list[dict[str, Any]] = [
         {
-            "type": "SimpleItem", "command": NAV_WAYPOINT, "frame": RELATIVE_ALTITUDE,
-            "autoContinue": True, "AltitudeMode": 1,
-            "Altitude": altitude(p.position[2]), "AMSLAltAboveTerrain": None,
-            "params": [_hold(p, settings), 0, 0, p.heading, _degrees(lat), _degrees(lon),
-                       altitude(p.position[2])],
+            "type": "SimpleItem",
+            "command": NAV_WAYPOINT,
+            "frame": RELATIVE_ALTITUDE,
+            "autoContinue": True,
+            "AltitudeMode": 1,
+            "Altitude": altitude(p.position[2]),
+            "AMSLAltAboveTerrain": None,
+            "params": [
+                _hold(p, settings),
+                0,
+                0,
+                p.heading,
+                _degrees(lat),
+                _degrees(lon),
+                altitude(p.position[2]),
+            ],
         }
         for p, (lat, lon) in zip(points, places, strict=True)
-    ]  # fmt: skip
+    ]
     for item, p in zip(items, points, strict=True):
         item["netsp"] = _mark(problem, p)  # ground stations pass over what they do not know
     if settings.speed is not None:
         change: dict[str, Any] = {
-            "type": "SimpleItem", "command": CHANGE_SPEED, "frame": MISSION_FRAME,
+            "type": "SimpleItem",
+            "command": CHANGE_SPEED,
+            "frame": MISSION_FRAME,
             "autoContinue": True,
             "params": [GROUND_SPEED, settings.speed, KEEP_THROTTLE, 0, 0, 0, 0],
-        }  # fmt: skip
+        }
         items.insert(1, change)
     for k, item in enumerate(items):
         item["doJumpId"] = k + 1
@@ -325,9 +343,12 @@ def _plan(
             corners = [[_degrees(a), _degrees(b)] for a, b in projection.to_earth(o.polygon)]
             polygons.append({"version": 1, "inclusion": False, "polygon": corners})
     plan = {
-        "fileType": "Plan", "version": 1, "groundStation": "QGroundControl",
+        "fileType": "Plan",
+        "version": 1,
+        "groundStation": "QGroundControl",
         "netsp": {
-            "tether_length": problem.tether_length, "clearance": problem.clearance,
+            "tether_length": problem.tether_length,
+            "clearance": problem.clearance,
             "heading": projection.heading,
             "fence": {
                 "simplified": [problem.obstacle_name(z.obstacle) for z in fence.simplified],
@@ -337,13 +358,16 @@ def _plan(
         "geoFence": {"version": 2, "circles": circles, "polygons": polygons},
         "rallyPoints": {"version": 2, "points": []},
         "mission": {
-            "version": 2, "firmwareType": ARDUPILOT, "vehicleType": SUBMARINE,
-            "globalPlanAltitudeMode": 1, "cruiseSpeed": settings.speed or 0.5,
+            "version": 2,
+            "firmwareType": ARDUPILOT,
+            "vehicleType": SUBMARINE,
+            "globalPlanAltitudeMode": 1,
+            "cruiseSpeed": settings.speed or 0.5,
             "hoverSpeed": settings.speed or 0.5,
             "plannedHomePosition": [projection.latitude, projection.longitude, 0],
             "items": items,
         },
-    }  # fmt: skip
+    }
     return json.dumps(plan, indent=1, allow_nan=False) + "\n"
 
 
@@ -369,12 +393,39 @@ def _wpl(
     ]
     places = projection.to_earth([p.position[:2] for p in points])
     for p, (lat, lon) in zip(points, places, strict=True):
-        rows.append([len(rows), 0, RELATIVE_ALTITUDE, NAV_WAYPOINT, _hold(p, settings), 0, 0,
-                     p.heading or 0, _degrees(lat), _degrees(lon), altitude(p.position[2]),
-                     1])  # fmt: skip
+        rows.append(
+            [
+                len(rows),
+                0,
+                RELATIVE_ALTITUDE,
+                NAV_WAYPOINT,
+                _hold(p, settings),
+                0,
+                0,
+                p.heading or 0,
+                _degrees(lat),
+                _degrees(lon),
+                altitude(p.position[2]),
+                1,
+            ]
+        )
         if len(rows) == 2 and settings.speed is not None:
-            rows.append([2, 0, MISSION_FRAME, CHANGE_SPEED, GROUND_SPEED, settings.speed,
-                         KEEP_THROTTLE, 0, 0, 0, 0, 1])  # fmt: skip
+            rows.append(
+                [
+                    2,
+                    0,
+                    MISSION_FRAME,
+                    CHANGE_SPEED,
+                    GROUND_SPEED,
+                    settings.speed,
+                    KEEP_THROTTLE,
+                    0,
+                    0,
+                    0,
+                    0,
+                    1,
+                ]
+            )
     return "QGC WPL 110\n" + "".join("\t".join(map(_cell, r)) + "\n" for r in rows)
 
 
@@ -409,26 +460,35 @@ def _geojson(
     def feature(kind: str, shape: str, coordinates: Any, **more: Any) -> dict[str, Any]:
         properties = {"kind": kind, **{k: v for k, v in more.items() if v is not None}}
         return {
-            "type": "Feature", "properties": properties,
+            "type": "Feature",
+            "properties": properties,
             "geometry": {"type": shape, "coordinates": coordinates},
-        }  # fmt: skip
+        }
 
     visits = {p.goal: (n, p) for n, p in enumerate(q for q in points if q.goal not in (None, HOME))}
     features = [
-        feature("base", "Point", lonlat(problem.base[:2], problem.base[2]),
-                tether_length=problem.tether_length, clearance=problem.clearance,
-                heading=projection.heading or None)
-    ]  # fmt: skip
+        feature(
+            "base",
+            "Point",
+            lonlat(problem.base[:2], problem.base[2]),
+            tether_length=problem.tether_length,
+            clearance=problem.clearance,
+            heading=projection.heading or None,
+        )
+    ]
     for k, goal in enumerate(problem.goals):
         visit, point = visits.get(k, (None, None))
         features.append(
             feature(
-                "goal", "Point", lonlat(goal.position[:2], goal.position[2]), name=goal.name,
+                "goal",
+                "Point",
+                lonlat(goal.position[:2], goal.position[2]),
+                name=goal.name,
                 visit=None if visit is None else visit + 1,
                 tether_length=None if point is None else point.tether,
                 signature=None if point is None else list(point.word),
             )
-        )  # fmt: skip
+        )
     for o in problem.obstacles:
         if isinstance(o, Circle):
             features.append(
@@ -496,9 +556,16 @@ __all__ = ["FORMATS", "FOR_VEHICLES", "Settings", "altitude", "export"]
 
 
 EXTENSIONS = {
-    ".plan": "plan", ".waypoints": "wpl", ".txt": "wpl", ".cmp": "cockpit", ".geojson": "geojson",
-    ".json": "geojson", ".kml": "kml", ".kmz": "kmz", ".csv": "csv",
-}  # fmt: skip
+    ".plan": "plan",
+    ".waypoints": "wpl",
+    ".txt": "wpl",
+    ".cmp": "cockpit",
+    ".geojson": "geojson",
+    ".json": "geojson",
+    ".kml": "kml",
+    ".kmz": "kmz",
+    ".csv": "csv",
+}
 """Which format a file's name asks for."""
 
 

@@ -127,12 +127,13 @@ def clearance_of(problem: Problem, points: list[Waypoint]) -> float:
     line = shapely.LineString([p.position[:2] for p in points])
     return min(
         (
-            line.distance(shapely.Point(o.center)) - o.radius if isinstance(o, Circle)
+            line.distance(shapely.Point(o.center)) - o.radius
+            if isinstance(o, Circle)
             else line.distance(shapely.Polygon(o.polygon))
             for o in problem.obstacles
         ),
         default=float("inf"),
-    )  # fmt: skip
+    )
 
 
 def _coarsened(
@@ -153,8 +154,10 @@ def _coarsened(
                 break
             corner = _meeting(out[-1], line[k], line[m], line[m + 1]) if m > k else line[k]
             if corner is not None:
-                paths = [shapely.LineString([a[:2], b[:2]])
-                        for a, b in ((out[-1], corner), (corner, line[m + 1]))]  # fmt: skip
+                paths = [
+                    shapely.LineString([a[:2], b[:2]])
+                    for a, b in ((out[-1], corner), (corner, line[m + 1]))
+                ]
                 if tree is None or not any(len(tree.query(w, "intersects")) for w in paths):
                     best = (m, corner)
             m += 1
