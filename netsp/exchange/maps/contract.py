@@ -5,3 +5,331 @@ object classes of charts and tags of OpenStreetMap, the shape.
 """
 
 from __future__ import annotations
+
+import re
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass
+
+from netsp.base.errors import InputError
+from netsp.base.validated import shown
+from netsp.exchange.maps.chart_classes import chart_kind
+from netsp.exchange.maps.feature import Feature
+from netsp.exchange.maps.word_tables import tags
+
+SHAPES = {
+    "base": ("Point",),
+    "goal": ("Point", "MultiPoint"),
+    "obstacle": (
+        "Point",
+        "MultiPoint",
+        "Polygon",
+        "MultiPolygon",
+        "LineString",
+        "MultiLineString",
+        "GeometryCollection",
+    ),
+    "bounds": ("Polygon", "MultiPolygon", "LineString", "MultiLineString"),
+    "path": ("LineString", "MultiLineString", "GeometryCollection"),
+}
+"""Shapes that a kind may have; lines of bounds are closed, open ones of obstacles have a width.
+
+A `GeometryCollection` is a block of a drawing.
+"""
+
+KINDS = (*SHAPES, "ignore")
+
+MAX_REASON = 300
+"""Characters of a reason; `why` of a feature of kind ignore is cut off there."""
+
+WORDS = {
+    **dict.fromkeys(("base", "bases", "anchor", "vessel", "ship"), "base"),
+    **dict.fromkeys(("goal", "goals", "target", "targets", "inspection points"), "goal"),
+    **dict.fromkeys(
+        (
+            "obstacle",
+            "obstacles",
+            "structure",
+            "structures",
+            "pile",
+            "piles",
+            "pier",
+            "piers",
+            "quay",
+            "quays",
+            "breakwater",
+            "breakwaters",
+            "jetty",
+            "jetties",
+            "wall",
+            "walls",
+            "column",
+            "columns",
+            "pontoon",
+            "pontoons",
+            "moorings",
+            "rocks",
+            "wrecks",
+        ),
+        "obstacle",
+    ),
+    **dict.fromkeys(("bounds", "boundary", "basin", "workspace"), "bounds"),
+    **dict.fromkeys(("path", "paths", "cables"), "path"),
+    "ignore": "ignore",
+}
+"""Names of layers, lower case."""
+
+
+STANDING_POINTS = tags("""
+    seamark:type = pile platform obstruction rock wreck mooring pylon hulk pontoon
+    seamark:type = beacon_cardinal beacon_lateral beacon_isolated_danger beacon_special_purpose
+    seamark:type = beacon_safe_water marine_farm production_area landmark
+    man_made = piling offshore_platform mooring lighthouse beacon dolphin bollard wind_turbine
+    man_made = crane
+    natural = rock stone
+    historic = wreck
+    generator:source = wind
+    seamark:landmark:category = windmotor
+    mooring = dolphin pile yes commercial wall buoy
+""")
+"""Tags of OpenStreetMap's points that stand in the water: key to values."""
+
+STANDING_LINES = tags("""
+    man_made = pier quay breakwater groyne jetty dyke embankment pontoon mooring dolphin reef
+    man_made = wharf
+    natural = coastline reef cliff rock bare_rock
+    waterway = dam weir lock_gate
+    seamark:type = shoreline_construction pontoon obstruction mooring bridge gate
+    seamark:type = floating_barrier causeway dyke wreck rock platform pile hulk marine_farm
+    seamark:type = fishing_facility
+    mooring = yes commercial wall private ferry cruise pile dolphin
+    floating = yes
+    barrier = wall fence retaining_wall boom net
+    bridge = yes movable viaduct
+""")
+"""Tags of OpenStreetMap's lines that a tether may catch on: key to values."""
+
+PATH_LINES = tags("""
+    route = ferry
+    power = cable
+    communication = line cable
+    man_made = pipeline
+    seamark:type = cable_submarine cable_overhead pipeline_submarine ferry_route fairway
+    seamark:type = navigation_line recommended_track recommended_route_centreline
+    seamark:type = separation_boundary separation_line depth_contour
+""")
+"""Tags of OpenStreetMap's lines that a tether passes: key to values."""
+
+WATER_AREAS = tags("""
+    natural = water bay strait
+    water = harbour basin lagoon river lake reservoir
+    place = sea ocean
+    leisure = marina
+    landuse = harbour port basin
+    seamark:type = harbour harbour_basin anchorage restricted_area depth_area fairway
+    seamark:type = dredged_area sea_area military_area dumping_ground cable_area pipeline_area
+    seamark:type = precautionary_area separation_zone
+""")
+"""Tags of OpenStreetMap's areas of open water: key to values."""
+
+LAYER_SUFFIX = re.compile(r"(\s*\(#\d+\)|\.(kml|kmz|dxf|shp|gpkg|geojson|csv|tab|mif|gml|fgb))+$")
+"""Ends of layers' names that say nothing of their kind: GDAL's numbers, extensions of files."""
+
+RADIUS = ("radius_m", "radius")
+WIDTH = ("width_m", "width")
+DEPTH = ("depth_m", "depth")
+NAME = ("name", "objnam", "label")
+
+FIELDS = {
+    "name": NAME,
+    "radius": RADIUS,
+    "width": WIDTH,
+    "depth": DEPTH,
+    "tether_length": ("tether_length",),
+    "clearance": ("clearance",),
+    "heading": ("heading",),
+}
+"""Properties of the contract, and the names that they have in files; `--map` adds others."""
+
+
+def words_of(maps: Sequence[tuple[str, str]]) -> tuple[dict[str, str], dict[str, str]]:
+    """What the user says of layers and of properties.
+
+    Parameters
+    ----------
+    maps : sequence of (str, str)
+        As ``("obstacle", "TURBINES")`` or ``("name", "TURB_ID")``.
+
+    Returns
+    -------
+    kinds : dict
+        Layer, lower case, to kind.
+    fields : dict
+        Our property to theirs, lower case.
+
+    Raises
+    ------
+    InputError
+        Neither a kind nor a property.
+    """
+    kinds: dict[str, str] = {}
+    fields: dict[str, str] = {}
+    for ours, theirs in maps:
+        if ours in KINDS:
+            kinds[theirs.lower()] = ours
+        elif ours in FIELDS:
+            fields[ours] = theirs.lower()
+        else:
+            raise InputError(
+                f"--map: expected one of {', '.join((*KINDS, *FIELDS))} before the =, got {ours!r}"
+            )
+    return kinds, fields
+
+
+SHAPE_LAYERS = {"points": "Point", "lines": "Line", "polygons": "Polygon"}
+"""Words that stand for all features of a shape in ``--map``, where no layer has that name."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Kind of a feature, and for one that is left out the reason.
+
+    Attributes
+    ----------
+    kind
+        One of `KINDS`; ``ignore`` for a feature that is left out.
+    reason
+        Why it is left out; empty for the other kinds.
+    """
+
+    kind: str
+    reason: str = ""
+
+
+def kind_of(
+    feature: Feature, kinds: Mapping[str, str], *, chart: bool, layers: Container[str] = ()
+) -> Decision:
+    """Decide what a feature is.
+
+    Parameters
+    ----------
+    feature : Feature
+        The feature.
+    kinds : mapping
+        Layer or a word of `SHAPE_LAYERS`, lower case, to kind, as the user says.
+    chart : bool
+        Whether the map is an S-57 chart, of which only known object classes count.
+    layers : container of str
+        Names of the map's layers, lower case: a word of `SHAPE_LAYERS` among them is that layer
+        only.
+
+    Returns
+    -------
+    Decision
+        Kind or reason. An open line may be an obstacle: it needs a width.
+
+    Raises
+    ------
+    InputError
+        No kind fits, or one that cannot have its shape.
+    """
+    shape = feature.shape.geom_type
+    said = feature.get("kind")
+    names = [name.strip().lower() for name in (feature.layer, *feature.folders)]
+    asked = next((kinds[name] for name in names if name in kinds), None)
+    word = next((WORDS[w] for name in names for w in words_in(name) if w in WORDS), None)
+    by_shape = next(
+        (
+            kinds[w]
+            for w, s in SHAPE_LAYERS.items()
+            if w in kinds and w not in layers and s in shape
+        ),
+        None,
+    )
+    if asked is not None:
+        decision = Decision(asked, "as asked for")
+    elif by_shape is not None:
+        decision = Decision(by_shape, "as asked for")
+    elif said is not None:
+        why = str(feature.get("why") or "its kind is ignore")[:MAX_REASON]
+        decision = Decision(said if isinstance(said, str) else "", why)
+    elif word is not None:
+        decision = Decision(word, "its layer is named ignore")
+    elif feature.kind:
+        decision = Decision(feature.kind)
+    elif chart:
+        of_chart = chart_kind(feature)
+        decision = Decision(of_chart.kind, of_chart.reason)
+    else:
+        decision = _bytags(feature, shape) or _by_shape(feature, shape)
+    kind = decision.kind
+    if kind == "ignore":
+        return decision
+    if kind not in KINDS:
+        raise InputError(
+            f"{feature.where}: expected a kind of {', '.join(KINDS)}, got {shape!r} of kind "
+            f"{shown(said)}"
+        )
+    marked = shape if feature.marker is None else feature.marker.geom_type
+    if shape not in SHAPES[kind] and marked not in SHAPES[kind]:
+        article = "an" if kind[0] in "aeiou" else "a"
+        raise InputError(
+            f"{feature.where}: {article} {kind} cannot be a {shape}; expected "
+            f"{' or '.join(SHAPES[kind])}"
+        )
+    return Decision(kind)
+
+
+def is_coastline(feature: Feature) -> bool:
+    """Return whether a feature is a coastline of OpenStreetMap, which has land on its left."""
+    return str(feature.get("natural")).lower() == "coastline"
+
+
+def words_in(name: str) -> tuple[str, ...]:
+    """Return the words of a layer's name that may say its kind, the nearest folder first.
+
+    Parameters
+    ----------
+    name : str
+        Name in lower case, as ``piles (#2)``: GDAL's name for a second layer ``piles``; or a path
+        of folders, as ``piles/north``.
+
+    Returns
+    -------
+    tuple of str
+        Words.
+
+    Examples
+    --------
+    >>> words_in("piles (#2)"), words_in("piles/north")
+    (('piles',), ('piles/north', 'north', 'piles'))
+    """
+    whole = _bare_name(name)
+    parts = [_bare_name(part) for part in whole.split("/")]
+    return (whole,) if len(parts) == 1 else (whole, *reversed(parts))
+
+
+def _bare_name(name: str) -> str:
+    """Return a name without the number of a second layer and the extension of a file."""
+    return LAYER_SUFFIX.sub("", name.strip())
+
+
+def _bytags(feature: Feature, shape: str) -> Decision | None:
+    """Decide by tags of OpenStreetMap; None where none of them is known."""
+
+    def has(table: Mapping[str, frozenset[str]]) -> bool:
+        return any(str(feature.get(key)).lower() in values for key, values in table.items())
+
+    if "Point" in shape:
+        return Decision("obstacle") if has(STANDING_POINTS) or has(STANDING_LINES) else None
+    if has(STANDING_LINES):
+        return Decision("obstacle")
+    if "Line" in shape:
+        return Decision("path") if has(PATH_LINES) else None
+    return Decision("ignore", "an area of water") if has(WATER_AREAS) else None
+
+
+def _by_shape(feature: Feature, shape: str) -> Decision:
+    """Decide by the shape: polygons and lines are obstacles, points goals without a radius."""
+    if "Point" not in shape:
+        return Decision("obstacle")
+    return Decision("obstacle" if feature.get(*RADIUS) is not None else "goal")
