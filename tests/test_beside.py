@@ -8,7 +8,7 @@ import pytest
 from netsp import solve, travel_graph
 from netsp.gtsp import searching
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.neighbourhood import beside_tour
+from netsp.gtsp.neighbourhood import cheapest_insertions
 from netsp.gtsp.travel.graph import least_tethers
 from netsp.mip.mip_solver import MipRun
 from netsp.plan.random_worlds import random_world
@@ -31,14 +31,14 @@ def test_of_each_goal_those_are_chosen_that_lengthen_the_tour_least(seed):
     rng = np.random.default_rng(seed)
     order = rng.permutation(np.arange(1, graph.goal_count + 1))
     tour = [0, *(int(rng.choice(graph.members(c))) for c in order)]
-    chosen = beside_tour(graph.lower_bounds(rows=tour), tour, graph.cluster, 2)
+    chosen = cheapest_insertions(graph.lower_bounds(rows=tour), tour, graph.cluster, 2)
     assert 0 in chosen
     for goal in order:
         members = graph.members(goal)
         costs = sorted(lengthens(graph, tour, v) for v in members)
         found = sorted(lengthens(graph, tour, v) for v in members if v in chosen)
         assert found == pytest.approx(costs[:2])
-    every = beside_tour(graph.lower_bounds(rows=tour), tour, graph.cluster, len(graph))
+    every = cheapest_insertions(graph.lower_bounds(rows=tour), tour, graph.cluster, len(graph))
     assert every.tolist() == list(range(len(graph)))
 
 
@@ -63,10 +63,10 @@ def test_a_proof_begins_with_a_tour_beside_which_there_is_none_better(monkeypatc
     monkeypatch.setattr(searching, "CORE", 40)  # three classes of each goal
     graph = travel_graph(random_world(0, goals=20, tether_length=350.0))
     run = MipRun(graph, Limits(iterations=10_000), search_rounds=300)
-    run.begin()
+    run.find_first_tour()
     first = solve_all(
-        graph.subgraph(least_tethers(graph.costs_to_base, graph.cluster, run.classes_per_goal))
+        graph.subgraph(least_tethers(graph.costs_to_base, graph.cluster, run.core_classes_per_goal))
     )
-    core = run.search_beside()
+    core = run.search_near_incumbent()
     assert run.length < first - 1.0
     assert np.isin(run.tour, core).all()

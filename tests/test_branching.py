@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp.gtsp.cost_matrix import LegCosts
+from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.solver_run import Stop
+from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip.branching import Tree
 from netsp.mip.combs import comb_cuts
@@ -35,7 +35,7 @@ def root_of(graph, *, tour=None, rows=None):
     """A root that has done nothing but hold all legs, with a poor tour or none."""
     run = MipRun(graph, Limits(on_progress=None if rows is None else rows.append))
     run.update_incumbent(tour)
-    return Root(run, LegCosts(graph), HighsRelaxation, run.round)
+    return Root(run, CostMatrix(graph), HighsRelaxation, run.round)
 
 
 def test_the_first_legs_of_every_vertex_are_found_in_little_memory(monkeypatch):
@@ -71,7 +71,7 @@ def test_branching_alone_finds_the_shortest_tour_and_proves_it(seed, start, cuts
     root = root_of(graph, tour=some if start else None, rows=rows)
     Tree(root).solve()
     best = brute_tour(graph)
-    assert root.run.done
+    assert root.run.is_done
     assert root.run.length == pytest.approx(best)
     assert all(r.bound.length <= best * (1 + 1e-9) for r in rows)
 
@@ -99,9 +99,9 @@ def test_that_there_is_no_tour_is_said_only_where_it_is_proven(legs, with_ray, m
     for u, v in legs:
         costs[u, v] = costs[v, u] = 1.0
     root = root_of(TravelGraph.from_costs(costs, cluster))
-    with contextlib.nullcontext() if with_ray else pytest.raises(Stop):
+    with contextlib.nullcontext() if with_ray else pytest.raises(RunStopped):
         Tree(root).solve()
-    assert root.run.infeasible == with_ray
+    assert root.run.is_infeasible == with_ray
 
 
 def test_a_tree_that_is_stopped_claims_no_more_than_its_open_nodes(monkeypatch):
@@ -253,8 +253,8 @@ def test_nothing_shorter_than_a_known_tour_is_not_that_there_is_none():
     graph = random_graph(2, 6, most=3)
     best = brute_tour(graph)
     root = root_of(graph)
-    root.run.known = 0.9 * best
+    root.run.known_length = 0.9 * best
     Tree(root).solve()
     assert root.run.tour is None
-    assert not root.run.infeasible
+    assert not root.run.is_infeasible
     assert 0.9 * best * (1 - 1e-6) <= root.run.bound <= best

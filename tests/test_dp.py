@@ -14,7 +14,7 @@ from netsp.gtsp.dp import walks as walks_module
 from netsp.gtsp.dp.label_kernels import translate
 from netsp.gtsp.dp.ng_sets import MOST, Memory
 from netsp.gtsp.dp.walks import Walks
-from netsp.gtsp.solver_run import Stop
+from netsp.gtsp.solver_run import RunStopped
 from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.prices import Prices
 from netsp.mip.program import Duals
@@ -112,9 +112,9 @@ def test_a_matrix_is_taken_over_block_by_block_until_the_flag_is_set(shuffled, m
     walks = Walks(cluster, costs, np.ones(1, dtype=np.int64))
 
     def check():
-        raise Stop
+        raise RunStopped
 
-    with pytest.raises(Stop):
+    with pytest.raises(RunStopped):
         walks.solve(np.zeros(walks.n + 1), 1e9, check)
 
 

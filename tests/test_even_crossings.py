@@ -16,7 +16,7 @@ from netsp import Circle, Problem, Status, solve_graph, travel_graph
 from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.solver_run import Stop
+from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.travel.costs import CostTable
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.parity_distances import WaysByParity
@@ -234,11 +234,11 @@ def test_covers_in_between_prove_the_same(seed, most, monkeypatch):
     problem = random_world(seed, goals=14, tether_length=320.0)
     whole, seen = solve(travel_graph(problem)), []
 
-    def climbed(*args, **more):
+    def on_cover_bound(*args, **more):
         seen.append(climb(*args, **more))
         return seen[-1]
 
-    monkeypatch.setattr("netsp.mip.goal_relaxation.climb", climbed)
+    monkeypatch.setattr("netsp.mip.goal_relaxation.climb", on_cover_bound)
     monkeypatch.setattr("netsp.mip.covers.MOST_CELLS", most)
     monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "MANY_GOALS", 5)
     monkeypatch.setattr("netsp.gtsp.searching.MEASURE_AT_ONCE", 50)
@@ -286,7 +286,7 @@ def test_however_long_covers_take_the_core_has_its_share_of_what_is_left(monkeyp
         began.append(run.clock.left)
 
     def program(run, known=module.MipRun.program):
-        proven.append(run.done)
+        proven.append(run.is_done)
         return known(run)
 
     monkeypatch.setattr(module.MipRun, "bound_by_goals", slowly)
@@ -376,7 +376,7 @@ def test_the_legs_of_a_matrix_that_takes_too_long_leave_the_bound_over_goals(mon
     assert 0.5 * best < graph.bound_in_any_class <= best
 
 
-@pytest.mark.parametrize("press", [KeyboardInterrupt, Stop])
+@pytest.mark.parametrize("press", [KeyboardInterrupt, RunStopped])
 def test_covers_that_are_stopped_keep_what_they_have_proven(press, monkeypatch):
     graph, odd, tower, _ = towers(2)
     best, clock = solve_graph(graph, "auto"), Clock()

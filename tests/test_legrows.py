@@ -10,10 +10,10 @@ from netsp import Problem, Status, solve_graph, travel_graph
 from netsp import solve as solve_problem
 from netsp.base.clock import Clock
 from netsp.gtsp import cost_matrix
-from netsp.gtsp.cost_matrix import LegCosts
+from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.nearest_index import NearRows
-from netsp.gtsp.sparse_costs import LegRows
+from netsp.gtsp.nearest_index import NearestIndex
+from netsp.gtsp.sparse_costs import SparseCosts
 from netsp.mip import goal_relaxation
 from netsp.mip.cost_fixing import longest_legs, survivors
 from netsp.mip.cover_costs import OverClasses, OverWays
@@ -44,7 +44,7 @@ def in_blocks(costs, rng, size):
 def rows_of(costs, rng, size=7):
     """All legs of a matrix."""
     everywhere = np.zeros(len(costs), dtype=np.int64)
-    return LegRows(
+    return SparseCosts(
         len(costs), in_blocks(costs, rng, size), everywhere, np.full((1, 1), np.inf), NO_TOUR
     )
 
@@ -53,7 +53,7 @@ def matrix_of(rows):
     """(V, V) costs; inf where a leg is gone."""
     every = np.arange(len(rows))
     u, v = np.meshgrid(every, every, indexing="ij")
-    return rows.of(u.ravel(), v.ravel()).reshape(len(rows), -1)
+    return rows.costs_of(u.ravel(), v.ravel()).reshape(len(rows), -1)
 
 
 def some_costs(rng, size=40):
@@ -74,7 +74,7 @@ def test_what_costs_more_than_its_cells_allow_is_gone_but_for_the_legs_of_the_to
     longest = np.minimum(longest, longest.T)
     longest[2, 3] = longest[3, 2] = -np.inf
     tour = rng.permutation(len(costs))[:9]
-    rows = LegRows(len(costs), in_blocks(costs, rng, size), own, longest, tour)
+    rows = SparseCosts(len(costs), in_blocks(costs, rng, size), own, longest, tour)
     kept = (costs <= longest[own][:, own]) & (own >= 0)[:, None] & (own >= 0)
     kept[tour, np.roll(tour, 1)] = kept[np.roll(tour, 1), tour] = True
     assert 0 < kept.sum() < np.isfinite(costs).sum()
@@ -140,7 +140,7 @@ def test_prices_over_rows_are_those_over_a_matrix_and_rule_out_the_same(seed):
     assert in_rows.bound == with_marks.bound
     cutoff = with_marks.bound + 3.0
     legs = marks.legs_left()
-    assert (in_rows.of(legs) == with_marks.of(legs)).all()
+    assert (in_rows.costs_of(legs) == with_marks.costs_of(legs)).all()
     before = rows.left
     in_rows.rule_out(cutoff)
     with_marks.rule_out(cutoff)
@@ -149,7 +149,7 @@ def test_prices_over_rows_are_those_over_a_matrix_and_rule_out_the_same(seed):
     for a, b in zip(in_rows.cheapest(1e-9), with_marks.cheapest(1e-9), strict=True):
         assert (a == b).all()
     gone = np.argwhere(np.isinf(matrix_of(rows)) & np.isfinite(costs))
-    assert np.isinf(in_rows.of(gone)).all()
+    assert np.isinf(in_rows.costs_of(gone)).all()
 
 
 def test_what_lies_nearest_is_so_along_legs_that_were_let_go_too(monkeypatch):
@@ -163,11 +163,11 @@ def test_what_lies_nearest_is_so_along_legs_that_were_let_go_too(monkeypatch):
 
     graph.costs_in_blocks = noted
     least = np.full((1, 1), -np.inf)  # no leg is left
-    rows = LegRows(len(graph), find(), np.zeros(len(graph), dtype=np.int64), least, NO_TOUR)
-    held = LegCosts(graph, rows)
+    rows = SparseCosts(len(graph), find(), np.zeros(len(graph), dtype=np.int64), least, NO_TOUR)
+    held = CostMatrix(graph, rows)
     some = rng.permutation(len(graph))[:30]
     for fresh in 30, 10, 0:
-        near = held.nearest_of(some)
+        near = held.nearest_among(some)
         left = costs[np.ix_(held.vertices, held.vertices)]
         every = np.arange(len(held))
         assert (left[every, some[near]] == left[:, some].min(axis=1)).all()
@@ -293,7 +293,7 @@ def rows_from_the_start(monkeypatch):
     monkeypatch.setattr("netsp.mip.covers.MOST_CELLS", 25)
     monkeypatch.setattr("netsp.mip.covers.PATIENCE", 0)
     made, restricted = [], []
-    make, restrict = LegCosts.__init__, LegRows.restrict
+    make, restrict = CostMatrix.__init__, SparseCosts.restrict
 
     def noted(self, graph, rows=None):
         made.append(rows is not None)
@@ -303,8 +303,8 @@ def rows_from_the_start(monkeypatch):
         restricted.append(int(keep.sum()))
         restrict(self, keep)
 
-    monkeypatch.setattr(LegCosts, "__init__", noted)
-    monkeypatch.setattr(LegRows, "restrict", heard)
+    monkeypatch.setattr(CostMatrix, "__init__", noted)
+    monkeypatch.setattr(SparseCosts, "restrict", heard)
     return made, restricted
 
 
@@ -313,13 +313,13 @@ def test_a_proof_over_rows_finds_the_optimum_of_one_over_a_matrix(
     seed, rows_from_the_start, monkeypatch
 ):
     made, _ = rows_from_the_start
-    asked, find = [], NearRows.nearest
+    asked, find = [], NearestIndex.nearest
 
     def heard(self, vertices, some):
         asked.append(len(some))
         return find(self, vertices, some)
 
-    monkeypatch.setattr(NearRows, "nearest", heard)
+    monkeypatch.setattr(NearestIndex, "nearest", heard)
     problem = random_world(
         seed, goals=9 + seed, obstacles=6, side=80.0, radii=(4.0, 8.0), tether_length=150.0
     )

@@ -44,7 +44,7 @@ def test_it_is_the_shortest_through_their_classes(seed, count, chance):
 def test_searches_from_the_start_give_different_tours_and_the_merged_is_no_longer():
     graph = travel_graph(random_world(3, goals=40, tether_length=250.0))
     run = SearchingRun(graph, Limits(rng=np.random.default_rng(0)), search_rounds=5)
-    tours = run.search_from_start(6, Clock())
+    tours = run.search_afresh(6, Clock())
     assert len(tours) == 6
     assert len({round(graph.tour_length(t), 6) for t in tours}) > 1
     assert run.length == pytest.approx(min(graph.tour_length(t) for t in tours))
@@ -53,8 +53,8 @@ def test_searches_from_the_start_give_different_tours_and_the_merged_is_no_longe
     assert graph.tour_length(found) < 0.995 * run.length
     assert merged(graph, [], solve_merged, Limits()) is None
     # the best one is among them from then on
-    assert run.search_from_start(1, Clock())[0] == run.tour
-    assert run.search_from_start(1, Clock(0.0)) == [run.tour]
+    assert run.search_afresh(1, Clock())[0] == run.tour
+    assert run.search_afresh(1, Clock(0.0)) == [run.tour]
 
 
 def test_tours_of_very_many_classes_are_merged_by_a_program_that_merges_nothing(monkeypatch):
@@ -81,7 +81,7 @@ def ends_of(monkeypatch, least, limits):
     graph = travel_graph(random_world(3, goals=30, tether_length=250.0))
     run = module.MipRun(graph, limits, search_rounds=2)
     run.solve("highs", None)
-    assert run.done
+    assert run.is_done
     return given
 
 
@@ -99,7 +99,7 @@ def test_a_merged_tour_that_a_bound_may_have_ruled_out_is_not_taken():
     best = brute_tour(graph.subgraph(classes_of(tours)))
     for above, taken in ((0.5, True), (-1e-9, False)):
         run = SearchingRun(graph, Limits())
-        run.known = best + above
+        run.known_length = best + above
         merge(run, tours, solve_merged, Clock())
         assert (run.tour is not None) == taken
     stopped = SearchingRun(graph, Limits())
@@ -114,7 +114,7 @@ def test_under_a_limit_of_iterations_nothing_is_merged(monkeypatch):
 def test_the_classes_of_a_hundred_goals_hold_a_shorter_tour_than_their_legs():
     graph = travel_graph(random_world(3, goals=100, tether_length=300.0))
     run = SearchingRun(graph, Limits(rng=np.random.default_rng(0)), search_rounds=500)
-    tours = run.search_from_start(3, Clock())
+    tours = run.search_afresh(3, Clock())
     found = merged(graph, tours, solve_merged, Limits())
     legs = {frozenset(leg) for t in tours for leg in zip(t, np.roll(t, -1).tolist(), strict=True)}
     new = {frozenset(leg) for leg in zip(found, np.roll(found, -1).tolist(), strict=True)} - legs

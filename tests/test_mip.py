@@ -17,9 +17,9 @@ from scipy.sparse import csc_array, csr_array
 
 from netsp import solve_graph, travel_graph
 from netsp.gtsp import cost_matrix, searching
-from netsp.gtsp.cost_matrix import MEASURE_AT_ONCE, LegCosts
+from netsp.gtsp.cost_matrix import MEASURE_AT_ONCE, CostMatrix
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.solver_run import Stop
+from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.travel.costs import rounded_down
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip import highs, root
@@ -480,7 +480,7 @@ def test_a_long_tether_is_solved_without_measuring_most_legs_where_that_takes_lo
 def test_legs_that_an_lp_uses_are_measured_and_no_others(monkeypatch):
     monkeypatch.setattr(TravelGraph, "legs_at_once", False)
     graph = travel_graph(far_world(0, goals=5, tether_length=500.0))
-    costs = LegCosts(graph)
+    costs = CostMatrix(graph)
     bounds = costs.values.copy()
     goals = graph.cluster[:, None] != graph.cluster[None, :]
     legs = np.argwhere(np.triu(goals, 1) & ~costs.exact)[:: len(bounds)]
@@ -522,7 +522,7 @@ def test_rounded_costs_prove_the_same(monkeypatch, rounded_from, at_once):
     monkeypatch.setattr(cost_matrix, "MEASURE_AT_ONCE", 5)
     monkeypatch.setattr(searching, "MEASURE_AT_ONCE", 5)
     graph = travel_graph(problem)
-    costs = LegCosts(graph)
+    costs = CostMatrix(graph)
     assert costs.rounded
     assert costs.values.dtype == np.float32
     most = travel_graph(problem).costs if at_once else graph.lower_bounds()
@@ -542,7 +542,7 @@ def test_what_is_measured_of_rounded_costs_is_as_long_as_it_is(monkeypatch):
     monkeypatch.setattr(cost_matrix, "MEASURE_AT_ONCE", 5)
     monkeypatch.setattr(TravelGraph, "legs_at_once", False)
     graph = travel_graph(far_world(0, goals=5, tether_length=400.0))
-    costs, rng = LegCosts(graph), np.random.default_rng(0)
+    costs, rng = CostMatrix(graph), np.random.default_rng(0)
     asked = rng.random(costs.values.shape) < 0.5
     asked = (asked | asked.T) & np.isfinite(costs.values)
     costs.measure_all(asked)
@@ -583,15 +583,15 @@ def test_with_many_classes_of_few_goals_a_bound_comes_before_all_legs_are_bounde
     graph = travel_graph(far_world(0, goals=8, tether_length=500.0))
     held = []
 
-    class OfSome(LegCosts):
+    class OfSome(CostMatrix):
         def __init__(self, part):
             if len(part) == len(graph):
-                raise Stop
+                raise RunStopped
             held.append(len(part))
             super().__init__(part)
 
     module = sys.modules["netsp.mip.mip_solver"]  # the function of that name hides it
-    monkeypatch.setattr(module, "LegCosts", OfSome)
+    monkeypatch.setattr(module, "CostMatrix", OfSome)
     monkeypatch.setattr(module, "CORE_FIRST", 10)
     monkeypatch.setattr(searching, "LARGER", 2)
     assert len(graph) > MEASURE_AT_ONCE
@@ -617,12 +617,12 @@ def test_the_matrices_of_a_proof_go_when_it_ends(monkeypatch):
     made = []
     module = sys.modules["netsp.mip.mip_solver"]  # the function of that name hides it
 
-    class Noted(LegCosts):
+    class Noted(CostMatrix):
         def __init__(self, graph):
             super().__init__(graph)
             made.append(weakref.ref(self))
 
-    monkeypatch.setattr(module, "LegCosts", Noted)
+    monkeypatch.setattr(module, "CostMatrix", Noted)
     gc.disable()
     try:
         found = solve(travel_graph(far_world(1, goals=25, tether_length=300.0)))
@@ -754,11 +754,11 @@ def test_looking_at_prices_can_be_stopped_half_way():
     def stop():
         seen.append(1)
         if len(seen) > 2:
-            raise Stop
+            raise RunStopped
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("netsp.mip.prices.ROWS", max(1, vertices // 6))
-        with pytest.raises(Stop):
+        with pytest.raises(RunStopped):
             Prices(costs_of(graph), dead, graph.cluster, [], duals, stop)
 
 

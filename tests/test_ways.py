@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import TravelGraph, travel_graph
-from netsp.gtsp.cost_matrix import LegCosts
+from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.solver_run import Stop
+from netsp.gtsp.solver_run import RunStopped
 from netsp.mip import root
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs
@@ -100,11 +100,11 @@ def test_the_search_for_ways_can_be_stopped(monkeypatch):
     def stop():
         asked.append(1)
         if len(asked) == 3:
-            raise Stop
+            raise RunStopped
 
     prices = Prices(costs, DeadLegs.of(costs), cluster, [], duals, stop)
     monkeypatch.setattr("netsp.mip.parity_paths.AT_ONCE", 1)
-    with pytest.raises(Stop):
+    with pytest.raises(RunStopped):
         prices.rule_out(prices.bound + 100.0)
 
 
@@ -150,7 +150,7 @@ def test_cuts_of_a_core_keep_their_sides_there_and_never_hold_the_base():
         cuts.append(Cut(inside, c))
         whole = np.isin(graph.cluster[core], rng.choice(12, 3, replace=False) + 1)
         cuts.append(replace(cuts[-1], inside=whole, cluster=-1, teeth=((1, 2), (3, 4), (5, 6))))
-    wide = Warm(core, np.zeros((0, 2), np.int64), cuts, core).cuts_over(LegCosts(graph))
+    wide = Warm(core, np.zeros((0, 2), np.int64), cuts, core).cuts_over(CostMatrix(graph))
     own = {(c.inside.tobytes(), c.cluster) for c in cuts}
     assert {(c.inside[core].tobytes(), c.cluster) for c in wide} == own
     assert len(own) < len(wide) < 2 * len(own)

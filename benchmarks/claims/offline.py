@@ -385,8 +385,8 @@ def covers() -> tuple[str, bool]:
 
     graph = travel_graph(frontier.world(4, 100, 500.0, many=False))
     run = MipRun(graph, Limits(rng=np.random.default_rng(0)), search_rounds=1000)
-    run.begin()
-    run.search_beside()
+    run.find_first_tour()
+    run.search_near_incumbent()
     costs, most = graph.costs_rounded(np.arange(len(graph))), module.MOST_CELLS
     module.MOST_CELLS = 450
     try:

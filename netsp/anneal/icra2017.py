@@ -22,7 +22,7 @@ from netsp.base.compiled.kernel import kernel
 from netsp.base.compiled.rng import below, metropolis, seeded
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.search.layers import Instance
-from netsp.gtsp.search.lns_solver import core_of
+from netsp.gtsp.search.lns_solver import search_core
 from netsp.gtsp.solver_run import SolverRun
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
@@ -79,7 +79,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     run = SolverRun(graph, limits)
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)
-        if not run.trivial():
+        if not run.solve_if_trivial():
             _anneal(run, rng, chosen)
     return run.finish("done", entangled=0)
 
@@ -88,7 +88,7 @@ def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     warm = run.tour is not None
     run.check()
     graph = run.graph
-    core = core_of(run, vertices=MOST_VERTICES)
+    core = search_core(run, vertices=MOST_VERTICES)
     instance = Instance.among(graph, core)
     goals = graph.goal_count
     state = np.zeros(goals + 1, dtype=np.int64)

@@ -125,7 +125,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     run = SolverRun(graph, limits)
     with run.until_stopped(blind=True):
         run.update_incumbent(limits.warm_start)
-        if not run.trivial():
+        if not run.solve_if_trivial():
             _anneal(run, rng, chosen)
     return run.finish("done")
 

@@ -146,7 +146,7 @@ def steps() -> Iterator[Step]:
     from netsp.base.clock import Clock
     from netsp.base.errors import InputError, LimitReachedError
     from netsp.gtsp.limits import Limits
-    from netsp.gtsp.sparse_costs import LegRows
+    from netsp.gtsp.sparse_costs import SparseCosts
     from netsp.gtsp.travel.graph import TravelGraph
     from netsp.judge import verify
     from netsp.mip.cover_costs import OverClasses, OverWays
@@ -191,7 +191,9 @@ def steps() -> Iterator[Step]:
         costs, clusters = graph.costs_rounded(np.arange(len(graph))), graph.goal_count + 1
         duals = Duals(np.zeros(clusters), np.zeros(len(costs)), np.zeros(0))
         none = np.zeros(len(graph), dtype=np.int64)
-        rows = LegRows(len(graph), graph.costs_in_blocks(), none, np.full((1, 1), np.inf), none[:1])
+        rows = SparseCosts(
+            len(graph), graph.costs_in_blocks(), none, np.full((1, 1), np.inf), none[:1]
+        )
         rows.add_above(none, np.zeros((1, 1), dtype=bool))
         rows.nearest_legs(1)
         odd = odd_letters(graph.signatures)
@@ -206,7 +208,7 @@ def steps() -> Iterator[Step]:
             prices.of(prices.cheapest(-1.0)[0])
         rows.restrict(rows.with_legs())
         legs = rows.legs_left()
-        rows.of(legs[:, 0], legs[:, 1])
+        rows.costs_of(legs[:, 0], legs[:, 1])
 
     yield "thousands of classes", rounded
 

@@ -20,8 +20,8 @@ import numpy.typing as npt
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.ram import ask
-from netsp.gtsp.nearest_index import NearRows
-from netsp.gtsp.sparse_costs import LegRows
+from netsp.gtsp.nearest_index import NearestIndex
+from netsp.gtsp.sparse_costs import SparseCosts
 from netsp.gtsp.travel.costs import rounded_down
 from netsp.gtsp.travel.graph import TravelGraph
 
@@ -42,7 +42,7 @@ ROWS, LEGS = 512, 200_000
 """Of a matrix that are worked on at a time, so that what is in between stays small."""
 
 
-class LegCosts:
+class CostMatrix:
     """Costs among some vertices of a travel graph.
 
     Parameters
@@ -60,10 +60,10 @@ class LegCosts:
         (k, k) which are lengths; None when all are.
     """
 
-    def __init__(self, graph: TravelGraph, rows: LegRows | None = None) -> None:
+    def __init__(self, graph: TravelGraph, rows: SparseCosts | None = None) -> None:
         self.graph, self.rows = graph, rows
         self._let_go = rows is not None  # legs of the incumbent, too
-        self._near = NearRows(graph)
+        self._near = NearestIndex(graph)
         self.vertices: Ints = np.arange(len(graph))
         self.cluster: Ints = graph.cluster
         self.values: Floats
@@ -114,11 +114,13 @@ class LegCosts:
         """Lengths as they are held."""
         return rounded_down(lengths) if self.rounded else lengths
 
-    def of(self, legs: Ints) -> Floats:
+    def costs_of(self, legs: Ints) -> Floats:
         """(k,) values of legs (k, 2), rows."""
         if self._let_go:
             out = (
-                self.values[legs[:, 0], legs[:, 1]] if self.rows is None else self.rows.of(*legs.T)
+                self.values[legs[:, 0], legs[:, 1]]
+                if self.rows is None
+                else self.rows.costs_of(*legs.T)
             )
             gone = np.isinf(out)
             if gone.any():  # of a tour that is no better than the one they were let go for
@@ -131,13 +133,13 @@ class LegCosts:
         return len(self.vertices)
 
     @property
-    def of_base(self) -> Floats:
+    def base_costs(self) -> Floats:
         """(k,) values of the legs of the base."""
         if self.rows is not None:
             return self._held(self.graph.costs_to_base[self.vertices])
         return np.asarray(self.values[0])
 
-    def bounds_from(self, some: Ints) -> Floats:
+    def lower_bounds_from(self, some: Ints) -> Floats:
         """(r, k) values of the legs of some rows, or less."""
         if self.rows is not None:
             return self.graph.lower_bounds(self.vertices, some)
@@ -150,7 +152,7 @@ class LegCosts:
         self.measure(some)
         return np.asarray(self.values[np.ix_(some, some)], dtype=np.float64)
 
-    def nearest_of(self, some: Ints) -> Ints:
+    def nearest_among(self, some: Ints) -> Ints:
         """(k,) which of some rows has the least value to each row, also along legs that are in no
         better tour."""
         if self.rows is None:
@@ -240,12 +242,12 @@ class LegCosts:
         if self.rounded and 2 * len(self) <= ROUNDED_FROM:
             self._unround()
 
-    def _spell_out(self, rows: LegRows) -> None:
+    def _spell_out(self, rows: SparseCosts) -> None:
         """From rows back to a matrix, in double precision; legs that are gone count as none."""
         left, u = np.zeros((len(self), len(self)), dtype=bool), rows.legs_left()
         left[u[:, 0], u[:, 1]] = left[u[:, 1], u[:, 0]] = True
         self.values = np.where(left, self.graph.costs_among(self.vertices, left), np.inf)
-        self.rows, self._near = None, NearRows(self.graph)
+        self.rows, self._near = None, NearestIndex(self.graph)
 
     def _unround(self) -> None:
         """Back to double precision; what was measured is measured again when it is asked for."""

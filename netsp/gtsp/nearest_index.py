@@ -16,7 +16,7 @@ from netsp.gtsp.travel.graph import TravelGraph
 NOBODY: Ints = np.zeros(0, dtype=np.int64)
 
 
-class NearRows:
+class NearestIndex:
     """The legs from the vertices that were asked for last, (r, k) in single precision.
 
     Parameters

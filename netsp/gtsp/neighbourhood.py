@@ -22,7 +22,7 @@ least and at most. With 200 goals at tether 500, three of each end 3 % above the
 at, after a few seconds or a minute."""
 
 
-def searched_per_goal(goals: int) -> int:
+def searched_classes_per_goal(goals: int) -> int:
     """So many classes of each goal are worth a search.
 
     Parameters
@@ -38,7 +38,7 @@ def searched_per_goal(goals: int) -> int:
     return min(max(FEWEST, SEARCHED // (goals + 1)), ENOUGH)
 
 
-def beside_tour(bounds: Floats, tour: npt.ArrayLike, cluster: Ints, classes: int) -> Ints:
+def cheapest_insertions(bounds: Floats, tour: npt.ArrayLike, cluster: Ints, classes: int) -> Ints:
     """The classes of each goal that lengthen a tour least, by bounds on their legs.
 
     Parameters
@@ -73,7 +73,7 @@ def beside_tour(bounds: Floats, tour: npt.ArrayLike, cluster: Ints, classes: int
     return np.sort(order[np.arange(len(order)) - first < classes])
 
 
-def classes_beside(
+def classes_near_tour(
     tethers: Floats, cluster: Ints, bounds: Floats, tour: npt.ArrayLike, classes: int
 ) -> Ints:
     """What a search looks at once there is a tour.
@@ -85,7 +85,7 @@ def classes_beside(
     cluster : ndarray of int, shape (V,)
         Of all vertices.
     bounds, tour
-        As of `beside_tour`.
+        As of `cheapest_insertions`.
     classes : int
         So many of each goal beside the tour, and one in `LEAST_SHARE` as many of least tether.
 
@@ -95,5 +95,5 @@ def classes_beside(
         The vertices, in order; the tour's are among them.
     """
     least = least_tethers(tethers, cluster, max(1, classes // LEAST_SHARE))
-    beside = beside_tour(bounds, tour, cluster, classes)
+    beside = cheapest_insertions(bounds, tour, cluster, classes)
     return np.unique(np.concatenate([least, beside, np.asarray(tour, dtype=np.int64)]))

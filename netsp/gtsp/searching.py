@@ -19,12 +19,12 @@ import numpy as np
 from netsp.base.arrays import Ints
 from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
-from netsp.gtsp.cost_matrix import MEASURE_AT_ONCE, LegCosts
+from netsp.gtsp.cost_matrix import MEASURE_AT_ONCE, CostMatrix
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.neighbourhood import classes_beside, searched_per_goal
+from netsp.gtsp.neighbourhood import classes_near_tour, searched_classes_per_goal
 from netsp.gtsp.search.layers import Instance
 from netsp.gtsp.search.local_search import Search
-from netsp.gtsp.solver_run import SLIVER, SolverRun, Stop
+from netsp.gtsp.solver_run import SLIVER, RunStopped, SolverRun
 from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
 
@@ -72,7 +72,7 @@ class SearchingRun(SolverRun):
     outer
         For a run over a core, the run over all classes and the core's vertices there: its
         incumbent is updated, too, and its report shows it; bounds of the core mean nothing to it.
-    ends
+    local_optima
         Tours in which the last searches ended, `MOST_ENDS` at most, no two the same.
     """
 
@@ -86,11 +86,11 @@ class SearchingRun(SolverRun):
         super().__init__(graph, limits)
         self.search_rounds = search_rounds
         self.outer: tuple[SearchingRun, Ints] | None = None
-        self.ends: list[tuple[int, ...]] = []
+        self.local_optima: list[tuple[int, ...]] = []
         self.bound = 0.0
         self._core: tuple[int, Instance] | None = None
 
-    def begin(self) -> None:
+    def find_first_tour(self) -> None:
         """A first tour, among few classes, before all legs are bounded: with very many classes that
         takes long, and whoever stops the run meanwhile wants a tour."""
         graph = self.graph
@@ -99,14 +99,14 @@ class SearchingRun(SolverRun):
         core = least_tethers(graph.costs_to_base, graph.cluster, FEW_CLASSES)
         search = Search(Instance.among(graph, core), self.rng, clock=self.clock)
         search.settle()
-        self.take(search)
+        self.offer_incumbent_from(search)
         self.report("begun", vertices=len(graph))
 
-    def search_beside(self) -> Ints:
+    def search_near_incumbent(self) -> Ints:
         """Search among the classes of least tether, then among those beside the best tour, as long
         as that is improved; the classes of the last search."""
         graph, clock = self.graph, self.clock.part(TURNS_SHARE)
-        core = least_tethers(graph.costs_to_base, graph.cluster, self.searched_per_goal)
+        core = least_tethers(graph.costs_to_base, graph.cluster, self.searched_classes_per_goal)
         vain = 0
         for _ in range(TURNS):
             before = self.length
@@ -119,7 +119,7 @@ class SearchingRun(SolverRun):
             core = self._beside()
         return core
 
-    def climbed(self, bound: float, cells: int, classes: Ints) -> tuple[int, ...] | None:
+    def on_cover_bound(self, bound: float, cells: int, classes: Ints) -> tuple[int, ...] | None:
         """Take the bound of a cover of so many cells, and search among classes, if there are any,
         and the tour's; the best tour."""
         self.raise_bound(bound)
@@ -129,11 +129,11 @@ class SearchingRun(SolverRun):
         self.report("covers", vertices=cells)
         return self.tour
 
-    def search_from_start(self, count: int, clock: Clock) -> list[tuple[int, ...]]:
+    def search_afresh(self, count: int, clock: Clock) -> list[tuple[int, ...]]:
         """The tours of so many searches, each from the start, among the classes of least tether and
         those beside the best tour; the one that was best before comes first."""
         graph = self.graph
-        core = least_tethers(graph.costs_to_base, graph.cluster, self.searched_per_goal)
+        core = least_tethers(graph.costs_to_base, graph.cluster, self.searched_classes_per_goal)
         if self.tour is not None:
             core = np.union1d(core, self._beside())
         instance = Instance.among(graph, core)
@@ -154,25 +154,25 @@ class SearchingRun(SolverRun):
     def _beside(self) -> Ints:
         """The classes beside the best tour."""
         graph, tour = self.graph, self.tour or (0,)
-        return classes_beside(
+        return classes_near_tour(
             graph.costs_to_base, graph.cluster, graph.lower_bounds(rows=tour), tour,
-            self.searched_per_goal,
+            self.searched_classes_per_goal,
         )  # fmt: skip
 
     @contextmanager
     def core(self) -> Iterator[Self | None]:
         """A run like this one over the classes of least tether, and those beside the best tour if
         there is room for enough of them; None where they are too few to be worth it. Its share of
-        the time begins with `begin_share`; when that is over, the body is left early."""
+        the time begins with `start_time_share`; when that is over, the body is left early."""
         graph = self.graph
-        core = least_tethers(graph.costs_to_base, graph.cluster, self.classes_per_goal)
+        core = least_tethers(graph.costs_to_base, graph.cluster, self.core_classes_per_goal)
         larger = LARGER_OF_MANY if graph.goal_count >= OF_MANY else LARGER
         few = len(graph) <= max(MEASURE_AT_ONCE, larger * len(core))
         if few or not graph.roadmapped or self.outer is not None:
             yield None
             return
-        beside = self.search_beside()
-        if self.classes_per_goal >= ENOUGH_BESIDE:
+        beside = self.search_near_incumbent()
+        if self.core_classes_per_goal >= ENOUGH_BESIDE:
             core = beside
         core = np.union1d(core, np.array(self.tour or (0,), dtype=np.int64))
         inner = type(self)(
@@ -185,24 +185,24 @@ class SearchingRun(SolverRun):
             inner.update_incumbent(np.searchsorted(core, np.array(self.tour)).tolist())
         try:
             yield inner
-        except (Stop, LimitReachedError):
+        except (RunStopped, LimitReachedError):
             self.check()
         finally:
             self.iterations += inner.iterations
 
-    def begin_share(self) -> None:
+    def start_time_share(self) -> None:
         """Give a run over a core its part of the time that is left now."""
         self.clock = self.clock.part(CORE_SHARE)
 
     @property
-    def classes_per_goal(self) -> int:
+    def core_classes_per_goal(self) -> int:
         """In the core."""
         return min(max(3, CORE // (self.graph.goal_count + 1)), MOST_CLASSES)
 
     @property
-    def searched_per_goal(self) -> int:
+    def searched_classes_per_goal(self) -> int:
         """In a search."""
-        return searched_per_goal(self.graph.goal_count)
+        return searched_classes_per_goal(self.graph.goal_count)
 
     def update_incumbent(
         self,
@@ -224,33 +224,40 @@ class SearchingRun(SolverRun):
         else:
             self.outer[0].report("core", **more)
 
-    def searches_all(self, costs: LegCosts) -> bool:
+    def searches_all_vertices(self, costs: CostMatrix) -> bool:
         """Whether the heuristic searches all vertices that are left."""
         few = len(costs) <= SEARCHED_WHOLE or not self.graph.roadmapped
         return costs.exact is None and costs.rows is None and few
 
-    def instance(self, costs: LegCosts, more: Ints) -> Instance:
+    def instance(self, costs: CostMatrix, more: Ints) -> Instance:
         """What the heuristic searches: everything if it is not too much, else the classes of least
         tether, those beside the incumbent, its own, and more."""
-        if self.searches_all(costs):
+        if self.searches_all_vertices(costs):
             if self._core is None or self._core[0] != len(costs):
                 values = np.asarray(costs.values, dtype=np.float64)
                 whole = Instance(costs.cluster, values, costs.vertices, self.graph.before)
                 self._core = len(costs), whole
             return self._core[1]
-        tethers, own = costs.of_base, np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
+        tethers, own = (
+            costs.base_costs,
+            np.searchsorted(costs.vertices, np.array(self.tour or (0,))),
+        )
         if self.tour is None:
-            some = least_tethers(tethers, costs.cluster, self.searched_per_goal)
+            some = least_tethers(tethers, costs.cluster, self.searched_classes_per_goal)
         else:
-            some = classes_beside(
-                tethers, costs.cluster, costs.bounds_from(own), own, self.searched_per_goal
+            some = classes_near_tour(
+                tethers,
+                costs.cluster,
+                costs.lower_bounds_from(own),
+                own,
+                self.searched_classes_per_goal,
             )
         core = np.unique(np.concatenate([some, own, more]))
         return Instance(
             costs.cluster[core], costs.among(core), costs.vertices[core], self.graph.before
         )
 
-    def search(self, costs: LegCosts, more: Ints | None = None) -> None:
+    def search(self, costs: CostMatrix, more: Ints | None = None) -> None:
         """Local search, then ruin and recreate, from the incumbent if there is one; again beside a
         better tour, where not all classes are looked at."""
         more = np.zeros(0, dtype=np.int64) if more is None else more
@@ -260,7 +267,7 @@ class SearchingRun(SolverRun):
             before = self.length
             self._search(self.instance(costs, more), clock, rounded=costs.rounded)
             vain = 0 if self.length < before else vain + 1
-            if self.searches_all(costs) or clock.up or vain == IN_VAIN:
+            if self.searches_all_vertices(costs) or clock.up or vain == IN_VAIN:
                 break
 
     def _search(self, instance: Instance, clock: Clock, *, rounded: bool = False) -> None:
@@ -268,12 +275,12 @@ class SearchingRun(SolverRun):
         search = Search(instance, self.rng, start, clock)
         search.settle()
         search.run(self.search_rounds, clock)
-        self.take(search, rounded=rounded)
+        self.offer_incumbent_from(search, rounded=rounded)
         length, tour = search.best()
-        if np.isfinite(length) and tour not in self.ends:
-            self.ends = [*self.ends[1 - MOST_ENDS :], tour]
+        if np.isfinite(length) and tour not in self.local_optima:
+            self.local_optima = [*self.local_optima[1 - MOST_ENDS :], tour]
 
-    def take(self, search: Search, *, rounded: bool = False) -> None:
+    def offer_incumbent_from(self, search: Search, *, rounded: bool = False) -> None:
         """Offer what a search found; its legs are measured, so its length is known unless they were
         rounded."""
         length, tour = search.best()
@@ -283,5 +290,5 @@ class SearchingRun(SolverRun):
     def cutoff(self) -> float:
         """Tours no shorter than this are of no interest: half the tolerance below the incumbent, or
         the next multiple of a grain."""
-        length, grain = min(self.length, self.known), self.graph.grain
+        length, grain = min(self.length, self.known_length), self.graph.grain
         return min(length * (1.0 - 0.5 * OPTIMALITY_TOLERANCE), length - grain * (1.0 - 2 * SLIVER))

@@ -19,7 +19,7 @@ from netsp.model.bound_scope import LowerBound
 from netsp.model.solution import Status
 
 
-class Stop(Exception):
+class RunStopped(Exception):
     """A limit is reached."""
 
 
@@ -31,13 +31,13 @@ part of it: bounds are off by rounding themselves."""
 class SolverRun:
     """One run of a solver on a travel graph.
 
-    `Stop` and Ctrl-C both end it with the best tour so far.
+    `RunStopped` and Ctrl-C both end it with the best tour so far.
 
     Attributes
     ----------
     iterations
         How many the solver has done; each solver says what one is.
-    known
+    known_length
         Length of a tour from elsewhere: a bound that reaches it is all that is wanted.
     """
 
@@ -50,7 +50,7 @@ class SolverRun:
         if len(lost):
             raise InputError(f"graph: no class of goal {lost[0]}; expected one of every goal")
         self.graph = graph
-        self.known = limits.cutoff
+        self.known_length = limits.cutoff
         self.clock = Clock.of(limits.time)
         self.iterations = 0
         self.iteration_limit = math.inf if limits.iterations is None else limits.iterations
@@ -61,8 +61,8 @@ class SolverRun:
         self.walk: tuple[int, ...] | None = None
         self.length = math.inf
         self.bound: float | None = None
-        self.infeasible = False
-        self.stopped = False
+        self.is_infeasible = False
+        self.was_stopped = False
 
     def update_incumbent(
         self,
@@ -97,26 +97,26 @@ class SolverRun:
         try:
             if not blind and not self.graph.complete and self.clock.limit is not None:
                 # a roadmap that was cut short says that nothing here is quick
-                self.start()
+                self.ensure_tour()
             yield
         except MemoryLimitError:
             raise
-        except (Stop, LimitReachedError, KeyboardInterrupt, SystemError) as error:
+        except (RunStopped, LimitReachedError, KeyboardInterrupt, SystemError) as error:
             if interrupted(error):
                 self.clock.end()  # for the run that this one is a part of, too
             elif isinstance(error, SystemError):
                 raise
-            self.stopped = True
+            self.was_stopped = True
             if not blind:
-                self.start()
+                self.ensure_tour()
 
     def finish(self, stage: str, **more: Any) -> Result:
         """The last report, which says so if the run was stopped, and the outcome."""
         with suppress(KeyboardInterrupt):
-            self.report("stopped" if self.stopped else stage, **more)
+            self.report("stopped" if self.was_stopped else stage, **more)
         return self.result()
 
-    def trivial(self) -> bool:
+    def solve_if_trivial(self) -> bool:
         """Settle problems of no goal or one, where the answer is known."""
         if self.graph.goal_count > 1:
             return False
@@ -128,7 +128,7 @@ class SolverRun:
         self.bound = self.length
         return True
 
-    def start(self) -> None:
+    def ensure_tour(self) -> None:
         """Take a first tour, whatever the time: the goals in the class of least tether, each the
         nearest to the one before, by the bounds of legs where goals are many."""
         graph = self.graph
@@ -171,16 +171,16 @@ class SolverRun:
         self.bound = min(max(self.bound or 0.0, bound), self.length)
 
     def check(self) -> None:
-        """Raise `Stop` when a limit is reached."""
+        """Raise `RunStopped` when a limit is reached."""
         if self.clock.up or self.iterations >= self.iteration_limit:
-            raise Stop
+            raise RunStopped
 
     @property
-    def done(self) -> bool:
+    def is_done(self) -> bool:
         """Whether the incumbent is proven optimal, or no shorter than what is known."""
         if self.tour is None or self.bound is None:
             return False
-        return proven(min(self.length, self.known), self.bound)
+        return proven(min(self.length, self.known_length), self.bound)
 
     def report(self, stage: str, **more: Any) -> None:
         """Add a row to the trace and hand it on; `more` are further fields of `Progress`."""
@@ -200,7 +200,7 @@ class SolverRun:
     def result(self) -> Result:
         """The outcome as it stands."""
         if self.tour is None:
-            status = Status.INFEASIBLE if self.infeasible else Status.NO_SOLUTION_FOUND
+            status = Status.INFEASIBLE if self.is_infeasible else Status.NO_SOLUTION_FOUND
             return Result(
                 None, None, self.bound or None, status, tuple(self.trace),
                 lower_bound_of=self.graph.scope,

@@ -43,14 +43,14 @@ class Rows(NamedTuple):
     cost: Floats
 
 
-NO_ROWS = Rows(
+EMPTY_ROWS = Rows(
     np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int32),
     np.zeros(0, dtype=np.float32),  # type: ignore[arg-type]
 )  # fmt: skip
 """Where legs are held as a matrix."""
 
 
-class LegRows:
+class SparseCosts:
     """The legs left among some vertices.
 
     Parameters
@@ -106,9 +106,9 @@ class LegRows:
 
     def __getitem__(self, ends: tuple[Ints, Ints]) -> Bools:
         """(k,) whether legs from us to vs are gone."""
-        return np.asarray(np.isinf(self.of(*ends)))
+        return np.asarray(np.isinf(self.costs_of(*ends)))
 
-    def of(self, us: Ints, vs: Ints) -> Floats:
+    def costs_of(self, us: Ints, vs: Ints) -> Floats:
         """(k,) costs of legs from us to vs; inf where they are gone."""
         return _costs_of(np.asarray(us), np.asarray(vs), self.held)
 
@@ -190,7 +190,7 @@ def _kept(k: int, kept: Kept, other: Columns, cost: Floats) -> int:
 @kernel
 def _count(kept: Kept, count: Ints, first: int, last: int) -> None:
     """How many legs of some rows are kept."""
-    other, cost = NO_ROWS.other, NO_ROWS.cost
+    other, cost = EMPTY_ROWS.other, EMPTY_ROWS.cost
     for k in range(first, last):
         count[k] = _kept(k, kept, other, cost)
 

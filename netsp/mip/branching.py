@@ -23,7 +23,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
-from netsp.gtsp.solver_run import Stop
+from netsp.gtsp.solver_run import RunStopped
 from netsp.mip.blossoms import shrunk
 from netsp.mip.cuts import Cut
 from netsp.mip.legprices import LegPrices
@@ -103,9 +103,9 @@ class Tree:
         wanted, held = legs @ (size, 1), self.lp.legs @ np.array((size, 1))
         self.lp.keep_legs(np.isin(held, wanted))
         new = legs[~np.isin(wanted, held)]
-        self.lp.add_legs(new, root.costs.of(new))
+        self.lp.add_legs(new, root.costs.costs_of(new))
         self.legs: Ints = self.lp.legs
-        self.costs: Floats = root.costs.of(self.legs)
+        self.costs: Floats = root.costs.costs_of(self.legs)
         ends = np.sort(self.cluster[self.legs], axis=1)
         self.clusters = int(self.cluster.max()) + 1
         self.pair: Ints = ends[:, 0] * self.clusters + ends[:, 1]
@@ -125,7 +125,7 @@ class Tree:
                 node = heapq.heappop(open_nodes)
             least = min(n.bound for n in (node, *open_nodes[:1]))
             run.raise_bound(min(least, settled, run.cutoff))
-            if run.done:
+            if run.is_done:
                 return
             if node.bound >= run.cutoff:
                 settled, node = min(settled, node.bound), None
@@ -147,8 +147,8 @@ class Tree:
                 "branches", cuts=len(self.lp.cuts), legs=int(tried.alive.sum()),
                 vertices=len(np.unique(self.legs[tried.alive])),
             )  # fmt: skip
-        run.infeasible = run.tour is None and settled == np.inf
-        if not run.infeasible:
+        run.is_infeasible = run.tour is None and settled == np.inf
+        if not run.is_infeasible:
             run.raise_bound(min(settled, run.cutoff))
 
     # one node
@@ -262,7 +262,7 @@ class Tree:
         largest = int(np.argmax(np.bincount(self.cluster[used])))
         members = used[self.cluster[used] == largest]
         if len(members) < 2:
-            raise Stop  # the LP has failed where there is nothing left to choose
+            raise RunStopped  # the LP has failed where there is nothing left to choose
         first, second = members[: len(members) // 2], members[len(members) // 2 :]
         without, within = (alive & ~np.isin(self.legs, m).any(axis=1) for m in (first, second))
         return Choice((without, together), (within, together), [])

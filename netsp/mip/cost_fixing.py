@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats
-from netsp.gtsp.sparse_costs import LegRows
+from netsp.gtsp.sparse_costs import SparseCosts
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip.cover_bounds import OverCells
 from netsp.mip.deadlegs import DeadLegs
@@ -40,7 +40,7 @@ def longest_legs(over: OverCells, cutoff: float) -> Floats:
 
 def survivors(
     graph: TravelGraph, over: OverCells, length: float, tour: Sequence[int], odd: Bools
-) -> LegRows:  # fmt: skip
+) -> SparseCosts:  # fmt: skip
     """The legs among all vertices that may be in a tour as short as one of that length.
 
     Parameters
@@ -59,4 +59,4 @@ def survivors(
     """
     own = over.cells.of(graph.cluster, odd)
     longest = longest_legs(over, length)
-    return LegRows(len(graph), graph.costs_in_blocks(), own, longest, np.asarray(tour))
+    return SparseCosts(len(graph), graph.costs_in_blocks(), own, longest, np.asarray(tour))

@@ -14,7 +14,7 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.compiled.kernel import kernel
-from netsp.gtsp.sparse_costs import LegRows, Rows
+from netsp.gtsp.sparse_costs import Rows, SparseCosts
 from netsp.gtsp.travel.parity_distances import WaysByParity
 from netsp.mip.cover_bounds import Cells, packed
 
@@ -48,10 +48,12 @@ class OverClasses:
         (V, n) as of `netsp.mip.parity_cuts.odd_letters`.
     """
 
-    def __init__(self, costs: Floats | LegRows, cluster: Ints, odd: Bools) -> None:
+    def __init__(self, costs: Floats | SparseCosts, cluster: Ints, odd: Bools) -> None:
         self._costs, self._cluster, self._odd = costs, cluster, odd
         self._with_legs = (
-            costs.with_legs() if isinstance(costs, LegRows) else np.ones(len(cluster), dtype=bool)
+            costs.with_legs()
+            if isinstance(costs, SparseCosts)
+            else np.ones(len(cluster), dtype=bool)
         )
         self.obstacles = odd.shape[1]
 
@@ -65,7 +67,7 @@ class OverClasses:
         """As of `Tower.costs`."""
         own, order, row = self._members(cells)
         out = np.full((len(cells.cluster), len(cells.cluster)), np.inf)
-        if isinstance(self._costs, LegRows):
+        if isinstance(self._costs, SparseCosts):
             _least_in_rows(self._costs.held, own, out)
         else:
             _least(self._costs, order, row, out)
@@ -74,7 +76,7 @@ class OverClasses:
     def by_parity(self, cells: Cells, ends: Ints) -> Floats:
         """As of `Tower.by_parity`."""
         own, order, row = self._members(cells)
-        if isinstance(self._costs, LegRows):
+        if isinstance(self._costs, SparseCosts):
             return _least_by_parity_in_rows(self._costs.held, self._odd, own, order, row, ends)
         return _least_by_parity(self._costs, self._odd, order, row, ends)
 

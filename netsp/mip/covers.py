@@ -25,10 +25,10 @@ import numpy as np
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError, interrupted
-from netsp.gtsp.cost_matrix import LegCosts
+from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.searching import SearchingRun
-from netsp.gtsp.solver_run import Stop
+from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.travel.costs import CostTable
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip.cover_bounds import Cells, OverCells
@@ -111,7 +111,7 @@ def climb(
             if not more:
                 break
             obstacles += more
-    except (Stop, LimitReachedError):
+    except (RunStopped, LimitReachedError):
         pass
     except (KeyboardInterrupt, SystemError) as error:
         if not interrupted(error):
@@ -155,22 +155,22 @@ class _Level:
         run.tour, run.length = tuple(self.own_tour.tolist()), length
         if before is not None:
             run.bound = before.run.bound
-        self.root = Root(run, LegCosts(graph), HighsRelaxation, lambda *_: None)
+        self.root = Root(run, CostMatrix(graph), HighsRelaxation, lambda *_: None)
         self.root.patience = PATIENCE
         if before is not None:
             all_legs = np.vstack([legs, tour_legs(self.own_tour)])
             all_legs = np.unique(np.sort(all_legs, axis=1), axis=0)
             all_legs = all_legs[np.isfinite(costs[all_legs[:, 0], all_legs[:, 1]])]
-            self.root.lp = HighsRelaxation(cluster, all_legs, self.root.costs.of(all_legs))
+            self.root.lp = HighsRelaxation(cluster, all_legs, self.root.costs.costs_of(all_legs))
             self.root.lp.add_cuts([replace(c, inside=c.inside[own]) for c in cuts])
 
     def solve(self) -> OverCells | None:
         """Until there is nothing to add or progress stalls; what it has proven."""
         try:
             self.root.solve()
-        except Stop:
+        except RunStopped:
             self.over = True
-        self.over |= self.run.done
+        self.over |= self.run.is_done
         root, m = self.root, len(self.cells.cluster)
         if root.best is None:
             return None

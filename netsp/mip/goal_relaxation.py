@@ -20,7 +20,7 @@ import numpy as np
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.sparse_costs import LegRows
+from netsp.gtsp.sparse_costs import SparseCosts
 from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.gtsp.travel.result import Result
 from netsp.mip.cost_fixing import survivors
@@ -64,7 +64,7 @@ ABOVE_CELL = 2
 
 Prove = Callable[[TravelGraph, Limits], tuple[Result, Sequence[Cut]]]
 
-Keep = Callable[[LegRows], None]
+Keep = Callable[[SparseCosts], None]
 """Is given the legs that may be in a better tour, once they are known."""
 
 

@@ -38,9 +38,9 @@ Prove = Callable[[TravelGraph, Limits], Result]
 def search_and_merge(run: SearchingRun, prove: Prove) -> None:
     """Search from the start and merge the tours, again beside the best one, until the time is up;
     not at all if it is not limited, or iterations are."""
-    while run.clock.limit and run.iteration_limit == np.inf and not run.done:
+    while run.clock.limit and run.iteration_limit == np.inf and not run.is_done:
         run.check()
-        tours = run.search_from_start(MERGED, run.clock.part(SEARCHED))
+        tours = run.search_afresh(MERGED, run.clock.part(SEARCHED))
         merge(run, tours, prove, Clock.of(run.clock))
 
 

@@ -16,14 +16,14 @@ import numpy as np
 
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock
-from netsp.gtsp.cost_matrix import ROUNDED_FROM, LegCosts
+from netsp.gtsp.cost_matrix import ROUNDED_FROM, CostMatrix
 from netsp.gtsp.dp.dp_solver import bound_by_walks
 from netsp.gtsp.dp.handover import Handover
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.search import Search
 from netsp.gtsp.searching import TURNS_SHARE, SearchingRun
-from netsp.gtsp.solver_run import Stop
-from netsp.gtsp.sparse_costs import LegRows
+from netsp.gtsp.solver_run import RunStopped
+from netsp.gtsp.sparse_costs import SparseCosts
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
 from netsp.mip.branching import Tree
@@ -171,7 +171,7 @@ class MipRun(SearchingRun):
     root: Root | None = None
     cuts: Sequence[Cut] = ()
     _over_goals: OverGoals | None = None
-    _costs: LegCosts | None = None
+    _costs: CostMatrix | None = None
     _merged: Ints = np.zeros(0, dtype=np.int64)
 
     def solve(
@@ -180,8 +180,8 @@ class MipRun(SearchingRun):
         """Heuristic, walks if wanted, root, branching."""
         with self.until_stopped():
             self.update_incumbent(warm_start)
-            if not self.trivial():
-                self.begin()
+            if not self.solve_if_trivial():
+                self.find_first_tour()
                 warm: Warm | None = None
                 if not walks or len(self.graph) > CORE_FIRST:
                     with self.core() as core:
@@ -190,18 +190,18 @@ class MipRun(SearchingRun):
                             self.bound_by_goals(backend)
                             if self._out_of_reach:
                                 search_and_merge(self, solve_merged)
-                        if core is not None and not self.done:
+                        if core is not None and not self.is_done:
                             # from here on: covers may take longer than its share
-                            core.begin_share()
+                            core.start_time_share()
                             # the tours found meanwhile are not all among its classes
-                            core.known = min(core.known, self.length)
+                            core.known_length = min(core.known_length, self.length)
                             core.prove(backend, walks=walks)
                     warm = core.program() if core is not None else None
-                if not (self.done and self._in_rows):
+                if not (self.is_done and self._in_rows):
                     self.prove(backend, walks=walks, warm=warm)
         if self.root is not None:
             self.cuts, self.root = self.root.lp.cuts, None
-        return self.finish("proven" if self.done else "open")
+        return self.finish("proven" if self.is_done else "open")
 
     def prove(self, backend: str, *, walks: bool = False, warm: Warm | None = None) -> None:
         """Heuristic, walks if wanted, cutting planes, until it is proven.
@@ -217,22 +217,22 @@ class MipRun(SearchingRun):
             self.report("heuristic", vertices=len(costs))
         if walks and costs.rows is None:
             bound_by_walks(self, costs, handover=HANDOVER)
-        if not (self.done or self.infeasible):
+        if not (self.is_done or self.is_infeasible):
             self.cut(costs, backend, warm)
 
-    def _left(self) -> LegCosts:
+    def _left(self) -> CostMatrix:
         """The costs of legs, where covers have not come to them."""
         graph, over = self.graph, self._over_goals
         if not self._in_rows or over is None or self.tour is None:
-            return LegCosts(graph)
+            return CostMatrix(graph)
         if over.cells is None:
             # no cover was proven in half of the time: what is left is worth more in a search
             search_and_merge(self, solve_merged)
             self.check()
-            return LegCosts(graph)
+            return CostMatrix(graph)
         odd = odd_letters(graph.signatures)
         with graph.on_clock(self.clock):
-            return LegCosts(graph, survivors(graph, over.cells, self.length, self.tour, odd))
+            return CostMatrix(graph, survivors(graph, over.cells, self.length, self.tour, odd))
 
     def bound_by_goals(self, backend: str) -> None:
         """A first bound for who stops the run before the proof over all classes has one."""
@@ -253,19 +253,24 @@ class MipRun(SearchingRun):
         graph = self.graph
 
         def costs() -> Floats:
-            self._costs = LegCosts(graph)
+            self._costs = CostMatrix(graph)
             return self._costs.values
 
-        def keep(rows: LegRows) -> None:
-            self._costs = LegCosts(graph, rows)
+        def keep(rows: SparseCosts) -> None:
+            self._costs = CostMatrix(graph, rows)
 
         known = climbs and graph.legs_at_once and graph.complete
         in_rows = self._in_rows
         try:
             self._over_goals = bound_over_goals(
-                graph, prove, limits, self.tour if climbs else None,
-                costs if known and not in_rows else None, self.climbed, keep if in_rows else None,
-            )  # fmt: skip
+                graph,
+                prove,
+                limits,
+                self.tour if climbs else None,
+                costs if known and not in_rows else None,
+                self.on_cover_bound,
+                keep if in_rows else None,
+            )
         finally:
             self.raise_bound(graph.bound_in_any_class)
         self.raise_bound(self._over_goals.bound)
@@ -318,7 +323,7 @@ class MipRun(SearchingRun):
         core = self.outer[1][self.root.costs.vertices]
         return Warm(core, core[self.root.lp.legs], list(self.root.lp.cuts), self.outer[1])
 
-    def cut(self, costs: LegCosts, backend: str, warm: Warm | None) -> None:
+    def cut(self, costs: CostMatrix, backend: str, warm: Warm | None) -> None:
         """Root and branching over what is left of the vertices."""
         self._gap_searched = self.length
         if warm is not None:
@@ -328,20 +333,20 @@ class MipRun(SearchingRun):
             self, costs, _load(BACKENDS[backend]), self.round, warm, self._over_goals
         )
         root.solve()
-        if not self.done and root.point is not None:
+        if not self.is_done and root.point is not None:
             before, used = self.length, np.flatnonzero(root.point.x > 1e-6)
             self.search(costs, used)
             self.report("heuristic", **root.size())
             if costs.exact is None and self.length < before:
                 root.solve()
-        if not self.done and costs.exact is not None:
+        if not self.is_done and costs.exact is not None:
             self.check()
             root.measure()
             self.search(costs)
             self.report("measured", **root.size())
             root.solve()
         for _ in range(TRIES):
-            if self.done or root.size()["legs"] <= MOST_LEGS:
+            if self.is_done or root.size()["legs"] <= MOST_LEGS:
                 break
             before = self.length
             self.search(costs)
@@ -349,7 +354,7 @@ class MipRun(SearchingRun):
             if self.length < before:
                 root.solve()
         legs = root.size()["legs"]
-        if self.done or legs > MOST_LEGS or self._core_of_many:
+        if self.is_done or legs > MOST_LEGS or self._core_of_many:
             return
         if backend not in LAZY:
             Tree(root).solve()
@@ -358,19 +363,19 @@ class MipRun(SearchingRun):
 
     # incumbents
 
-    def search_beside(self) -> Ints:
-        """As `SearchingRun.search_beside`, and the shortest tour through the classes found."""
-        core = super().search_beside()
+    def search_near_incumbent(self) -> Ints:
+        """Search near the incumbent, and merge the local optima found."""
+        core = super().search_near_incumbent()
         self.merge_ends()
         return core
 
-    def climbed(self, bound: float, cells: int, classes: Ints) -> tuple[int, ...] | None:
-        """As `SearchingRun.climbed`, and the shortest tour through the classes found."""
-        super().climbed(bound, cells, classes)
+    def on_cover_bound(self, bound: float, cells: int, classes: Ints) -> tuple[int, ...] | None:
+        """As `SearchingRun.on_cover_bound`, and the shortest tour through the classes found."""
+        super().on_cover_bound(bound, cells, classes)
         self.merge_ends()
         return self.tour
 
-    def search(self, costs: LegCosts, more: Ints | None = None) -> None:
+    def search(self, costs: CostMatrix, more: Ints | None = None) -> None:
         """As `SearchingRun.search`, and the shortest tour through the classes found."""
         super().search(costs, more)
         self.merge_ends()
@@ -380,10 +385,10 @@ class MipRun(SearchingRun):
         incumbent's, unless they have been merged before. Not where iterations are limited, as
         they would be those of another program."""
         few = self.graph.goal_count < MERGED_FROM or not self.graph.roadmapped
-        idle = self.done or self.clock.up or self.iteration_limit < np.inf
-        if few or idle or not self.ends or self.tour is None:
+        idle = self.is_done or self.clock.up or self.iteration_limit < np.inf
+        if few or idle or not self.local_optima or self.tour is None:
             return
-        tours = list(dict.fromkeys([self.tour, *self.ends]))
+        tours = list(dict.fromkeys([self.tour, *self.local_optima]))
         classes = classes_of(tours)
         if not np.isin(classes, self._merged).all():
             self._merged = classes
@@ -393,7 +398,7 @@ class MipRun(SearchingRun):
         """Turn a point of the root into a tour, if all that is left is searched; else search the
         classes that it visits whenever the gap has shrunk to `SEARCH_AGAIN` of what it was."""
         whole = np.abs(point.y - np.rint(point.y)).max(initial=0.0) < 1e-6
-        if self.searches_all(root.costs) or (whole and root.costs.exact is None):
+        if self.searches_all_vertices(root.costs) or (whole and root.costs.exact is None):
             self.tour_at(root.costs, point, whole=whole)
             return
         gap = self.length - (self.bound or 0.0)
@@ -401,7 +406,7 @@ class MipRun(SearchingRun):
             self._gap_searched = gap
             self.search(root.costs, np.flatnonzero(point.x > 1e-6))
 
-    def tour_at(self, costs: LegCosts, point: Point, *, whole: bool) -> None:
+    def tour_at(self, costs: CostMatrix, point: Point, *, whole: bool) -> None:
         """Join the cycles of a point, or follow its strongest legs, and improve that."""
         cluster = costs.cluster
         if whole:
@@ -417,7 +422,7 @@ class MipRun(SearchingRun):
             self.instance(costs, np.flatnonzero(point.x > 1e-6)), self.rng, order, self.clock
         )
         search.settle()
-        self.take(search, rounded=costs.rounded)
+        self.offer_incumbent_from(search, rounded=costs.rounded)
 
     # the end
 
@@ -427,17 +432,19 @@ class MipRun(SearchingRun):
         legs = root.dead.legs_left()
         legs = np.unique(np.vstack([legs, tour_legs(root.tour())]), axis=0)
         vertices = np.unique(np.concatenate([[0], legs.ravel()]))
-        model: IntegerProgram = program(costs.cluster, vertices, legs, costs.of(legs), root.lp.cuts)
+        model: IntegerProgram = program(
+            costs.cluster, vertices, legs, costs.costs_of(legs), root.lp.cuts
+        )
         size = {"legs": len(legs), "vertices": len(vertices)}
         self.report("fixed", cuts=len(model.cuts), **size)
-        while not self.done:
+        while not self.is_done:
             self.check()
             outcome = model.solve(self.clock)
             self.iterations += 1
             point = outcome.point
             if outcome.infeasible:
                 # nothing that was not ruled out beats the incumbent, if there is one
-                self.infeasible = self.tour is None
+                self.is_infeasible = self.tour is None
                 if self.tour is not None:
                     self.raise_bound(self.cutoff)
                 break
@@ -446,10 +453,10 @@ class MipRun(SearchingRun):
             if point is not None:
                 self.tour_at(costs, point, whole=True)
             self.report("integer", cuts=len(model.cuts), **size)
-            if self.done:
+            if self.is_done:
                 break
             if point is None or not outcome.finished:
-                raise Stop
+                raise RunStopped
             cuts = component_cuts(np.rint(point.x), point.legs, np.rint(point.y), costs.cluster)
             if not cuts:
                 # an optimal tour of the program: the bound stands at its own length

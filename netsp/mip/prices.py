@@ -14,7 +14,7 @@ import numpy as np
 
 from netsp.base.arrays import Floats, Ints
 from netsp.base.compiled.kernel import kernel
-from netsp.gtsp.sparse_costs import NO_ROWS, LegRows, Rows
+from netsp.gtsp.sparse_costs import EMPTY_ROWS, Rows, SparseCosts
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import NO_BITS, Bits, DeadLegs, mark_dead
 from netsp.mip.lagrangian_bound import least_of_clusters, rounding
@@ -36,7 +36,7 @@ class Prices:
     ----------
     costs : ndarray, shape (V, V)
         Of legs; inf where there is none.
-    dead : DeadLegs or LegRows
+    dead : DeadLegs or SparseCosts
         Legs that are of no interest, and those that there are none of; or the others, with costs,
         and then the matrix is not looked at.
     cluster : ndarray of int, shape (V,)
@@ -55,7 +55,7 @@ class Prices:
     """
 
     def __init__(
-        self, costs: Floats, dead: DeadLegs | LegRows, cluster: Ints, cuts: Sequence[Cut],
+        self, costs: Floats, dead: DeadLegs | SparseCosts, cluster: Ints, cuts: Sequence[Cut],
         duals: Duals, check: Callable[[], None] = lambda: None,
     ) -> None:  # fmt: skip
         self._check, self._dead = check, dead
@@ -150,9 +150,9 @@ class Prices:
             list(pool.map(checked, blocks))
 
 
-def _held(dead: DeadLegs | LegRows) -> tuple[Bits, Rows]:
+def _held(dead: DeadLegs | SparseCosts) -> tuple[Bits, Rows]:
     """For the kernels."""
-    return (dead.bits, NO_ROWS) if isinstance(dead, DeadLegs) else (NO_BITS, dead.held)
+    return (dead.bits, EMPTY_ROWS) if isinstance(dead, DeadLegs) else (NO_BITS, dead.held)
 
 
 @kernel

@@ -32,7 +32,7 @@ from netsp.base.arrays import Floats, Ints
 from netsp.base.errors import InputError
 from netsp.base.ram import ask
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.solver_run import SolverRun, Stop
+from netsp.gtsp.solver_run import RunStopped, SolverRun
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
 from netsp.mip.cbc_program import CbcInteger
@@ -97,11 +97,11 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     run = SolverRun(graph, limits)
     # blind: do not substitute a heuristic tour if the run stops before its first tour
     with run.until_stopped(blind=True):
-        if not run.trivial():
+        if not run.solve_if_trivial():
             legs, costs = _all_legs(graph, chosen.max_legs)
             run.check()
             _lazy_rounds(run, legs, costs, chosen)
-    return run.finish("proven" if run.done else "open")
+    return run.finish("proven" if run.is_done else "open")
 
 
 def _all_legs(graph: TravelGraph, max_legs: int) -> tuple[Ints, Floats]:
@@ -130,14 +130,14 @@ def _lazy_rounds(run: SolverRun, legs: Ints, costs: Floats, params: Params) -> N
         outcome = model.solve(run.clock)
         run.iterations += 1
         if outcome.infeasible:
-            run.infeasible = True
+            run.is_infeasible = True
             return
         if outcome.bound is not None:
             run.raise_bound(outcome.bound)
         point = outcome.point
         if point is None or not outcome.finished:
             run.report("integer", cuts=cut_count, **size)
-            raise Stop
+            raise RunStopped
         x, y = np.rint(point.x), np.rint(point.y)
         cycles = tour_from(x, legs, y)
         if len(cycles) == 1:

@@ -22,7 +22,7 @@ import numpy as np
 
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.search import Instance, best_classes
-from netsp.gtsp.search.lns_solver import core_of
+from netsp.gtsp.search.lns_solver import search_core
 from netsp.gtsp.solver_run import SolverRun
 from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.gtsp.travel.result import Progress, Result
@@ -81,22 +81,22 @@ def solve(
     part.on_progress = pass_on
     with outer.until_stopped():
         outer.update_incumbent(limits.warm_start)
-        if outer.trivial():
+        if outer.solve_if_trivial():
             return outer.finish("trivial")
         place = {int(v): k for k, v in enumerate(kept)}
         start = [place.get(int(v), -1) for v in limits.warm_start or ()]
         result = part.solve(chosen.backend, start if start and -1 not in start else None)
-        outer.stopped = part.stopped
+        outer.was_stopped = part.was_stopped
         if result.tour is not None:
             outer.update_incumbent(kept[np.array(result.tour)].tolist())
             if chosen.polish and not whole:
                 outer.check()
-                instance = Instance.among(graph, core_of(outer, vertices=MOST_POLISHED))
+                instance = Instance.among(graph, search_core(outer, vertices=MOST_POLISHED))
                 order = graph.cluster[kept[np.array(result.tour[1:])]]
                 _, tour = best_classes(order, instance.start, instance.costs)
                 outer.update_incumbent(instance.original(tour))
     if whole:
-        outer.infeasible = part.infeasible
+        outer.is_infeasible = part.is_infeasible
         if part.bound is not None:
             outer.raise_bound(part.bound)
-    return outer.finish("proven" if outer.done else "polished" if chosen.polish else "reduced")
+    return outer.finish("proven" if outer.is_done else "polished" if chosen.polish else "reduced")

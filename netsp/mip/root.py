@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
-from netsp.gtsp.cost_matrix import LEGS, LegCosts
+from netsp.gtsp.cost_matrix import LEGS, CostMatrix
 from netsp.gtsp.searching import SearchingRun
-from netsp.gtsp.solver_run import Stop
-from netsp.gtsp.sparse_costs import LegRows
+from netsp.gtsp.solver_run import RunStopped
+from netsp.gtsp.sparse_costs import SparseCosts
 from netsp.mip.blossoms import blossom_cuts, shrunk
 from netsp.mip.combs import comb_cuts, tight_sets
 from netsp.mip.cover_bounds import OverGoals
@@ -110,7 +110,7 @@ class Root:
     def __init__(
         self,
         run: SearchingRun,
-        costs: LegCosts,
+        costs: CostMatrix,
         relaxation: Callable[[Ints, Ints, Floats], Relaxation],
         round_point: Callable[[Root, Point], None],
         warm: Warm | None = None,
@@ -130,7 +130,7 @@ class Root:
         legs = self._first_legs() if warm is None else self._warm_legs(warm)
         if graph.quick_legs:
             costs.measure_legs(legs)
-        self.lp = relaxation(costs.cluster, legs, costs.of(legs))
+        self.lp = relaxation(costs.cluster, legs, costs.costs_of(legs))
         if warm is not None:
             self.lp.add_cuts(warm.cuts_over(costs))
         # with these, and those of pairs that `goal_cuts` finds, the LP does not fall below the
@@ -153,7 +153,7 @@ class Root:
         """Rounds of LP, pricing, elimination and separation, until there is nothing to add or
         progress stalls."""
         run, pace, settling = self.run, Pace(), False
-        while not run.done:
+        while not run.is_done:
             point = self._relaxed()
             if not (settling or pace.look_is_due):
                 pace.rounds += 1
@@ -166,7 +166,7 @@ class Root:
             if self.point is not None:
                 self.round_point(self, point)
             run.report("root", **self.size())
-            if run.done:
+            if run.is_done:
                 return
             if self.point is None or self._missing_tour_legs():
                 continue  # vertices were forgotten, or a new incumbent came with legs of its own
@@ -192,8 +192,8 @@ class Root:
         run.iterations += 1
         if point is None:
             # without an incumbent all legs are in the program from the start
-            run.infeasible = self.lp.infeasible and run.tour is None
-            raise Stop
+            run.is_infeasible = self.lp.infeasible and run.tour is None
+            raise RunStopped
         self.point = point
         return point
 
@@ -224,7 +224,7 @@ class Root:
         assert isinstance(self.dead, DeadLegs)  # what rows hold has been measured
         self.costs.measure_all(~self.dead.matrix())
         legs = self.lp.legs
-        self.lp.set_costs(self.costs.of(legs))
+        self.lp.set_costs(self.costs.costs_of(legs))
 
     def size(self) -> dict[str, int]:
         """For the report."""
@@ -259,20 +259,20 @@ class Root:
         if run.tour is not None:
             prices = Prices(costs.values, self.dead, costs.cluster, cuts, duals, run.check)
             run.raise_bound(min(prices.bound, run.cutoff))
-            if not run.done:
+            if not run.is_done:
                 prices.rule_out(run.cutoff)
         return [c for c, price in zip(cuts, duals.cut.tolist(), strict=True) if price < 0.0]
 
-    def _left(self) -> DeadLegs | LegRows:
+    def _left(self) -> DeadLegs | SparseCosts:
         rows = self.costs.rows
         return DeadLegs.of(self.costs.values) if rows is None else rows
 
     def _with_costs(self, legs: Ints) -> Ints:
         """Of legs those that there are, and the incumbent's whatever has been let go of."""
-        if isinstance(self.dead, LegRows):
+        if isinstance(self.dead, SparseCosts):
             gone = self.dead[legs[:, 0], legs[:, 1]]
             return legs[~gone | np.isin(self._keys(legs), self._keys(tour_legs(self.tour())))]
-        return np.asarray(legs[np.isfinite(self.costs.of(legs))])
+        return np.asarray(legs[np.isfinite(self.costs.costs_of(legs))])
 
     def _first_legs(self) -> Ints:
         """The nearest legs of every vertex, all legs to the base, and the incumbent's; all legs if
@@ -300,7 +300,7 @@ class Root:
         tour = tour_legs(self.tour())
         new = tour[~np.isin(self._keys(tour), self._keys(self.lp.legs))]
         if len(new):
-            self.lp.add_legs(new, self.costs.of(new))
+            self.lp.add_legs(new, self.costs.costs_of(new))
         return len(new) > 0
 
     def _keys(self, legs: Ints) -> Ints:
@@ -317,17 +317,17 @@ class Root:
             self.best = Best(self.costs.vertices.copy(), tuple(self.lp.cuts), point.duals)
         self._reached = max(self._reached, prices.bound)
         run.raise_bound(min(prices.bound, run.cutoff))
-        if run.done:
+        if run.is_done:
             return False
         missing = run.cutoff - (run.bound or 0.0)
         longer = False
         if run.cutoff - prices.bound < FAR * missing:
             prices.rule_out(run.cutoff)
             longer = self._measure_left()
-        scale = run.length if run.tour is not None else float(self.costs.of_base[1:].max())
+        scale = run.length if run.tour is not None else float(self.costs.base_costs[1:].max())
         new, found_longer = self._most_negative(prices, TINY * scale)
         if len(new):
-            self.lp.add_legs(new, self.costs.of(new))
+            self.lp.add_legs(new, self.costs.costs_of(new))
         longer |= found_longer | self._measure_used(point)
         if lean and len(self.costs) > MANY:
             self._drop_dear(prices.of(self.lp.legs), point)
@@ -357,7 +357,7 @@ class Root:
         if not self.costs.measure_legs(point.legs[point.y > USED]):
             return False
         legs = self.lp.legs
-        self.lp.set_costs(self.costs.of(legs))
+        self.lp.set_costs(self.costs.costs_of(legs))
         return True
 
     def _drop_dear(self, price: Floats, point: Point) -> None:
@@ -438,7 +438,7 @@ class Root:
         tour = tour_legs(self.tour())
         # visited by the point or by the incumbent
         visited = np.union1d(np.flatnonzero(point.x > TINY), self.tour())
-        near = visited[self.costs.nearest_of(visited)]
+        near = visited[self.costs.nearest_among(visited)]
         near[visited] = visited
         if len(tour):
             y = (1.0 - MIX) * point.y

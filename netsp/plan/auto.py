@@ -97,9 +97,9 @@ def _by_size(graph: TravelGraph, chosen: Params, limits: Limits) -> Result:
         small = SolverRun(graph, limits)
         with small.until_stopped():
             small.update_incumbent(limits.warm_start)
-            if not small.trivial():
+            if not small.solve_if_trivial():
                 exact.solve(small)
-        return small.finish("proven" if small.done else "exact")
+        return small.finish("proven" if small.is_done else "exact")
     if len(graph.before):
         return _in_part_ordered(graph, limits, chosen.backend)
     clock = Clock.of(limits.time)
@@ -136,15 +136,15 @@ def _beyond(graph: TravelGraph, limits: Limits) -> Result:
 
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)
-        run.begin()
-        run.search_beside()
+        run.find_first_tour()
+        run.search_near_incumbent()
         share = run.clock.part(BOUND_SHARE) if run.clock.limit else run.clock
         run.raise_bound(
-            _bound_by_goals(graph, Limits(share, rng=limits.rng), run.tour, run.climbed)
+            _bound_by_goals(graph, Limits(share, rng=limits.rng), run.tour, run.on_cover_bound)
         )
         run.report("goals")
         search_and_merge(run, solve_merged)
-    return run.finish("proven" if run.done else "open")
+    return run.finish("proven" if run.is_done else "open")
 
 
 def _rounds(graph: TravelGraph) -> int:

@@ -126,8 +126,8 @@ def call(
             )
         run.raise_bound(float(bound))
     if claimed is not None and claimed.status is Status.INFEASIBLE:
-        run.start()
+        run.ensure_tour()
         if run.tour is not None:
             raise InputError(f"solver {name!r}: calls the graph infeasible, but it has a tour")
-        run.infeasible = True
+        run.is_infeasible = True
     return run.finish("done")

@@ -55,7 +55,7 @@ def solve(run: SolverRun) -> None:
     every = 2**n - 1
     home = reach[every] + costs[:, 0]
     if not np.isfinite(home).any():
-        run.infeasible = run.tour is None
+        run.is_infeasible = run.tour is None
         return
     v, s, tour = int(np.argmin(home)), every, []
     length = float(home[v])

@@ -17,7 +17,7 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
-from netsp.gtsp.cost_matrix import MEASURE_AT_ONCE, LegCosts
+from netsp.gtsp.cost_matrix import MEASURE_AT_ONCE, CostMatrix
 from netsp.gtsp.dp.handover import Handover
 from netsp.gtsp.dp.walks import Walks
 from netsp.gtsp.limits import Limits
@@ -104,13 +104,13 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     run = SearchingRun(graph, limits, search_rounds=chosen.search_rounds)
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)
-        if not run.trivial():
-            run.begin()
-            costs = LegCosts(graph)
+        if not run.solve_if_trivial():
+            run.find_first_tour()
+            costs = CostMatrix(graph)
             run.search(costs)
             run.report("heuristic", vertices=len(costs))
             bound_by_walks(run, costs)
-    return run.finish("proven" if run.done else "open")
+    return run.finish("proven" if run.is_done else "open")
 
 
 def fits(graph: TravelGraph) -> bool:
@@ -118,23 +118,25 @@ def fits(graph: TravelGraph) -> bool:
     return (graph.goal_count + 1) ** 2 * len(graph) <= MOST_CELLS
 
 
-def bound_by_walks(run: SearchingRun, costs: LegCosts, *, handover: Handover = NO_HANDOVER) -> None:
+def bound_by_walks(
+    run: SearchingRun, costs: CostMatrix, *, handover: Handover = NO_HANDOVER
+) -> None:
     """Raise the bound of a run and forget vertices, until the proof is done or progress stalls, or
     few legs are left that are all measured: what is proven of those is up to the caller."""
     before = run.graph.before
     walks = Walks(costs.cluster, costs.values, run.clock.flag, before)
-    prices = first_prices(run, costs)
+    prices = initial_prices(run, costs)
     direction: Floats = np.zeros(walks.n + 1)
     best, kept, step, vain = -np.inf, prices, STEP, 0
     history: list[tuple[float, int]] = []
-    searched = run.searches_all(costs)
-    while not run.done:
+    searched = run.searches_all_vertices(costs)
+    while not run.is_done:
         run.check()
         cutoff = run.cutoff
         walk = walks.solve(prices, cutoff, run.check)
         run.iterations += 1
         if walk is None:
-            run.infeasible = run.tour is None
+            run.is_infeasible = run.tour is None
             if run.tour is not None:
                 run.raise_bound(cutoff - walks.rounding(prices))
             return
@@ -149,12 +151,12 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts, *, handover: Handover = N
             run.update_incumbent([0, *costs.vertices[walk.rows].tolist()])
             walks.set_values(costs.values)
         _forget(run, walks, costs)
-        if not searched and run.searches_all(costs):
+        if not searched and run.searches_all_vertices(costs):
             run.search(costs)
             searched = True
         run.report("walks", vertices=len(costs), legs=len(costs) * (len(costs) - 1) // 2)
         if whole:
-            if measured and not run.done:
+            if measured and not run.is_done:
                 return  # rounding is all that is missing, and no price can mend that
             best = -np.inf  # its legs have grown
             continue
@@ -168,7 +170,7 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts, *, handover: Handover = N
         stalls = _stalls(history, run.length)
         if costs.exact is not None and (stalls or len(costs) <= MEASURE_AT_ONCE):
             _measure(run, walks, costs)
-            searched = run.searches_all(costs)
+            searched = run.searches_all_vertices(costs)
             best, step = -np.inf, STEP
             history.clear()
         elif stalls:
@@ -189,7 +191,7 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts, *, handover: Handover = N
         prices = prices + step * (target - walk.bound) / (direction @ direction) * direction
 
 
-def first_prices(run: SearchingRun, costs: LegCosts) -> Floats:
+def initial_prices(run: SearchingRun, costs: CostMatrix) -> Floats:
     """(n + 1,) for every goal half of the two legs of the incumbent there: its prices pay for its
     legs, but for half of those of the base."""
     prices = np.zeros(run.graph.goal_count + 1)
@@ -201,7 +203,7 @@ def first_prices(run: SearchingRun, costs: LegCosts) -> Floats:
     return prices
 
 
-def _forget(run: SearchingRun, walks: Walks, costs: LegCosts) -> None:
+def _forget(run: SearchingRun, walks: Walks, costs: CostMatrix) -> None:
     """Drop vertices without a state, once they are many; the incumbent's stay."""
     keep = walks.left
     if run.tour is not None:
@@ -212,7 +214,7 @@ def _forget(run: SearchingRun, walks: Walks, costs: LegCosts) -> None:
         walks.set_values(costs.values)
 
 
-def _measure(run: SearchingRun, walks: Walks, costs: LegCosts) -> None:
+def _measure(run: SearchingRun, walks: Walks, costs: CostMatrix) -> None:
     """Measure all legs that are left, and search among them."""
     run.check()
     costs.measure_all(np.isfinite(costs.values))

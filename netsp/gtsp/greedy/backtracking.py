@@ -79,7 +79,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     stage = "trivial"
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)
-        if not run.trivial():
+        if not run.solve_if_trivial():
             stage = _nearest_by_tether(run, retrace=chosen.retrace == "path" and graph.geometric)
     return run.finish(stage)
 
@@ -171,7 +171,7 @@ def solve_2016(
     stage = "greedy"
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)
-        if not run.trivial():
+        if not run.solve_if_trivial():
             run.check()
             if chosen.retrace == "goal":
                 _out_and_back(run)

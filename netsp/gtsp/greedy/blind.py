@@ -48,7 +48,7 @@ def solve(graph: TravelGraph, params: None = None, limits: Limits | None = None)
     run = SolverRun(graph, limits)
     walked: Trajectory | None = None
     with run.until_stopped(blind=True):
-        if not run.trivial():
+        if not run.solve_if_trivial():
             run.check()
             walked = _nearest_neighbour(run)
     if walked is None:

@@ -9,7 +9,7 @@ import numpy as np
 from netsp.base.arrays import Ints
 from netsp.base.clock import Clock
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.neighbourhood import classes_beside, searched_per_goal
+from netsp.gtsp.neighbourhood import classes_near_tour, searched_classes_per_goal
 from netsp.gtsp.search.layers import Instance
 from netsp.gtsp.search.local_search import Search
 from netsp.gtsp.solver_run import SolverRun
@@ -55,7 +55,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     run = SolverRun(graph, limits)
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)
-        if not run.trivial():
+        if not run.solve_if_trivial():
             _search(run, rng, chosen)
     return run.finish("done")
 
@@ -63,7 +63,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
 def _search(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     graph = run.graph
     run.check()
-    core = core_of(run, chosen.classes or _by_default(graph))
+    core = search_core(run, chosen.classes or _by_default(graph))
     instance = Instance.among(graph, core)
     by_clock = run.clock.limit is not None and run.iteration_limit == np.inf
     if not by_clock and run.iteration_limit == np.inf:
@@ -73,7 +73,7 @@ def _search(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
         start = None if run.tour is None else graph.cluster[list(run.tour)]
         run.check()
         if k and len(core) < len(graph) and run.tour is not None:
-            core = core_beside(run, chosen.classes)
+            core = core_near_incumbent(run, chosen.classes)
             instance = Instance.among(graph, core)
         clock = run.clock.part(1.0 / (chosen.restarts - k))
         search = Search(instance, rng, start, clock)
@@ -94,22 +94,22 @@ def _search(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
         search.run(np.inf if by_clock else rounds, clock, progress if by_clock else None, tell)
 
 
-def core_of(run: SolverRun, classes: int = 0, vertices: int = MOST_VERTICES) -> Ints:
+def search_core(run: SolverRun, classes: int = 0, vertices: int = MOST_VERTICES) -> Ints:
     """The classes of least tether that a search looks at, and those of the incumbent: so many of
     every goal, by default (0) as many as make so many vertices in all."""
     graph = run.graph
-    some = classes or most_classes(graph, vertices)
+    some = classes or max_classes_per_goal(graph, vertices)
     core = least_tethers(graph.costs_to_base, graph.cluster, some)
     return np.union1d(core, run.tour) if run.tour is not None else core
 
 
-def core_beside(run: SolverRun, classes: int = 0) -> Ints:
+def core_near_incumbent(run: SolverRun, classes: int = 0) -> Ints:
     """The classes that a search looks at once there is a tour: some of least tether, and those
     beside it."""
     graph, tour = run.graph, run.tour or (0,)
     some = classes or _by_default(graph)
     bounds = graph.lower_bounds(rows=tour)
-    return classes_beside(graph.costs_to_base, graph.cluster, bounds, tour, some)
+    return classes_near_tour(graph.costs_to_base, graph.cluster, bounds, tour, some)
 
 
 def _take(run: SolverRun, search: Search) -> None:
@@ -119,10 +119,12 @@ def _take(run: SolverRun, search: Search) -> None:
 
 def _by_default(graph: TravelGraph) -> int:
     """Classes per goal."""
-    return max(most_classes(graph, MOST_VERTICES), searched_per_goal(graph.goal_count))
+    return max(
+        max_classes_per_goal(graph, MOST_VERTICES), searched_classes_per_goal(graph.goal_count)
+    )
 
 
-def most_classes(graph: TravelGraph, vertices: int) -> int:
+def max_classes_per_goal(graph: TravelGraph, vertices: int) -> int:
     """The most classes per goal that give no more than so many vertices, at least 3."""
     sizes = np.bincount(graph.cluster)
     k = 3
