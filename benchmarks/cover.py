@@ -16,9 +16,9 @@ from react import external_mission
 from sites import mission_of
 from table import ROOT, head, heading, row
 
-from netsp.online import Scene
 from netsp.plan.cover import cover
 from netsp.plan.space.mission_solver import seconds_until_home, solve_mission
+from netsp.world import Scene
 from netsp.world.mission.equipment import Camera
 from netsp.world.mission.mission import Mission
 from netsp.world.simulator.mission_run import simulate

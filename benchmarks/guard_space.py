@@ -14,11 +14,11 @@ from guard_tracks import DRIFT_S, DT, SPEED
 from sites import SITES, mission_of, shipped
 from table import head, heading, row
 
-from netsp.online import Scene
 from netsp.online.guard.space_site import SpaceSite
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_guard import Guard, GuardOptions
 from netsp.plan.space.mission_solver import solve_mission
+from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import LogRow
 from netsp.world.simulator.mission_run import simulate

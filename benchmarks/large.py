@@ -20,7 +20,7 @@ import trimesh
 from peak import highest
 from table import head, heading, row
 
-from netsp.online import Scene
+from netsp.world import Scene
 from netsp.world.scene import lattice, voxels
 from netsp.world.scene.field import DistanceField
 from netsp.world.tether import TETHERS

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from table import RESULTS, head, heading, row, source
 
-from netsp.online import Scene
+from netsp.world import Scene
 from netsp.world.mission.equipment import Camera
 from netsp.world.mission.mission import Mission
 from netsp.world.paths.refine import RefineParams

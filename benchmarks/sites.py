@@ -18,7 +18,7 @@ import numpy as np
 from table import ROOT, head, heading, row
 
 from netsp.base.geometry import polylines
-from netsp.online import Scene
+from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from netsp.world.paths.tree import ShortestTree, taut
 from netsp.world.scene.field import pushed_out

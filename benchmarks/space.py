@@ -34,7 +34,6 @@ from netsp import Problem, solve
 from netsp.base.clock import Clock
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.hsignature.rays import signature
-from netsp.online import Scene
 from netsp.plan.random_worlds import reachable_world
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.judge import verify_mission
@@ -52,6 +51,7 @@ from netsp.plan.space.space_signature import SpaceSignature
 from netsp.plan.space.upright import bound_of_upright
 from netsp.plan.space.visit_order import order_by_going_on
 from netsp.roadmap.explain_unreachable import shortest_tethers
+from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import Run
 from netsp.world.scene.field import DistanceField

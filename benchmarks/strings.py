@@ -28,7 +28,7 @@ from tether import wander
 
 from netsp.base.compiled.kernel import kernel
 from netsp.base.geometry import polylines
-from netsp.online import GeodesicTether
+from netsp.world import GeodesicTether
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.scene.sampling import Field, sample
 from netsp.world.scene.voxels import of_triangles

@@ -21,9 +21,9 @@ from table import ROOT, head, heading, row
 
 from netsp import Problem
 from netsp.hsignature import signature
-from netsp.online import GeodesicTether, ReactTether, Scene
 from netsp.plan.random_worlds import random_world
 from netsp.roadmap.paths import TautPaths
+from netsp.world import GeodesicTether, ReactTether, Scene
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.voxels import of_cloud_file
 

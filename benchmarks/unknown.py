@@ -13,7 +13,7 @@ import argparse
 import numpy as np
 from table import head, heading, row
 
-from netsp.online import Scene
+from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import Run
 from netsp.world.simulator.mission_run import simulate

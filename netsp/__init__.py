@@ -10,8 +10,10 @@ True
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from netsp.base import moved_modules
+from netsp.base.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from netsp.base.errors import InfeasibleError, InputError, NetspError, VerificationError
@@ -26,26 +28,26 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _PUBLIC = {
-    "Circle": "model.problem",
-    "Goal": "model.problem",
-    "InfeasibleError": "base.errors",
-    "InputError": "base.errors",
-    "NetspError": "base.errors",
-    "Polygon": "model.problem",
-    "Problem": "model.problem",
-    "Progress": "gtsp.travel.result",
-    "Result": "gtsp.travel.result",
-    "Solution": "model.solution",
-    "State": "model.problem",
-    "Status": "model.solution",
-    "Tethers": "roadmap.tether_classes",
-    "TravelGraph": "gtsp.travel.graph",
-    "Verification": "judge",
-    "VerificationError": "base.errors",
-    "solve": "plan.solve_problem",
-    "solve_graph": "plan.solve_problem",
-    "travel_graph": "plan.solve_problem",
-    "verify": "judge",
+    "Circle": "netsp.model.problem",
+    "Goal": "netsp.model.problem",
+    "InfeasibleError": "netsp.base.errors",
+    "InputError": "netsp.base.errors",
+    "NetspError": "netsp.base.errors",
+    "Polygon": "netsp.model.problem",
+    "Problem": "netsp.model.problem",
+    "Progress": "netsp.gtsp.travel.result",
+    "Result": "netsp.gtsp.travel.result",
+    "Solution": "netsp.model.solution",
+    "State": "netsp.model.problem",
+    "Status": "netsp.model.solution",
+    "Tethers": "netsp.roadmap.tether_classes",
+    "TravelGraph": "netsp.gtsp.travel.graph",
+    "Verification": "netsp.judge",
+    "VerificationError": "netsp.base.errors",
+    "solve": "netsp.plan.solve_problem",
+    "solve_graph": "netsp.plan.solve_problem",
+    "travel_graph": "netsp.plan.solve_problem",
+    "verify": "netsp.judge",
 }
 
 __all__ = [
@@ -72,14 +74,5 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    """Public names are imported when first used, so that `import netsp` is instant."""
-    if name in _PUBLIC:
-        value = getattr(importlib.import_module(f"netsp.{_PUBLIC[name]}"), name)
-        globals()[name] = value
-        return value
-    raise AttributeError(f"module 'netsp' has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *_PUBLIC})
+__getattr__, __dir__ = lazy_names(globals(), _PUBLIC)
+moved_modules.install()

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.command.main import main
-from netsp.online import Scene
 from netsp.plan.cover import cover
 from netsp.plan.cover.choose import by_program, choose, greedy, merged, pruned, simple_bound
 from netsp.plan.cover.viewpoints import Viewer, coarser, spread
+from netsp.world import Scene
 from netsp.world.mission.equipment import Camera
 from netsp.world.mission.mission import Mission
 from netsp.world.simulator.coverage import Coverage, patches_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from netsp import InputError
-from netsp.online import Scene
+from netsp.world import Scene
 from netsp.world.mission.equipment import Camera
 from netsp.world.simulator.coverage import Coverage, divided, patches_of
 

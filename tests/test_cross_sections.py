@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from netsp.base.clock import Clock
 from netsp.model.problem import Circle
-from netsp.online import Scene
 from netsp.plan.space.cross_sections import Depths, cross_sections
 from netsp.plan.space.places import Places
 from netsp.plan.space.space_plan import water_of
 from netsp.plan.space.upright import bound_of_upright, upright_obstacles
+from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 
 DIP = 0.02

@@ -7,7 +7,7 @@ import pytest
 
 from netsp import InputError
 from netsp.command.main import main
-from netsp.online import GeodesicTether, Scene
+from netsp.world import GeodesicTether, Scene
 from netsp.world.scene.floor import floor_mesh
 from netsp.world.scene.readers import read_cloud
 from netsp.world.scene.voxels import of_mesh

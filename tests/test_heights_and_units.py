@@ -376,7 +376,7 @@ def test_an_exported_tour_dives_to_the_depth_given(tmp_path, capsys):
 
 def test_a_cloud_stands_beside_a_mesh_and_a_floor(tmp_path, capsys):
     trimesh = pytest.importorskip("trimesh")
-    from netsp.online import Scene
+    from netsp.world import Scene
 
     z = "\n".join(" ".join(["-8"] * 12) for _ in range(12))
     (tmp_path / "z.asc").write_text(

@@ -14,7 +14,6 @@ from netsp import Problem, solve
 from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
 from netsp.judge import Check, Verification
-from netsp.online import Scene
 from netsp.plan.space.board import Board
 from netsp.plan.space.judge import verify_mission
 from netsp.plan.space.mission_solver import seconds_until_home, solve_mission
@@ -23,6 +22,7 @@ from netsp.plan.space.planning_context import Water, along
 from netsp.plan.space.prisms import PlaneParams, floor_plan, tours_of_plan
 from netsp.plan.space.space_plan import AS_GIVEN, OUT_AND_BACK, PLANE, given_plan, plan, plans
 from netsp.plan.space.states import Effort, first_states
+from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from tests.worlds import FEW_CELLS
 

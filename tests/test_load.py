@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError
-from netsp.online import GeodesicTether
+from netsp.world import GeodesicTether
 from netsp.world.mission.equipment import TetherPhysics
 from netsp.world.mission.mission import Mission
 from netsp.world.simulator.mission_run import simulate

@@ -23,8 +23,8 @@ from netsp.hsignature.signature_measures import (
     self_crossings,
     winding_numbers,
 )
-from netsp.online import Scene
 from netsp.plan.space.mission_measures import measure_path
+from netsp.world import Scene
 
 PILE = Circle(center=(0, 0), radius=1)
 FAR = Circle(center=(10, 0), radius=1)

@@ -9,7 +9,6 @@ import pytest
 from netsp.base.errors import InputError, LimitReachedError
 from netsp.base.geometry import polylines
 from netsp.command.main import main
-from netsp.online import Scene
 from netsp.plan.cover import cover
 from netsp.plan.space.flown import words_of_flight
 from netsp.plan.space.judge import verify_mission
@@ -18,6 +17,7 @@ from netsp.plan.space.mission_solver import solve_mission
 from netsp.plan.space.path_bound import bound_of_all
 from netsp.plan.space.planning_context import Water, has_room
 from netsp.plan.space.space_plan import plan
+from netsp.world import Scene
 from netsp.world.mission.equipment import Camera
 from netsp.world.mission.mission import Mission, MissionState, MissionWaypoint, Viewpoint
 from netsp.world.planner import PlannerOptions

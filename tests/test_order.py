@@ -8,9 +8,9 @@ import pytest
 
 from netsp.base.clock import Clock
 from netsp.command.main import main
-from netsp.online import Scene
 from netsp.plan.space.mission_solver import seconds_until_home, solve_mission, tour_of_flight
 from netsp.plan.space.visit_order import order_by_going_on, waypoint_graph
+from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from netsp.world.simulator.mission_run import grid_of, simulate
 from tests.worlds import FEW_CELLS

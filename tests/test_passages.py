@@ -13,11 +13,11 @@ from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.command.main import main
 from netsp.command.solve_mission import summary
-from netsp.online import Scene
 from netsp.plan.space.mission_repair import _gaps_named
 from netsp.plan.space.mission_solver import solve_mission
 from netsp.plan.space.passages import GapGrid, GapParams, resolved, unresolved_gaps
 from netsp.plan.space.space_plan import given_plan, plans, water_of
+from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.planned_tour import PlannedTour
 from netsp.world.simulator.mission_run import grid_box, grid_of

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from netsp import Problem, TravelGraph, solve, travel_graph
 from netsp.model.bound_scope import LowerBound, Scope, above_shortest
-from netsp.online import Scene
 from netsp.online.execute import execute
 from netsp.view.pictures import style
+from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from netsp.world.simulator.mission_run import simulate
 

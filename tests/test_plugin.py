@@ -18,10 +18,10 @@ from netsp.base.registry import Registry
 from netsp.command.main import main
 from netsp.gtsp.params import read_params
 from netsp.gtsp.travel.result import Result
-from netsp.online import GeodesicTether, Scene
 from netsp.study.compare.rows import read_rows
 from netsp.study.compare.study import Study
 from netsp.study.compare.study_run import compare
+from netsp.world import GeodesicTether, Scene
 from netsp.world.mission.mission import Mission
 from netsp.world.planner import Planner
 from netsp.world.simulator.mission_run import simulate

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError
-from netsp.online import Scene
+from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from netsp.world.planner import PLANNERS, PlannerOptions, make_planner
 from netsp.world.planner.pivots import Pivots

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from netsp import InputError
 from netsp.base.geometry import polylines
-from netsp.online import Scene
+from netsp.world import Scene
 from netsp.world.paths.refine import (
     REFINEMENTS,
     RefineParams,

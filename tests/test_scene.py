@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from netsp import InputError, Problem
 from netsp.command.main import main
-from netsp.online import DistanceField, Scene
+from netsp.world import DistanceField, Scene
 from netsp.world.scene.packing import CELLS
 from netsp.world.scene.surfaces import surface_of
 from netsp.world.scene.voxels import of_cloud, of_cloud_file, of_mesh, of_triangles

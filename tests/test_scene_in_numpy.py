@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from netsp.base.compiled import interpretation
 from netsp.base.compiled.compile_policy import CompilePolicy, compiled_by, everything_compiled
-from netsp.online import Scene
+from netsp.world import Scene
 from netsp.world.paths.standoff import sees
 from netsp.world.paths.tree import all_see, free_cells, grow, states_of, way
 from netsp.world.scene import packing, sampling

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp.online import GeodesicTether, Scene
+from netsp.world import GeodesicTether, Scene
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import encode
 from netsp.world.scene.seams import seam_boxes

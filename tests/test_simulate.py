@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import dijkstra
 from netsp import InputError
 from netsp.base.geometry import polylines
 from netsp.command.main import main
-from netsp.online import Scene
+from netsp.world import Scene
 from netsp.world.mission.equipment import PositionSensor
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import describe_run

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from netsp.base.clock import NEVER, Clock
 from netsp.base.errors import InputError
-from netsp.online import Scene
 from netsp.plan.solve_problem import solve
 from netsp.plan.space.path_bound import LegBounds, bound_of_all
 from netsp.plan.space.places import Places
@@ -27,6 +26,7 @@ from netsp.plan.space.potential import (
 from netsp.plan.space.space_legs import Ways
 from netsp.plan.space.states import Effort
 from netsp.plan.space.upright import bound_of_upright
+from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 
 BOUNDS = [-3, -4, -1.5, 3, 4, 1.5]

@@ -13,7 +13,6 @@ from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.command.main import main
 from netsp.hsignature.wordtable import times, times_inverse
-from netsp.online import Scene
 from netsp.plan.space.board import Board
 from netsp.plan.space.judge import verify_mission
 from netsp.plan.space.path_bound import bound_of_all
@@ -23,6 +22,7 @@ from netsp.plan.space.space_legs import Legs, Ways
 from netsp.plan.space.space_plan import _best_driven, plan
 from netsp.plan.space.states import Effort, first_states
 from netsp.plan.space.triangle_labels import LENGTHS, STEPS, axes_of, lower_end, nth_axis, staircase
+from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from netsp.world.scene.scene import scene_of
 from netsp.world.simulator.surprises import SceneSurprises

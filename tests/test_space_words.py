@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from netsp.base.errors import InputError
 from netsp.hsignature.rays import signature
 from netsp.hsignature.words import reduce
-from netsp.online import Scene
 from netsp.plan.space.space_signature import SpaceSignature
+from netsp.world import Scene
 
 LOW, HIGH, ANCHOR = [-5.0] * 3, [5.0] * 3, [4.0, 0.3, 3.0]
 

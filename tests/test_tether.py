@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from netsp import InputError, Problem
 from netsp.hsignature import signature
-from netsp.online import GeodesicTether, ReactTether, Scene
 from netsp.plan.random_worlds import random_world
 from netsp.roadmap.paths import TautPaths
+from netsp.world import GeodesicTether, ReactTether, Scene
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.voxels import of_triangles
 

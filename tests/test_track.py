@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError
-from netsp.online import Scene
 from netsp.plan.space.mission_solver import solve_mission
 from netsp.view.pictures.mission_picture import save_runs, tethers_along
+from netsp.world import Scene
 from netsp.world.mission.anchor_track import Track
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import describe_run

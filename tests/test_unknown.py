@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from netsp import InputError
 from netsp.base.errors import interrupted
 from netsp.command.main import main
-from netsp.online import Scene
+from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import describe_run
 from netsp.world.scene.scene import Solid

@@ -45,7 +45,7 @@ def closed_forms() -> tuple[str, bool]:
 
     errors, backs = [], []
     for _, solid, path, truth in tether.closed_cases():
-        from netsp.online import GeodesicTether, Scene
+        from netsp.world import GeodesicTether, Scene
 
         found, _, _, back = tether.driven(GeodesicTether(Scene(solids=[solid]).field(), 0.1), path)
         errors.append(abs(found.length / truth - 1.0))
@@ -204,7 +204,7 @@ def update() -> tuple[str, bool]:
     closed form."""
     import tether
 
-    from netsp.online import GeodesicTether, Scene
+    from netsp.world import GeodesicTether, Scene
 
     medians = []
     for _, solid, path, _ in tether.closed_cases():

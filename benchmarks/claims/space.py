@@ -11,8 +11,8 @@ def groups() -> tuple[str, bool]:
     """What groups scenes have."""
     from space import ANCHOR, HIGH, LOW, shapes
 
-    from netsp.online import Scene
     from netsp.plan.space.space_signature import SpaceSignature
+    from netsp.world import Scene
 
     found = []
     for name, solids in shapes().items():

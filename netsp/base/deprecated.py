@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import importlib
 import warnings
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -29,7 +30,7 @@ def deprecated_names(names: dict[str, Any], **renamed: str) -> Callable[[str], A
     names : dict
         The module's `globals()`.
     **renamed : str
-        Old names and the new names of the same module.
+        Old names, and their new names in the same module, or `module:name` in another one.
 
     Examples
     --------
@@ -41,9 +42,9 @@ def deprecated_names(names: dict[str, Any], **renamed: str) -> Callable[[str], A
 
     def find(name: str) -> Any:
         if name in renamed:
-            new = renamed[name]
-            warn_renamed(f"{module}.{name}", f"{module}.{new}")
-            return names[new]
+            place, _, new = renamed[name].rpartition(":")
+            warn_renamed(f"{module}.{name}", f"{place or module}.{new}")
+            return getattr(importlib.import_module(place), new) if place else names[new]
         raise AttributeError(f"module {module!r} has no attribute {name!r}")
 
     return find

@@ -155,13 +155,13 @@ def steps() -> Iterator[Step]:
     from netsp.mip.parity_cuts import odd_letters
     from netsp.mip.prices import Prices
     from netsp.mip.program import Duals
-    from netsp.online import ReactTether, Scene
     from netsp.online.fly.flight_rehearsal import rehearse
     from netsp.online.guard.guard_rehearsal import rehearse as watched
     from netsp.plan.random_worlds import random_world
     from netsp.plan.solve_problem import solve, solve_graph, travel_graph
     from netsp.plan.solver_table import SOLVERS
     from netsp.plan.space.mission_solver import solve_mission
+    from netsp.world import ReactTether, Scene
     from netsp.world.mission.equipment import TetherPhysics
     from netsp.world.mission.mission import Mission
     from netsp.world.scene import voxels

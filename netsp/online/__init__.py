@@ -1,7 +1,13 @@
-"""The online layer: scenes as distance fields, and tethers that stay taut in them."""
+"""Beside the vehicle: tours executed and repaired, flown, and watched by a guard."""
 
-from netsp.world.scene.field import DistanceField
-from netsp.world.scene.scene import Scene
-from netsp.world.tether import Contact, GeodesicTether, ReactTether, Tether
+from netsp.base.deprecated import deprecated_names
 
-__all__ = ["Contact", "DistanceField", "GeodesicTether", "ReactTether", "Scene", "Tether"]
+__getattr__ = deprecated_names(
+    globals(),
+    Contact="netsp.world:Contact",
+    DistanceField="netsp.world:DistanceField",
+    GeodesicTether="netsp.world:GeodesicTether",
+    ReactTether="netsp.world:ReactTether",
+    Scene="netsp.world:Scene",
+    Tether="netsp.world:Tether",
+)

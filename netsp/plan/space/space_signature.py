@@ -118,7 +118,7 @@ class SpaceSignature:
 
         Examples
         --------
-        >>> from netsp.online import Scene
+        >>> from netsp.world import Scene
         >>> ring = {"center": [0, 0, 0], "axis": [0, 0, 1], "major_radius": 2, "minor_radius": 0.1}
         >>> field = Scene(solids=[{"torus": ring}]).field()
         >>> water = SpaceSignature.of(field, [-4] * 3, [4] * 3, 0.25, [3, 0, 3])

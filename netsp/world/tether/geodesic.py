@@ -57,7 +57,7 @@ class GeodesicTether:
 
     Examples
     --------
-    >>> from netsp.online import Scene
+    >>> from netsp.world import Scene
     >>> scene = Scene(solids=[{"capsule": {"a": [0, 0, -5], "b": [0, 0, 5], "radius": 0.5}}])
     >>> model = GeodesicTether(scene.field())
     >>> tether = model.start(anchor=(-2, 0.6, 0), robot=(2, 0.6, 0))
