@@ -69,7 +69,7 @@ def test_what_lies_inside_another_solid_need_not_be_seen():
 
 def test_dividing_keeps_the_area_and_bounds_the_sides():
     triangles = np.random.default_rng(0).normal(size=(20, 3, 3))
-    small = divided(triangles, 0.3)
+    small = divided(triangles, 0.3, 200_000)
 
     def area(t):
         return 0.5 * np.linalg.norm(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]), axis=1).sum()

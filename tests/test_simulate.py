@@ -20,9 +20,10 @@ from netsp.world import Scene
 from netsp.world.mission.equipment import PositionSensor
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import describe_run
+from netsp.world.paths.path_policy import PathPolicy
 from netsp.world.paths.tree import STEPS, Grid, ShortestTree, grow, states_of, taut, way
 from netsp.world.planner import PLANNERS, PlannerOptions
-from netsp.world.planner.predictive import WORTH, PredictivePlanner
+from netsp.world.planner.predictive import PredictivePlanner
 from netsp.world.scene.field import pushed_out
 from netsp.world.simulator.mission_run import simulate
 from netsp.world.simulator.sensing import Positions
@@ -98,7 +99,10 @@ def test_the_tautest_path_is_sought_until_little_is_to_be_saved_or_enough_was_lo
         assert not len(that_fit)
     else:
         assert taken[1, 0] in that_fit
-        assert planner._looked_enough or taken[1, 0] * (1.0 - WORTH) <= that_fit.min() + 1e-9
+        assert (
+            planner._looked_enough
+            or taken[1, 0] * (1.0 - planner.predictive.min_saving) <= that_fit.min() + 1e-9
+        )
 
 
 def test_what_the_tether_cannot_reach_is_left_out_with_the_reason():
@@ -203,9 +207,11 @@ def test_trees_that_are_kept_lead_as_those_that_are_grown_whatever_comes_and_goe
 
 
 def test_no_more_trees_are_kept_than_go_into_the_memory():
-    grid = Grid(POST.field(), (-4, -4, -1), (4, 4, 1), 0.1, 0.0)
+    policy = PathPolicy(max_tree_bytes=2 * 80 * 80 * 20)
+    grid = Grid(POST.field(), (-4, -4, -1), (4, 4, 1), 0.1, 0.0, policy)
     goals = [(2.0, 0.05 * k, 0.0) for k in range(1, 20, 4)]
-    assert grid.prepare(goals, memory=2 * grid.free.size) == 2
+    assert grid.free.size == 80 * 80 * 20
+    assert grid.prepare(goals) == 2
 
 
 def test_advance_passes_corners_and_stops_after_its_step():
@@ -574,12 +580,12 @@ def test_the_estimate_follows_a_straight_course_without_lag():
     """An alpha-beta filter with the delay made up for has no error on a straight line in the end,
     and less noise than what is measured."""
     steps = np.array([0.03, 0.01, 0.0])
-    late = Positions(PositionSensor(delay=0.5), POST.field(), np.array([2.0, 2, 0]), 0.1, 0)
+    late = Positions(PositionSensor(delay=0.5), POST.field(), np.array([2.0, 2, 0]), 0)
     for k in range(1, 200):
         place = np.array([2.0, 2, 0]) + k * steps
         estimate = late(place)
     assert estimate == pytest.approx(place, abs=1e-3)
-    noisy = Positions(PositionSensor(noise=0.1), POST.field(), np.array([2.0, 2, 0]), 0.1, 0)
+    noisy = Positions(PositionSensor(noise=0.1), POST.field(), np.array([2.0, 2, 0]), 0)
     off = np.array([noisy(np.array([2.0, 2, 0])) for _ in range(3000)]) - [2.0, 2, 0]
     assert off[100:].std() < 0.07
 

@@ -59,7 +59,7 @@ def kept(run):
 @given(st.floats(1.0, 180.0), st.floats(0, 7), st.tuples(*[st.floats(-1, 1)] * 3))
 def test_rays_fill_the_cone_and_none_leaves_it(angle, turn, ahead):
     ahead = np.array(ahead) + np.array([0.0, 0.0, 2.0])
-    rays = fan(angle, ahead, turn)
+    rays = fan(angle, ahead, turn, 240)
     assert np.allclose(np.linalg.norm(rays, axis=1), 1.0)
     cosine = rays @ ahead / np.linalg.norm(ahead)
     assert cosine.min() >= math.cos(math.radians(0.5 * angle)) - 1e-9

@@ -146,13 +146,13 @@ def until_stopped(
 
 def show_mission(mission: Mission, units: str) -> Callable[[LogRow, Planner], None]:
     """Shows how a mission goes, in one line."""
-    from netsp.world.simulator.simulation import STEP
+    from netsp.world.simulator.simulation_policy import SimulationPolicy
 
-    count = len(mission.waypoints)
+    count, step_s = len(mission.waypoints), SimulationPolicy().step_s
 
     def on_step(row: LogRow, planner: Planner) -> None:
         del planner
-        if round(row.time / STEP) % 20:
+        if round(row.time / step_s) % 20:
             return
         done = int(20 * row.waypoint / count)
         seen = f"  seen {100 * row.coverage:.0f} %" if mission.camera is not None else ""

@@ -15,9 +15,9 @@ from netsp.base.geometry import polylines
 from netsp.command import messages
 from netsp.view.pictures import scene_picture as pictures
 from netsp.view.pictures import style
-from netsp.world.mission.mission_limits import MOST_NODES
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
+from netsp.world.simulator.simulation_policy import MissionLimits
 from netsp.world.tether import GeodesicTether, Tether, make_tether
 from netsp.world.tether.resolution import delta_for_path
 
@@ -35,10 +35,9 @@ def plot_scene(args: argparse.Namespace) -> int:
         note_scene(scene.name, field.notes)
         check_overlap(scene, field, path, args.solution)
         delta = args.delta or delta_for_path(field, path)
-        if (nodes := polylines.length(path) / delta) > MOST_NODES:
+        if (nodes := polylines.length(path) / delta) > (most := MissionLimits().max_tether_nodes):
             raise InputError(
-                f"--delta: {delta:g} makes {nodes:.2g} nodes of a tether; expected at most "
-                f"{MOST_NODES:g}"
+                f"--delta: {delta:g} makes {nodes:.2g} nodes of a tether; expected at most {most:g}"
             )
         tether = lay(field, path, args.tether_model, delta)
         print(

@@ -25,7 +25,7 @@ from netsp.world.mission.mission import Mission
 from netsp.world.mission.mission_limits import check_bounds, check_size
 from netsp.world.mission.planned_tour import PlannedTour
 from netsp.world.paths.tree import ShortestTree
-from netsp.world.planner.planner import FREE
+from netsp.world.planner.planner_policy import PlannerPolicy
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
 from netsp.world.tether import GeodesicTether
@@ -304,7 +304,7 @@ class _Judge:
             ),
             Check(
                 "free at home",
-                left <= FREE * self.mission.delta,
+                left <= PlannerPolicy().free_tolerance * self.mission.delta,
                 f"{max(left, 0.0):.3f} m longer than at the start",
             ),
         ]

@@ -12,8 +12,8 @@ from netsp.base.validated import Model
 from netsp.model.solution import max_turning
 from netsp.world.tether.load import Load
 
-SEA_WATER = 1025.0
-"""kg / m^3."""
+SEA_WATER_DENSITY = 1025.0
+"""Physical constant: density of sea water, kg/m³."""
 
 
 class Camera(Model):
@@ -104,7 +104,7 @@ class TetherPhysics(Model):
         Load
             For `netsp.world.tether.load`.
         """
-        drag = 0.5 * SEA_WATER * self.drag_coefficient * self.diameter
+        drag = 0.5 * SEA_WATER_DENSITY * self.drag_coefficient * self.diameter
         x, y, z = (float(v) for v in water)
         return Load(self.slack, drag, x, y, z, self.tension)
 

@@ -36,11 +36,8 @@ from netsp.world.mission.planned_tour import PathField, PlannedTour
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.scene.scene import Scene
 
-TURN_TIME = 30.0
-"""Seconds that are given to turn to a heading."""
-
-MOST_DWELL = 86400.0
-"""Seconds; a day at one waypoint is taken for a mistake of units."""
+MAX_DWELL_S = 86400.0
+"""Format of mission files: longest dwell at a waypoint, s. A day or more is a mistake of units."""
 
 
 class Viewpoint(Model):
@@ -101,17 +98,12 @@ class MissionWaypoint(Model):
         Field(description="to turn to there, degrees from the x axis towards y; null for any"),
     ] = None
     dwell: Annotated[
-        Annotated[NonNegative, Field(le=MOST_DWELL)],
+        Annotated[NonNegative, Field(le=MAX_DWELL_S)],
         Field(description="seconds to stay there, at that heading"),
     ] = 0.0
     alternatives: Annotated[
         tuple[Viewpoint, ...], Field(description="other places that would do as well")
     ] = ()
-
-    @property
-    def longest_stay(self) -> float:
-        """Seconds that the robot may spend there."""
-        return self.dwell + (0.0 if self.heading is None else TURN_TIME)
 
     @model_serializer(mode="wrap")
     def _plain(self, handler: SerializerFunctionWrapHandler) -> Any:
@@ -172,7 +164,7 @@ WaypointLike = Annotated[
                             "description": "to turn to there, degrees from the x axis towards y",
                         },
                         "dwell": {
-                            "type": "number", "minimum": 0, "maximum": MOST_DWELL, "default": 0,
+                            "type": "number", "minimum": 0, "maximum": MAX_DWELL_S, "default": 0,
                             "description": "seconds to stay there, at that heading",
                         },
                         "alternatives": {

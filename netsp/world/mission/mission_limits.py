@@ -10,21 +10,9 @@ from netsp.world.mission.anchor_track import Track
 from netsp.world.mission.mission import Mission
 from netsp.world.planner import PLANNERS
 from netsp.world.scene.scene import Scene
-from netsp.world.simulator.simulation import STEP
+from netsp.world.simulator.simulation_policy import SimulationPolicy
 from netsp.world.tether import TETHERS
 from netsp.world.vehicle import VEHICLES
-
-FARTHEST = 1000.0
-"""A waypoint may be so many tether lengths from the anchor."""
-
-MOST_STEPS, MOST_NODES = 5_000_000, 200_000
-"""Steps of a run, and nodes of a tether, beyond which a mission is taken for a mistake of units."""
-
-MOST_CURRENT = 20.0
-"""m/s: no sea is faster; rather a mistake of units."""
-
-MOST_SAG_RATIO = 20.0
-"""Drag on a whole tether over its tension, beyond which a current is taken for a mistake."""
 
 
 def check_names(planner: object, vehicle: object, tether: object) -> None:
@@ -101,8 +89,9 @@ def check_tether(mission: Mission, length: float) -> None:
         )
 
 
-def check_size(mission: Mission) -> None:
-    """InputError for a mission that would take for ever, or whose measures make no sense."""
+def check_size(mission: Mission, policy: SimulationPolicy = SimulationPolicy()) -> None:
+    """Raise InputError for a mission that would take for ever, or whose numbers make no sense."""
+    limits, step_s = policy.limits, policy.step_s
     for name, value in (("delta", mission.delta), ("reach", mission.reach)):
         if value > mission.tether_length:
             raise InputError(
@@ -118,27 +107,29 @@ def check_size(mission: Mission) -> None:
                 f"track[{k}]: the anchor moves at {track.speed:.3g} m/s, the robot at "
                 f"{mission.speed:g}: it would outrun the tether; expected a slower one"
             )
-        if track.end / STEP > MOST_STEPS:
+        if track.end / step_s > limits.max_steps:
             raise InputError(
-                f"track: its {track.end:g} s take more than {MOST_STEPS:g} steps of {STEP:g} s"
+                f"track: its {track.end:g} s take more than {limits.max_steps:g} steps of "
+                f"{step_s:g} s"
             )
     far = float(np.abs(places - np.array(mission.anchor)).max())
-    if far > FARTHEST * mission.tether_length:
+    if far > limits.max_distance_ratio * mission.tether_length:
         raise InputError(
-            f"waypoints: one is {far:g} from the anchor; expected at most {FARTHEST:g} times the "
-            f"tether_length {mission.tether_length:g}: mixed units?"
+            f"waypoints: one is {far:g} from the anchor; expected at most "
+            f"{limits.max_distance_ratio:g} times the tether_length {mission.tether_length:g}: "
+            "mixed units?"
         )
-    steps = polylines.length(places[: len(mission.waypoints) + 1]) / (mission.speed * STEP)
-    if steps > MOST_STEPS:
+    steps = polylines.length(places[: len(mission.waypoints) + 1]) / (mission.speed * step_s)
+    if steps > limits.max_steps:
         raise InputError(
-            f"speed: {mission.speed:g} takes {steps:.2g} steps of {STEP:g} s for the waypoints; "
-            f"expected at most {MOST_STEPS:g}"
+            f"speed: {mission.speed:g} takes {steps:.2g} steps of {step_s:g} s for the waypoints; "
+            f"expected at most {limits.max_steps:g}"
         )
-    stays = sum(w.dwell for w in mission.waypoints) / STEP
-    if stays > MOST_STEPS:
+    stays = sum(w.dwell for w in mission.waypoints) / step_s
+    if stays > limits.max_steps:
         raise InputError(
-            f"waypoints: dwell takes {stays:.2g} steps of {STEP:g} s in all; expected at most "
-            f"{MOST_STEPS:g}"
+            f"waypoints: dwell takes {stays:.2g} steps of {step_s:g} s in all; expected at most "
+            f"{limits.max_steps:g}"
         )
     sensor = mission.sensor
     reserve = sensor.reserve(mission.speed)
@@ -150,20 +141,20 @@ def check_size(mission: Mission) -> None:
         )
     load = mission.tether.load(np.array(mission.current))
     speed = float(np.linalg.norm(mission.current)) + 3.0 * mission.gusts
-    if speed > MOST_CURRENT:
+    if speed > limits.max_water_speed:
         raise InputError(
-            f"current, gusts: water of {speed:g} m/s; expected at most {MOST_CURRENT:g}: mixed "
-            "units?"
+            f"current, gusts: water of {speed:g} m/s; expected at most "
+            f"{limits.max_water_speed:g}: mixed units?"
         )
     sag = load.drag * speed**2 * mission.tether_length / load.tension
-    if sag > MOST_SAG_RATIO:
+    if sag > limits.max_drag_ratio:
         raise InputError(
             f"current: {speed:g} m/s pulls on {mission.tether_length:g} m of tether with {sag:.3g} "
-            f"times its tension of {load.tension:g} N; expected at most {MOST_SAG_RATIO:g}: mixed "
-            "units?"
+            f"times its tension of {load.tension:g} N; expected at most "
+            f"{limits.max_drag_ratio:g}: mixed units?"
         )
-    if mission.tether_length / mission.delta > MOST_NODES:
+    if mission.tether_length / mission.delta > limits.max_tether_nodes:
         raise InputError(
             f"delta: {mission.delta:g} makes {mission.tether_length / mission.delta:.2g} nodes of "
-            f"a tether; expected at most {MOST_NODES:g}"
+            f"a tether; expected at most {limits.max_tether_nodes:g}"
         )

@@ -12,14 +12,11 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
+from netsp.world.paths.path_policy import PathPolicy
 from netsp.world.paths.tree import Grid
 from netsp.world.scene.sampling import distance, lowest_along
 
 OMPL_PLANNERS = {"rrtstar": "RRTstar", "bitstar": "BITstar", "prmstar": "PRMstar"}
-
-ITERATIONS = {"rrtstar": 1000, "bitstar": 3000, "prmstar": 300}
-"""How often a planner is let go on, for PRM* its milestones: a count, not a time, so that the same
-seed gives the same path."""
 
 
 class SampledPaths:
@@ -45,11 +42,17 @@ class SampledPaths:
     """
 
     def __init__(
-        self, name: str, grid: Grid, target: Floats, points: Floats, seed: int = 0
+        self,
+        name: str,
+        grid: Grid,
+        target: Floats,
+        points: Floats,
+        seed: int = 0,
+        policy: PathPolicy = PathPolicy(),
     ) -> None:
         if name not in OMPL_PLANNERS:
             raise InputError(f"paths: expected tree, {', '.join(OMPL_PLANNERS)}, got {name!r}")
-        self.name, self.grid, self.seed = name, grid, seed
+        self.name, self.grid, self.seed, self.policy = name, grid, seed, policy
         self.target = np.asarray(target, dtype=float)
         self.points = np.asarray(points, dtype=float).reshape(-1, 3)
         self._paths: dict[int, Floats | None] = {}
@@ -89,21 +92,22 @@ class SampledPaths:
         planner = getattr(og, OMPL_PLANNERS[self.name])(info)
         planner.setProblemDefinition(query)
         planner.setup()
-        left = [ITERATIONS[self.name]]
-
-        def enough() -> bool:
-            left[0] -= 1
-            return left[0] < 0
-
         if self.name == "prmstar":
-            # its `solve` looks for paths in a thread of its own, which waits for Python's lock
+            # its `solve` searches in a thread of its own, which waits for Python's lock
             grow = getattr(planner, "growRoadmapPtc", planner.growRoadmap)
-            grow(ob.PlannerTerminationCondition(
-                lambda: planner.milestoneCount() >= ITERATIONS["prmstar"]
-            ))  # fmt: skip
-            path = _through_roadmap(ob, info, planner, np.array([start, self.target]))
+            milestones = self.policy.prmstar_milestones
+            grow(ob.PlannerTerminationCondition(lambda: planner.milestoneCount() >= milestones))
+            ends = np.array([start, self.target])
+            path = _through_roadmap(ob, info, planner, ends, self.policy.prmstar_neighbours)
         else:
-            planner.solve(ob.PlannerTerminationCondition(enough))
+            is_rrt = self.name == "rrtstar"
+            left = [self.policy.rrtstar_iterations if is_rrt else self.policy.bitstar_iterations]
+
+            def is_over() -> bool:
+                left[0] -= 1
+                return left[0] < 0
+
+            planner.solve(ob.PlannerTerminationCondition(is_over))
             path = None
             if query.hasExactSolution():
                 states = query.getSolutionPath().getStates()
@@ -118,8 +122,11 @@ class SampledPaths:
         return path if free else None
 
 
-def _through_roadmap(ob: Any, info: Any, planner: Any, ends: Floats) -> Floats | None:
-    """The shortest path over a PRM*'s milestones between two places, joined to the nearest."""
+def _through_roadmap(
+    ob: Any, info: Any, planner: Any, ends: Floats, neighbours: int
+) -> Floats | None:
+    """Return the shortest path over the milestones of PRM* between two places (2, 3), each joined
+    to its nearest milestones."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import dijkstra
 
@@ -130,7 +137,7 @@ def _through_roadmap(ob: Any, info: Any, planner: Any, ends: Floats) -> Floats |
     pairs = [(i, int(j)) for i in range(len(states)) for j in data.getEdges(i)]
     state = info.allocState(), info.allocState()
     for end in (len(states), len(states) + 1):
-        near = np.argsort(np.linalg.norm(points[: len(states)] - points[end], axis=1))[:20]
+        near = np.argsort(np.linalg.norm(points[: len(states)] - points[end], axis=1))[:neighbours]
         for j in near:
             for k in range(3):
                 state[0][k], state[1][k] = float(points[end, k]), float(points[j, k])

@@ -7,45 +7,30 @@ import numpy as np
 from netsp.base.arrays import Bools, Floats
 from netsp.base.compiled.interpretation import interprets
 from netsp.base.compiled.kernel import kernel
+from netsp.world.paths.path_policy import StandoffPolicy
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.sampling import Field, lowest_along, lowest_along_each
 
-CLIMB, STENCIL, SWEEPS = 1 / 6, 1 / 3, 80
-"""Of the clearance, what a point goes at once, and over what the distance's rise is taken; and how
-often."""
 
-LEAST = 0.05
-"""Metres of clearance that steps are as long as for where there is less, or none."""
+def beside(
+    field: DistanceField, line: Floats, clearance: float, policy: StandoffPolicy = StandoffPolicy()
+) -> Floats:
+    """Return a line (n, 3) moved off surfaces to the clearance, as far as its class allows.
 
-GAIN = 0.02
-"""A step that brings less than this share of its length is not taken."""
-
-
-def beside(field: DistanceField, line: Floats, clearance: float) -> Floats:
-    """A line moved off surfaces, as far as its class allows.
-
-    All points climb the distance to the surfaces in small steps, a deformation in free water: a
-    step after which neighbours no longer see one another is taken back. The rise is taken over a
-    stencil, so that in the crotch between two solids points climb along its middle, out to where
-    there is room, instead of leaping to one side.
+    All points climb the distance field in small steps; a step after which neighbours no longer see
+    one another is undone. The gradient is taken over a stencil, so that points in the crotch
+    between two solids climb along its middle, out to where there is room, instead of leaping to one
+    side. The ends stay.
 
     Parameters
     ----------
-    field : DistanceField
-        The scene.
     line : ndarray, shape (n, 3)
-        Free or on surfaces, its points no farther apart than what it must not pass is wide, metres.
-    clearance : float
-        Distance to be kept where there is room, metres.
-
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        The path, metres; its ends are those of the line.
+        Line in free water or on surfaces, metres. Its points must be no farther apart than the
+        thinnest solid.
     """
-    path, scale = np.array(line, dtype=float), max(clearance, LEAST)
-    arms = STENCIL * scale * np.vstack([np.eye(3), -np.eye(3)])
-    for _ in range(SWEEPS):
+    path, scale = np.array(line, dtype=float), max(clearance, policy.min_scale)
+    arms = policy.stencil_share * scale * np.vstack([np.eye(3), -np.eye(3)])
+    for _ in range(policy.max_sweeps):
         d = field.distance(path)
         short = d < clearance - 1e-6
         short[[0, -1]] = False
@@ -54,10 +39,10 @@ def beside(field: DistanceField, line: Floats, clearance: float) -> Floats:
         around = field.distance((path[short, None] + arms).reshape(-1, 3)).reshape(-1, 6)
         rise = around[:, :3] - around[:, 3:]
         rise /= np.maximum(np.linalg.norm(rise, axis=1), 1e-12)[:, None]
-        step = np.minimum(CLIMB * scale, clearance - d[short])
+        step = np.minimum(policy.step_share * scale, clearance - d[short])
         moved = path.copy()
         moved[short] += step[:, None] * rise
-        better = field.distance(moved[short]) >= d[short] + GAIN * step
+        better = field.distance(moved[short]) >= d[short] + policy.min_gain * step
         moved[short] = np.where(better[:, None], moved[short], path[short])
         blocked = ~sees(field.arrays, moved[:-1], moved[1:], 1e-2)
         blocked &= sees(field.arrays, path[:-1], path[1:], 1e-2)

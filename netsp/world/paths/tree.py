@@ -20,26 +20,11 @@ from netsp.base.compiled.interpretation import interprets
 from netsp.base.compiled.kernel import kernel
 from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
+from netsp.world.paths.path_policy import PathPolicy
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.point_batches import CHUNK, distances
 from netsp.world.scene.sampling import Field, distance, lowest_along, lowest_along_each
 from netsp.world.tether.geodesic import GeodesicTether
-
-MOST_CELLS = 20_000_000
-"""So many cells take about 0.3 GiB."""
-
-
-KEPT = 200_000_000
-"""Bytes of trees that are kept, one for each cell and target."""
-
-ROUNDS = 60
-"""A path need not be taut to the last millimetre."""
-
-STAGES = 15
-"""How many paths are offered between one that is not pulled and one that is taut."""
-
-FEW_ROUNDS = 12
-"""Enough to tell which of several classes has the shortest path, or nearly."""
 
 
 class Grid:
@@ -59,42 +44,47 @@ class Grid:
     Raises
     ------
     InputError
-        A box without size, or more than 20 million cells.
+        A box without size, or more cells than the policy allows.
     """
 
     def __init__(
-        self, field: DistanceField, low: npt.ArrayLike, high: npt.ArrayLike, cell: float,
+        self,
+        field: DistanceField,
+        low: npt.ArrayLike,
+        high: npt.ArrayLike,
+        cell: float,
         clearance: float,
-    ) -> None:  # fmt: skip
-        self.field, self.cell, self.clearance = field, cell, clearance
+        policy: PathPolicy = PathPolicy(),
+    ) -> None:
+        self.field, self.cell, self.clearance, self.policy = field, cell, clearance, policy
         self.low = np.asarray(low, dtype=float)
         size = np.asarray(high, dtype=float) - self.low
         if not (size > 0.0).all():
             raise InputError(f"bounds: expected a box, got sides {size.tolist()}")
         shape = np.maximum(1, np.round(size / cell)).astype(int)
-        if float(np.prod(shape.astype(float))) > MOST_CELLS:
-            better = cell * (float(np.prod(shape.astype(float))) / MOST_CELLS) ** (1.0 / 3.0)
+        if float(np.prod(shape.astype(float))) > policy.max_cells:
+            better = cell * (float(np.prod(shape.astype(float))) / policy.max_cells) ** (1.0 / 3.0)
             raise InputError(
                 f"cell: {cell:g} makes {' x '.join(map(str, shape))} cells; expected {better:.2g} "
                 "or more"
             )
-        self.free = free_cells(
-            field.arrays, self.low, cell, (int(shape[0]), int(shape[1]), int(shape[2])), clearance,
-            abandoned(),
-        )  # fmt: skip
+        counts = (int(shape[0]), int(shape[1]), int(shape[2]))
+        self.free = free_cells(field.arrays, self.low, cell, counts, clearance, abandoned())
         end_if_abandoned()
         self._states: npt.NDArray[np.uint8] | None = None
         self._kept: dict[tuple[int, ...], npt.NDArray[np.int8]] = {}
 
-    def prepare(self, targets: Sequence[Floats], memory: int = KEPT) -> int:
-        """Keep the trees to some targets (3,), as many as go into the memory (bytes): which path
-        is shortest depends on the map alone, so it need not be asked while the robot waits. How
-        many are kept."""
+    def prepare(self, targets: Sequence[Floats]) -> int:
+        """Keep the shortest-path trees to targets (3,), as many as fit into the policy's memory.
+
+        Shortest paths depend on the map alone, so they can be found before the robot waits for
+        one. Returns the number of trees kept.
+        """
         for target in targets:
             root = self.free_near(target)
             if root is None or tuple(root) in self._kept:
                 continue
-            if (len(self._kept) + 1) * self.free.size > memory:
+            if (len(self._kept) + 1) * self.free.size > self.policy.max_tree_bytes:
                 break
             nowhere = np.full((1, 3), -1)
             self._kept[tuple(root)] = grow(self.states, root, nowhere)
@@ -120,10 +110,10 @@ class Grid:
         nx, ny, nz = (int(s) for s in last - first)
         new = copy(self)
         new.field, new.free, new._states = field, self.free.copy(), None
+        low, part = self.low + self.cell * first, (nx, ny, nz)
         new.free[tuple(slice(a, b) for a, b in zip(first, last, strict=True))] = free_cells(
-            field.arrays, self.low + self.cell * first, self.cell, (nx, ny, nz), self.clearance,
-            abandoned(),
-        )  # fmt: skip
+            field.arrays, low, self.cell, part, self.clearance, abandoned()
+        )
         end_if_abandoned()
         if (new.free & ~self.free).any():
             new._kept = {}  # there may be shorter paths now; else those that are still free are
@@ -474,35 +464,51 @@ def _way_in_python(toward: npt.NDArray[np.int8], start: Ints) -> Ints:
     return np.array(out, dtype=np.int64)
 
 
-def taut(field: DistanceField, path: Floats, clearance: float, delta: float) -> Floats:
-    """A path (k, 3) pulled taut in its class, no nearer to solids than the clearance, or than it is
-    at its ends; densely enough for straight lines between its points to keep to it."""
+def taut(
+    field: DistanceField,
+    path: Floats,
+    clearance: float,
+    delta: float,
+    policy: PathPolicy = PathPolicy(),
+) -> Floats:
+    """Return a path (k, 3) pulled taut in its class, no nearer to solids than the clearance, or
+    than its ends are. Its points are dense enough that straight lines between them keep to it."""
     grown, room = _grown(field, path, clearance, delta)
     line = _shortcut(grown, path, max(room, delta))
     # the grown solids are no thinner than twice the room: nothing is lost with a coarser delta
     for share in (1.0, 0.5):
-        line = _relaxed(grown, line, max(delta, share * room), ROUNDS)
+        line = _relaxed(grown, line, max(delta, share * room), policy.pull_rounds)
     return line[np.r_[True, np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-9]]
 
 
-def roughly_taut(field: DistanceField, path: Floats, clearance: float, delta: float) -> Floats:
-    """The same in a tenth of the time: in its class, and somewhat longer."""
+def roughly_taut(
+    field: DistanceField,
+    path: Floats,
+    clearance: float,
+    delta: float,
+    policy: PathPolicy = PathPolicy(),
+) -> Floats:
+    """Return a path pulled nearly taut, in a tenth of the time of `taut`."""
     grown, room = _grown(field, path, clearance, delta)
     step = max(room, delta)
-    return _relaxed(grown, _shortcut(grown, path, step), step, FEW_ROUNDS)
+    return _relaxed(grown, _shortcut(grown, path, step), step, policy.rough_pull_rounds)
 
 
 def ever_tauter(
-    field: DistanceField, path: Floats, clearance: float, delta: float
+    field: DistanceField,
+    path: Floats,
+    clearance: float,
+    delta: float,
+    policy: PathPolicy = PathPolicy(),
 ) -> Iterator[Floats]:
-    """The same path, and what becomes of it while it is pulled."""
+    """Yield a path, then ever tauter paths of its class."""
     yield path
     grown, room = _grown(field, path, clearance, delta)
     step = max(room, delta)
     path = _shortcut(grown, path, step)
-    for _ in range(STAGES):
+    for _ in range(policy.pull_stages):
         yield path
-        path = _relaxed(grown, path, step, FEW_ROUNDS)
+        path = _relaxed(grown, path, step, policy.rough_pull_rounds)
 
 
 def _grown(

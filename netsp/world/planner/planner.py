@@ -21,21 +21,13 @@ from netsp.world.paths.refine import RefineParams, refined, stepped
 from netsp.world.paths.sampled import SampledPaths
 from netsp.world.paths.standoff import beside
 from netsp.world.paths.tree import Grid, Paths, ShortestTree, grow, taut
+from netsp.world.planner.planner_policy import PlannerPolicy
 from netsp.world.scene.field import DistanceField
 from netsp.world.tether import GeodesicTether, ReactTether, Tether
 from netsp.world.tether.load import Load, payout, payout_along
 from netsp.world.tether.resolution import THINNEST
 
 Tethers = GeodesicTether | ReactTether
-
-FREE = 0.1
-"""A tether so many delta longer than as it was laid when the mission began is not free."""
-
-ROOM = 0.7
-"""Of the clearance, that a path must keep when the map changes."""
-
-MOST_HOLDS = 20
-"""Steps that a planner may fail at one waypoint before it is left out."""
 
 NORMAL, RECOVERY, WAIT, DWELL, HOME, HOLD, DONE = (
     "normal", "recovery", "wait", "dwell", "home", "hold", "done",
@@ -92,6 +84,8 @@ class PlannerOptions:
         needed.
     clock : Clock, optional
         When it is up, planning ends as at Ctrl-C, and so does the mission.
+    policy : PlannerPolicy
+        Thresholds of the planners.
     """
 
     paths: str = "tree"
@@ -104,6 +98,7 @@ class PlannerOptions:
     planning_limit: float = 10.0
     prepared: bool = True
     clock: Clock | None = None
+    policy: PlannerPolicy = PlannerPolicy()
 
 
 @dataclass
@@ -172,6 +167,11 @@ class Planner:
 
     name = "none"
     refine = "none"
+
+    @property
+    def policy(self) -> PlannerPolicy:
+        """Thresholds of the planner."""
+        return self.options.policy
 
     @cached_property
     def load(self) -> Load:
@@ -405,7 +405,8 @@ class Planner:
         """
         line = polylines.dense(path, 0.5 * self.grid.cell)
         room = min(self.mission.clearance, float(self.scene.distance(path[[0, -1]]).min()))
-        return not len(line) or bool(self.scene.distance(line).min() >= ROOM * room)
+        needed = self.policy.min_clearance_share * room
+        return not len(line) or bool(self.scene.distance(line).min() >= needed)
 
     def hear_of_payout(self, more: float, trail: Floats) -> None:
         """How much more tether is out than the map explains.
@@ -424,7 +425,7 @@ class Planner:
         """Stay, and try again at the next step; leave the waypoint out after a while."""
         self._held += 1
         self.defects.append(f"{type(error).__name__}: {error}")
-        if self._held > MOST_HOLDS:
+        if self._held > self.policy.max_holds:
             self.leave_out(f"a defect of netsp ended planning ({self.defects[-1]})")
         return Command(np.array([robot]), HOLD, spent)
 
@@ -526,8 +527,13 @@ class Planner:
         ndarray, shape (k, 3)
             From the robot to the start, at the clearance where there is room, metres.
         """
-        line = np.vstack([tether.nodes[::-1], self.laid_now.nodes[1:]])
-        return beside(self.scene, polylines.points_along(line, self.fine), self.mission.clearance)
+        return self.beside(np.vstack([tether.nodes[::-1], self.laid_now.nodes[1:]]))
+
+    def beside(self, line: Floats) -> Floats:
+        """Return a finely divided line (k, 3) moved off surfaces to the clearance."""
+        points = polylines.points_along(line, self.fine)
+        standoff = self.policy.paths.standoff
+        return beside(self.scene, points, self.mission.clearance, standoff)
 
     @property
     def fine(self) -> float:
@@ -575,7 +581,8 @@ class Planner:
         if self.options.paths == "tree":
             return ShortestTree(self.grid, self.waypoint, points)
         seed = 1000 * self.options.seed + self.index
-        return SampledPaths(self.options.paths, self.grid, self.waypoint, points, seed)
+        name, policy = self.options.paths, self.policy.paths
+        return SampledPaths(name, self.grid, self.waypoint, points, seed, policy)
 
     def refined(self, path: Floats) -> Floats:
         """A path made safer and smoother, as the options have it.
@@ -623,7 +630,7 @@ class Planner:
     @property
     def pivot_spacing(self) -> float:
         """Distance between pivots along a tether, metres."""
-        return self.options.pivot_spacing or max(self.grid.cell, 0.25)
+        return self.options.pivot_spacing or max(self.grid.cell, self.policy.min_pivot_spacing)
 
     def pulled(self, path: Floats) -> Floats:
         """A path pulled taut in its class, at the clearance.
@@ -638,7 +645,8 @@ class Planner:
         ndarray, shape (m, 3)
             The taut path, metres.
         """
-        return taut(self.scene, path, self.mission.clearance, self.mission.delta)
+        mission = self.mission
+        return taut(self.scene, path, mission.clearance, mission.delta, self.policy.paths)
 
     def is_free(self, path: Floats) -> bool:
         """Whether a path keeps the clearance, or what its ends have of it.

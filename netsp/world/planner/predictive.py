@@ -18,53 +18,11 @@ from netsp.base.geometry import polylines
 from netsp.world.mission.mission import MissionWaypoint
 from netsp.world.paths.standoff import beside
 from netsp.world.paths.tree import ever_tauter, homotopic, roughly_taut
-from netsp.world.planner.planner import (
-    FREE,
-    HOME,
-    NORMAL,
-    RECOVERY,
-    WAIT,
-    Planner,
-    Tethers,
-)
-from netsp.world.planner.preview import DEEPEST, MARGIN, Ahead
+from netsp.world.planner.planner import HOME, NORMAL, RECOVERY, WAIT, Planner, Tethers
+from netsp.world.planner.planner_policy import PredictivePolicy
+from netsp.world.planner.preview import CONTACT_DEPTH, Ahead
 from netsp.world.scene.field import DistanceField
 from netsp.world.tether import GeodesicTether, Tether
-
-PIVOTS = 24
-"""At most so many places along the tether to turn at."""
-
-ALIKE = 1.5
-"""Times the reach that a robot may be off a tour, and its tether longer or shorter by, to go on
-along it."""
-
-WORTH = 0.03
-"""Share of a path that must still be to save for another look."""
-
-ROUGH = 0.9
-"""Pulled taut, a path is seldom shorter than this share of what it is roughly pulled."""
-
-COMING_TO_REST = 60
-"""Rounds that a tether gets to come free at home."""
-
-CHECK, LAG = 2.0, 3.0
-"""While the anchor moves: seconds between two looks whether the tether still lasts, and seconds of
-the anchor's way that are kept in reserve, for a robot that is late."""
-
-UNKNOWN, CAUGHT = 0.2, 0.1
-"""Metres of tether kept in reserve where the map may be wrong, and how much more of it than planned
-for makes another plan."""
-
-EVERY, MOST_HOMES = 20, 3
-"""Steps between two looks whether the tether still comes free on the way home, and how often the
-robot goes back from there along a tether that is not."""
-
-PULL, PULLS, FORESEEN = 10, 10, 2.0
-"""Rounds of a pull, how many pulls at most until a tether counts as taut, and how many times what
-a geometric series would still take away is allowed for."""
-
-FAR_OVER = 1.1
-"""Times the limit: a tether that is longer after all these pulls is not pulled any further."""
 
 
 class Candidate(NamedTuple):
@@ -92,6 +50,11 @@ class PredictivePlanner(Planner):
     _candidates: list[Candidate] = field(default_factory=list)
 
     name = "predictive"
+
+    @property
+    def predictive(self) -> PredictivePolicy:
+        """Thresholds of the look-ahead."""
+        return self.policy.predictive
 
     def plan(self, robot: Floats, tether: Tether) -> bool:
         """One path per waypoint, planned when the robot sets out for it."""
@@ -138,11 +101,12 @@ class PredictivePlanner(Planner):
         """The leg of the mission's tour, where the robot is where it begins, the tether as the tour
         has it there, and nothing on the map in the way."""
         leg, meant = self._planned_leg()
+        tolerance = self.predictive.tour_tolerance
         if (
             leg is None
-            or np.linalg.norm(leg[0] - robot) > ALIKE * self.mission.reach
+            or np.linalg.norm(leg[0] - robot) > tolerance * self.mission.reach
             or abs(tether.length - (tether.length if meant is None else meant))
-            > ALIKE * (self.mission.reach + self.mission.delta)
+            > tolerance * (self.mission.reach + self.mission.delta)
         ):
             return None
         # it counts as there a bit before the waypoint, from where a corner may be cut too short
@@ -196,18 +160,21 @@ class PredictivePlanner(Planner):
     @property
     def limit(self) -> float:
         """Metres of tether that plans may use."""
-        return self.mission.tether_length * (1.0 - MARGIN) - self._kept
+        margin = self.policy.preview.limit_margin
+        return self.mission.tether_length * (1.0 - margin) - self._kept
 
     @property
     def _kept(self) -> float:
         """Metres of tether kept back: for positions, a moving anchor, what is not on the map."""
-        unknown = 0.0 if self.mission.range_sensor is None else UNKNOWN
+        unknown = 0.0 if self.mission.range_sensor is None else self.predictive.unmapped_reserve
         return self.reserve + self._anchors_way + self.caught + unknown
 
     @property
     def _anchors_way(self) -> float:
         """Metres of tether kept back for a moving anchor."""
-        return LAG * self.track.speed if self.track is not None and self.anchor_moves else 0.0
+        if self.track is None or not self.anchor_moves:
+            return 0.0
+        return self.predictive.anchor_lag_s * self.track.speed
 
     @property
     def _kept_back(self) -> str:
@@ -215,10 +182,11 @@ class PredictivePlanner(Planner):
 
     def _surprised(self, tether: Tether) -> bool:
         """Whether half of the reserve is used up, as in a current: said once for each waypoint."""
+        margin = self.policy.preview.limit_margin
         if (
             self._warned == self.index
             or self.payout(tether) + 0.5 * self.reserve
-            <= (1.0 - 0.5 * MARGIN) * self.mission.tether_length
+            <= (1.0 - 0.5 * margin) * self.mission.tether_length
         ):
             return False
         self._warned = self.index
@@ -229,7 +197,7 @@ class PredictivePlanner(Planner):
         always, of others when the tether no longer lasts for what is left of the path."""
         if self.mode == WAIT and not self.anchor_moves:
             return True
-        if not self.anchor_moves or self.now < self._checked + CHECK:
+        if not self.anchor_moves or self.now < self._checked + self.predictive.anchor_check_s:
             return False
         self._checked = self.now
         limit = self.limit + 0.5 * self._anchors_way
@@ -239,9 +207,10 @@ class PredictivePlanner(Planner):
         """For an anchor that comes nearer: where the robot is, as long as the tether lasts there,
         else back along the tether, which is shorter by more than the anchor can take it along."""
         self.path, self.mode = robot[None], WAIT
-        if not self._fits(tether, np.array([robot, robot]), limit, 2.0 * CHECK):
-            way = 2.0 * CHECK * self.mission.speed
-            self.path = polylines.part(self.back_along(tether), 0.0, way)[1:]
+        wait_s = 2.0 * self.predictive.anchor_check_s
+        if not self._fits(tether, np.array([robot, robot]), limit, wait_s):
+            distance = wait_s * self.mission.speed
+            self.path = polylines.part(self.back_along(tether), 0.0, distance)[1:]
 
     def _near_enough(self, robot: Floats, waypoint: Floats) -> Floats:
         """Where on the straight path the waypoint counts as visited: the tether may fit there only.
@@ -261,7 +230,7 @@ class PredictivePlanner(Planner):
 
     def hear_of_payout(self, more: float, trail: Floats) -> None:
         """See `Planner`; a path that was planned for less tether is forgotten."""
-        if more > self._caught_before + CAUGHT:
+        if more > self._caught_before + self.predictive.snag_tolerance:
             self._caught_before = more
             self.path = self.path[:0]
         self._caught_before = min(self._caught_before, more)
@@ -286,12 +255,16 @@ class PredictivePlanner(Planner):
             self.load if self.loaded else None,
             self.track if self.anchor_moves else None,
             self.now,
+            self.policy.preview,
         )
 
     @property
     def _stay(self) -> float:
         """Seconds at the end of the path that is planned."""
-        return 0.0 if self.homeward else self.mission.waypoints[self.index].longest_stay
+        if self.homeward:
+            return 0.0
+        waypoint = self.mission.waypoints[self.index]
+        return waypoint.dwell + (0.0 if waypoint.heading is None else self.policy.max_turn_s)
 
     def _fits(
         self, tether: Tether, path: Floats, limit: float, staying: float | None = None
@@ -332,8 +305,9 @@ class PredictivePlanner(Planner):
         along = polylines.along(nodes)
         back = polylines.points_along(nodes, self.grid.cell)
         places = np.linspace(0.0, along[-1], len(back))
-        back = beside(self.scene, back, self.mission.clearance)
-        pivots = np.unique(np.linspace(0, len(back) - 1, PIVOTS + 1).round().astype(int))
+        back = beside(self.scene, back, self.mission.clearance, self.policy.paths.standoff)
+        pivots = np.linspace(0, len(back) - 1, self.predictive.max_pivots + 1)
+        pivots = np.unique(pivots.round().astype(int))
         tree = self.paths(back[pivots])
         onward = {int(i): tree.path(n) for n, i in enumerate(pivots)}
 
@@ -361,9 +335,8 @@ class PredictivePlanner(Planner):
         best: Floats | None = None
         least = np.inf
         for candidate in sorted(classes, key=lambda c: polylines.length(c.rough)):
-            if ROUGH * polylines.length(candidate.rough) >= least or (
-                best is not None and self._looked_enough
-            ):
+            expected = self.predictive.min_pull_ratio * polylines.length(candidate.rough)
+            if expected >= least or (best is not None and self._looked_enough):
                 break
             if self._over_at_its_end(candidate, limit):
                 continue
@@ -415,7 +388,8 @@ class PredictivePlanner(Planner):
                 least = polylines.length(best)
             else:
                 paths = paths[:middle]
-            if paths and least - polylines.length(paths[-1]) < WORTH * least:
+            min_saving = self.predictive.min_saving * least
+            if paths and least - polylines.length(paths[-1]) < min_saving:
                 break
         return best
 
@@ -429,10 +403,10 @@ class PredictivePlanner(Planner):
         ):
             return False
         self._checked = self.now
-        if self.caught > CAUGHT:
+        if self.caught > self.predictive.snag_tolerance:
             back = polylines.points_along(self.trail[::-1], self.fine)
             back = np.vstack([back, self.laid_now.nodes[1:]])
-            if self.scene.distance(back).min() > DEEPEST * self.mission.delta:
+            if self.scene.distance(back).min() > CONTACT_DEPTH * self.mission.delta:
                 self.path, self.mode, self._sure = back[1:], HOME, False
                 return True
         path = self._leg_home(robot, tether)
@@ -482,18 +456,20 @@ class PredictivePlanner(Planner):
         """Whether on what is left of the way home the tether no longer comes free, as when a
         vehicle that cuts corners has taken it past something. Asked now and then."""
         self._asked += 1
-        if self._asked % EVERY or not self._sure:
+        if self._asked % self.predictive.home_check_steps or not self._sure:
             return False
         return not self._comes_free(tether, np.vstack([robot, self.path]))
 
     def ends_here(self, tether: Tether) -> bool:
         """At home with the tether not free, the robot goes back along it and comes home again."""
-        if self.caught > CAUGHT and self._homes < MOST_HOMES:
+        policy, max_attempts = self.predictive, self.predictive.max_home_attempts
+        if self.caught > policy.snag_tolerance and self._homes < max_attempts:
             self._homes += 1
             return False
         here = self._model.update(self.laid_now, tether.robot)
-        length = self._model.relaxed(tether.nodes, COMING_TO_REST).length
-        if length <= here.length + FREE * self.mission.delta or self._homes >= MOST_HOMES:
+        length = self._model.relaxed(tether.nodes, policy.release_rounds).length
+        free_length = here.length + self.policy.free_tolerance * self.mission.delta
+        if length <= free_length or self._homes >= max_attempts:
             return True
         self._homes += 1
         return False
@@ -505,18 +481,21 @@ class PredictivePlanner(Planner):
 
     def _is_free(self, tether: Tether) -> bool:
         """Whether a tether at home comes to lie as at the start of the mission."""
-        return self._model.relaxed(tether.nodes, COMING_TO_REST).length <= self._free_length
+        rounds = self.predictive.release_rounds
+        return self._model.relaxed(tether.nodes, rounds).length <= self._free_length
 
     @property
     def _free_length(self) -> float:
         """A tether that is no longer is free at home, metres."""
-        return self.laid_now.length + FREE * self.mission.delta
+        return self.laid_now.length + self.policy.free_tolerance * self.mission.delta
 
     def _roughly_pulled(self, path: Floats) -> Floats:
-        return roughly_taut(self.scene, path, self.mission.clearance, self.mission.delta)
+        mission = self.mission
+        return roughly_taut(self.scene, path, mission.clearance, mission.delta, self.policy.paths)
 
     def _ever_tauter(self, path: Floats) -> Iterator[Floats]:
-        return ever_tauter(self.scene, path, self.mission.clearance, self.mission.delta)
+        mission = self.mission
+        return ever_tauter(self.scene, path, mission.clearance, mission.delta, self.policy.paths)
 
     def _classes(self, back: Floats, onward: Mapping[int, Floats | None]) -> list[int]:
         """Pivots in a row often lead to paths of one class: the last of each such row."""
@@ -537,15 +516,16 @@ class PredictivePlanner(Planner):
     def _longer_than(self, line: Floats, limit: float) -> bool:
         """Whether a tether that lies along a line is longer even when it is taut, as far as that
         can be foreseen: what a pull takes away becomes ever less."""
-        tether = self._model.relaxed(line, PULL)
+        policy = self.predictive
+        tether = self._model.relaxed(line, policy.pull_rounds)
         length, less = tether.length, np.inf
-        for _ in range(PULLS):
+        for _ in range(policy.max_pulls):
             if length <= limit:
                 return False
-            tether = self._model.relaxed(tether.nodes, PULL)
+            tether = self._model.relaxed(tether.nodes, policy.pull_rounds)
             before, less, length = less, length - tether.length, tether.length
             ratio = min(less / before, 0.95) if before > 0.0 else 0.0
-            if length - FORESEEN * less * ratio / (1.0 - ratio) > limit:
+            if length - policy.pull_allowance * less * ratio / (1.0 - ratio) > limit:
                 break
         return length > limit
 
@@ -559,7 +539,7 @@ class PredictivePlanner(Planner):
             return None
         needs, near = self.payout(own), 0.8 * self.mission.reach
         if needs - near <= limit:
-            path = np.vstack([self._beside(tether.nodes[::-1]), self._beside(own.nodes)[1:]])
+            path = np.vstack([self.beside(tether.nodes[::-1]), self.beside(own.nodes)[1:]])
             for short in (0.0, near):
                 part = polylines.part(path, 0.0, polylines.length(path) - short)
                 if self._fits(tether, part, limit):
@@ -575,11 +555,9 @@ class PredictivePlanner(Planner):
     def _shortest_tether(self, limit: float) -> Tether | None:
         """The shortest tether at the waypoint, of all classes that the last search has found."""
         found: list[Tether] = []
+        policy = self.predictive
         for candidate in self._candidates:
-            roughly = self._model.relaxed(candidate.tether, PULLS * PULL)
-            far_over = roughly.length > FAR_OVER * limit and bool(found)
-            found.append(roughly if far_over else self._model.refine(roughly))
+            roughly = self._model.relaxed(candidate.tether, policy.max_pulls * policy.pull_rounds)
+            is_far_over = roughly.length > policy.max_overrun * limit and bool(found)
+            found.append(roughly if is_far_over else self._model.refine(roughly))
         return min(found, key=lambda t: t.length, default=None)
-
-    def _beside(self, line: Floats) -> Floats:
-        return beside(self.scene, polylines.points_along(line, self.fine), self.mission.clearance)

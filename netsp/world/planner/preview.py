@@ -11,20 +11,13 @@ from netsp.base.arrays import Floats
 from netsp.base.geometry import polylines
 from netsp.world.mission.anchor_track import Track
 from netsp.world.mission.mission import Mission
+from netsp.world.planner.planner_policy import PreviewPolicy
 from netsp.world.tether import GeodesicTether, Tether
 from netsp.world.tether.load import Load, payout, turning
 
-MARGIN = 0.004
-"""Share of the tether that is kept in reserve for what the simulation does not know."""
-
-SURE = 0.95
-"""Of the limit, a length below which nothing that is added to it reaches the limit."""
-
-DEEPEST = 0.2
-"""So many delta inside a solid, a robot has met it."""
-
-TICK = 0.1
-"""Shortest time between two places of a look ahead, seconds, while the anchor moves."""
+CONTACT_DEPTH = 0.2
+"""Tolerance of contacts, as a multiple of delta: how deep a robot may be in a solid, because the
+tether model's nodes let paths dip in."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +36,8 @@ class Ahead:
         Where the anchor goes, if it still moves.
     now : float
         Seconds since the start of the mission.
+    policy : PreviewPolicy
+        Steps and margins.
     """
 
     mission: Mission
@@ -50,6 +45,7 @@ class Ahead:
     load: Load | None
     track: Track | None
     now: float
+    policy: PreviewPolicy = PreviewPolicy()
 
     def follow(
         self, tether: Tether, path: Floats, limit: float, staying: float
@@ -94,7 +90,7 @@ class Ahead:
         while s < length:
             until = min(length, s + max(self._fine, most - tether.length))
             part = polylines.part(path, s, until)[1:]
-            tether, lengths = self.model.drive(tether, part, floor=SURE * most)
+            tether, lengths = self.model.drive(tether, part, floor=self.policy.floor_share * most)
             if lengths.max() > most:
                 return s, tether
             s = until
@@ -109,7 +105,7 @@ class Ahead:
         """Whether a path, pulled over points of a tether that lies in a crease, say, leads into a
         solid: as deep as ends a flight."""
         points = polylines.dense(path, self.mission.delta)
-        depth = DEEPEST * self.mission.delta
+        depth = CONTACT_DEPTH * self.mission.delta
         return bool(len(points) and self.model.field.distance(points).min() < -depth)
 
     def _under_load(
@@ -136,9 +132,9 @@ class Ahead:
         speed, far = self.mission.speed, polylines.length(path)
         whole, at, out = far / speed + staying, 0.0, self._payout(tether)
         while at < whole - 1e-9:
-            step = (
-                TICK if self.load is not None else max(TICK, (most - out) / (speed + track.speed))
-            )
+            step = self.policy.min_step_s
+            if self.load is None:
+                step = max(step, (most - out) / (speed + track.speed))
             until = min(whole, at + step)
             for place in track.between(self.now + at, self.now + until)[1:]:
                 tether = self.model.update(tether, tether.robot, place)

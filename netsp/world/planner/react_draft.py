@@ -12,7 +12,7 @@ The planner follows the listing of the draft where its text, or common sense, di
   the robot: there is no path to follow, and the robot goes on to the waypoint for one step.
 - The robot then goes on to the waypoint in normal mode, which may well lead along the old path
   over the limit again. Nothing in the listing ends such a cycle; a mission gives the waypoint up
-  after `netsp.world.simulator.mission_run.STUCK` seconds.
+  after `SimulationPolicy.max_waypoint_s`.
 - Every recovery path is refined once, the fallback too. One that is then not free is not followed:
   the robot goes on to the waypoint, and the search begins anew at the next step.
 

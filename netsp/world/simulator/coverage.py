@@ -23,8 +23,7 @@ from netsp.world.scene.sampling import Field, lowest_along, lowest_along_each
 from netsp.world.scene.scene import Scene
 from netsp.world.scene.shapes import HalfSpace
 from netsp.world.scene.surfaces import drawn_points, extent, surface_of
-
-MOST_PATCHES = 200_000
+from netsp.world.simulator.environment_policy import CoveragePolicy
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +48,13 @@ class Patches(ComparesArrays):
 
 
 def patches_of(
-    scene: Scene, field: DistanceField, size: float, places: Floats,
+    scene: Scene,
+    field: DistanceField,
+    size: float,
+    places: Floats,
     inspect: tuple[str, ...] | None = None,
-) -> Patches:  # fmt: skip
+    policy: CoveragePolicy = CoveragePolicy(),
+) -> Patches:
     """The surface of a scene in triangles with sides of at most `size`, without what lies inside
     another solid. places : (k, 3); what has no end is taken as far as they reach. inspect : names
     of the solids to be seen; default all but half spaces and the sea floor.
@@ -78,7 +81,7 @@ def patches_of(
     chosen_meshes = ("mesh",) if inspect is None else inspect  # no floor unless it is asked for
     own += [(triangles, field) for name, triangles in scene.meshes() if name in chosen_meshes]
     for (vertices, faces), alone in own:
-        triangles = divided(vertices[faces], size)
+        triangles = divided(vertices[faces], size, policy.max_patches)
         cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         twice = np.linalg.norm(cross, axis=1)
         good = twice > 1e-12
@@ -124,7 +127,7 @@ def sides_of(field: DistanceField, points: Floats) -> tuple[Floats, Floats]:
     return out[0], out[1]
 
 
-def divided(triangles: Floats, size: float) -> Floats:
+def divided(triangles: Floats, size: float, max_patches: int) -> Floats:
     """Triangles (n, 3, 3) halved across their longest sides until none is longer than `size`."""
     done = []
     while len(triangles):
@@ -132,9 +135,9 @@ def divided(triangles: Floats, size: float) -> Floats:
         small = sides.max(axis=1) <= size
         done.append(triangles[small])
         large = triangles[~small]
-        if len(large) > MOST_PATCHES:
+        if len(large) > max_patches:
             raise InputError(
-                f"camera.patch: {size:g} makes more than {MOST_PATCHES} patches; expected larger "
+                f"camera.patch: {size:g} makes more than {max_patches} patches; expected larger "
                 "ones"
             )
         k = sides[~small].argmax(axis=1)

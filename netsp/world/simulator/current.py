@@ -6,12 +6,7 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.field_types import Point3
-
-GUST_S = 5.0
-"""Seconds over which a gust is forgotten."""
-
-INTERVAL = 0.1
-"""Seconds between two values."""
+from netsp.world.simulator.environment_policy import GustPolicy
 
 
 class Water:
@@ -25,9 +20,11 @@ class Water:
         m/s, standard deviation along each axis.
     """
 
-    def __init__(self, current: Point3, gusts: float, seed: int) -> None:
+    def __init__(
+        self, current: Point3, gusts: float, seed: int, policy: GustPolicy = GustPolicy()
+    ) -> None:
         self.current = np.array(current, dtype=float)
-        self.gusts = gusts
+        self.gusts, self.policy = gusts, policy
         self._rng = np.random.default_rng(seed)
         self._values = [gusts * self._rng.normal(size=3)]
 
@@ -35,8 +32,9 @@ class Water:
         """(3,) m/s at a time in seconds."""
         if self.gusts == 0.0:
             return self.current
-        keep = np.exp(-INTERVAL / GUST_S)
-        while len(self._values) <= now / INTERVAL:
+        interval_s = self.policy.interval_s
+        keep = np.exp(-interval_s / self.policy.memory_s)
+        while len(self._values) <= now / interval_s:
             noise = self.gusts * np.sqrt(1.0 - keep**2) * self._rng.normal(size=3)
             self._values.append(keep * self._values[-1] + noise)
-        return np.asarray(self.current + self._values[int(now / INTERVAL)])
+        return np.asarray(self.current + self._values[int(now / interval_s)])

@@ -15,9 +15,9 @@ from netsp.world.planner.planner import Tethers
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.tether import Tether
 
-DEPTH = 0.25
-"""Of delta: the edges of a taut tether dip into surfaces by an eighth of it (docs/tether.md), and
-rounding in a file takes them no farther than this."""
+STATE_TETHER_DEPTH = 0.25
+"""Tolerance of a state's tether: how deep it may lie in a solid, as a share of delta. Edges of a
+taut tether dip into surfaces by an eighth (docs/tether.md), and a file rounds them."""
 
 
 def first_tether(mission: Mission, field: DistanceField, model: Tethers, grid: Grid) -> Tether:
@@ -91,7 +91,7 @@ def present_tether(mission: Mission, field: DistanceField, model: Tethers, grid:
     robot = field.free_point(mission.state.position, "state.position")
     line = np.vstack([anchor, np.array(mission.state.tether)[1:-1].reshape(-1, 3), robot])
     for k, (a, b) in enumerate(pairwise(line)):
-        if not field.line_of_sight(a, b, depth=DEPTH * mission.delta):
+        if not field.line_of_sight(a, b, depth=STATE_TETHER_DEPTH * mission.delta):
             raise InputError(
                 f"state.tether: passes through a solid between points {k} and {k + 1}, "
                 f"{_shown(a)} and {_shown(b)}; expected a line in the water"

@@ -12,9 +12,10 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError, interrupted
 from netsp.world.mission.anchor_track import Track
-from netsp.world.mission.mission import TURN_TIME, Mission, MissionWaypoint
+from netsp.world.mission.mission import Mission, MissionWaypoint
 from netsp.world.mission.mission_limits import check_bounds, check_names, check_size, check_tether
 from netsp.world.mission.run_log import LogRow, Run
+from netsp.world.paths.path_policy import PathPolicy
 from netsp.world.paths.tree import Grid
 from netsp.world.planner import Command, Planner, PlannerOptions, make_planner
 from netsp.world.planner.planner import DONE, DWELL, WAIT
@@ -25,7 +26,8 @@ from netsp.world.simulator.coverage import Coverage, patches_of
 from netsp.world.simulator.current import Water
 from netsp.world.simulator.laid_tether import first_tether, present_tether
 from netsp.world.simulator.sensing import Positions
-from netsp.world.simulator.simulation import STEP, Simulation
+from netsp.world.simulator.simulation import Simulation
+from netsp.world.simulator.simulation_policy import SimulationPolicy
 from netsp.world.simulator.stalls import Stalls
 from netsp.world.simulator.summary import summarise
 from netsp.world.simulator.surprises import SceneSurprises
@@ -34,18 +36,10 @@ from netsp.world.tether import GeodesicTether, make_tether
 from netsp.world.vehicle import make_vehicle
 from netsp.world.vehicle.kinematic import turned
 
-CELL, MOST_CELLS = 0.2, 2_000_000
-"""Cells of the grid that paths are sought on, metres, where a mission does not say; larger ones
-where there would be more than so many, so that planning takes no longer than a second."""
 
-HEADING_REACH = math.radians(5.0)
-"""A heading this near counts as taken."""
-
-STUCK = 600.0
-"""Seconds at one waypoint after which it is left out."""
-
-
-def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
+def grid_of(
+    mission: Mission, scene: Scene, field: DistanceField, policy: PathPolicy = PathPolicy()
+) -> Grid:
     """The grid that paths are sought on: the scene's bounds, or all there is and some room.
 
     Parameters
@@ -67,11 +61,13 @@ def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
     InputError
         It would take too much memory; says which cell would not. A cell larger than the site.
     """
-    low, high, cell = grid_box(mission, scene)
-    return Grid(field, low, high, cell, mission.clearance)
+    low, high, cell = grid_box(mission, scene, policy)
+    return Grid(field, low, high, cell, mission.clearance, policy)
 
 
-def grid_box(mission: Mission, scene: Scene) -> tuple[Floats, Floats, float]:
+def grid_box(
+    mission: Mission, scene: Scene, policy: PathPolicy = PathPolicy()
+) -> tuple[Floats, Floats, float]:
     """Return the box of the grid for paths, and the size of its cells.
 
     Parameters
@@ -93,7 +89,7 @@ def grid_box(mission: Mission, scene: Scene) -> tuple[Floats, Floats, float]:
     InputError
         A cell larger than the site.
     """
-    cell = mission.cell or CELL
+    cell = mission.cell or policy.cell
     if scene.bounds is not None:
         low, high = np.array(scene.bounds[:3]), np.array(scene.bounds[3:])
     else:
@@ -105,7 +101,8 @@ def grid_box(mission: Mission, scene: Scene) -> tuple[Floats, Floats, float]:
             f"cell: {cell:g} is more than the whole site, {widest:.4g} across; expected far less"
         )
     if mission.cell is None:
-        cell = max(CELL, float(np.prod(np.maximum(high - low, CELL)) / MOST_CELLS) ** (1.0 / 3.0))
+        volume = np.prod(np.maximum(high - low, policy.cell))
+        cell = max(policy.cell, float(volume / policy.max_default_cells) ** (1.0 / 3.0))
     return low, high, cell
 
 
@@ -122,6 +119,7 @@ def simulate(
     surprises: SceneSurprises | None = None,
     seed: int = 0,
     on_step: Callable[[LogRow, Planner], None] | None = None,
+    policy: SimulationPolicy = SimulationPolicy(),
 ) -> Run:
     """Run a mission.
 
@@ -153,6 +151,8 @@ def simulate(
     on_step : callable, optional
         Called with every row and the planner; a KeyboardInterrupt ends the run, and what was done
         till then is returned.
+    policy : SimulationPolicy
+        Steps and thresholds of the simulation.
 
     Returns
     -------
@@ -166,7 +166,8 @@ def simulate(
         parts of the water, a tether that is shorter than the path between them.
     """
     check_names(planner, vehicle, tether)
-    check_size(mission)
+    check_size(mission, policy)
+    options = options or PlannerOptions()
     track = Track.of(mission)
     if surprises is not None and tether != "geodesic":
         raise InputError(f"surprises: tether model {tether!r} has one map only; expected geodesic")
@@ -177,7 +178,7 @@ def simulate(
     field = field or scene.field()
     mission = mission.checked_waypoints(field, snap=snap)
     tethers = GeodesicTether(field, mission.delta)
-    grid = grid_of(mission, scene, field)
+    grid = grid_of(mission, scene, field, options.policy.paths)
     laid = first_tether(mission, field, tethers, grid)
     taut = present_tether(mission, field, tethers, grid)
     if surprises is not None:
@@ -191,24 +192,22 @@ def simulate(
     chosen.laid = laid
     coverage = None
     if mission.camera is not None:
-        patches = patches_of(
-            scene, field, mission.camera.patch, mission.every_place, mission.inspect
-        )
+        size, places = mission.camera.patch, mission.every_place
+        patches = patches_of(scene, field, size, places, mission.inspect, policy.coverage)
         coverage = Coverage(patches, field, mission.camera)
-    water = Water(mission.current, mission.gusts, seed)
+    water = Water(mission.current, mission.gusts, seed, policy.gusts)
     chosen.warm_up(robot.position, taut)
-    positions = Positions(mission.sensor, field, robot.position, STEP, seed)
+    positions = Positions(mission.sensor, field, robot.position, seed, policy)
     if believed is None and not positions.exact:
         believed = tethers
     world = Simulation(mission, field, robot, tethers, taut, water, coverage, believed)
-    world.positions, world.track = positions, track
+    world.positions, world.track, world.policy = positions, track, policy
     if believed is not None:
         world.believed = present_tether(mission, field, believed, grid)
     around = None
     if surprises is not None:
-        around = Surroundings(
-            mission, scene, field.voxels, surprises, np.vstack([taut.nodes, robot.position]), seed
-        )
+        line = np.vstack([taut.nodes, robot.position])
+        around = Surroundings(mission, scene, field.voxels, surprises, line, seed, policy)
         world.model, world.believed, world.tethers_seen = tethers, taut, [(0, taut)]
     since, stopped, stalls = (0.0, -1), False, Stalls()
     begin = time.perf_counter()
@@ -230,8 +229,8 @@ def simulate(
                     continue
             if since[1] != chosen.index or command.mode == WAIT:
                 since = (world.now, chosen.index)
-            elif world.now - since[0] > STUCK:
-                chosen.leave_out(f"not reached in {STUCK:g} s")
+            elif world.now - since[0] > policy.max_waypoint_s:
+                chosen.leave_out(f"not reached in {policy.max_waypoint_s:g} s")
                 continue
             if stalls.seen(world, chosen, command):
                 chosen.leave_out(stalls.reason)
@@ -267,7 +266,7 @@ def stay(
     waypoint: MissionWaypoint,
     on_step: Callable[[LogRow, Planner], None] | None = None,
 ) -> None:
-    """At a waypoint: turn to its heading, for `TURN_TIME` at most, then stay as long as it asks.
+    """Turn to a waypoint's heading, for at most `max_turn_s`, then stay as long as it asks.
 
     Parameters
     ----------
@@ -283,6 +282,7 @@ def stay(
     heading = None if waypoint.heading is None else math.radians(waypoint.heading)
     if heading is None and waypoint.dwell == 0.0:
         return
+    tolerance = math.radians(world.policy.heading_tolerance_deg)
     here, since, arrived = world.vehicle.position, world.now, None
     while arrived is None or world.now < arrived + waypoint.dwell - 1e-9:
         world.go(here[None], world.now == since, heading=heading)
@@ -290,5 +290,5 @@ def stay(
         if on_step is not None:
             on_step(row, planner)
         off = 0.0 if heading is None else abs(turned(heading - world.vehicle.yaw))
-        if arrived is None and (off <= HEADING_REACH or world.now - since >= TURN_TIME):
+        if arrived is None and (off <= tolerance or world.now - since >= planner.policy.max_turn_s):
             arrived = world.now

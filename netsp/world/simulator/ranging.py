@@ -11,15 +11,13 @@ from netsp.base.compiled.kernel import kernel
 from netsp.world.mission.equipment import RangeSensor
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.sampling import Field, distance
+from netsp.world.simulator.environment_policy import RangingPolicy
 
-RAYS = 240
-"""In one look; they are turned from look to look, so that what stands between them comes up."""
-
-TOUCH = 1e-3
-"""Metres from a surface at which a ray has met it."""
+RAY_TOLERANCE = 1e-3
+"""Tolerance of sphere tracing: distance from a surface at which a ray has hit it, metres."""
 
 
-def fan(field_of_view: float, ahead: Floats, turn: float) -> Floats:
+def fan(field_of_view: float, ahead: Floats, turn: float, ray_count: int) -> Floats:
     """Rays that share a cone evenly: a spiral of Fibonacci on the cap of the sphere.
 
     Parameters
@@ -36,8 +34,8 @@ def fan(field_of_view: float, ahead: Floats, turn: float) -> Floats:
     ndarray, shape (n, 3)
         Unit vectors.
     """
-    k = np.arange(RAYS) + 0.5
-    cosine = 1.0 - (1.0 - math.cos(math.radians(0.5 * field_of_view))) * k / RAYS
+    k = np.arange(ray_count) + 0.5
+    cosine = 1.0 - (1.0 - math.cos(math.radians(0.5 * field_of_view))) * k / ray_count
     sine = np.sqrt(1.0 - cosine**2)
     angle = math.pi * (1.0 + math.sqrt(5.0)) * k + turn
     w = ahead / np.linalg.norm(ahead)
@@ -60,8 +58,10 @@ class Ranging:
         Of the noise.
     """
 
-    def __init__(self, sensor: RangeSensor, seed: int) -> None:
-        self.sensor = sensor
+    def __init__(
+        self, sensor: RangeSensor, seed: int, policy: RangingPolicy = RangingPolicy()
+    ) -> None:
+        self.sensor, self.policy = sensor, policy
         self._rng = np.random.default_rng([seed, 2])
 
     def look(
@@ -88,7 +88,8 @@ class Ranging:
         off : ndarray, shape (n,)
             Metres by which these are wrong.
         """
-        rays = fan(self.sensor.field_of_view, ahead, self._rng.uniform(0.0, 2.0 * math.pi))
+        turn = self._rng.uniform(0.0, 2.0 * math.pi)
+        rays = fan(self.sensor.field_of_view, ahead, turn, self.policy.ray_count)
         ranges = cast(field.arrays, np.asarray(place, dtype=float), rays, self.sensor.range)
         noise = self.sensor.noise * self._rng.normal(size=len(rays))
         return rays, ranges + noise, noise
@@ -105,7 +106,7 @@ def cast(field: Field, place: Floats, rays: Floats, most: float) -> Floats:
                 field, place[0] + s * rays[n, 0], place[1] + s * rays[n, 1],
                 place[2] + s * rays[n, 2],
             )  # fmt: skip
-            if d < TOUCH:
+            if d < RAY_TOLERANCE:
                 out[n] = s
                 break
             s += d

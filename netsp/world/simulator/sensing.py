@@ -7,10 +7,7 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.world.mission.equipment import PositionSensor
 from netsp.world.scene.field import DistanceField, pushed_out
-
-TRUST = 0.25
-"""Share of a new position that goes into the estimate: the others of the last second or so average
-its noise out. Their age is made up for by the velocity that they show."""
+from netsp.world.simulator.simulation_policy import SimulationPolicy
 
 
 class Positions:
@@ -34,10 +31,15 @@ class Positions:
     """
 
     def __init__(
-        self, sensor: PositionSensor, field: DistanceField, place: Floats, step: float, seed: int
+        self,
+        sensor: PositionSensor,
+        field: DistanceField,
+        place: Floats,
+        seed: int,
+        policy: SimulationPolicy = SimulationPolicy(),
     ) -> None:
-        self.sensor, self.field, self.step = sensor, field, step
-        self._late = round(sensor.delay / step)
+        self.sensor, self.field, self.policy = sensor, field, policy
+        self._late = round(sensor.delay / policy.step_s)
         self._true = [np.array(place, dtype=float)]
         self._estimate, self._velocity = self._true[0].copy(), np.zeros(3)
         self._rng = np.random.default_rng([seed, 1])
@@ -65,9 +67,10 @@ class Positions:
         self._true.append(np.array(place, dtype=float))
         old = self._true[max(0, len(self._true) - 1 - self._late)]
         measured = old + self.sensor.noise * self._rng.normal(size=3)
-        ahead = self._estimate + self.step * self._velocity
+        step_s, gain = self.policy.step_s, self.policy.position_gain
+        ahead = self._estimate + step_s * self._velocity
         off = measured - ahead
-        self._estimate = ahead + TRUST * off
-        self._velocity += TRUST**2 / (2.0 - TRUST) / self.step * off
-        now = self._estimate + self._late * self.step * self._velocity
+        self._estimate = ahead + gain * off
+        self._velocity += gain**2 / (2.0 - gain) / step_s * off
+        now = self._estimate + self._late * step_s * self._velocity
         return np.asarray(pushed_out(self.field, now[None], 1e-3)[0])

@@ -14,25 +14,14 @@ from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import LogRow
 from netsp.world.planner import Command, Planner
 from netsp.world.planner.planner import HOME, Tethers
-from netsp.world.planner.preview import DEEPEST
+from netsp.world.planner.preview import CONTACT_DEPTH
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.simulator.coverage import Coverage
 from netsp.world.simulator.sensing import Positions
+from netsp.world.simulator.simulation_policy import SimulationPolicy
 from netsp.world.tether import GeodesicTether, Tether
 from netsp.world.tether.load import Load, payout, pull_on_robot, turning
 from netsp.world.vehicle import Vehicle
-
-STEP = 0.1
-"""Seconds between two decisions of the planner."""
-
-SEEN = 10
-"""Steps between two tethers that are kept for pictures."""
-
-FRAME = 2
-"""Steps between two pictures of the camera."""
-
-LEAST_COURSE = 0.05
-"""m/s: slower motion through the water asks for no heading."""
 
 
 @dataclass
@@ -75,6 +64,8 @@ class Simulation:
         Whether the limit was lowered below the tether, which is being shortened.
     log : list of LogRow
         One row per step.
+    policy : SimulationPolicy
+        Steps and thresholds.
     """
 
     mission: Mission
@@ -94,6 +85,7 @@ class Simulation:
     shortening: bool = False
     tethers_seen: list[tuple[int, Tether]] = field(default_factory=list)
     log: list[LogRow] = field(default_factory=list)
+    policy: SimulationPolicy = SimulationPolicy()
     _was: Floats | None = None
 
     def _course(self, path: Floats, yaw: float) -> float:
@@ -103,7 +95,7 @@ class Simulation:
         if far < 1e-6:
             return yaw
         x, y, _ = leg * (self.mission.speed / far) - self.water(self.now)
-        return math.atan2(y, x) if math.hypot(x, y) > LEAST_COURSE else yaw
+        return math.atan2(y, x) if math.hypot(x, y) > self.policy.min_course_speed else yaw
 
     def _pull(self) -> dict[str, Floats]:
         """The tether's force on a vehicle that is to feel it."""
@@ -111,7 +103,7 @@ class Simulation:
         if not physics.pulls_vehicle:
             return {}
         here, delta = self.vehicle.position, self.tethers.delta
-        velocity = np.zeros(3) if self._was is None else (here - self._was) / STEP
+        velocity = np.zeros(3) if self._was is None else (here - self._was) / self.policy.step_s
         return {"pull": pull_on_robot(self.tether, self.load, physics.friction, velocity, delta)}
 
     @property
@@ -136,7 +128,11 @@ class Simulation:
         """
         x, y, z = (float(v) for v in self.vehicle.position)
         seen = self.coverage
-        if seen is not None and len(self.log) % FRAME == 0 and command.mode != HOME:
+        if (
+            seen is not None
+            and len(self.log) % self.policy.camera_steps == 0
+            and command.mode != HOME
+        ):
             seen.look(self.vehicle.position, self.vehicle.yaw)
         limit, out = self.mission.tether_length, payout(self.tether, self.load)
         self.shortening = self.shortening and out > limit
@@ -147,7 +143,7 @@ class Simulation:
             seen.share if seen else 0.0, seen.share_through if seen else 0.0,
             command.replan_s, limit, self.shortening,
         )  # fmt: skip
-        if self.tethers_seen and len(self.log) % SEEN == 0:
+        if self.tethers_seen and len(self.log) % self.policy.tether_steps == 0:
             self.tethers_seen.append((len(self.log), self.tether))
         self.log.append(row)
         return row
@@ -184,10 +180,11 @@ class Simulation:
             yaw = self.coverage.heading(robot, yaw)
         elif self.coverage is None:
             yaw = self._course(path, yaw)
-        points, passed = self.vehicle.go(path, STEP, yaw, self.water(self.now), fresh, **pull)
-        self.now += STEP
+        step_s = self.policy.step_s
+        points, passed = self.vehicle.go(path, step_s, yaw, self.water(self.now), fresh, **pull)
+        self.now += step_s
         anchor = None if self.track is None else self.track(self.now)
-        if self.scene.distance(np.array(points)).min() < -DEEPEST * self.tethers.delta:
+        if self.scene.distance(np.array(points)).min() < -CONTACT_DEPTH * self.tethers.delta:
             self.vehicle.stop_at(robot)
             points, passed, moved = [robot], 0, False
             self.contacts += 1

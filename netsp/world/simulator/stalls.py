@@ -13,9 +13,6 @@ from netsp.world.planner import Command, Planner
 from netsp.world.planner.planner import HOLD, WAIT
 from netsp.world.simulator.simulation import Simulation
 
-STALL, PROGRESS = 30.0, 0.05
-"""A robot has stalled when in so many seconds it has not come so many metres nearer."""
-
 
 @dataclass
 class Stalls:
@@ -36,7 +33,7 @@ class Stalls:
     _since: float = 0.0
 
     def seen(self, world: Simulation, planner: Planner, command: Command) -> bool:
-        """Whether what is left of the path has not become shorter for `STALL` seconds.
+        """Whether what is left of the path has not become shorter for the policy's `stall_s`.
 
         Parameters
         ----------
@@ -57,13 +54,14 @@ class Stalls:
         # home may move away as fast as the robot comes after it
         chasing = command.mode == WAIT or (planner.homeward and planner.anchor_moves)
         planned = planner.index != self._index or command.replan_s > 0.0
-        if chasing or planned or left < self._least - PROGRESS:
+        if chasing or planned or left < self._least - world.policy.stall_progress:
             self._index, self._least, self._since = planner.index, left, world.now
             return False
-        if world.now - self._since < STALL or command.mode == HOLD:
+        stall_s = world.policy.stall_s
+        if world.now - self._since < stall_s or command.mode == HOLD:
             return False
         water = float(np.linalg.norm(world.water(world.now)))
-        self.reason = f"stalled: no progress in {STALL:g} s, in water of {water:.2f} m/s"
+        self.reason = f"stalled: no progress in {stall_s:g} s, in water of {water:.2f} m/s"
         self.found.append({"time": world.now, "waypoint": planner.index, "position": here.tolist()})
         self._index = -1
         return True

@@ -13,8 +13,8 @@ from netsp.model.solution import tension_ratio
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import LogRow
 from netsp.world.planner import Planner
-from netsp.world.planner.planner import DWELL, FREE, WAIT
-from netsp.world.simulator.simulation import STEP, Simulation
+from netsp.world.planner.planner import DWELL, WAIT
+from netsp.world.simulator.simulation import Simulation
 
 
 def summarise(
@@ -64,7 +64,7 @@ def summarise(
     turnings = np.array([r.turning for r in log])
     places = np.array([[r.x, r.y, r.z] for r in inspected])
     planned = [r.replan_s for r in log if r.replan_s > 0.0]
-    walked = polylines.length(places)
+    walked, step_s = polylines.length(places), world.policy.step_s
     inspection = inspected[-1].time if log else 0.0
     control = world.vehicle.control_s
     by_tether = inspected[-1].tether / mission.speed if log else 0.0
@@ -80,15 +80,15 @@ def summarise(
         "tether_length": mission.tether_length,
         "longest_tether": float(lengths.max(initial=0.0)),
         "longest_payout": float(payouts.max(initial=0.0)),
-        "exceedance_s": STEP * sum(_over(r) and not r.shortening for r in log),
-        "shortening_s": STEP * sum(r.shortening for r in log),
-        "friction": _friction(mission, turnings),
+        "exceedance_s": step_s * sum(_over(r) and not r.shortening for r in log),
+        "shortening_s": step_s * sum(r.shortening for r in log),
+        "friction": _friction(mission, turnings, step_s),
         "visited": len(planner.reached),
         "waypoints": len(mission.waypoints),
         "contacts": world.contacts,
         "left_out": [{"waypoint": k, "reason": why} for k, why in planner.left_out],
         "stops": _stops(mission, planner, log),
-        "waited_s": STEP * sum(r.mode == WAIT for r in log),
+        "waited_s": step_s * sum(r.mode == WAIT for r in log),
         "home": _home(planner, world, inspection),
         "defects": len(planner.defects),
         "replans": len(planned),
@@ -113,7 +113,7 @@ def _home(planner: Planner, world: Simulation, since: float) -> dict[str, Any]:
     left = max(0.0, model.refine(world.tether).length - as_laid)
     return {
         "reached": planner.home,
-        "tether_free": planner.home and left <= FREE * delta,
+        "tether_free": planner.home and left <= planner.policy.free_tolerance * delta,
         "left": left,
         "seconds": world.now - since if planner.homeward else 0.0,
         "reason": planner.not_home,
@@ -142,7 +142,7 @@ def _stops(mission: Mission, planner: Planner, log: list[LogRow]) -> list[dict[s
     ]
 
 
-def _friction(mission: Mission, turnings: Floats) -> dict[str, float] | None:
+def _friction(mission: Mission, turnings: Floats, step_s: float) -> dict[str, float] | None:
     """Turning and tension ratio where they were greatest, and seconds over the limit; None without
     friction."""
     physics = mission.tether
@@ -152,5 +152,5 @@ def _friction(mission: Mission, turnings: Floats) -> dict[str, float] | None:
     return {
         "most_turning_deg": math.degrees(most),
         "most_tension_ratio": tension_ratio(physics.friction, most),
-        "over_s": float((turnings > physics.max_turning * (1 + 1e-9)).sum() * STEP),
+        "over_s": float((turnings > physics.max_turning * (1 + 1e-9)).sum() * step_s),
     }

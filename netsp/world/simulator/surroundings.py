@@ -15,38 +15,20 @@ from netsp.base.arrays import Floats
 from netsp.base.geometry import polylines
 from netsp.world.mission.mission import Mission
 from netsp.world.planner import Planner
-from netsp.world.planner.predictive import CAUGHT
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.scene.grid import VoxelGrid
 from netsp.world.scene.scene import Scene, Solid
 from netsp.world.simulator.ranging import Ranging, cast
 from netsp.world.simulator.simulation import Simulation
+from netsp.world.simulator.simulation_policy import SimulationPolicy
 from netsp.world.simulator.surprises import SceneEvent, SceneSurprises, changed, moved
 from netsp.world.tether import GeodesicTether, Tether
 from netsp.world.tether.load import payout
 
-MET = 3
-"""So many rays must have met a solid before it is put on the map."""
-
-THROUGH, PASSED = 0.1, 5
-"""Metres that a ray goes on inside a solid of the map, and how many such rays of one look show that
-it is not there."""
-
-RECALL, MOST_MOMENTS, EXPLAINED = 50, 40, 0.03
-"""Steps between two moments at which the tether is remembered, and how many of these at most (of
-more, every other one is forgotten); metres within which a tether explains what is out."""
-
-TRAIL, TAKEN_UP = 0.1, 0.9
-"""Metres between points of the robot's trail, and how near to the last but one, as a share of them,
-the robot has gone back."""
-
-ENDLESS = 1e6
-"""Metres that solids without end are taken to reach."""
+UNBOUNDED_EXTENT = 1e6
+"""Sentinel extent of solids without end, metres."""
 
 FAR_OFF = Solid.model_validate({"sphere": {"center": [0.0, 0.0, -1e6], "radius": 1.0}})
-
-EVERY = 3
-"""Steps between two looks."""
 
 
 @dataclass
@@ -73,9 +55,9 @@ class Sighting:
     mapped: Solid | None = None
     placed_by: int = 0
 
-    def place(self) -> bool:
-        """Put it on the map where the rays say; whether that is another place than before."""
-        if self.count < max(MET, 4 * self.placed_by):
+    def place(self, min_hits: int) -> bool:
+        """Put the solid on the map where the rays say; return whether that is a new place."""
+        if self.count < max(min_hits, 4 * self.placed_by):
             return False
         x, y, z = (self.off / self.count).tolist()
         self.mapped, self.placed_by = moved(self.solid, (x, y, z)), self.count
@@ -102,12 +84,19 @@ class Surroundings:
     """
 
     def __init__(
-        self, mission: Mission, scene: Scene, voxels: VoxelGrid | None,
-        surprises: SceneSurprises, places: Floats, seed: int,
-    ) -> None:  # fmt: skip
+        self,
+        mission: Mission,
+        scene: Scene,
+        voxels: VoxelGrid | None,
+        surprises: SceneSurprises,
+        places: Floats,
+        seed: int,
+        policy: SimulationPolicy = SimulationPolicy(),
+    ) -> None:
         self.mission, self.scene, self.voxels = mission, scene, voxels
         sensor = mission.range_sensor
-        self.ranging = None if sensor is None else Ranging(sensor, seed)
+        self.policy = policy.mapping
+        self.ranging = None if sensor is None else Ranging(sensor, seed, policy.ranging)
         self.solids = self.mapped = scene.all_solids()
         self.sightings: list[Sighting] = []
         self.found: set[str | int] = set()
@@ -134,28 +123,31 @@ class Surroundings:
         before = self.mapped
         told = self._happen(world, planner)
         if self.ranging is not None:
-            told = self._steps % EVERY == 0 and self._look(world, planner)
+            told = self._steps % self.policy.look_steps == 0 and self._look(world, planner)
         self._steps += 1
         if told:
             self._tell(world, planner, self._other(before))
         if world.believed is not None:
             more = payout(world.tether, world.load) - payout(world.believed, world.load)
-            if more > CAUGHT and self._steps % RECALL == 0:
+            is_recalled = self._steps % self.policy.recall_steps == 0
+            if more > planner.policy.predictive.snag_tolerance and is_recalled:
                 assert isinstance(world.model, GeodesicTether)
                 world.believed = self._laid_again(world, world.model)
                 more = payout(world.tether, world.load) - payout(world.believed, world.load)
-            elif self._steps % RECALL == 0:
+            elif is_recalled:
                 self.moments.append((world.believed.nodes.copy(), len(self.trail)))
                 self.times.append(world.now)
-                if len(self.moments) > MOST_MOMENTS:
+                if len(self.moments) > self.policy.max_recalled:
                     self.moments, self.times = self.moments[1::2], self.times[1::2]
             planner.hear_of_payout(max(0.0, more), self.trail)
 
     def _leave_trail(self, here: Floats) -> None:
         """Lengthen the trail, or take up what the robot goes back along."""
-        while len(self.trail) > 2 and np.linalg.norm(here - self.trail[-2]) < TAKEN_UP * TRAIL:
+        spacing = self.policy.trail_spacing
+        back = self.policy.retrace_share * spacing
+        while len(self.trail) > 2 and np.linalg.norm(here - self.trail[-2]) < back:
             self.trail = self.trail[:-1]
-        if np.linalg.norm(here - self.trail[-1]) >= TRAIL:
+        if np.linalg.norm(here - self.trail[-1]) >= spacing:
             self.trail = np.vstack([self.trail, here])
 
     def _happen(self, world: Simulation, planner: Planner) -> bool:
@@ -270,7 +262,7 @@ class Surroundings:
             sighting.count += int(some.sum())
             sighting.off = sighting.off + (rays[met][some] * off[met][some, None]).sum(0)
             before = sighting.mapped
-            if sighting.place() and sighting.mapped is not None:
+            if sighting.place(self.policy.min_hits) and sighting.mapped is not None:
                 # whatever has a name is there once
                 name = solid.name
                 kept = tuple(
@@ -285,12 +277,14 @@ class Surroundings:
         assert self.ranging is not None
         sensor = self.ranging.sensor
         expected = cast(known.arrays, here, rays, sensor.range)
-        inside = expected + THROUGH
-        passed = inside + 3.0 * sensor.noise + THROUGH < np.minimum(ranges, sensor.range)
+        depth = self.policy.removal_depth
+        inside = expected + depth
+        passed = inside + 3.0 * sensor.noise + depth < np.minimum(ranges, sensor.range)
         points = here + rays[passed] * inside[passed, None]
-        deep = known.distance(points) < -0.25 * THROUGH - 2.0 * sensor.noise
+        deep = known.distance(points) < -0.25 * depth - 2.0 * sensor.noise
         which, counts = np.unique(known.nearest(points[deep]), return_counts=True)
-        gone = {int(n) for n, c in zip(which, counts, strict=True) if n >= 0 and c >= PASSED}
+        is_gone = (which >= 0) & (counts >= self.policy.min_passes)
+        gone = set(which[is_gone].tolist())
         off = [s for n, s in enumerate(self.mapped) if n in gone]
         self.mapped = tuple(s for n, s in enumerate(self.mapped) if n not in gone)
         self.sightings = [s for s in self.sightings if all(s.mapped is not o for o in off)]
@@ -299,11 +293,12 @@ class Surroundings:
     def _other(self, before: tuple[Solid, ...]) -> Floats:
         """(2, 3) box of all in which the map differs from the one before."""
         boxes: list[list[list[float]]] = []
+        everywhere = [[-UNBOUNDED_EXTENT] * 3, [UNBOUNDED_EXTENT] * 3]
         for some, others in ((before, self.mapped), (self.mapped, before)):
             for solid in some:
                 if all(solid is not o for o in others):
                     box = solid.shape.box()
-                    boxes.append([[-ENDLESS] * 3, [ENDLESS] * 3] if box is None else box.tolist())
+                    boxes.append(everywhere if box is None else box.tolist())
         return np.array([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
 
     def _tell(self, world: Simulation, planner: Planner, box: Floats) -> None:
@@ -322,7 +317,7 @@ class Surroundings:
         payout is nearest to the one measured; the earliest where several are as near.
         """
         out = payout(world.tether, world.load)
-        best, least = None, np.inf
+        best, least, tolerance = None, np.inf, self.policy.payout_tolerance
         for n, (nodes, count) in enumerate([(self.trail[:1], 1), *self.moments]):
             if count > len(self.trail):
                 continue  # gone back past it
@@ -331,9 +326,9 @@ class Surroundings:
             line = np.vstack([self._anchors_way(world, n), line])
             tether = model.drive(model.relaxed(line[[0, 0]], 1), line[1:])[0]
             off = abs(payout(tether, world.load) - out)
-            if best is None or off < least - EXPLAINED:
+            if best is None or off < least - tolerance:
                 best, least, chosen, trail = tether, off, n, line
-            if least <= EXPLAINED:
+            if least <= tolerance:
                 break
         assert best is not None
         if chosen:
