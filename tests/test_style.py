@@ -25,7 +25,8 @@ from netsp.view.pictures.film_page import FRAMES, save_page
 from netsp.view.pictures.interactive import seen
 from netsp.view.pictures.mission_picture import save_runs
 from netsp.view.pictures.problem_picture import draw
-from netsp.view.pictures.scene_picture import Stops, figure_of, save
+from netsp.view.pictures.scene_picture import figure_of, save
+from netsp.view.pictures.waypoint_marks import WaypointMarks
 from netsp.view.report import figures
 from netsp.view.report.stats import best_lengths, cells, methods
 from netsp.world.mission.mission import Mission
@@ -118,7 +119,7 @@ def of(what, request, monkeypatch):
     if what == "scene":
         found, scene = request.getfixturevalue("mission")
         path = np.array([[-3.0, 0, -2], [3, 1, -2]])
-        return figure_of(scene, path, "a scene", Stops(found.places))
+        return figure_of(scene, path, "a scene", WaypointMarks(found.places))
     if what == "tall scene":
         kept = []
         monkeypatch.setattr(style, "save", lambda figure, *_, **__: kept.append(figure))

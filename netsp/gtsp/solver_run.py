@@ -12,8 +12,7 @@ import numpy as np
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError, LimitReachedError, MemoryLimitError, interrupted
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.travel.baseless import BaselessGraph
-from netsp.gtsp.travel.graph import UNTIMED, TravelGraph, least_tethers
+from netsp.gtsp.travel.graph import UNTIMED, BaselessGraph, TravelGraph, least_tethers
 from netsp.gtsp.travel.result import Progress, Result, proven
 from netsp.model.bound_scope import LowerBound
 from netsp.model.solution import Status

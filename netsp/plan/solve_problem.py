@@ -17,8 +17,7 @@ from netsp.base.registry import foreign, load
 from netsp.base.validated import shown
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.params import NoParams, read_params
-from netsp.gtsp.travel.baseless import BaselessGraph
-from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.graph import BaselessGraph, TravelGraph
 from netsp.gtsp.travel.result import OnProgress, Progress, Result
 from netsp.model.bound_scope import Scope
 from netsp.model.problem import Problem

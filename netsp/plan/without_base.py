@@ -17,8 +17,7 @@ from netsp.base.clock import Clock, until_interrupt
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.search.lns_solver import Params as SearchParams
 from netsp.gtsp.search.lns_solver import solve as search
-from netsp.gtsp.travel.baseless import BaselessGraph
-from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.graph import BaselessGraph, TravelGraph
 from netsp.gtsp.travel.result import OnProgress, Progress, Result, of_part, proven
 from netsp.mip.goal_relaxation import bound_at_once
 from netsp.model.bound_scope import Scope

@@ -177,7 +177,7 @@ class TravelGraph(Drawn):
         -------
         TravelGraph
             A graph without geometry beneath it; without a base, one for `netsp.solve_graph` only
-            (`netsp.gtsp.travel.baseless`).
+            (`BaselessGraph`).
 
         Raises
         ------
@@ -195,11 +195,7 @@ class TravelGraph(Drawn):
             raise InputError(f"base: expected 0 or None, got {base!r}")
         table = CostTable(*checked_costs(costs, clusters, base=base is not None))
         cluster = table.cluster
-        kind: type[TravelGraph] = cls
-        if base is None:
-            from netsp.gtsp.travel.baseless import BaselessGraph
-
-            kind = BaselessGraph
+        kind: type[TravelGraph] = BaselessGraph if base is None else cls
         graph = kind(cluster, [()] * len(cluster), np.zeros(len(cluster)), table)
         graph.grain = grain_of(table.costs)
         return graph
@@ -964,3 +960,74 @@ class _PartOfLegs:
 
     def path(self, u: int, v: int) -> Floats:
         return self.graph.path(int(self.chosen[u]), int(self.chosen[v]))
+
+
+class BaselessGraph(TravelGraph):
+    """Travel graph without a base, for `netsp.solve_graph`: a generalised TSP.
+
+    Solvers want a base. Every tour takes a vertex of the smallest cluster, so the shortest tour is
+    the shortest of those through each of its vertices (`rooted`). Clusters of GTSPLIB usually
+    include one of a single vertex, and then there is one such problem.
+    """
+
+    def __repr__(self) -> str:
+        """In a line."""
+        return (
+            f"<TravelGraph: {counted(self.cluster_count, 'cluster')} of {len(self)} vertices, "
+            "no base>"
+        )
+
+    @property
+    def cluster_count(self) -> int:
+        """Number of clusters."""
+        return int(self.cluster.max()) + 1
+
+    @property
+    def roots(self) -> Ints:
+        """Vertices of the smallest cluster, the first of those."""
+        return self.members(int(np.argmin(np.bincount(self.cluster))))
+
+    @property
+    def costs_to_base(self) -> Floats:
+        """There is no base: InputError."""
+        raise InputError("graph: has no base; expected solve_graph to be called with it")
+
+    def is_tour(self, tour: Sequence[int]) -> bool:
+        """Whether vertices are a tour: exactly one of every cluster.
+
+        Parameters
+        ----------
+        tour : sequence of int
+            Vertices, the first not repeated at the end.
+
+        Returns
+        -------
+        bool
+            True for a tour.
+        """
+        return self.takes_one_of_each(tour)
+
+    def rooted(self, root: int) -> tuple[TravelGraph, Ints]:
+        """The tours through a vertex, as those from a base.
+
+        Parameters
+        ----------
+        root : int
+            The vertex.
+
+        Returns
+        -------
+        graph : TravelGraph
+            The root is its base; the other vertices of that cluster are left out.
+        vertices : ndarray of int
+            What its vertices are here.
+        """
+        own = int(self.cluster[root])
+        vertices = np.r_[root, np.flatnonzero(self.cluster != own)]
+        cluster = self.cluster[vertices]
+        cluster = np.where(cluster == own, 0, cluster + (cluster < own))
+        costs = self.costs[np.ix_(vertices, vertices)]
+        table = CostTable(costs, cluster)
+        graph = TravelGraph(cluster, [()] * len(cluster), np.zeros(len(cluster)), table)
+        graph.grain, graph.declared_scope = self.grain, Scope.PART
+        return graph, vertices

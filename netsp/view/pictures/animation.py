@@ -18,7 +18,8 @@ from netsp.view.pictures import style
 from netsp.view.pictures.film import Film, steps_of
 from netsp.view.pictures.moments import CANCELLED, LEFT_OUT, VISITED
 from netsp.view.pictures.problem_picture import draw_map, view
-from netsp.view.pictures.scene_picture import Stops, draw_space
+from netsp.view.pictures.scene_picture import draw_space
+from netsp.view.pictures.waypoint_marks import WaypointMarks
 
 FORMATS = (".gif", ".mp4")
 
@@ -187,7 +188,7 @@ def _draw_space(ax: Any, film: Film) -> None:
     """A scene, seen as far as the robot goes."""
     assert film.scene is not None
     every = np.vstack([m.nodes for m in film.moments] + [film.moments[-1].path])
-    stops = Stops(film.places, anchor=film.anchor)
+    stops = WaypointMarks(film.places, anchor=film.anchor)
     draw_space(film.scene, every, np.zeros((0, 3)), ax=ax, stops=stops)
     for line in ax.lines:
         if line.get_label() == "path" and not line.get_animated():

@@ -20,7 +20,7 @@ from netsp.base.errors import InputError
 from netsp.base.files import write_text
 from netsp.base.geometry import polylines
 from netsp.view.pictures import style
-from netsp.view.pictures.scene_picture import Stops
+from netsp.view.pictures.waypoint_marks import WaypointMarks
 from netsp.world.scene.scene import Scene
 from netsp.world.scene.surfaces import Triangles, drawn_points
 
@@ -121,7 +121,7 @@ def _plain(value: Any) -> Any:
 
 def write_scene(
     scene: Scene, parts: Sequence[tuple[str, Triangles]], path: Floats, nodes: Floats, title: str,
-    stops: Stops | None, file: str | Path,
+    stops: WaypointMarks | None, file: str | Path,
 ) -> None:  # fmt: skip
     """A page of a scene, as of `netsp.view.pictures.scene_picture.save`."""
     go = plotly_objects()
@@ -150,7 +150,7 @@ def write_scene(
     write_figure(figure, title, file)
 
 
-def stop_traces(stops: Stops) -> list[dict[str, Any]]:
+def stop_traces(stops: WaypointMarks) -> list[dict[str, Any]]:
     """Waypoints on an interactive page: those that were visited, and those that were not."""
     out = []
     left = np.isin(np.arange(len(stops.places)), stops.left_out)

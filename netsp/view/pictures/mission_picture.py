@@ -13,7 +13,8 @@ import numpy.typing as npt
 from netsp.base.arrays import Floats
 from netsp.base.errors import counted
 from netsp.view.pictures import style
-from netsp.view.pictures.scene_picture import Stops, draw_space, save
+from netsp.view.pictures.scene_picture import draw_space, save
+from netsp.view.pictures.waypoint_marks import WaypointMarks
 from netsp.world.mission.anchor_track import Track
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import Run
@@ -46,11 +47,11 @@ def title_of(run: Run) -> str:
     )
 
 
-def stops_of(run: Run) -> Stops:
+def stops_of(run: Run) -> WaypointMarks:
     """Its waypoints, and which of them were not visited."""
     visited = {int(stop["waypoint"]) for stop in run.summary["stops"]}
     left = tuple(sorted(set(range(len(run.mission.waypoints))) - visited))
-    return Stops(run.mission.places, left, visited=True)
+    return WaypointMarks(run.mission.places, left, visited=True)
 
 
 def save_mission(mission: Mission, scene: Scene, file: str | Path) -> None:
@@ -68,7 +69,7 @@ def save_mission(mission: Mission, scene: Scene, file: str | Path) -> None:
         title += f", tour {tour.length:.5g} {scene.units}"
     save(
         scene, file, path=None if tour is None else tour.line, title=title,
-        stops=Stops(mission.places, left, mission.anchor),
+        stops=WaypointMarks(mission.places, left, mission.anchor),
     )  # fmt: skip
 
 

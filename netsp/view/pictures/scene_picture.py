@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy.typing as npt
 from netsp.base.arrays import Floats
 from netsp.base.geometry import polylines
 from netsp.view.pictures import style
+from netsp.view.pictures.waypoint_marks import WaypointMarks
 from netsp.world.scene.scene import Scene
 from netsp.world.scene.shapes import HalfSpace
 from netsp.world.scene.surfaces import Triangles, drawn_points, extent, surface_of
@@ -28,41 +28,9 @@ MOST_NUMBERED = 30
 """Waypoints whose numbers are drawn."""
 
 
-@dataclass(frozen=True)
-class Stops:
-    """Waypoints of a mission.
-
-    Parameters
-    ----------
-    places : ndarray, shape (n, 3)
-        Metres.
-    left_out : tuple of int
-        Which of them are left out.
-    anchor : (x, y, z) or None
-        Drawn as well where no tether is.
-    visited : bool
-        Whether the others have been visited, or are to be.
-    """
-
-    places: Floats
-    left_out: tuple[int, ...] = ()
-    anchor: tuple[float, float, float] | None = None
-    visited: bool = False
-
-    @property
-    def name(self) -> str:
-        """What the legend calls those that are not left out."""
-        return "waypoint visited" if self.visited else "waypoint"
-
-    @property
-    def every_place(self) -> Floats:
-        """(m, 3) all that is drawn, metres."""
-        return self.places if self.anchor is None else np.vstack([self.places, self.anchor])
-
-
 def save(
     scene: Scene, file: str | Path, *, path: npt.ArrayLike | None = None,
-    tether: Tether | None = None, title: str | None = None, stops: Stops | None = None,
+    tether: Tether | None = None, title: str | None = None, stops: WaypointMarks | None = None,
 ) -> None:  # fmt: skip
     """Draw a scene, with a path (k, 3), a tether and waypoints if given, by the file name's ending:
     .png, .svg and .pdf a figure, .html a page that needs nothing else.
@@ -86,7 +54,7 @@ def save(
         style.save(_figure(scene, parts, line, nodes, (low, high), title, stops), file)
 
 
-def figure_of(scene: Scene, path: Floats, title: str, stops: Stops) -> Any:
+def figure_of(scene: Scene, path: Floats, title: str, stops: WaypointMarks) -> Any:
     """The same as a Matplotlib figure.
 
     Parameters
@@ -97,7 +65,7 @@ def figure_of(scene: Scene, path: Floats, title: str, stops: Stops) -> Any:
         Of the robot, metres.
     title : str
         Above it.
-    stops : Stops
+    stops : WaypointMarks
         Waypoints.
 
     Returns
@@ -132,7 +100,7 @@ def parts_of(scene: Scene, low: Floats, high: Floats) -> list[tuple[str, Triangl
 
 def _figure(
     scene: Scene, parts: Sequence[tuple[str, Triangles]], path: Floats, nodes: Floats,
-    box: tuple[Floats, Floats], title: str, stops: Stops | None = None,
+    box: tuple[Floats, Floats], title: str, stops: WaypointMarks | None = None,
 ) -> Any:  # fmt: skip
     """A view in space, and the plans from above and from two sides."""
     from matplotlib.collections import PolyCollection
@@ -179,7 +147,7 @@ def _figure(
 
 
 def draw_space(
-    scene: Scene, path: Floats, nodes: Floats, *, ax: Any = None, stops: Stops | None = None
+    scene: Scene, path: Floats, nodes: Floats, *, ax: Any = None, stops: WaypointMarks | None = None
 ) -> Any:
     """Solids, path (k, 3), tether (n, 3) and waypoints in space, on 3D axes of the caller or on new
     ones; returns the axes."""
@@ -214,7 +182,7 @@ def draw_space(
     return ax
 
 
-def draw_stops(ax: Any, stops: Stops, axes: tuple[int, ...]) -> None:
+def draw_stops(ax: Any, stops: WaypointMarks, axes: tuple[int, ...]) -> None:
     """Waypoints on two or three of the axes (0, 1, 2) of space, with their numbers in the order of
     the tour where these are few enough to be read."""
     columns = list(axes)

@@ -21,7 +21,8 @@ from netsp.model.bound_scope import LowerBound, Scope, above_shortest
 from netsp.model.solution import Status
 from netsp.plan.space.judge import verify_mission
 from netsp.view.pictures import style
-from netsp.view.pictures.scene_picture import Stops, figure_of
+from netsp.view.pictures.scene_picture import figure_of
+from netsp.view.pictures.waypoint_marks import WaypointMarks
 from netsp.view.report import briefing, run_page
 from netsp.view.report.page import STYLE
 from netsp.world.mission.mission import Mission
@@ -88,7 +89,7 @@ def page(mission: Mission, scene: Scene, run: Path | None) -> str:
     line = _line(mission, rows)
     left = tuple(int(w["waypoint"]) for w in summary.get("left_out", ()))
     left = left or tuple(range(_stops(mission), len(mission.waypoints))) * (run is None)
-    stops = Stops(mission.places, left, mission.anchor, visited=run is not None)
+    stops = WaypointMarks(mission.places, left, mission.anchor, visited=run is not None)
     parts += ["<h2>Pictures</h2>", _picture(scene, line, mission.name, stops)]
     if run is not None and (run / "run.html").exists():
         parts.append(
@@ -187,7 +188,7 @@ def _planned(tour: PlannedTour, mission: Mission, unit: str) -> str:
     )
 
 
-def _picture(scene: Scene, line: Floats, name: str, stops: Stops) -> str:
+def _picture(scene: Scene, line: Floats, name: str, stops: WaypointMarks) -> str:
     """A figure as an image: drawn as lines, the triangles of a mesh would take megabytes."""
     out = io.BytesIO()
     style.literal(figure_of(scene, line, name, stops)).savefig(out, format="png", dpi=110)

@@ -1,0 +1,41 @@
+"""Waypoints of a mission as pictures mark them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from netsp.base.arrays import Floats
+
+
+@dataclass(frozen=True)
+class WaypointMarks:
+    """Waypoints of a mission, and what is marked of them.
+
+    Parameters
+    ----------
+    places : ndarray, shape (n, 3)
+        Waypoints, metres.
+    left_out : tuple of int
+        Indices of the waypoints that are not visited.
+    anchor : (x, y, z) or None
+        Anchor of the tether, drawn where no tether is.
+    visited : bool
+        Whether the waypoints that are not left out have been visited; otherwise they are planned.
+    """
+
+    places: Floats
+    left_out: tuple[int, ...] = ()
+    anchor: tuple[float, float, float] | None = None
+    visited: bool = False
+
+    @property
+    def name(self) -> str:
+        """Name in the legend of the waypoints that are not left out."""
+        return "waypoint visited" if self.visited else "waypoint"
+
+    @property
+    def every_place(self) -> Floats:
+        """All marked places, shape (m, 3), metres."""
+        return self.places if self.anchor is None else np.vstack([self.places, self.anchor])
