@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from netsp.base.number_ranges import check_not_negative, check_positive, check_shares
 from netsp.gtsp.dp.handover import Handover
+from netsp.gtsp.gtsp_policy import GtspPolicy
 
 
 @dataclass(frozen=True)
@@ -439,6 +440,8 @@ class MipPolicy:
         Time of the bounds before the proof.
     cuts, pricing, schedule, lp, branching, covers, goals, merging
         Policies of the parts.
+    gtsp
+        Policy of costs, searches and walks (`SearchingRun.gtsp_policy`).
     """
 
     many_goals: int = 100
@@ -463,6 +466,7 @@ class MipPolicy:
     covers: CoverPolicy = CoverPolicy()
     goals: GoalBoundPolicy = GoalBoundPolicy()
     merging: MergingPolicy = MergingPolicy()
+    gtsp: GtspPolicy = field(default_factory=GtspPolicy)
 
     def __post_init__(self) -> None:
         check_not_negative(self)
