@@ -19,7 +19,7 @@ from nbconvert.preprocessors import ExecutePreprocessor
 ROOT = Path(__file__).parents[2]
 BESIDE = {"problems.md": "problems/README.md", "scenes.md": "scenes/README.md"}
 EXAMPLES = ROOT / "examples"
-FORMATS, LICENCES = "<!-- formats -->", "<!-- licences -->"
+FORMATS, LICENCES, MODULES = "<!-- formats -->", "<!-- licences -->", "<!-- modules -->"
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -59,6 +59,9 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     if LICENCES in markdown:
         hook = runpy.run_path(str(Path(__file__).with_name("licences.py")))
         markdown = markdown.replace(LICENCES, "\n".join(hook["table"]()))
+    if MODULES in markdown:
+        hook = runpy.run_path(str(Path(__file__).with_name("modules.py")))
+        markdown = markdown.replace(MODULES, "\n".join(hook["module_list"]()))
     return markdown
 
 
