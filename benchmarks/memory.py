@@ -41,7 +41,7 @@ class Outcome:
 def measured(problem: Problem, limit: float, *, until_rows: bool = False) -> Outcome:
     """What `auto` does in so many seconds, or until it is known which legs are left."""
     legs = []
-    find = overgoals.survivors
+    find = overgoals.surviving_legs
 
     def noted(graph, *args):
         rows = find(graph, *args)
@@ -50,11 +50,11 @@ def measured(problem: Problem, limit: float, *, until_rows: bool = False) -> Out
             raise KeyboardInterrupt  # gives the best tour so far
         return rows
 
-    overgoals.survivors = noted
+    overgoals.surviving_legs = noted
     try:
         found = solve(problem, time_limit=limit)
     finally:
-        overgoals.survivors = find
+        overgoals.surviving_legs = find
     peak = highest()
     return Outcome(
         len(problem.goals), len(travel_graph(problem)), legs[0] if legs else 100.0, peak,

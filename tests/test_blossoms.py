@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp.mip.blossoms import best_teeth, blossom_cuts, shrunk
+from netsp.mip.blossoms import best_teeth, blossom_cuts, cluster_flows
 from netsp.mip.cbc_program import CbcInteger, CbcRelaxation
 from netsp.mip.cuts import Cut, cut_coefficients
 from netsp.mip.deadlegs import DeadLegs
@@ -54,7 +54,7 @@ def tours_as_points(chance, graph, legs, count=30):
 
 
 def test_the_prism_of_halves_is_cut():
-    cuts = blossom_cuts(shrunk(PRISM, HALVES, np.arange(6)), np.arange(6))
+    cuts = blossom_cuts(cluster_flows(PRISM, HALVES, np.arange(6)), np.arange(6))
     assert cuts
     for cut in cuts:
         assert cut.teeth == ((0, 3), (1, 4), (2, 5))

@@ -78,9 +78,9 @@ def test_branching_alone_finds_the_shortest_tour_and_proves_it(seed, start, cuts
 
 def _as_it_is(run, costs, point, *, whole):
     """Take a point that is a tour for one, without a search that would find better."""
-    from netsp.mip.subtours import tour_from
+    from netsp.mip.subtours import cycles_of
 
-    cycles = tour_from(point.x, point.legs, point.y)
+    cycles = cycles_of(point.x, point.legs, point.y)
     if whole and len(cycles) == 1:
         run.update_incumbent(costs.vertices[cycles[0]].tolist())
 

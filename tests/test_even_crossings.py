@@ -21,8 +21,8 @@ from netsp.gtsp.travel.costs import CostTable
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.parity_distances import WaysByParity
 from netsp.mip import root
-from netsp.mip.cover_costs import OverClasses, OverWays
-from netsp.mip.covers import climb
+from netsp.mip.cover_costs import ClassCovers, PathCovers
+from netsp.mip.covers import refine_covers
 from netsp.mip.cuts import Cut, cut_coefficients
 from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.goal_relaxation import bound_over_goals
@@ -153,8 +153,8 @@ def towers(seed):
     """Covers below the classes of a small world, and below its ways."""
     graph = travel_graph(small(seed, tether_length=150.0))
     odd = odd_letters(graph.signatures)
-    classes = OverClasses(graph.costs, graph.cluster, odd)
-    return graph, odd, classes, OverWays(graph.ways_by_parity(), np.inf)
+    classes = ClassCovers(graph.costs, graph.cluster, odd)
+    return graph, odd, classes, PathCovers(graph.ways_by_parity(), np.inf)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -181,7 +181,7 @@ def test_bounds_of_covers_hold_and_what_they_rule_out_is_in_no_best_tour(seed):
     least = bound_over_goals(graph, proven_goals, Limits()).bound
     stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour]
     for tower in both:
-        found = climb(tower, stops, best.length * 1.02, Clock(), Limits())
+        found = refine_covers(tower, stops, best.length * 1.02, Clock(), Limits())
         assert least * (1.0 - 1e-6) <= found.bound <= best.length * 1.02
         own = found.cells.of(graph.cluster, odd)[list(best.tour)]
         assert found.alive[own].all()
@@ -190,8 +190,8 @@ def test_bounds_of_covers_hold_and_what_they_rule_out_is_in_no_best_tour(seed):
             # as bounds over classes, from the dual values of the cells
             own = found.cells.of(graph.cluster, odd)
             prices = Prices(
-                costs_of(graph), DeadLegs.of(graph.costs), graph.cluster, found.cuts_over(own),
-                found.duals_over(own),
+                costs_of(graph), DeadLegs.of(graph.costs), graph.cluster, found.lifted_cuts(own),
+                found.lifted_duals(own),
             )  # fmt: skip
             assert prices.bound <= best.length * (1.0 + 1e-9)
 
@@ -218,11 +218,11 @@ def test_two_sheets_know_that_a_ring_around_an_obstacle_is_no_tour(kind):
     best, odd = solve_graph(graph, "auto"), odd_letters(graph.signatures)
     assert bound_over_goals(graph, proven_goals, Limits()).bound < 0.9 * best.length
     tower = (
-        OverClasses(graph.costs, graph.cluster, odd) if kind == "classes"
-        else OverWays(graph.ways_by_parity(), np.inf)
+        ClassCovers(graph.costs, graph.cluster, odd) if kind == "classes"
+        else PathCovers(graph.ways_by_parity(), np.inf)
     )  # fmt: skip
     stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour]
-    found = climb(tower, stops, best.length, Clock(), Limits())
+    found = refine_covers(tower, stops, best.length, Clock(), Limits())
     assert found.cells.obstacles == (0,)
     assert found.bound == pytest.approx(best.length, rel=1e-5)
 
@@ -235,7 +235,7 @@ def test_covers_in_between_prove_the_same(seed, most, monkeypatch):
     whole, seen = solve(travel_graph(problem)), []
 
     def on_cover_bound(*args, **more):
-        seen.append(climb(*args, **more))
+        seen.append(refine_covers(*args, **more))
         return seen[-1]
 
     monkeypatch.setattr("netsp.mip.goal_relaxation.climb", on_cover_bound)
@@ -305,7 +305,7 @@ def share_of_covers(goals, classes):
     cluster = np.sort(np.append(np.arange(goals + 1), np.ones(classes - goals - 1, dtype=int)))
     costs = CostTable(np.broadcast_to(1.0, (classes, classes)), cluster)
     graph = TravelGraph(cluster, [()] * classes, np.ones(classes), costs)
-    return sys.modules["netsp.mip.mip_solver"].MipRun(graph)._cells_share
+    return sys.modules["netsp.mip.mip_solver"].MipRun(graph)._cover_time_share
 
 
 def test_covers_have_more_of_the_time_the_more_classes_there_are():
@@ -340,7 +340,7 @@ def test_more_obstacles_than_a_word_of_the_machine_has_bits():
     rows = np.array([[1 << 63, 1], [0, 1 << 5]], dtype=np.uint64)
     ways = WaysByParity(np.array([(0, 1), (0, 2)]), rows, np.array([1.0, 2.0]), 9.0, 70)
     assert [np.flatnonzero(o).tolist() for o in ways.odd_of(np.arange(2))] == [[63, 64], [69]]
-    cells = OverWays(ways, np.inf).cells((64, 69))
+    cells = PathCovers(ways, np.inf).cells((64, 69))
     assert list(zip(cells.cluster, cells.code, strict=True)) == [(0, 0), (1, 1), (2, 2)]
 
 
@@ -381,15 +381,17 @@ def test_covers_that_are_stopped_keep_what_they_have_proven(press, monkeypatch):
     graph, odd, tower, _ = towers(2)
     best, clock = solve_graph(graph, "auto"), Clock()
     stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour]
-    relaxed, heard = root.Root._relaxed, []
+    relaxed, heard = root.Root._solve_lp, []
 
     def stopping(self):
         if heard and len(self.costs) > graph.goal_count + 1:
             raise press
         return relaxed(self)
 
-    monkeypatch.setattr(root.Root, "_relaxed", stopping)
-    found = climb(tower, stops, 1.5 * best.length, clock, Limits(), lambda *b: heard.append(b))
+    monkeypatch.setattr(root.Root, "_solve_lp", stopping)
+    found = refine_covers(
+        tower, stops, 1.5 * best.length, clock, Limits(), lambda *b: heard.append(b)
+    )
     assert len(heard) >= 1
     assert found.bound == heard[-1][0] > 0.0
     assert clock.up == (press is KeyboardInterrupt)

@@ -26,7 +26,7 @@ from netsp.gtsp.limits import Limits
 from netsp.gtsp.search import Instance, Search
 from netsp.mip.flows import min_cuts
 from netsp.mip.mip_solver import MipRun
-from netsp.mip.subtours import branches
+from netsp.mip.subtours import cover_branches
 from netsp.roadmap.slits import _taut, build_slits, slit_lengths
 from netsp.roadmap.taut import TautRoadmap
 from tests.brute import brute_tour
@@ -178,7 +178,7 @@ def test_the_clusters_with_a_cut_below_enough_are_those_of_networkx(seed):
 
 def test_branches_are_the_prefixes_of_words():
     words = [(), (1,), (1, 2), (1, 2, 3), (-1,), (-1, 2)]
-    found = {tuple(np.flatnonzero(row).tolist()) for row in branches(words)}
+    found = {tuple(np.flatnonzero(row).tolist()) for row in cover_branches(words)}
     assert found == {(1, 2, 3), (2, 3), (4, 5)}
 
 

@@ -17,7 +17,7 @@ from netsp.base.errors import InputError
 from netsp.command.main import main
 from netsp.gtsp.gtsplib import load
 from netsp.gtsp.search.lns_solver import solve as lns
-from netsp.mip.goal_relaxation import bound_at_once
+from netsp.mip.goal_relaxation import bound_by_one_trees
 from netsp.model.solution import Status
 from netsp.view.pictures.gtsp_picture import draw_gtsp
 
@@ -316,7 +316,7 @@ def test_the_bound_of_no_time_holds_where_legs_are_missing():
     costs[ring, np.roll(ring, 1)] = costs[np.roll(ring, 1), ring] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
     costs[0, 3] = costs[3, 0] = 1.0
     graph = TravelGraph.from_costs(costs, range(6))
-    bound_at_once(graph)
+    bound_by_one_trees(graph)
     assert 10.0 < graph.bound_in_any_class <= 21.0
 
 

@@ -15,9 +15,9 @@ from netsp.gtsp.limits import Limits
 from netsp.gtsp.nearest_index import NearestIndex
 from netsp.gtsp.sparse_costs import SparseCosts
 from netsp.mip import goal_relaxation
-from netsp.mip.cost_fixing import longest_legs, survivors
-from netsp.mip.cover_costs import OverClasses, OverWays
-from netsp.mip.covers import climb
+from netsp.mip.cost_fixing import max_leg_costs, surviving_legs
+from netsp.mip.cover_costs import ClassCovers, PathCovers
+from netsp.mip.covers import refine_covers
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.parity_cuts import odd_letters
@@ -194,18 +194,18 @@ def over_ways(seed):
 
     def finer(over, length):
         seen.append((over, length))
-        rows = survivors(graph, over, length, best.tour, odd)
-        return OverClasses(rows, graph.cluster, odd)
+        rows = surviving_legs(graph, over, length, best.tour, odd)
+        return ClassCovers(rows, graph.cluster, odd)
 
     length = 1.02 * best.length
-    found = climb(OverWays(ways, np.inf), stops, length, Clock(), Limits(), finer=finer)
+    found = refine_covers(PathCovers(ways, np.inf), stops, length, Clock(), Limits(), finer=finer)
     return graph, best, odd, seen, found
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_covers_go_on_where_a_cell_has_no_class_left(seed, monkeypatch):
     monkeypatch.setattr("netsp.mip.covers.COARSE", 2)
-    emptied, find = [], survivors
+    emptied, find = [], surviving_legs
 
     def fewer(graph, over, length, tour, odd):
         rows = find(graph, over, length, tour, odd)
@@ -250,13 +250,13 @@ def test_no_leg_of_a_better_tour_is_let_go(seed, monkeypatch):
     graph, best, odd, seen, found = over_ways(seed)
     ((over, length),) = seen
     assert over.bound < length
-    rows = survivors(graph, over, length, NO_TOUR, odd)
+    rows = surviving_legs(graph, over, length, NO_TOUR, odd)
     left = matrix_of(rows)
     assert np.isfinite(left).sum() < np.isfinite(graph.costs).sum()
     gone = np.argwhere(np.triu(np.isinf(left) & np.isfinite(graph.costs)))
     own = over.cells.of(graph.cluster, odd)
     u, v = gone.T
-    excess = graph.costs[u, v] - longest_legs(over, length)[own[u], own[v]]
+    excess = graph.costs[u, v] - max_leg_costs(over, length)[own[u], own[v]]
     assert (excess > 0.0).all()
     shortest = shortest_along(graph)
     assert shortest.min() == pytest.approx(best.length)
@@ -270,7 +270,7 @@ def test_no_leg_of_a_better_tour_is_let_go(seed, monkeypatch):
 def test_what_a_leg_may_cost_is_no_less_than_it_costs_in_tours_as_short(seed):
     graph, best, odd, seen, _ = over_ways(seed)
     for over, length in seen:
-        longest = longest_legs(over, length)
+        longest = max_leg_costs(over, length)
         own = over.cells.of(graph.cluster, odd)
         tour = np.array(best.tour)
         cost = graph.costs[tour, np.roll(tour, 1)]
@@ -374,7 +374,7 @@ def test_legs_in_blocks_are_those_rounded_and_ways_no_longer(kind, monkeypatch):
     ways = graph.ways_by_parity()
     assert graph.knows_ways
     odd = odd_letters(graph.signatures, ways.obstacles)
-    tower = OverWays(ways, np.inf)
+    tower = PathCovers(ways, np.inf)
     cells = tower.cells(tuple(range(ways.obstacles)))
     own = cells.of(graph.cluster, odd)
     assert (own >= 0).all()

@@ -13,7 +13,7 @@ from netsp import travel_graph
 from netsp.base.clock import Clock
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.searching import SearchingRun
-from netsp.mip.merging import classes_of, merge, merged
+from netsp.mip.merging import merge, merged_tour, visited_classes
 from netsp.mip.mip_solver import solve_merged
 from netsp.plan.random_worlds import random_world
 from tests.brute import brute_tour
@@ -34,7 +34,7 @@ def some_tours(graph, chance, count):
 def test_it_is_the_shortest_through_their_classes(seed, count, chance):
     graph = random_graph(seed, 5, most=3)
     tours = some_tours(graph, chance, count)
-    found = merged(graph, tours, solve_merged, Limits())
+    found = merged_tour(graph, tours, solve_merged, Limits())
     classes = np.unique(np.concatenate(tours))
     assert set(found) <= set(classes.tolist())
     least = brute_tour(graph.subgraph(classes))
@@ -48,10 +48,10 @@ def test_searches_from_the_start_give_different_tours_and_the_merged_is_no_longe
     assert len(tours) == 6
     assert len({round(graph.tour_length(t), 6) for t in tours}) > 1
     assert run.length == pytest.approx(min(graph.tour_length(t) for t in tours))
-    found = merged(graph, tours, solve_merged, Limits())
+    found = merged_tour(graph, tours, solve_merged, Limits())
     assert graph.is_tour(found)
     assert graph.tour_length(found) < 0.995 * run.length
-    assert merged(graph, [], solve_merged, Limits()) is None
+    assert merged_tour(graph, [], solve_merged, Limits()) is None
     # the best one is among them from then on
     assert run.search_afresh(1, Clock())[0] == run.tour
     assert run.search_afresh(1, Clock(0.0)) == [run.tour]
@@ -62,7 +62,7 @@ def test_tours_of_very_many_classes_are_merged_by_a_program_that_merges_nothing(
     monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "MANY_CLASSES", 2)
     monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "MANY_GOALS", 2)
     tours = some_tours(graph, random.Random(0), 4)
-    found = merged(graph, tours, solve_merged, Limits(Clock(60.0)))
+    found = merged_tour(graph, tours, solve_merged, Limits(Clock(60.0)))
     assert graph.is_tour(found)
 
 
@@ -96,7 +96,7 @@ def test_what_searches_end_in_is_merged_once_where_goals_are_many(monkeypatch):
 def test_a_merged_tour_that_a_bound_may_have_ruled_out_is_not_taken():
     graph = random_graph(0, 5, most=3)
     tours = some_tours(graph, random.Random(0), 6)
-    best = brute_tour(graph.subgraph(classes_of(tours)))
+    best = brute_tour(graph.subgraph(visited_classes(tours)))
     for above, taken in ((0.5, True), (-1e-9, False)):
         run = SearchingRun(graph, Limits())
         run.known_length = best + above
@@ -115,7 +115,7 @@ def test_the_classes_of_a_hundred_goals_hold_a_shorter_tour_than_their_legs():
     graph = travel_graph(random_world(3, goals=100, tether_length=300.0))
     run = SearchingRun(graph, Limits(rng=np.random.default_rng(0)), search_rounds=500)
     tours = run.search_afresh(3, Clock())
-    found = merged(graph, tours, solve_merged, Limits())
+    found = merged_tour(graph, tours, solve_merged, Limits())
     legs = {frozenset(leg) for t in tours for leg in zip(t, np.roll(t, -1).tolist(), strict=True)}
     new = {frozenset(leg) for leg in zip(found, np.roll(found, -1).tolist(), strict=True)} - legs
     assert new

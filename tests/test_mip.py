@@ -27,14 +27,14 @@ from netsp.mip import solve as mip
 from netsp.mip.cbc_program import CbcRelaxation
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs, not_dead
-from netsp.mip.flows import joined
-from netsp.mip.goal_relaxation import best_tree
+from netsp.mip.flows import contracted
+from netsp.mip.goal_relaxation import one_tree_bound
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.lagrangian_bound import exact_bound
 from netsp.mip.mip_solver import Params
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
-from netsp.mip.reducedcosts import reduced_row
+from netsp.mip.reducedcosts import reduced_costs_at
 from netsp.mip.subtours import (
     VIOLATION,
     components,
@@ -313,9 +313,9 @@ def test_goals_joined_by_whole_edges_hide_no_violated_set(seed, goals, mixed):
 def test_strings_of_whole_edges_are_joined_and_the_base_to_nothing():
     tail, head = np.array([0, 1, 2, 3, 4, 5]), np.array([1, 2, 3, 4, 5, 0])
     capacity = np.array([1.0, 1.0, 1.0, 0.5, 1.0, 1.0])
-    assert joined(6, tail, head, capacity, 0).tolist() == [0, 1, 1, 1, 2, 2]
+    assert contracted(6, tail, head, capacity, 0).tolist() == [0, 1, 1, 1, 2, 2]
     # 0.5 is all that others of either carry, but not of both
-    pair = joined(4, np.array([0, 1, 2, 1]), np.array([1, 2, 3, 3]), np.full(4, 0.5), 0)
+    pair = contracted(4, np.array([0, 1, 2, 1]), np.array([1, 2, 3, 3]), np.full(4, 0.5), 0)
     assert pair.tolist() == [0, 1, 2, 2]
 
 
@@ -347,7 +347,7 @@ def row_prices(prices):
     out = np.full((n, n), np.inf)
     other, price, room = np.empty(n, np.int64), np.empty(n), np.zeros(max(n, len(terms.weight)))
     for u in range(n):
-        count = reduced_row(u, terms, other, price, room)
+        count = reduced_costs_at(u, terms, other, price, room)
         out[u, other[:count]] = price[:count]
         assert not room.any()
     return out
@@ -496,14 +496,14 @@ def test_legs_that_an_lp_uses_are_measured_and_no_others(monkeypatch):
 
 def test_no_leg_comes_into_an_lp_that_is_only_bounded(monkeypatch):
     seen = []
-    few = root.Root._a_few
+    few = root.Root._few_per_vertex
 
     def note(self, legs, price):
         if self.costs.exact is not None and len(legs):
             seen.append(bool(self.costs.exact[legs[:, 0], legs[:, 1]].all()))
         return few(self, legs, price)
 
-    monkeypatch.setattr(root.Root, "_a_few", note)
+    monkeypatch.setattr(root.Root, "_few_per_vertex", note)
     monkeypatch.setattr(TravelGraph, "legs_at_once", False)
     assert solve(travel_graph(far_world(0, goals=5, tether_length=500.0))).status is Status.OPTIMAL
     assert seen
@@ -645,7 +645,7 @@ def test_a_one_tree_is_no_longer_than_any_tour(numbers, n, hurried):
         sum(lengths[a, b] for a, b in itertools.pairwise((0, *order, 0)))
         for order in itertools.permutations(range(1, n))
     )
-    assert 0.0 <= best_tree(lengths, lambda: hurried) <= best * (1 + 1e-9) + 1e-9
+    assert 0.0 <= one_tree_bound(lengths, lambda: hurried) <= best * (1 + 1e-9) + 1e-9
 
 
 def test_one_trees_come_near_the_tour_of_many_places():
@@ -654,7 +654,7 @@ def test_one_trees_come_near_the_tour_of_many_places():
     apart = lengths + np.diag(np.full(60, np.inf))
     tour = solve(TravelGraph.from_costs(apart, range(60)))
     assert tour.status is Status.OPTIMAL
-    assert best_tree(lengths, lambda: False) >= 0.97 * tour.length
+    assert one_tree_bound(lengths, lambda: False) >= 0.97 * tour.length
 
 
 def test_between_goals_straight_lines_bound_legs_when_there_is_no_time():
@@ -691,7 +691,7 @@ def test_ctrl_c_in_a_proof_over_goals_ends_the_proof_over_classes_too(monkeypatc
         calls.append(len(self.costs))
         press()
 
-    monkeypatch.setattr(root.Root, "_relaxed", relaxed)
+    monkeypatch.setattr(root.Root, "_solve_lp", relaxed)
     monkeypatch.setattr(searching, "LARGER", 2)
     found = solve(graph)
     assert calls == [9]  # base and goals
@@ -717,9 +717,11 @@ def test_what_is_done_with_thousands_of_classes_only_proves_the_same_with_hundre
     monkeypatch.setattr(root, "LEAN_EVERY", 1)
     monkeypatch.setattr(root, "SETTLE", 0.05)
     left = []
-    drop = root.Root._drop_dear
+    drop = root.Root._drop_expensive_legs
     monkeypatch.setattr(
-        root.Root, "_drop_dear", lambda self, *more: (drop(self, *more), left.append(self))
+        root.Root,
+        "_drop_expensive_legs",
+        lambda self, *more: (drop(self, *more), left.append(self)),
     )
     lean = solve(travel_graph(problem))
     assert left

@@ -13,7 +13,7 @@ from netsp.gtsp.limits import Limits
 from netsp.gtsp.solver_run import Stop
 from netsp.mip import covers
 from netsp.mip.cover_bounds import Cells
-from netsp.mip.cover_refinement import Splits, frustration
+from netsp.mip.cover_refinement import CoverRefinement, frustration
 from netsp.mip.root import Root
 from tests.test_even_crossings import towers
 
@@ -80,7 +80,7 @@ def test_legs_by_parity_are_those_between_sides_of_the_cover_above(seed):
             (a, b) for a, b in itertools.combinations(range(m), 2)
             if cells.cluster[a] != cells.cluster[b]
         ])  # fmt: skip
-        found = tower.by_parity(cells, ends)
+        found = tower.costs_by_parity(cells, ends)
         np.testing.assert_array_equal(
             found.min(axis=2), np.repeat(tower.costs(cells)[*ends.T], tower.obstacles).reshape(
                 len(ends), -1
@@ -110,7 +110,7 @@ class TwoObstacles:
         codes = np.tile(np.arange(1 << len(obstacles)), 3)
         return Cells(obstacles, np.insert(goals, 0, 0), np.insert(codes, 0, 0))
 
-    def by_parity(self, cells, ends):
+    def costs_by_parity(self, cells, ends):
         out = np.empty((len(ends), 3, 2))
         out[:] = 1.0, 4.0
         out[-1, 1] = 4.0, 1.0
@@ -120,10 +120,12 @@ class TwoObstacles:
 def test_the_obstacle_that_a_point_goes_around_is_told_apart_first():
     tower = TwoObstacles()
     ring = np.array([(1, 2), (2, 3), (1, 3)])
-    splits = Splits(tower, growth=1.3, most=100)
+    splits = CoverRefinement(tower, growth=1.3, most=100)
     assert splits.after(tower.cells(()), ring, np.ones(3), gap=10.0) == [1]
     # with no more cells than there may be
-    assert Splits(tower, 1.3, most=6).after(tower.cells(()), ring, np.ones(3), gap=10.0) == []
+    assert (
+        CoverRefinement(tower, 1.3, most=6).after(tower.cells(()), ring, np.ones(3), gap=10.0) == []
+    )
     # what promised once is believed after a point that goes around nothing
     assert splits.after(tower.cells((0,)), ring[:2], np.ones(2), gap=10.0) == [1]
 
@@ -153,14 +155,14 @@ def test_a_better_tour_that_is_told_is_gone_on_with(seed, much, monkeypatch):
         return stops(best), told_length
 
     monkeypatch.setattr(covers, "_Level", Noted)
-    found = covers.climb(tower, stops(other), given, Clock(), Limits(), told)
+    found = covers.refine_covers(tower, stops(other), given, Clock(), Limits(), told)
     assert levels[0].run.length == given
     assert len(levels) > 1
     for level in levels[1:]:
         tour, length = (best, told_length) if much else (other, given)
         assert level.run.length == length
         own = level.cells.of(graph.cluster, odd)[tour]
-        assert level.own_tour.tolist() == own.tolist()
+        assert level.cell_tour.tolist() == own.tolist()
     assert found.bound <= length * (1.0 + 1e-9)
 
 
@@ -176,5 +178,7 @@ def test_a_cover_that_has_proven_nothing_tells_nothing(monkeypatch):
         return price(self, *args, **more)
 
     monkeypatch.setattr(Root, "_price", priced)
-    covers.climb(tower, stops, 1.5 * best.length, clock, Limits(), lambda *a: heard.append(a))
+    covers.refine_covers(
+        tower, stops, 1.5 * best.length, clock, Limits(), lambda *a: heard.append(a)
+    )
     assert len(heard) == 1

@@ -16,9 +16,9 @@ from netsp.gtsp.solver_run import RunStopped
 from netsp.mip import root
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs
-from netsp.mip.lp_warm_start import Warm
+from netsp.mip.lp_warm_start import WarmStart
 from netsp.mip.mip_solver import MipRun
-from netsp.mip.parity_paths import beyond, ways_from_base
+from netsp.mip.parity_paths import beyond, paths_from_base
 from netsp.mip.prices import Prices
 from netsp.mip.program import Duals, duals_of_relaxation
 from netsp.mip.reducedcosts import reduced_costs
@@ -48,7 +48,7 @@ def test_no_tour_pays_less_than_the_ways_to_its_vertices_and_along_its_legs(seed
     )
     prices = Prices(costs_of(graph), DeadLegs.of(graph.costs), graph.cluster, cuts, duals)
     terms, excess = prices._terms, prices._cost - prices._cheapest[graph.cluster]
-    way, other, before = ways_from_base(terms, excess, np.inf)
+    way, other, before = paths_from_base(terms, excess, np.inf)
     lengths, least = [], []
     for tour in tours_of(graph):
         legs = np.column_stack([tour, np.roll(tour, -1)])
@@ -150,7 +150,7 @@ def test_cuts_of_a_core_keep_their_sides_there_and_never_hold_the_base():
         cuts.append(Cut(inside, c))
         whole = np.isin(graph.cluster[core], rng.choice(12, 3, replace=False) + 1)
         cuts.append(replace(cuts[-1], inside=whole, cluster=-1, teeth=((1, 2), (3, 4), (5, 6))))
-    wide = Warm(core, np.zeros((0, 2), np.int64), cuts, core).cuts_over(CostMatrix(graph))
+    wide = WarmStart(core, np.zeros((0, 2), np.int64), cuts, core).lifted_cuts(CostMatrix(graph))
     own = {(c.inside.tobytes(), c.cluster) for c in cuts}
     assert {(c.inside[core].tobytes(), c.cluster) for c in wide} == own
     assert len(own) < len(wide) < 2 * len(own)

@@ -149,8 +149,8 @@ def steps() -> Iterator[Step]:
     from netsp.gtsp.sparse_costs import SparseCosts
     from netsp.gtsp.travel.graph import TravelGraph
     from netsp.judge import verify
-    from netsp.mip.cover_costs import OverClasses, OverWays
-    from netsp.mip.covers import climb
+    from netsp.mip.cover_costs import ClassCovers, PathCovers
+    from netsp.mip.covers import refine_covers
     from netsp.mip.deadlegs import DeadLegs
     from netsp.mip.parity_cuts import odd_letters
     from netsp.mip.prices import Prices
@@ -197,10 +197,10 @@ def steps() -> Iterator[Step]:
         rows.add_above(none, np.zeros((1, 1), dtype=bool))
         rows.nearest_legs(1)
         odd = odd_letters(graph.signatures)
-        tower = OverClasses(rows, graph.cluster, odd)
+        tower = ClassCovers(rows, graph.cluster, odd)
         cells = tower.cells(())
         tower.costs(cells)
-        tower.by_parity(cells, np.array([[0, 1]]))
+        tower.costs_by_parity(cells, np.array([[0, 1]]))
         for held in DeadLegs.of(costs), rows:
             prices = Prices(costs, held, graph.cluster, [], duals)
             prices.room(1.0)
@@ -219,8 +219,8 @@ def steps() -> Iterator[Step]:
         odd, ways = odd_letters(graph.signatures), graph.ways_by_parity()
         assert ways is not None
         stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour or ()]
-        for tower in OverClasses(graph.costs, graph.cluster, odd), OverWays(ways, np.inf):
-            climb(tower, stops, 1.02 * best.length, Clock(), Limits())
+        for tower in ClassCovers(graph.costs, graph.cluster, odd), PathCovers(ways, np.inf):
+            refine_covers(tower, stops, 1.02 * best.length, Clock(), Limits())
 
     yield "covers", covered
 

@@ -24,7 +24,7 @@ LEVELS = (1e-6, 0.05, 0.15, 0.3)
 """A pair of clusters counts as fractional between such a level and one less it."""
 
 
-def shrunk(legs: Ints, y: Floats, cluster: Ints) -> Floats:
+def cluster_flows(legs: Ints, y: Floats, cluster: Ints) -> Floats:
     """(m + 1, m + 1) symmetric sums of y between clusters."""
     m = int(cluster.max()) + 1
     out = np.zeros((m, m))
@@ -32,7 +32,7 @@ def shrunk(legs: Ints, y: Floats, cluster: Ints) -> Floats:
     return np.asarray(out + out.T)
 
 
-def handles(between: Floats, least: int) -> list[Bools]:
+def fractional_components(between: Floats, least: int) -> list[Bools]:
     """Components of what is fractional between so many clusters or more, at several levels."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -49,9 +49,9 @@ def handles(between: Floats, least: int) -> list[Bools]:
 
 
 def blossom_cuts(between: Floats, cluster: Ints) -> list[Cut]:
-    """Violated 2-matching inequalities, the most violated first; `between` as of `shrunk`."""
+    """Return the violated 2-matching inequalities of `cluster_flows`, the most violated first."""
     found = []
-    for handle in handles(between, 3):
+    for handle in fractional_components(between, 3):
         violation, teeth = best_teeth(between, handle)
         if violation > VIOLATION and len(teeth) >= 3:
             found.append((violation, Cut(handle[cluster], -1, teeth)))

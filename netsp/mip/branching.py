@@ -24,7 +24,7 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.gtsp.solver_run import RunStopped
-from netsp.mip.blossoms import shrunk
+from netsp.mip.blossoms import cluster_flows
 from netsp.mip.cuts import Cut
 from netsp.mip.legprices import LegPrices
 from netsp.mip.program import Point, WarmRelaxation
@@ -240,7 +240,7 @@ class Tree:
         self, point: Point, alive: Bools, together: tuple[tuple[int, int], ...]
     ) -> Iterator[Choice]:
         """Pairs of clusters that follow each other or do not, vertices that are visited or not."""
-        between = np.triu(shrunk(point.legs, point.y, self.cluster), 1)
+        between = np.triu(cluster_flows(point.legs, point.y, self.cluster), 1)
         for g, h in together:
             between[g, h] = 0.0  # a pair is charged once
         for g, h in _most_open(between, PAIRS):

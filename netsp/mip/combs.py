@@ -18,7 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
-from netsp.mip.blossoms import VIOLATION, handles
+from netsp.mip.blossoms import VIOLATION, fractional_components
 from netsp.mip.cuts import Cut
 from netsp.mip.program import Point
 
@@ -78,7 +78,7 @@ def comb_cuts(between: Floats, tight: Sequence[Bools], cluster: Ints) -> list[Cu
         to[label, np.arange(len(between))] = 1.0
         flow = to @ between @ to.T
         np.fill_diagonal(flow, 0.0)
-        for handle in handles(flow, 2):
+        for handle in fractional_components(flow, 2):
             violation, pairs = _teeth(flow, handle)
             if violation <= VIOLATION:
                 continue

@@ -16,7 +16,7 @@ import numpy as np
 from netsp.base.arrays import Bools, Floats
 from netsp.gtsp.sparse_costs import SparseCosts
 from netsp.gtsp.travel.graph import TravelGraph
-from netsp.mip.cover_bounds import OverCells
+from netsp.mip.cover_bounds import CellBound
 from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.prices import Prices
 
@@ -24,7 +24,7 @@ ROUNDING = 1e-9
 """Ways are shortest up to this, relative."""
 
 
-def longest_legs(over: OverCells, cutoff: float) -> Floats:
+def max_leg_costs(over: CellBound, cutoff: float) -> Floats:
     """(m, m) what a leg above one between two cells may cost, at most, to be in a tour shorter
     than the cutoff; -inf for nothing.
 
@@ -38,15 +38,15 @@ def longest_legs(over: OverCells, cutoff: float) -> Floats:
     return np.where(np.isinf(costs), 0.0, costs) + prices.room(cutoff) + ROUNDING * cutoff
 
 
-def survivors(
-    graph: TravelGraph, over: OverCells, length: float, tour: Sequence[int], odd: Bools
+def surviving_legs(
+    graph: TravelGraph, over: CellBound, length: float, tour: Sequence[int], odd: Bools
 ) -> SparseCosts:  # fmt: skip
     """The legs among all vertices that may be in a tour as short as one of that length.
 
     Parameters
     ----------
     over
-        As of `longest_legs`.
+        As of `max_leg_costs`.
     tour
         One as short as that, whose legs are kept in any case.
     odd
@@ -58,5 +58,5 @@ def survivors(
         The graph's clock was up before they were measured.
     """
     own = over.cells.of(graph.cluster, odd)
-    longest = longest_legs(over, length)
+    longest = max_leg_costs(over, length)
     return SparseCosts(len(graph), graph.costs_in_blocks(), own, longest, np.asarray(tour))

@@ -48,7 +48,7 @@ class Cells:
 
 
 @dataclass(frozen=True)
-class OverCells:
+class CellBound:
     """What a program over cells has proven.
 
     Attributes
@@ -75,17 +75,17 @@ class OverCells:
     cuts: tuple[Cut, ...]
     duals: Duals
 
-    def cuts_over(self, own: Ints) -> list[Cut]:
+    def lifted_cuts(self, own: Ints) -> list[Cut]:
         """Over vertices that lie in these cells."""
         return [replace(c, inside=c.inside[own]) for c in self.cuts]
 
-    def duals_over(self, own: Ints) -> Duals:
-        """For vertices that lie in these cells, with the cuts of `cuts_over`."""
+    def lifted_duals(self, own: Ints) -> Duals:
+        """For vertices that lie in these cells, with the cuts of `lifted_cuts`."""
         return replace(self.duals, degree=self.duals.degree[own])
 
 
 @dataclass(frozen=True)
-class OverGoals:
+class GoalBound:
     """A bound over goals or cells, and what it rests on.
 
     Attributes
@@ -100,7 +100,7 @@ class OverGoals:
 
     bound: float
     cuts: tuple[Cut, ...] = ()
-    cells: OverCells | None = None
+    cells: CellBound | None = None
 
 
 def packed(odd: Bools, obstacles: Sequence[int]) -> Ints:

@@ -1,7 +1,7 @@
 """The cells of covers, and what legs between them cost: from classes, or from ways.
 
-The cheapest leg between the classes of two cells is one between the cells (`OverClasses`). Where
-there are too many classes the shortest way of any from the one to the other is (`OverWays`,
+The cheapest leg between the classes of two cells is one between the cells (`ClassCovers`). Where
+there are too many classes the shortest way of any from the one to the other is (`PathCovers`,
 `netsp.gtsp.travel.parity_distances`); then a bound holds for classes that a roadmap has left out,
 too.
 """
@@ -19,7 +19,7 @@ from netsp.gtsp.travel.parity_distances import WaysByParity
 from netsp.mip.cover_bounds import Cells, packed
 
 
-class Tower(Protocol):
+class Covers(Protocol):
     """The covers of a problem."""
 
     obstacles: int
@@ -30,12 +30,12 @@ class Tower(Protocol):
     def costs(self, cells: Cells) -> Floats:
         """(m, m) costs between cells, inf within a goal."""
 
-    def by_parity(self, cells: Cells, ends: Ints) -> Floats:
+    def costs_by_parity(self, cells: Cells, ends: Ints) -> Floats:
         """(k, n, 2) costs of the cheapest legs between two cells (k, 2) that write an even, and an
         odd, number of letters of each obstacle; inf, or less, where there is none."""
 
 
-class OverClasses:
+class ClassCovers:
     """Covers below the classes of a travel graph.
 
     Parameters
@@ -58,13 +58,13 @@ class OverClasses:
         self.obstacles = odd.shape[1]
 
     def cells(self, obstacles: tuple[int, ...]) -> Cells:
-        """As of `Tower.cells`."""
+        """As of `Covers.cells`."""
         both = np.column_stack([self._cluster, packed(self._odd, obstacles)])
         both = np.unique(both[self._with_legs], axis=0)
         return Cells(obstacles, *np.ascontiguousarray(both.T))
 
     def costs(self, cells: Cells) -> Floats:
-        """As of `Tower.costs`."""
+        """As of `Covers.costs`."""
         own, order, row = self._members(cells)
         out = np.full((len(cells.cluster), len(cells.cluster)), np.inf)
         if isinstance(self._costs, SparseCosts):
@@ -73,8 +73,8 @@ class OverClasses:
             _least(self._costs, order, row, out)
         return out
 
-    def by_parity(self, cells: Cells, ends: Ints) -> Floats:
-        """As of `Tower.by_parity`."""
+    def costs_by_parity(self, cells: Cells, ends: Ints) -> Floats:
+        """As of `Covers.costs_by_parity`."""
         own, order, row = self._members(cells)
         if isinstance(self._costs, SparseCosts):
             return _least_by_parity_in_rows(self._costs.held, self._odd, own, order, row, ends)
@@ -148,7 +148,7 @@ def _least_by_parity_in_rows(
     return out
 
 
-class OverWays:
+class PathCovers:
     """Covers below whatever classes there are.
 
     Parameters
@@ -171,13 +171,13 @@ class OverWays:
         self._row = np.searchsorted(self._pair[self._order], every).astype(np.int64)
 
     def cells(self, obstacles: tuple[int, ...]) -> Cells:
-        """As of `Tower.cells`."""
+        """As of `Covers.cells`."""
         both = np.column_stack([self._goal, packed(self._at_goal, obstacles)])
         both = np.unique(np.vstack([[[0, 0]], both]), axis=0)
         return Cells(obstacles, *np.ascontiguousarray(both.T))
 
     def costs(self, cells: Cells) -> Floats:
-        """As of `Tower.costs`."""
+        """As of `Covers.costs`."""
         code, ways = packed(self._odd, cells.obstacles), self._ways
         order = np.lexsort((ways.length, code, self._pair))
         pair, code = self._pair[order], code[order]
@@ -192,8 +192,8 @@ class OverWays:
         )
         return costs
 
-    def by_parity(self, cells: Cells, ends: Ints) -> Floats:
-        """As of `Tower.by_parity`."""
+    def costs_by_parity(self, cells: Cells, ends: Ints) -> Floats:
+        """As of `Covers.costs_by_parity`."""
         low = np.minimum(cells.cluster[ends[:, 0]], cells.cluster[ends[:, 1]])
         high = np.maximum(cells.cluster[ends[:, 0]], cells.cluster[ends[:, 1]])
         wanted = cells.code[ends[:, 0]] ^ cells.code[ends[:, 1]]

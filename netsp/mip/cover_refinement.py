@@ -21,7 +21,7 @@ from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.compiled.dynamic_array import order_of
 from netsp.base.compiled.kernel import kernel
 from netsp.mip.cover_bounds import Cells
-from netsp.mip.cover_costs import Tower
+from netsp.mip.cover_costs import Covers
 
 FADES = 0.5
 """Of what an obstacle promised at the cover below, so much is believed: a point goes around it one
@@ -45,7 +45,7 @@ TINY = 1e-12
 
 
 @dataclass
-class Splits:
+class CoverRefinement:
     """The choice of obstacles, cover by cover.
 
     Attributes
@@ -57,7 +57,7 @@ class Splits:
         many cells.
     """
 
-    tower: Tower
+    tower: Covers
     growth: float
     most: int
     _promised: dict[int, float] = field(default_factory=dict)
@@ -83,7 +83,7 @@ class Splits:
         left = [i for i in range(self.tower.obstacles) if i not in own]
         if not left or len(own) >= MOST_OBSTACLES:
             return []
-        lengths = self.tower.by_parity(cells, ends)
+        lengths = self.tower.costs_by_parity(cells, ends)
         least = lengths.min(axis=2, keepdims=True)
         least[np.isinf(least)] = 0.0  # a leg that has none above it says nothing
         excess = y[:, None, None] * np.minimum(lengths - least, gap)

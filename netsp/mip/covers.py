@@ -31,9 +31,9 @@ from netsp.gtsp.searching import SearchingRun
 from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.travel.costs import CostTable
 from netsp.gtsp.travel.graph import TravelGraph
-from netsp.mip.cover_bounds import Cells, OverCells
-from netsp.mip.cover_costs import Tower
-from netsp.mip.cover_refinement import Splits
+from netsp.mip.cover_bounds import CellBound, Cells
+from netsp.mip.cover_costs import Covers
+from netsp.mip.cover_refinement import CoverRefinement
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.root import Root, tour_legs
@@ -53,23 +53,23 @@ PATIENCE = 4
 """Looks at the prices that closed hardly anything of the gap, after which the next cover is
 tried."""
 
-Stops = Sequence[tuple[int, Bools]]
+ParityTour = Sequence[tuple[int, Bools]]
 """A tour: goals, and of which obstacles each word has an odd number of letters."""
 
-Told = Callable[[float, Cells, Ints], tuple[Stops, float] | None]
+OnBound = Callable[[float, Cells, Ints], tuple[ParityTour, float] | None]
 """Hears, after each cover, the bound, its cells, and which of them the program's point visits; may
 give a better tour, with its length, to go on with."""
 
 
-Finer = Callable[[OverCells, float], Tower]
+RefineCosts = Callable[[CellBound, float], Covers]
 """The same covers with dearer legs, given what is proven over the cells of one, and the length of
 the best tour."""
 
 
-def climb(
-    tower: Tower, tour: Stops, length: float, clock: Clock, limits: Limits,
-    told: Told = lambda *_: None, finer: Finer | None = None,
-) -> OverCells | None:  # fmt: skip
+def refine_covers(
+    tower: Covers, tour: ParityTour, length: float, clock: Clock, limits: Limits,
+    told: OnBound = lambda *_: None, finer: RefineCosts | None = None,
+) -> CellBound | None:  # fmt: skip
     """Bound tours cover by cover, until they are proven, there are no more covers or time is up;
     None if there was none for the first.
 
@@ -80,15 +80,15 @@ def climb(
     length
         Of that.
     told
-        See `Told`.
+        See `OnBound`.
     finer
         Gives another tower to go on with after `COARSE` covers.
     """
-    found: OverCells | None = None
+    found: CellBound | None = None
     obstacles: list[int] = []
     before: _Level | None = None
     covers = 0
-    splits = Splits(tower, GROWTH, MOST_CELLS)
+    splits = CoverRefinement(tower, GROWTH, MOST_CELLS)
     try:
         while True:
             level = _Level(tower, tuple(obstacles), tour, length, clock, limits, before)
@@ -134,7 +134,7 @@ class _Level:
     """
 
     def __init__(
-        self, tower: Tower, obstacles: tuple[int, ...], tour: Stops,
+        self, tower: Covers, obstacles: tuple[int, ...], tour: ParityTour,
         length: float, clock: Clock, limits: Limits, before: _Level | None,
     ) -> None:  # fmt: skip
         from netsp.mip.highs import HighsRelaxation  # loads HiGHS
@@ -143,7 +143,7 @@ class _Level:
         self.cells = tower.cells(obstacles)
         costs = self.costs = tower.costs(self.cells)
         own, cuts, legs = self._from(before, costs)
-        self.own_tour = self.cells.of(
+        self.cell_tour = self.cells.of(
             np.array([g for g, _ in tour]), np.array([odd for _, odd in tour])
         )
         cluster = self.cells.cluster
@@ -152,19 +152,19 @@ class _Level:
         )
         # its tours are none: the incumbent is one over classes
         run = self.run = SearchingRun(graph, Limits(clock, rng=limits.rng))
-        run.tour, run.length = tuple(self.own_tour.tolist()), length
+        run.tour, run.length = tuple(self.cell_tour.tolist()), length
         if before is not None:
             run.bound = before.run.bound
         self.root = Root(run, CostMatrix(graph), HighsRelaxation, lambda *_: None)
         self.root.patience = PATIENCE
         if before is not None:
-            all_legs = np.vstack([legs, tour_legs(self.own_tour)])
+            all_legs = np.vstack([legs, tour_legs(self.cell_tour)])
             all_legs = np.unique(np.sort(all_legs, axis=1), axis=0)
             all_legs = all_legs[np.isfinite(costs[all_legs[:, 0], all_legs[:, 1]])]
             self.root.lp = HighsRelaxation(cluster, all_legs, self.root.costs.costs_of(all_legs))
             self.root.lp.add_cuts([replace(c, inside=c.inside[own]) for c in cuts])
 
-    def solve(self) -> OverCells | None:
+    def solve(self) -> CellBound | None:
         """Until there is nothing to add or progress stalls; what it has proven."""
         try:
             self.root.solve()
@@ -177,18 +177,18 @@ class _Level:
         best, at = root.best, root.costs.vertices
         alive = np.zeros(m, dtype=bool)
         alive[at] = True
-        alive[self.own_tour] = True
+        alive[self.cell_tour] = True
         degree = np.zeros(m)
         degree[best.vertices] = best.duals.degree
         cuts = tuple(replace(c, inside=_spread(c.inside, best.vertices, m)) for c in best.cuts)
-        return OverCells(
+        return CellBound(
             float(self.run.bound or 0.0), self.cells, self.costs, alive, self._dead(),
             cuts, replace(best.duals, degree=degree),
         )  # fmt: skip
 
     def used(self) -> tuple[Ints, Floats]:
         """(k, 2) legs that the point uses, and (k,) how much."""
-        point = self.root.point or self.root._relaxed()
+        point = self.root.point or self.root._solve_lp()
         on = point.y > 1e-6
         return self.root.costs.vertices[point.legs[on]], point.y[on]
 
@@ -205,7 +205,7 @@ class _Level:
         out = np.ones((m, m), dtype=bool)
         assert isinstance(self.root.dead, DeadLegs)
         out[np.ix_(at, at)] = self.root.dead.matrix()
-        legs = tour_legs(self.own_tour)
+        legs = tour_legs(self.cell_tour)
         out[legs[:, 0], legs[:, 1]] = out[legs[:, 1], legs[:, 0]] = False
         return out
 

@@ -31,19 +31,19 @@ class Cut:
         k = len(self.teeth)
         return sum(len(t) - 1 for t in self.teeth) - 0.5 * (k + 1) if k else 0.0
 
-    def bitten(self, clusters: int) -> Bools:
+    def tooth_pairs(self, clusters: int) -> Bools:
         """(m + 1, m + 1) pairs of different clusters within a tooth."""
         out = np.zeros((clusters, clusters), dtype=bool)
         for tooth in self.teeth:
             out[np.ix_(tooth, tooth)] = True
         return out
 
-    def bites(self, cluster: Ints, legs: Ints) -> Bools:
+    def in_tooth(self, cluster: Ints, legs: Ints) -> Bools:
         """(k,) legs (k, 2) that are in a tooth."""
         if not self.teeth:
             return np.zeros(len(legs), dtype=bool)
         ends = cluster[legs]
-        out = self.bitten(int(cluster.max()) + 1)[ends[:, 0], ends[:, 1]]
+        out = self.tooth_pairs(int(cluster.max()) + 1)[ends[:, 0], ends[:, 1]]
         if all(len(t) == 2 for t in self.teeth):
             out &= self.inside[legs[:, 0]] ^ self.inside[legs[:, 1]]
         return np.asarray(out)
@@ -65,7 +65,7 @@ class Cut:
             cluster
         )
 
-    def sets_of_teeth(self, cluster: Ints) -> list[Bools]:
+    def tooth_sets(self, cluster: Ints) -> list[Bools]:
         """For teeth that are pairs of clusters the sets of vertices, two for each, whose legs to
         one another are in the tooth."""
         out = []
@@ -81,7 +81,7 @@ class Cut:
         """Rows of the legs on the left side, and how often they stand there: a leg may be within
         the handle and within a tooth."""
         both = self.inside[legs[:, 0]] & self.inside[legs[:, 1]]
-        times = both.astype(np.float64) + self.bites(cluster, legs)
+        times = both.astype(np.float64) + self.in_tooth(cluster, legs)
         rows = np.flatnonzero(times)
         return rows, times[rows]
 
@@ -96,5 +96,5 @@ def cut_coefficients(cuts: Sequence[Cut], cluster: Ints, legs: Ints) -> Floats:
         at_c = (u & of_c[legs[:, 0]]).astype(np.int8) + (v & of_c[legs[:, 1]])
         out[k] = (u ^ v).astype(np.int8) - at_c
         if cut.teeth:
-            out[k] -= 2.0 * cut.bites(cluster, legs)
+            out[k] -= 2.0 * cut.in_tooth(cluster, legs)
     return out

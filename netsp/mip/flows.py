@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.compiled.dynamic_array import order_of
 from netsp.base.compiled.kernel import kernel
 
-TINY = 1e-11
-"""Residual capacity that counts as none."""
+RESIDUAL_TOLERANCE = 1e-11
+"""Tolerance below which a residual capacity counts as zero."""
 
-ALIKE = 1e-11
-"""Share of a capacity up to which two are the same."""
+CAPACITY_TOLERANCE = 1e-11
+"""Tolerance, relative, within which two capacities count as equal."""
 
 
 @kernel
-def joined(n: int, tail: Ints, head: Ints, capacity: Floats, sink: int) -> Ints:
-    """(n,) what each vertex is part of: two are joined by an edge that is no less than all others
-    of either together. A set that has one of them is cut no more with the other as well. The sink,
-    which no set may have, is joined to nothing."""
+def contracted(n: int, tail: Ints, head: Ints, capacity: Floats, sink: int) -> Ints:
+    """Return the contracted node of each vertex.
+
+    An edge is contracted if it has at least the capacity of all other edges of either end: a set
+    that holds one end is then cut no more with both. The sink is not contracted.
+    """
     degree = np.zeros(n)
     for e in range(len(tail)):
         degree[tail[e]] += capacity[e]
@@ -27,7 +31,9 @@ def joined(n: int, tail: Ints, head: Ints, capacity: Floats, sink: int) -> Ints:
     parent = np.arange(n)
     for e in range(len(tail)):
         u, v = tail[e], head[e]
-        if sink in (u, v) or 2.0 * capacity[e] < (1.0 - ALIKE) * max(degree[u], degree[v]):
+        if sink in (u, v) or 2.0 * capacity[e] < (1.0 - CAPACITY_TOLERANCE) * max(
+            degree[u], degree[v]
+        ):
             continue
         while parent[u] != u:
             parent[u] = parent[parent[u]]
@@ -60,37 +66,97 @@ def min_cuts(
     wanted: Ints,
     enough: float,
 ) -> tuple[Bools, Ints, Floats]:
-    """For every wanted cluster C the vertex set S of least ``capacity(δ(S))`` with all of C and
-    without the sink, if that is below `enough`.
+    """Return the minimum cuts between the sink and each wanted cluster that are below `enough`.
 
-    Vertices that no set is cut more for having together count as one (`joined`), and clusters that
-    lie within the same one are asked for once. Where the value is not below `enough` and C lies
-    within one, that one is in no set below `enough` without the sink, and counts as the sink from
-    then on (as in Padberg & Rinaldi 1990): flows become short. Clusters come in the order of their
-    distance to the sink, in edges: most are then beside one that counts as it.
-
-    Returns (k, n) flags of the vertices in the sets found, the cluster and the value of each. A
-    source joined to each vertex of C without limit makes it one maximum flow; it ends as soon as
-    the flow is enough.
+    A source with unlimited edges to the vertices of a cluster makes its cut one maximum flow, which
+    ends as soon as it is enough. Vertices are contracted first, and clusters within one contracted
+    node are cut once. If such a node has no cut below `enough`, it counts as a sink from then on
+    (Padberg & Rinaldi 1990), which makes flows short. Clusters come in the order of their distance
+    from the sink in edges, so that most lie beside a sink.
 
     Parameters
     ----------
     n
-        Vertices.
+        Number of vertices.
     tail, head, capacity
         Undirected edges.
+
+    Returns
+    -------
+    inside : ndarray of bool, shape (k, n)
+        Vertices on the cluster's side of each cut.
+    which : ndarray of int, shape (k,)
+        Cluster of each cut.
+    value : ndarray, shape (k,)
+        Capacity of each cut.
     """
-    node = joined(n, tail, head, capacity, sink)
+    node = contracted(n, tail, head, capacity, sink)
     nodes, sink = node.max() + 1, node[sink]
     crossing = node[tail] != node[head]
     tail, head, capacity = node[tail[crossing]], node[head[crossing]], capacity[crossing]
     edges = len(tail)
+    network = _network(nodes, tail, head)
+    inside = np.zeros((len(wanted), n), dtype=np.bool_)
+    which = np.empty(len(wanted), dtype=np.int64)
+    value = np.empty(len(wanted))
+    found = 0
+    is_sink = np.zeros(nodes + 1, dtype=np.bool_)
+    is_sink[sink] = True
+    level = _distances(sink, network)
+    distance = np.full(max(cluster.max(), wanted.max() if len(wanted) else 0) + 1, nodes + 1.0)
+    for v in range(n):
+        distance[cluster[v]] = min(distance[cluster[v]], level[node[v]])
+    is_done = np.zeros(nodes, dtype=np.bool_)
+    for c in wanted[order_of(distance[wanted])]:
+        network.residual[2 * edges :] = 0.0
+        last, in_one = -1, True
+        for v in range(n):
+            if cluster[v] == c:
+                network.residual[2 * edges + 2 * node[v]] = np.inf
+                in_one = in_one and last in (-1, node[v])
+                last = node[v]
+        if last < 0 or (in_one and is_done[last]):
+            continue
+        is_done[last] = is_done[last] or in_one
+        for e in range(edges):
+            network.residual[2 * e] = network.residual[2 * e + 1] = capacity[e]
+        flow = _max_flow(network, is_sink, level, enough)
+        if flow >= enough:
+            if in_one:
+                is_sink[last] = True
+            continue
+        # level marks what the source still reaches
+        is_empty = True
+        for v in range(n):
+            inside[found, v] = level[node[v]] >= 0
+            is_empty = is_empty and not inside[found, v]
+        if not is_empty:
+            which[found], value[found] = c, flow
+            found += 1
+    return inside[:found], which[:found], value[:found]
+
+
+class _Network(NamedTuple):
+    """Arcs of a flow network whose last node is the source.
+
+    Arcs 2 e and 2 e + 1 are the two directions of edge e; then come, for each node, the arc from
+    the source and its reverse. `first` is the first arc of each node, `following` the next arc of
+    the same node.
+    """
+
+    first: Ints
+    following: Ints
+    to: Ints
+    residual: Floats
+
+
+@kernel
+def _network(nodes: int, tail: Ints, head: Ints) -> _Network:
+    edges = len(tail)
     arcs = 2 * edges + 2 * nodes
-    # arc 2 e and 2 e + 1 are the two senses of edge e, then come source -> v and back
     first = np.full(nodes + 1, -1, dtype=np.int64)
     following = np.empty(arcs, dtype=np.int64)
     to = np.empty(arcs, dtype=np.int64)
-    rest = np.empty(arcs)
     for e in range(edges):
         to[2 * e], to[2 * e + 1] = head[e], tail[e]
         following[2 * e] = first[tail[e]]
@@ -104,119 +170,115 @@ def min_cuts(
         first[nodes] = a
         following[a + 1] = first[v]
         first[v] = a + 1
-    level = np.empty(nodes + 1, dtype=np.int64)
+    return _Network(first, following, to, np.empty(arcs))
+
+
+@kernel
+def _distances(start: int, network: _Network) -> Ints:
+    """Return the distance of each node from a node in edges, without the source's arcs."""
+    nodes = len(network.first) - 1
+    level = np.full(nodes + 1, nodes + 1, dtype=np.int64)
     queue = np.empty(nodes + 1, dtype=np.int64)
-    at = np.empty(nodes + 1, dtype=np.int64)
-    path = np.empty(nodes + 2, dtype=np.int64)
-    inside = np.zeros((len(wanted), n), dtype=np.bool_)
-    which = np.empty(len(wanted), dtype=np.int64)
-    value = np.empty(len(wanted))
-    found = 0
-    is_sink = np.zeros(nodes + 1, dtype=np.bool_)
-    is_sink[sink] = True
-    # breadth first from the sink
-    level[:] = nodes + 1
-    level[sink], queue[0] = 0, sink
+    level[start], queue[0] = 0, start
     low, high = 0, 1
     while low < high:
         v = queue[low]
         low += 1
-        a = first[v]
+        a = network.first[v]
         while a >= 0:
-            w = to[a]
+            w = network.to[a]
             if w < nodes and level[w] > nodes:
                 level[w] = level[v] + 1
                 queue[high] = w
                 high += 1
-            a = following[a]
-    far = np.full(max(cluster.max(), wanted.max() if len(wanted) else 0) + 1, nodes + 1.0)
-    for v in range(n):
-        far[cluster[v]] = min(far[cluster[v]], level[node[v]])
-    met = np.zeros(nodes, dtype=np.bool_)
-    for c in wanted[order_of(far[wanted])]:
-        rest[2 * edges :] = 0.0
-        last, in_one = -1, True
-        for v in range(n):
-            if cluster[v] == c:
-                rest[2 * edges + 2 * node[v]] = np.inf
-                in_one = in_one and last in (-1, node[v])
-                last = node[v]
-        if last < 0 or (in_one and met[last]):
+            a = network.following[a]
+    return level
+
+
+@kernel
+def _max_flow(network: _Network, is_sink: Bools, level: Ints, enough: float) -> float:
+    """Return the maximum flow from the source to the sinks by Dinic's algorithm, or `enough`.
+
+    `level` becomes the distance of each node from the source along residual arcs, -1 if there is no
+    such path.
+    """
+    nodes = len(network.first) - 1
+    queue = np.empty(nodes + 1, dtype=np.int64)
+    path = np.empty(nodes + 2, dtype=np.int64)
+    flow = 0.0
+    while flow < enough:
+        if not _layer(network, is_sink, level, queue):
+            break
+        flow = _augmented(network, is_sink, level, path, flow, enough)
+    return flow
+
+
+@kernel
+def _layer(network: _Network, is_sink: Bools, level: Ints, queue: Ints) -> bool:
+    """Fill in `level` breadth first and return whether a sink is reached."""
+    nodes = len(network.first) - 1
+    for v in range(nodes + 1):
+        level[v] = -1
+    level[nodes] = 0
+    queue[0] = nodes
+    low, high = 0, 1
+    reached = nodes + 1
+    while low < high:
+        v = queue[low]
+        low += 1
+        if level[v] >= reached:
+            break
+        a = network.first[v]
+        while a >= 0:
+            w = network.to[a]
+            if network.residual[a] > RESIDUAL_TOLERANCE and level[w] < 0:
+                level[w] = level[v] + 1
+                queue[high] = w
+                high += 1
+                if is_sink[w]:
+                    reached = level[w]
+            a = network.following[a]
+    return bool(reached <= nodes)
+
+
+@kernel
+def _augmented(
+    network: _Network, is_sink: Bools, level: Ints, path: Ints, flow: float, enough: float
+) -> float:
+    """Return the flow after augmenting along all paths of a layered network, or `enough`."""
+    to, residual = network.to, network.residual
+    at = network.first.copy()
+    depth = 0
+    v = len(at) - 1
+    while True:
+        if is_sink[v]:
+            push = np.inf
+            for k in range(depth):
+                push = min(push, residual[path[k]])
+            first_full = depth
+            for k in range(depth - 1, -1, -1):
+                a = path[k]
+                residual[a] -= push
+                residual[a ^ 1] += push
+                if residual[a] <= RESIDUAL_TOLERANCE:
+                    first_full = k
+            flow += push
+            if flow >= enough:
+                return flow
+            depth = first_full
+            v = to[path[depth] ^ 1]
             continue
-        met[last] = met[last] or in_one
-        for e in range(edges):
-            rest[2 * e] = rest[2 * e + 1] = capacity[e]
-        flow = 0.0
-        while flow < enough:
-            for v in range(nodes + 1):
-                level[v] = -1
-            level[nodes] = 0
-            queue[0] = nodes
-            low, high = 0, 1
-            reached = nodes + 1
-            while low < high:
-                v = queue[low]
-                low += 1
-                if level[v] >= reached:
-                    break
-                a = first[v]
-                while a >= 0:
-                    w = to[a]
-                    if rest[a] > TINY and level[w] < 0:
-                        level[w] = level[v] + 1
-                        queue[high] = w
-                        high += 1
-                        if is_sink[w]:
-                            reached = level[w]
-                    a = following[a]
-            if reached > nodes:
-                break
-            for v in range(nodes + 1):
-                at[v] = first[v]
-            depth = 0
-            v = nodes
-            while True:
-                if is_sink[v]:
-                    push = np.inf
-                    for k in range(depth):
-                        push = min(push, rest[path[k]])
-                    back = depth
-                    for k in range(depth - 1, -1, -1):
-                        a = path[k]
-                        rest[a] -= push
-                        rest[a ^ 1] += push
-                        if rest[a] <= TINY:
-                            back = k
-                    flow += push
-                    if flow >= enough:
-                        break
-                    depth = back
-                    v = to[path[depth] ^ 1]
-                    continue
-                a = at[v]
-                while a >= 0 and not (rest[a] > TINY and level[to[a]] == level[v] + 1):
-                    a = following[a]
-                at[v] = a
-                if a >= 0:
-                    path[depth] = a
-                    depth += 1
-                    v = to[a]
-                elif depth == 0:
-                    break
-                else:
-                    level[v] = -1
-                    depth -= 1
-                    v = to[path[depth] ^ 1]
-        if flow >= enough:
-            if in_one:
-                is_sink[last] = True
-            continue
-        # level marks what the source still reaches
-        some = False
-        for v in range(n):
-            inside[found, v] = level[node[v]] >= 0
-            some = some or inside[found, v]
-        if some:
-            which[found], value[found] = c, flow
-            found += 1
-    return inside[:found], which[:found], value[:found]
+        a = at[v]
+        while a >= 0 and not (residual[a] > RESIDUAL_TOLERANCE and level[to[a]] == level[v] + 1):
+            a = network.following[a]
+        at[v] = a
+        if a >= 0:
+            path[depth] = a
+            depth += 1
+            v = to[a]
+        elif depth == 0:
+            return flow
+        else:
+            level[v] = -1
+            depth -= 1
+            v = to[path[depth] ^ 1]

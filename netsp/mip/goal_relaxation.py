@@ -23,10 +23,10 @@ from netsp.gtsp.limits import Limits
 from netsp.gtsp.sparse_costs import SparseCosts
 from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.gtsp.travel.result import Result
-from netsp.mip.cost_fixing import survivors
-from netsp.mip.cover_bounds import Cells, OverCells, OverGoals
-from netsp.mip.cover_costs import OverClasses, OverWays, Tower
-from netsp.mip.covers import Stops, climb
+from netsp.mip.cost_fixing import surviving_legs
+from netsp.mip.cover_bounds import CellBound, Cells, GoalBound
+from netsp.mip.cover_costs import ClassCovers, Covers, PathCovers
+from netsp.mip.covers import ParityTour, refine_covers
 from netsp.mip.cuts import Cut
 from netsp.mip.parity_cuts import odd_letters
 
@@ -55,7 +55,7 @@ MANY_CLASSES = 3000
 FEW_GOALS = 60
 """With fewer the tour over shortest paths is proven in any case, which takes a second."""
 
-Told = Callable[[float, int, Ints], Sequence[int] | None]
+OnBound = Callable[[float, int, Ints], Sequence[int] | None]
 """Hears a bound as it rises, over how many cells, and the classes of least tether above those that
 the program's point visits; may give a better tour."""
 
@@ -70,9 +70,9 @@ Keep = Callable[[SparseCosts], None]
 
 def bound_over_goals(
     graph: TravelGraph, prove: Prove, limits: Limits, tour: Sequence[int] | None = None,
-    costs: Callable[[], Floats] | None = None, told: Told = lambda *_: None,
+    costs: Callable[[], Floats] | None = None, told: OnBound = lambda *_: None,
     keep: Keep | None = None,
-) -> OverGoals:  # fmt: skip
+) -> GoalBound:  # fmt: skip
     """No tour of the graph is shorter; a bound of 0 if the limits leave nothing.
 
     Parameters
@@ -85,14 +85,14 @@ def bound_over_goals(
         Gives (V, V) of all legs, if no class was left out; called once there is a first bound, for
         it may take all the time that is left.
     told
-        See `Told`.
+        See `OnBound`.
     keep
         See `Keep`. If it is given, covers of ways come first, then those of the classes left, whose
         bound says nothing of classes that a roadmap has left out.
     """
     clock = Clock.of(limits.time)
     least = graph.between_goals(lambda: clock.up)
-    bound, cuts, cells = best_tree(least, lambda: clock.up), tuple[Cut, ...](), None
+    bound, cuts, cells = one_tree_bound(least, lambda: clock.up), tuple[Cut, ...](), None
     _holds_in_any_class(graph, bound * (1.0 - ROUNDING))
     if tour is not None and len(graph) > MANY_CLASSES:
         known = None if costs is None else costs()
@@ -107,16 +107,16 @@ def bound_over_goals(
     # what lies over the classes that a roadmap has kept says nothing of the others
     over_kept = costs is not None or keep is not None
     _holds_in_any_class(graph, bound if over_kept else max(bound, over_cells))
-    return OverGoals(max(bound, over_cells), cuts, cells)
+    return GoalBound(max(bound, over_cells), cuts, cells)
 
 
-def bound_at_once(graph: TravelGraph) -> None:
+def bound_by_one_trees(graph: TravelGraph) -> None:
     """A first bound for who has no time: a few 1-trees of straight lines between goals, or of the
     least costs between clusters."""
     if not graph.bound_in_any_class:
         least = graph.between_goals(lambda: True)
         left = iter(range(LEGS_AT_ONCE // least.size))
-        bound = best_tree(_finite(least), lambda: next(left, None) is None)
+        bound = one_tree_bound(_finite(least), lambda: next(left, None) is None)
         _holds_in_any_class(graph, bound * (1.0 - ROUNDING))
 
 
@@ -132,25 +132,25 @@ def _holds_in_any_class(graph: TravelGraph, bound: float) -> None:
 
 def _over_cells(
     graph: TravelGraph, tour: Sequence[int], clock: Clock, limits: Limits, costs: Floats | None,
-    told: Told, keep: Keep | None,
-) -> OverCells | None:  # fmt: skip
+    told: OnBound, keep: Keep | None,
+) -> CellBound | None:  # fmt: skip
     """What covers prove; None where the ways between goals are not known."""
-    tower: Tower
+    tower: Covers
     if costs is not None:
         odd = odd_letters(graph.signatures)
-        tower = OverClasses(costs, graph.cluster, odd)
+        tower = ClassCovers(costs, graph.cluster, odd)
     else:
         some = clock.part(WAYS_SHARE)
         ways = graph.ways_by_parity(lambda: some.up)
         if ways is None:
             return None
-        tower = OverWays(ways, np.inf)
+        tower = PathCovers(ways, np.inf)
         odd = odd_letters(graph.signatures, ways.obstacles)
 
-    def stops(tour: Sequence[int]) -> Stops:
+    def stops(tour: Sequence[int]) -> ParityTour:
         return [(int(graph.cluster[v]), odd[v]) for v in tour]
 
-    def heard(bound: float, cells: Cells, visited: Ints) -> tuple[Stops, float] | None:
+    def heard(bound: float, cells: Cells, visited: Ints) -> tuple[ParityTour, float] | None:
         own = cells.of(graph.cluster, odd)
         above = np.flatnonzero(np.isin(own, visited))
         least = least_tethers(graph.costs_to_base[above], own[above], ABOVE_CELL)
@@ -162,19 +162,19 @@ def _over_cells(
         best[:] = better
         return stops(better), graph.tour_length(better)
 
-    def finer(over: OverCells, length: float) -> Tower:
+    def finer(over: CellBound, length: float) -> Covers:
         assert keep is not None
         with graph.on_clock(clock):
-            rows = survivors(graph, over, length, best, odd)
+            rows = surviving_legs(graph, over, length, best, odd)
         _holds_in_any_class(graph, over.bound * (1.0 - ROUNDING))
         keep(rows)
-        return OverClasses(rows, graph.cluster, odd)
+        return ClassCovers(rows, graph.cluster, odd)
 
     best, length = list(tour), graph.tour_length(tour)
-    return climb(tower, stops(tour), length, clock, limits, heard, finer if keep else None)
+    return refine_covers(tower, stops(tour), length, clock, limits, heard, finer if keep else None)
 
 
-def best_tree(lengths: Floats, up: Callable[[], bool]) -> float:
+def one_tree_bound(lengths: Floats, up: Callable[[], bool]) -> float:
     """The best bound on a tour by 1-trees; that of the first, whatever the time.
 
     Parameters

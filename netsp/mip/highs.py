@@ -13,7 +13,7 @@ from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock, TimeLimit
 from netsp.mip.cutpool import CutPool
 from netsp.mip.cuts import Cut, cut_coefficients
-from netsp.mip.highs_runner import NONE, Interruption, quiet_solver, run
+from netsp.mip.highs_runner import NONE, Interruption, run, silent_solver
 from netsp.mip.program import Duals, Point, duals_of_relaxation, restricted, scale_of
 
 _SETTLED = (
@@ -62,7 +62,7 @@ class HighsRelaxation:
         self.pool = CutPool()
         self.infeasible = False
         self._scale = scale_of(costs)
-        self._highs = quiet_solver()
+        self._highs = silent_solver()
         self._interruption = Interruption(self._highs.cbSimplexInterrupt)
         twos = np.full(self.clusters, 2.0)
         self._highs.addRows(self.clusters, twos, twos, *NONE)

@@ -11,7 +11,7 @@ import numpy as np
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock, TimeLimit
 from netsp.mip.cuts import Cut
-from netsp.mip.highs_runner import NONE, Interruption, quiet_solver, run
+from netsp.mip.highs_runner import NONE, Interruption, run, silent_solver
 from netsp.mip.program import IntegerOutcome, Point, scale_of
 
 
@@ -28,7 +28,7 @@ class HighsInteger:
         self._scale = scale_of(costs)
         self._position = np.full(len(cluster), -1, dtype=np.int64)
         self._position[vertices] = np.arange(len(vertices))
-        h = self._highs = quiet_solver()
+        h = self._highs = silent_solver()
         k, n = len(vertices), len(legs)
         ones = np.ones(self.clusters)
         h.addRows(self.clusters, ones, ones, *NONE)

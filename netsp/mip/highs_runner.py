@@ -23,7 +23,7 @@ class Quiet(highspy.Highs):  # type: ignore[misc]
         super().enableCallbacks()
 
 
-def quiet_solver() -> highspy.Highs:
+def silent_solver() -> highspy.Highs:
     """An empty program, and tolerances as small as HiGHS takes them."""
     h = Quiet()
     h.setOptionValue("output_flag", False)

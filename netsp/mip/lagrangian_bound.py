@@ -61,12 +61,12 @@ def exact_bound(costs: Floats, cluster: Ints, cuts: list[Cut], duals: Duals) -> 
                 r = Fraction(float(costs[u, v])) - degree[u] - degree[v]
                 pair = {int(cluster[u]), int(cluster[v])}
                 r -= sum(mu for c, mu in active if c.inside[u] and c.inside[v])
-                bitten = sum(
+                tooth_pairs = sum(
                     mu for c, mu in active
                     if any(pair <= set(t) for t in c.teeth)
                     and (c.inside[u] != c.inside[v] or any(len(t) > 2 for t in c.teeth))
                 )  # fmt: skip
-                legs[u].append(r - bitten)
+                legs[u].append(r - tooth_pairs)
     vertex = []
     for v in range(n):
         r = 2 * degree[v] - cluster_dual[cluster[v]]

@@ -45,7 +45,7 @@ class LegPrices:
             cut, mu = cuts[k], float(duals.cut[k])
             reduced[cut.inside[u] & cut.inside[v]] -= mu
             if cut.teeth:
-                reduced[cut.bites(cluster, legs)] -= mu
+                reduced[cut.in_tooth(cluster, legs)] -= mu
             vertex[cut.inside & (cluster != cut.cluster)] += mu
         least, second = _two_least(legs, reduced, len(cluster))
         cost = vertex + 0.5 * (least + second)

@@ -12,7 +12,7 @@ from netsp.mip.cuts import Cut
 
 
 @dataclass(frozen=True)
-class Warm:
+class WarmStart:
     """A program over some of the vertices: their numbers in the graph, legs (k, 2) by these
     numbers, and cuts over the vertices in their order; `measured` are vertices all of whose legs to
     one another have been measured."""
@@ -22,7 +22,7 @@ class Warm:
     cuts: list[Cut]
     measured: Ints
 
-    def cuts_over(self, costs: CostMatrix) -> list[Cut]:
+    def lifted_cuts(self, costs: CostMatrix) -> list[Cut]:
         """The cuts over all vertices left, each in up to two ways: a vertex that is not in the
         program goes with the one there that is nearest, or with that of its cluster which is
         nearest to the base; where the set must be a union of clusters, with its cluster. A cut of

@@ -48,25 +48,25 @@ def merge(run: SearchingRun, tours: Sequence[Sequence[int]], prove: Prove, clock
     """Take the shortest tour through the classes of some tours, if it is below the cutoff: one at
     it or above may use what a bound has ruled out."""
     with run.graph.on_clock(clock), suppress(LimitReachedError):
-        found = merged(run.graph, tours, prove, Limits(clock, rng=run.rng))
+        found = merged_tour(run.graph, tours, prove, Limits(clock, rng=run.rng))
         if found is not None and (length := run.graph.tour_length(found)) < run.cutoff:
             run.update_incumbent(found, length=length)
     run.report("merged")
 
 
-def classes_of(tours: Iterable[Sequence[int]]) -> Ints:
+def visited_classes(tours: Iterable[Sequence[int]]) -> Ints:
     """All that some tours visit, in order."""
     return np.unique(np.concatenate([np.asarray(t, dtype=np.int64) for t in tours]))
 
 
-def merged(
+def merged_tour(
     graph: TravelGraph, tours: Sequence[Sequence[int]], prove: Prove, limits: Limits
 ) -> list[int] | None:
     """The shortest tour through the classes of some tours, or as good a one as the limits leave;
     None if there is none."""
     if not tours:
         return None
-    vertices = classes_of(tours)
+    vertices = visited_classes(tours)
     part = TravelGraph.from_costs(graph.costs_among(vertices), graph.cluster[vertices])
     known = [np.searchsorted(vertices, t).tolist() for t in tours]
     found = prove(part, replace(limits, warm_start=min(known, key=part.tour_length)))

@@ -27,16 +27,16 @@ from netsp.gtsp.sparse_costs import SparseCosts
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
 from netsp.mip.branching import Tree
-from netsp.mip.cost_fixing import survivors
-from netsp.mip.cover_bounds import OverGoals
+from netsp.mip.cost_fixing import surviving_legs
+from netsp.mip.cover_bounds import GoalBound
 from netsp.mip.cuts import Cut
 from netsp.mip.goal_relaxation import MANY_CLASSES, bound_over_goals
-from netsp.mip.lp_warm_start import Warm
-from netsp.mip.merging import classes_of, merge, search_and_merge
+from netsp.mip.lp_warm_start import WarmStart
+from netsp.mip.merging import merge, search_and_merge, visited_classes
 from netsp.mip.parity_cuts import odd_letters
 from netsp.mip.program import IntegerProgram, Point
 from netsp.mip.root import Root, tour_legs
-from netsp.mip.subtours import component_cuts, heaviest_walk, tour_from
+from netsp.mip.subtours import component_cuts, cycles_of, heaviest_walk
 
 BACKENDS = {
     "highs": "netsp.mip.highs:HighsRelaxation",
@@ -170,7 +170,7 @@ class MipRun(SearchingRun):
 
     root: Root | None = None
     cuts: Sequence[Cut] = ()
-    _over_goals: OverGoals | None = None
+    _over_goals: GoalBound | None = None
     _costs: CostMatrix | None = None
     _merged: Ints = np.zeros(0, dtype=np.int64)
 
@@ -182,13 +182,13 @@ class MipRun(SearchingRun):
             self.update_incumbent(warm_start)
             if not self.solve_if_trivial():
                 self.find_first_tour()
-                warm: Warm | None = None
+                warm: WarmStart | None = None
                 if not walks or len(self.graph) > CORE_FIRST:
                     with self.core() as core:
                         many = self.graph.roadmapped and self.graph.goal_count >= MANY_GOALS
                         if core is not None or many:
                             self.bound_by_goals(backend)
-                            if self._out_of_reach:
+                            if self._root_is_hopeless:
                                 search_and_merge(self, solve_merged)
                         if core is not None and not self.is_done:
                             # from here on: covers may take longer than its share
@@ -197,13 +197,13 @@ class MipRun(SearchingRun):
                             core.known_length = min(core.known_length, self.length)
                             core.prove(backend, walks=walks)
                     warm = core.program() if core is not None else None
-                if not (self.is_done and self._in_rows):
+                if not (self.is_done and self._uses_sparse_costs):
                     self.prove(backend, walks=walks, warm=warm)
         if self.root is not None:
             self.cuts, self.root = self.root.lp.cuts, None
         return self.finish("proven" if self.is_done else "open")
 
-    def prove(self, backend: str, *, walks: bool = False, warm: Warm | None = None) -> None:
+    def prove(self, backend: str, *, walks: bool = False, warm: WarmStart | None = None) -> None:
         """Heuristic, walks if wanted, cutting planes, until it is proven.
 
         Parameters
@@ -223,7 +223,7 @@ class MipRun(SearchingRun):
     def _left(self) -> CostMatrix:
         """The costs of legs, where covers have not come to them."""
         graph, over = self.graph, self._over_goals
-        if not self._in_rows or over is None or self.tour is None:
+        if not self._uses_sparse_costs or over is None or self.tour is None:
             return CostMatrix(graph)
         if over.cells is None:
             # no cover was proven in half of the time: what is left is worth more in a search
@@ -232,7 +232,7 @@ class MipRun(SearchingRun):
             return CostMatrix(graph)
         odd = odd_letters(graph.signatures)
         with graph.on_clock(self.clock):
-            return CostMatrix(graph, survivors(graph, over.cells, self.length, self.tour, odd))
+            return CostMatrix(graph, surviving_legs(graph, over.cells, self.length, self.tour, odd))
 
     def bound_by_goals(self, backend: str) -> None:
         """A first bound for who stops the run before the proof over all classes has one."""
@@ -241,9 +241,9 @@ class MipRun(SearchingRun):
             run = MipRun(graph, limits)
             return run.solve(backend, None), run.cuts
 
-        climbs = self._climbs
-        part = (self._cells_share if climbs else GOALS_SHARE) * self.clock.left
-        if self._in_rows:
+        climbs = self._uses_covers
+        part = (self._cover_time_share if climbs else GOALS_SHARE) * self.clock.left
+        if self._uses_sparse_costs:
             part = max(part, min(FIRST_S, 0.5 * self.clock.left))
         share = Clock(part, within=self.clock) if self.clock.limit else self.clock
         # of classes left out the program over all classes says nothing
@@ -260,7 +260,7 @@ class MipRun(SearchingRun):
             self._costs = CostMatrix(graph, rows)
 
         known = climbs and graph.legs_at_once and graph.complete
-        in_rows = self._in_rows
+        in_rows = self._uses_sparse_costs
         try:
             self._over_goals = bound_over_goals(
                 graph,
@@ -277,14 +277,14 @@ class MipRun(SearchingRun):
         self.report("goals", vertices=len(self.graph))
 
     @property
-    def _climbs(self) -> bool:
+    def _uses_covers(self) -> bool:
         """Whether covers come first: with fewer goals the relaxation over classes is quicker than
         those below it."""
         many = len(self.graph) > MANY_CLASSES and self.graph.goal_count >= MANY_GOALS
-        return many or self._in_rows
+        return many or self._uses_sparse_costs
 
     @property
-    def _in_rows(self) -> bool:
+    def _uses_sparse_costs(self) -> bool:
         """Whether there are so many classes that no matrix of legs is made."""
         graph = self.graph
         # with many goals all that covers prove is to hold for classes left out, too
@@ -293,37 +293,41 @@ class MipRun(SearchingRun):
         return known and len(graph) > ROUNDED_FROM
 
     @property
-    def _cells_share(self) -> float:
+    def _cover_time_share(self) -> float:
         """Part of the time left that covers may take."""
         if self.graph.goal_count > LARGE:
             return CELLS_SHARE  # it is they that close the gap there
-        if self._in_rows and self.graph.goal_count <= CLOSES:
+        if self._uses_sparse_costs and self.graph.goal_count <= CLOSES:
             least, share = LEAST_SHARE, CELLS_SHARE * (len(self.graph) / ROWS_FOR) ** 3
         else:
             least, share = GOALS_SHARE, CELLS_SHARE * (len(self.graph) / CELLS_FOR) ** 2
         return min(max(share, least), CELLS_SHARE)
 
     @property
-    def _core_of_many(self) -> bool:
+    def _core_is_for_warm_start(self) -> bool:
         """Whether it is a core of which legs and cuts are wanted, not the tour, which the searches
         have found."""
         return self.outer is not None and self.graph.goal_count >= MANY_GOALS
 
     @property
-    def _out_of_reach(self) -> bool:
+    def _root_is_hopeless(self) -> bool:
         """Whether the program over all classes would not close what covers have left."""
         left = self.length - (self.bound or 0.0)
-        return self._climbs and self.graph.goal_count > LARGE and left > OUT_OF_REACH * self.length
+        return (
+            self._uses_covers
+            and self.graph.goal_count > LARGE
+            and left > OUT_OF_REACH * self.length
+        )
 
-    def program(self) -> Warm | None:
+    def program(self) -> WarmStart | None:
         """The program of the root of a run over a core, by vertices of the outer run; also of one
         whose share of the time was over."""
         if self.root is None or self.outer is None:
             return None
         core = self.outer[1][self.root.costs.vertices]
-        return Warm(core, core[self.root.lp.legs], list(self.root.lp.cuts), self.outer[1])
+        return WarmStart(core, core[self.root.lp.legs], list(self.root.lp.cuts), self.outer[1])
 
-    def cut(self, costs: CostMatrix, backend: str, warm: Warm | None) -> None:
+    def cut(self, costs: CostMatrix, backend: str, warm: WarmStart | None) -> None:
         """Root and branching over what is left of the vertices."""
         self._gap_searched = self.length
         if warm is not None:
@@ -354,7 +358,7 @@ class MipRun(SearchingRun):
             if self.length < before:
                 root.solve()
         legs = root.size()["legs"]
-        if self.is_done or legs > MOST_LEGS or self._core_of_many:
+        if self.is_done or legs > MOST_LEGS or self._core_is_for_warm_start:
             return
         if backend not in LAZY:
             Tree(root).solve()
@@ -366,21 +370,21 @@ class MipRun(SearchingRun):
     def search_near_incumbent(self) -> Ints:
         """Search near the incumbent, and merge the local optima found."""
         core = super().search_near_incumbent()
-        self.merge_ends()
+        self.merge_recent_local_optima()
         return core
 
     def on_cover_bound(self, bound: float, cells: int, classes: Ints) -> tuple[int, ...] | None:
         """As `SearchingRun.on_cover_bound`, and the shortest tour through the classes found."""
         super().on_cover_bound(bound, cells, classes)
-        self.merge_ends()
+        self.merge_recent_local_optima()
         return self.tour
 
     def search(self, costs: CostMatrix, more: Ints | None = None) -> None:
         """As `SearchingRun.search`, and the shortest tour through the classes found."""
         super().search(costs, more)
-        self.merge_ends()
+        self.merge_recent_local_optima()
 
-    def merge_ends(self) -> None:
+    def merge_recent_local_optima(self) -> None:
         """Take the shortest tour through the classes in which the last searches ended, and the
         incumbent's, unless they have been merged before. Not where iterations are limited, as
         they would be those of another program."""
@@ -389,7 +393,7 @@ class MipRun(SearchingRun):
         if few or idle or not self.local_optima or self.tour is None:
             return
         tours = list(dict.fromkeys([self.tour, *self.local_optima]))
-        classes = classes_of(tours)
+        classes = visited_classes(tours)
         if not np.isin(classes, self._merged).all():
             self._merged = classes
             merge(self, tours, solve_merged, self.clock.part(TURNS_SHARE))
@@ -410,7 +414,7 @@ class MipRun(SearchingRun):
         """Join the cycles of a point, or follow its strongest legs, and improve that."""
         cluster = costs.cluster
         if whole:
-            cycles = tour_from(point.x, point.legs, point.y)
+            cycles = cycles_of(point.x, point.legs, point.y)
             if len(cycles) == 1:
                 self.update_incumbent(costs.vertices[cycles[0]].tolist())
             order = [int(cluster[v]) for cycle in cycles for v in cycle]

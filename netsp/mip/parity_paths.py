@@ -22,7 +22,7 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.compiled.kernel import kernel
-from netsp.mip.reducedcosts import Terms, reduced_row, rooms
+from netsp.mip.reducedcosts import Terms, reduced_costs_at, rooms
 
 AT_ONCE = 500
 """Vertices between two looks at the clock."""
@@ -35,7 +35,7 @@ def beyond(u: int, v: int, price: float, terms: Terms) -> float:
     return float(0.5 * above)
 
 
-def ways_from_base(
+def paths_from_base(
     terms: Terms, excess: Floats, missing: float, check: Callable[[], None] = lambda: None
 ) -> tuple[Floats, Floats, Ints]:
     """(V,) the least that a way from the base to a vertex costs above the bound, the least with
@@ -71,7 +71,7 @@ def _settle(
         if u < 0 or least > missing:
             return False
         done[u] = True
-        for i in range(reduced_row(u, terms, other, price, room)):
+        for i in range(reduced_costs_at(u, terms, other, price, room)):
             v = other[i]
             if v == 0:
                 continue

@@ -18,9 +18,9 @@ from netsp.gtsp.sparse_costs import EMPTY_ROWS, Rows, SparseCosts
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import NO_BITS, Bits, DeadLegs, mark_dead
 from netsp.mip.lagrangian_bound import least_of_clusters, rounding
-from netsp.mip.parity_paths import beyond, ways_from_base
+from netsp.mip.parity_paths import beyond, paths_from_base
 from netsp.mip.program import Duals
-from netsp.mip.reducedcosts import Terms, reduced_costs, reduced_row, rooms
+from netsp.mip.reducedcosts import Terms, reduced_costs, reduced_costs_at, rooms
 
 ROWS = 256
 """Rows of a matrix that a thread works on at a time."""
@@ -64,7 +64,7 @@ class Prices:
         sets, weight = [cuts[k].inside for k in active], [-duals.cut[k] for k in active]
         split = {k for k in active if cuts[k].splits(cluster)}
         for k in sorted(split):
-            of_teeth = cuts[k].sets_of_teeth(cluster)
+            of_teeth = cuts[k].tooth_sets(cluster)
             sets += of_teeth
             weight += [-duals.cut[k]] * len(of_teeth)
         inside = np.array(sets, dtype=bool).reshape(-1, self._size)
@@ -73,17 +73,17 @@ class Prices:
         by_vertex = np.argsort(member, kind="stable")
         first_at = np.searchsorted(member[by_vertex], np.arange(self._size + 1))
         m = int(cluster.max(initial=0)) + 1
-        bitten = np.zeros((m, m))
+        tooth_pairs = np.zeros((m, m))
         for k in active:
             if cuts[k].teeth and k not in split:
-                bitten[cuts[k].bitten(m)] += duals.cut[k]
+                tooth_pairs[cuts[k].tooth_pairs(m)] += duals.cut[k]
         vertex = 2.0 * duals.degree - duals.cluster[cluster]
         for k in active:
             vertex[cuts[k].inside & (cluster != cuts[k].cluster)] += duals.cut[k]
         least, second, longest = np.empty((3, self._size))
         terms = self._terms = Terms(
             costs, *_held(dead), cluster, duals.degree, first_at, of_cut[by_vertex], first_member,
-            member, np.array(weight, dtype=float), bitten, vertex, least, second,
+            member, np.array(weight, dtype=float), tooth_pairs, vertex, least, second,
         )  # fmt: skip
         self._by_rows(lambda a, b: _scan(a, b, terms, longest), self._size)
         self._more = least < 0.0
@@ -100,7 +100,7 @@ class Prices:
         terms = self._terms
         above = terms.vertex - self._cheapest[terms.cluster]
         excess = self._cost - self._cheapest[terms.cluster]
-        way, other_way, before = ways_from_base(terms, excess, missing, self._check)
+        way, other_way, before = paths_from_base(terms, excess, missing, self._check)
         self._by_rows(
             lambda a, b: _rule_out(a, b, terms, above, way, other_way, before, missing), self._size
         )
@@ -162,7 +162,7 @@ def _scan(first: int, last: int, terms: Terms, longest: Floats) -> None:
     for u in range(first, last):
         least = second = np.inf
         size = 0.0
-        for i in range(reduced_row(u, terms, other, price, room)):
+        for i in range(reduced_costs_at(u, terms, other, price, room)):
             r = price[i]
             size = max(size, abs(r))
             if r < least:
@@ -184,7 +184,7 @@ def _rule_out(
     held = len(rows.first) > 0
     for u in range(first, last):
         kept = 0
-        for i in range(reduced_row(u, terms, other, price, room)):
+        for i in range(reduced_costs_at(u, terms, other, price, room)):
             v, r = other[i], price[i]
             there = other_way[u] if before[u] == v else way[u]
             home = other_way[v] if before[v] == u else way[v]
@@ -215,7 +215,7 @@ def with_ends(u: int, v: int, price: float, above: Floats, terms: Terms) -> floa
 def _room(first: int, last: int, terms: Terms, above: Floats, missing: float, out: Floats) -> None:
     other, price, room = rooms(terms)
     for u in range(first, last):
-        for i in range(reduced_row(u, terms, other, price, room)):
+        for i in range(reduced_costs_at(u, terms, other, price, room)):
             v = other[i]
             out[u, v] = missing - with_ends(u, v, price[i], above, terms)
 
@@ -229,7 +229,7 @@ def _cheapest(
     other, price, room = rooms(terms)
     for u in rows:
         held, worst = 0, 0
-        for i in range(reduced_row(u, terms, other, price, room)):
+        for i in range(reduced_costs_at(u, terms, other, price, room)):
             r = price[i]
             if r >= -tolerance or (held == most and r >= held_price[u, worst]):
                 continue

@@ -13,7 +13,7 @@ WORTH = 0.02
 
 
 @dataclass
-class Pace:
+class PricingSchedule:
     """When to look at the prices of all legs, and when to give up.
 
     Attributes
@@ -34,11 +34,11 @@ class Pace:
     gaps: list[float] = field(default_factory=list)
 
     @property
-    def look_is_due(self) -> bool:
+    def is_due(self) -> bool:
         """At first, and whenever enough rounds have passed."""
         return self.rounds % self.every == 0
 
-    def note_look(self, *, idle: bool) -> None:
+    def note_pass(self, *, idle: bool) -> None:
         """Looks that bring nothing become seldom."""
         self.rounds = 1
         self.looks += 1

@@ -36,7 +36,7 @@ from netsp.gtsp.solver_run import RunStopped, SolverRun
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
 from netsp.mip.cbc_program import CbcInteger
-from netsp.mip.subtours import tour_from
+from netsp.mip.subtours import cycles_of
 
 CUTS = ("goals", "vertices")
 
@@ -139,7 +139,7 @@ def _lazy_rounds(run: SolverRun, legs: Ints, costs: Floats, params: Params) -> N
             run.report("integer", cuts=cut_count, **size)
             raise RunStopped
         x, y = np.rint(point.x), np.rint(point.y)
-        cycles = tour_from(x, legs, y)
+        cycles = cycles_of(x, legs, y)
         if len(cycles) == 1:
             run.update_incumbent(cycles[0])
             run.report("integer", cuts=cut_count, **size)

@@ -24,7 +24,7 @@ class Terms(NamedTuple):
     `shared` is what the cuts that hold both ends cost: those of vertex v are
     `cut_at[first_at[v] : first_at[v + 1]]`, cut k holds
     `member[first_member[k] : first_member[k + 1]]`, both ascending, and costs `weight[k]`.
-    `bitten` (m + 1, m + 1) is what teeth that hold both clusters do; `vertex` r_v; `least` and
+    `tooth_pairs` (m + 1, m + 1) is what teeth that hold both clusters do; `vertex` r_v; `least` and
     `second` are r_uv of the two cheapest legs of each vertex. Legs are those of the matrix `costs`
     but for `dead`, the bits of `DeadLegs`, or those of `rows`, where these are not empty.
     """
@@ -39,7 +39,7 @@ class Terms(NamedTuple):
     first_member: Ints
     member: Ints
     weight: Floats
-    bitten: Floats
+    tooth_pairs: Floats
     vertex: Floats
     least: Floats
     second: Floats
@@ -48,12 +48,12 @@ class Terms(NamedTuple):
 @kernel
 def reduced(u: int, v: int, cost: float, shared: float, terms: Terms) -> float:
     """r_uv, the same as r_vu."""
-    bitten = terms.bitten[terms.cluster[u], terms.cluster[v]]
-    return float(cost - (terms.degree[u] + terms.degree[v]) + shared - bitten)
+    tooth_pairs = terms.tooth_pairs[terms.cluster[u], terms.cluster[v]]
+    return float(cost - (terms.degree[u] + terms.degree[v]) + shared - tooth_pairs)
 
 
 @kernel
-def legs_of(u: int, terms: Terms, other: Ints, cost: Floats) -> int:
+def legs_at(u: int, terms: Terms, other: Ints, cost: Floats) -> int:
     """How many legs at u are left, and the first so many of `other` and `cost`: their other ends,
     ascending, and costs."""
     if len(terms.rows.first) > 0:
@@ -68,14 +68,14 @@ def legs_of(u: int, terms: Terms, other: Ints, cost: Floats) -> int:
 
 
 @kernel
-def reduced_row(u: int, terms: Terms, other: Ints, price: Floats, room: Floats) -> int:
-    """As `legs_of`, with reduced costs. `room` has one place for each vertex or cut and is zero
+def reduced_costs_at(u: int, terms: Terms, other: Ints, price: Floats, room: Floats) -> int:
+    """As `legs_at`, with reduced costs. `room` has one place for each vertex or cut and is zero
     before and after.
 
     What cuts add is summed over the sets of u, or, where few legs are left, over those of their
     other ends; the order of the sums is the same, and makes r_uv the same as r_vu.
     """
-    count, work = legs_of(u, terms, other, price), 0
+    count, work = legs_at(u, terms, other, price), 0
     for v in other[:count]:
         work += terms.first_at[v + 1] - terms.first_at[v]
     cuts = terms.cut_at[terms.first_at[u] : terms.first_at[u + 1]]
@@ -109,14 +109,14 @@ def reduced_row(u: int, terms: Terms, other: Ints, price: Floats, room: Floats) 
 
 @kernel
 def rooms(terms: Terms) -> tuple[Ints, Floats, Floats]:
-    """`other`, `price` and `room` of `reduced_row`."""
+    """`other`, `price` and `room` of `reduced_costs_at`."""
     n = len(terms.cluster)
     return np.empty(n, np.int64), np.empty(n), np.zeros(max(n, len(terms.weight)))
 
 
 @kernel
 def reduced_costs(legs: Ints, terms: Terms) -> Floats:
-    """The reduced cost of each leg, as `reduced_row` has it; inf where rows have none."""
+    """The reduced cost of each leg, as `reduced_costs_at` has it; inf where rows have none."""
     out = np.empty(len(legs))
     for k in range(len(legs)):
         u, v = legs[k]

@@ -18,17 +18,17 @@ from netsp.gtsp.cost_matrix import LEGS, CostMatrix
 from netsp.gtsp.searching import SearchingRun
 from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.sparse_costs import SparseCosts
-from netsp.mip.blossoms import blossom_cuts, shrunk
+from netsp.mip.blossoms import blossom_cuts, cluster_flows
 from netsp.mip.combs import comb_cuts, tight_sets
-from netsp.mip.cover_bounds import OverGoals
+from netsp.mip.cover_bounds import GoalBound
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs
-from netsp.mip.lp_warm_start import Warm
+from netsp.mip.lp_warm_start import WarmStart
 from netsp.mip.parity_cuts import odd_letters, parity_cuts
 from netsp.mip.prices import Prices
-from netsp.mip.pricing_schedule import WORTH, Pace
+from netsp.mip.pricing_schedule import WORTH, PricingSchedule
 from netsp.mip.program import Duals, Point, Relaxation
-from netsp.mip.subtours import branches, fractional_cuts
+from netsp.mip.subtours import cover_branches, fractional_cuts
 
 NEAREST = 4
 """Legs per vertex in the first LP."""
@@ -113,13 +113,13 @@ class Root:
         costs: CostMatrix,
         relaxation: Callable[[Ints, Ints, Floats], Relaxation],
         round_point: Callable[[Root, Point], None],
-        warm: Warm | None = None,
-        over_goals: OverGoals | None = None,
+        warm: WarmStart | None = None,
+        over_goals: GoalBound | None = None,
     ) -> None:
         self.run, self.costs, self.round_point = run, costs, round_point
         graph = costs.graph
         words = [graph.signatures[v] for v in costs.vertices]
-        self.branch, self.odd = branches(words), odd_letters(words)
+        self.branch, self.odd = cover_branches(words), odd_letters(words)
         self.dead = self._left()
         self.patience: int | None = None
         self.best: Best | None = None
@@ -132,7 +132,7 @@ class Root:
             costs.measure_legs(legs)
         self.lp = relaxation(costs.cluster, legs, costs.costs_of(legs))
         if warm is not None:
-            self.lp.add_cuts(warm.cuts_over(costs))
+            self.lp.add_cuts(warm.lifted_cuts(costs))
         # with these, and those of pairs that `goal_cuts` finds, the LP does not fall below the
         # goals' own, whatever the classes
         self.lp.add_cuts(goals_cuts, for_good=True)
@@ -152,10 +152,10 @@ class Root:
     def solve(self) -> None:
         """Rounds of LP, pricing, elimination and separation, until there is nothing to add or
         progress stalls."""
-        run, pace, settling = self.run, Pace(), False
+        run, pace, settling = self.run, PricingSchedule(), False
         while not run.is_done:
-            point = self._relaxed()
-            if not (settling or pace.look_is_due):
+            point = self._solve_lp()
+            if not (settling or pace.is_due):
                 pace.rounds += 1
                 cuts = self.separate(point)
                 if cuts:
@@ -170,7 +170,7 @@ class Root:
                 return
             if self.point is None or self._missing_tour_legs():
                 continue  # vertices were forgotten, or a new incumbent came with legs of its own
-            settling = priced and self._promises(point, SETTLED if settling else SETTLE)
+            settling = priced and self._pricing_dominates(point, SETTLED if settling else SETTLE)
             if settling:
                 continue
             cuts = self.separate(point)
@@ -184,7 +184,7 @@ class Root:
             self.purge(point, risen=risen)
             self.lp.add_cuts(cuts)
 
-    def _relaxed(self) -> Point:
+    def _solve_lp(self) -> Point:
         """The next point of the LP; Stop when there is none."""
         run = self.run
         run.check()
@@ -197,7 +197,7 @@ class Root:
         self.point = point
         return point
 
-    def _promises(self, point: Point, share: float) -> bool:
+    def _pricing_dominates(self, point: Point, share: float) -> bool:
         """Whether prices alone would close that share of the gap: with thousands of classes it is
         long until no cut is found, and until then there would be no bound, nor anything to rule
         out."""
@@ -205,7 +205,7 @@ class Root:
         much = point.objective - bound > share * (self.run.length - bound)
         return much and len(self.costs) > MANY
 
-    def _look(self, point: Point, pace: Pace, *, lean: bool) -> tuple[bool, bool]:
+    def _look(self, point: Point, pace: PricingSchedule, *, lean: bool) -> tuple[bool, bool]:
         """Look at the prices of all legs; whether any came into the LP, and whether the bound has
         risen, or the LP's optimum since the last look."""
         run = self.run
@@ -215,7 +215,7 @@ class Root:
         self._objective, last = point.objective, self._objective
         # where vertices were forgotten the legs are counted anew
         brought = len(self.lp.legs) - legs if self.point is not None else legs
-        pace.note_look(idle=brought < HARDLY * legs and risen < WORTH * (run.length - before))
+        pace.note_pass(idle=brought < HARDLY * legs and risen < WORTH * (run.length - before))
         climbs = point.objective > last * (1.0 + RISEN)
         return priced, climbs or risen > RISEN * abs(before)
 
@@ -236,7 +236,7 @@ class Root:
 
     # parts
 
-    def _rule_out_over(self, over: OverGoals) -> list[Cut]:
+    def _rule_out_over(self, over: GoalBound) -> list[Cut]:
         """What a program over goals or cells has proven, taken over: most of what lies far from the
         base is in no better tour. Its cuts; of those of covers the ones that have a price, for with
         all of them linear programs take half as long again."""
@@ -255,7 +255,7 @@ class Root:
             self.dead.add_above(own, found.dead)
             if isinstance(self.dead, DeadLegs):
                 self.dead.revive(tour[np.isfinite(costs.values[tour[:, 0], tour[:, 1]])])
-        cuts, duals = found.cuts_over(own), found.duals_over(own)
+        cuts, duals = found.lifted_cuts(own), found.lifted_duals(own)
         if run.tour is not None:
             prices = Prices(costs.values, self.dead, costs.cluster, cuts, duals, run.check)
             run.raise_bound(min(prices.bound, run.cutoff))
@@ -290,7 +290,7 @@ class Root:
         legs = np.unique(np.sort(pairs, axis=1), axis=0)
         return self._with_costs(legs)
 
-    def _warm_legs(self, warm: Warm) -> Ints:
+    def _warm_legs(self, warm: WarmStart) -> Ints:
         """The legs of a program over some of the vertices, and the incumbent's."""
         legs = np.vstack([np.sort(warm.legs_over(self.costs), axis=1), tour_legs(self.tour())])
         return self._with_costs(np.unique(legs, axis=0))
@@ -325,12 +325,12 @@ class Root:
             prices.rule_out(run.cutoff)
             longer = self._measure_left()
         scale = run.length if run.tour is not None else float(self.costs.base_costs[1:].max())
-        new, found_longer = self._most_negative(prices, TINY * scale)
+        new, found_longer = self._columns_to_add(prices, TINY * scale)
         if len(new):
             self.lp.add_legs(new, self.costs.costs_of(new))
         longer |= found_longer | self._measure_used(point)
         if lean and len(self.costs) > MANY:
-            self._drop_dear(prices.of(self.lp.legs), point)
+            self._drop_expensive_legs(prices.of(self.lp.legs), point)
         self._forget()
         return len(new) > 0 or longer
 
@@ -360,7 +360,7 @@ class Root:
         self.lp.set_costs(self.costs.costs_of(legs))
         return True
 
-    def _drop_dear(self, price: Floats, point: Point) -> None:
+    def _drop_expensive_legs(self, price: Floats, point: Point) -> None:
         """Take the legs out of the LP that are far from being used; pricing brings them back if
         need be."""
         dear = price > DEAR * self.run.length
@@ -371,7 +371,7 @@ class Root:
         if dear.sum() > LEAN * len(dear):
             self.lp.keep_legs(~dear)
 
-    def _most_negative(self, prices: Prices, tolerance: float) -> tuple[Ints, bool]:
+    def _columns_to_add(self, prices: Prices, tolerance: float) -> tuple[Ints, bool]:
         """The legs to bring into the LP, those of most negative reduced cost first, a few of each
         vertex; and whether any leg was longer than its bound. Where legs are quickly measured,
         those that would come in are, first: else the LP fills with legs that are none."""
@@ -383,12 +383,12 @@ class Root:
             if self.costs.graph.quick_legs and self.costs.measure_legs(legs):
                 longer, price = True, prices.of(legs)
             negative = price < -tolerance
-            new = self._a_few(legs[negative], price[negative])
+            new = self._few_per_vertex(legs[negative], price[negative])
             if len(new) or not len(legs):
                 break
         return new, longer
 
-    def _a_few(self, legs: Ints, price: Floats) -> Ints:
+    def _few_per_vertex(self, legs: Ints, price: Floats) -> Ints:
         """Of legs (k, 2) with their prices the cheapest, a few of each vertex."""
         taken = np.zeros(len(self.costs), dtype=np.int64)
         chosen = []
@@ -454,7 +454,7 @@ class Root:
         cuts = parity_cuts(point.legs, point.y, cluster, self.odd, self.run.check)
         if cuts:
             return cuts
-        between = shrunk(point.legs, point.y, cluster)
+        between = cluster_flows(point.legs, point.y, cluster)
         tight = tight_sets(self.lp.cuts, point, between, cluster)
         return blossom_cuts(between, cluster) + comb_cuts(between, tight, cluster)
 

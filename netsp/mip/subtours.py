@@ -14,7 +14,7 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.hsignature import Word
-from netsp.mip.blossoms import shrunk
+from netsp.mip.blossoms import cluster_flows
 from netsp.mip.cuts import Cut
 from netsp.mip.flows import min_cuts
 
@@ -41,7 +41,7 @@ def components(x: Floats, legs: Ints, y: Floats) -> tuple[int, Ints]:
     return len(used), np.array([renumber.get(int(k), -1) for k in label], dtype=np.int64)
 
 
-def whole_clusters(inside: Bools, x: Floats, cluster: Ints) -> Bools:
+def complete_clusters(inside: Bools, x: Floats, cluster: Ints) -> Bools:
     """S with each cluster completed whose support lies inside: no weaker, and often stronger."""
     m = int(cluster.max()) + 1
     weight = np.bincount(cluster[inside], weights=x[inside], minlength=m)
@@ -68,7 +68,7 @@ def component_cuts(
             continue
         if near is not None:
             inside = inside[near]
-        full = whole_clusters(inside, x, cluster)
+        full = complete_clusters(inside, x, cluster)
         cuts.append(strongest_cut(full, x, legs, y, cluster)[1])
     return cuts
 
@@ -96,7 +96,7 @@ def goal_cuts(legs: Ints, y: Floats, cluster: Ints) -> list[Cut]:
     """Violated cuts of sets of whole clusters: those of least crossing, one for each cluster, or
     for some that no set is crossed more for having together. They say nothing of classes, so that
     no other class of a goal gets round them."""
-    between = shrunk(legs, y, cluster)
+    between = cluster_flows(legs, y, cluster)
     tail, head = map(np.ascontiguousarray, np.nonzero(np.triu(between)))
     goals = np.arange(1, len(between))
     sets, which, _ = min_cuts(
@@ -107,7 +107,7 @@ def goal_cuts(legs: Ints, y: Floats, cluster: Ints) -> list[Cut]:
     return [Cut(s[cluster], c) for s, c in distinct.values()]
 
 
-def branches(signatures: Sequence[Word]) -> Bools:
+def cover_branches(signatures: Sequence[Word]) -> Bools:
     """(k, V) vertices of every branch of the cover with more than one vertex and not all."""
     rows: dict[Word, list[int]] = {}
     for v, word in enumerate(signatures):
@@ -182,14 +182,14 @@ def _add(
     """Keep the cut of a set, completed by whole clusters, for the cluster it serves best."""
     if inside[0]:
         return
-    full = whole_clusters(inside, x, cluster)
+    full = complete_clusters(inside, x, cluster)
     violation, cut = strongest_cut(full, x, legs, y, cluster)
     key = np.packbits(cut.inside).tobytes()
     if violation > VIOLATION / 2.0 and (key not in found or violation > found[key][0]):
         found[key] = (violation, cut.inside, cut.cluster)
 
 
-def tour_from(x: Floats, legs: Ints, y: Floats) -> list[list[int]]:
+def cycles_of(x: Floats, legs: Ints, y: Floats) -> list[list[int]]:
     """The cycles of an integer point, each a list of vertices; the base's cycle first."""
     on = legs[y > 0.5]
     neighbours: dict[int, list[int]] = {}

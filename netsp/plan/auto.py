@@ -29,7 +29,7 @@ from netsp.gtsp.solver_run import SolverRun
 from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.gtsp.travel.kept import with_bound, with_classes_left_out
 from netsp.gtsp.travel.result import Result, of_part
-from netsp.mip.goal_relaxation import Told, bound_at_once, bound_over_goals
+from netsp.mip.goal_relaxation import OnBound, bound_by_one_trees, bound_over_goals
 from netsp.mip.merging import search_and_merge
 from netsp.mip.mip_solver import MipRun, solve_merged
 from netsp.mip.mip_solver import Params as MipParams
@@ -88,7 +88,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     """Solve by size. Iterations are those of the solver chosen."""
     found = _by_size(graph, params or Params(), limits or Limits())
     if not found.lower_bound:
-        bound_at_once(graph)
+        bound_by_one_trees(graph)
     return found
 
 
@@ -179,7 +179,7 @@ def _in_part_ordered(graph: TravelGraph, limits: Limits, backend: str) -> Result
 
 def _bound_by_goals(
     graph: TravelGraph, limits: Limits, tour: Sequence[int] | None = None,
-    told: Told = lambda *_: None,
+    told: OnBound = lambda *_: None,
 ) -> float:  # fmt: skip
     """A bound on the tours in any class; the one that is known if there is one, and no tour."""
     if tour is not None or not graph.bound_in_any_class:

@@ -19,7 +19,7 @@ from netsp.gtsp.search.lns_solver import Params as SearchParams
 from netsp.gtsp.search.lns_solver import solve as search
 from netsp.gtsp.travel.graph import BaselessGraph, TravelGraph
 from netsp.gtsp.travel.result import OnProgress, Progress, Result, of_part, proven
-from netsp.mip.goal_relaxation import bound_at_once
+from netsp.mip.goal_relaxation import bound_by_one_trees
 from netsp.model.bound_scope import Scope
 from netsp.model.solution import Status
 
@@ -86,7 +86,7 @@ def solve(graph: BaselessGraph, run: Run, limits: Limits, *, proves: bool) -> Re
                 best = replace(found, tour=tour)
     bound = min(bounds)
     if proves and bound == 0.0:
-        bound_at_once(graph)
+        bound_by_one_trees(graph)
         bound = graph.bound_in_any_class
     best = replace(best, lower_bound_of=graph.scope)
     if best.length is None or best.tour is None:
