@@ -19,12 +19,12 @@ from table import head, row
 
 from netsp.base.arrays import Floats
 from netsp.base.clock import Clock
+from netsp.plan.space.mission_policy import StatePolicy
 from netsp.plan.space.mission_solver import solve_mission
 from netsp.plan.space.path_bound import bound_of_all
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import Water
 from netsp.plan.space.space_legs import Ways
-from netsp.plan.space.states import Effort
 from netsp.world.mission.mission import Mission
 from netsp.world.scene.scene import Scene
 
@@ -88,7 +88,7 @@ def bound_only(mission: Mission, scene: Scene, seconds: float = 4.0) -> float:
     """Return the bound if all paths found go round the wall."""
     water = Water.of(mission, scene, scene.field())
     places = Places.of(mission, water.field)
-    ways = Ways(water, places, Effort.of(len(places)))
+    ways = Ways(water, places, StatePolicy().effort(len(places)))
     round_ = np.array([mission.start, (-0.5, END + 0.5, 0), (0.5, END + 0.5, 0), (4, 0, 0)])
     for n in range(len(places)):
         ways.tethers[n] = [np.vstack([round_[:-1], places.points[n]])]

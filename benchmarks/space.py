@@ -37,6 +37,7 @@ from netsp.hsignature.rays import signature
 from netsp.plan.random_worlds import reachable_world
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.judge import verify_mission
+from netsp.plan.space.mission_policy import MissionPolicy
 from netsp.plan.space.mission_solver import (
     GOING_ON,
     SolvedMission,
@@ -44,7 +45,7 @@ from netsp.plan.space.mission_solver import (
     solve_mission,
 )
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import SHARE, Water, along, straight
+from netsp.plan.space.planning_context import Water, along, straight
 from netsp.plan.space.prisms import tours_of_plan
 from netsp.plan.space.space_plan import AS_GIVEN, OUT_AND_BACK, PLANE, SHORT_ORDER, water_of
 from netsp.plan.space.space_signature import SpaceSignature
@@ -238,7 +239,7 @@ def in_space(problem: Problem, folder: Path) -> Mission:
     (folder / "mission.json").write_text(json.dumps({
         "schema_version": 1, "scene": "scene.json", "anchor": problem.base, "start": problem.base,
         "waypoints": [g.position for g in problem.goals], "clearance": 0.0,
-        "tether_length": problem.tether_length / SHARE,
+        "tether_length": problem.tether_length / MissionPolicy().tether_share,
     }))  # fmt: skip
     return Mission.load(folder / "mission.json")
 

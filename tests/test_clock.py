@@ -21,7 +21,8 @@ from netsp.base.ram import ask, available
 from netsp.mip.cutpool import IDLE, CutPool
 from netsp.mip.cuts import Cut
 from netsp.plan.random_worlds import random_world, reachable_world
-from netsp.plan.space.mission_solver import MissionPolicy, solve_mission
+from netsp.plan.space.mission_policy import MissionPolicy
+from netsp.plan.space.mission_solver import solve_mission
 from netsp.world.mission.mission import Mission
 from netsp.world.scene.scene import Scene
 from tests.clock_sites import watched

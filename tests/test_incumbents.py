@@ -16,12 +16,13 @@ from netsp.base.errors import LimitReachedError
 from netsp.judge import Check, Verification
 from netsp.plan.space.board import Board
 from netsp.plan.space.judge import verify_mission
+from netsp.plan.space.mission_policy import PlanePolicy, StatePolicy
 from netsp.plan.space.mission_solver import seconds_until_home, solve_mission
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import Water, along
-from netsp.plan.space.prisms import PlaneParams, floor_plan, tours_of_plan
+from netsp.plan.space.prisms import floor_plan, tours_of_plan
 from netsp.plan.space.space_plan import AS_GIVEN, OUT_AND_BACK, PLANE, given_plan, plan, plans
-from netsp.plan.space.states import Effort, first_states
+from netsp.plan.space.states import first_states
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from tests.worlds import FEW_CELLS
@@ -58,7 +59,7 @@ def square_water() -> Water:
 @pytest.fixture(scope="module")
 def square_board(square_water) -> Board:
     places = Places.of(square_water.mission, square_water.field)
-    states = first_states(square_water, places, 8.9, Effort.of(3), Clock())
+    states = first_states(square_water, places, 8.9, StatePolicy().effort(3), Clock())
     board = Board(square_water, states)
     board.take(netsp.plan.space.space_plan.Growth(states, None).legs, Clock())
     return board
@@ -202,7 +203,7 @@ def random_posts(seed: int) -> tuple[Problem, Scene, Mission]:
     return problem, scene, mission
 
 
-PATIENT = PlaneParams(max_s=300.0)
+PATIENT = PlanePolicy(max_s=300.0)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -13,9 +13,10 @@ from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.command.main import main
 from netsp.command.solve_mission import summary
+from netsp.plan.space.mission_policy import GapPolicy
 from netsp.plan.space.mission_repair import _gaps_named
 from netsp.plan.space.mission_solver import solve_mission
-from netsp.plan.space.passages import GapGrid, GapParams, resolved, unresolved_gaps
+from netsp.plan.space.passages import GapGrid, resolved, unresolved_gaps
 from netsp.plan.space.space_plan import given_plan, plans, water_of
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
@@ -115,7 +116,7 @@ def test_a_cell_is_chosen_that_shows_a_slot_the_default_does_not(y):
     assert asked.mission.cell == 0.2
     assert len(asked.left) == 1
     # and so is it where no cell that may be taken shows it
-    few = resolved(mission, scene, scene.field(), GapParams(smallest=0.99))
+    few = resolved(mission, scene, scene.field(), GapPolicy(smallest=0.99))
     assert few.mission.cell is None
     assert len(few.left) == 1
 
@@ -189,6 +190,6 @@ def test_optimal_of_an_older_file_is_read_as_what_it_was():
 
 def test_parameters_of_the_search_for_gaps_are_checked():
     with pytest.raises(InputError, match="smallest: 2; expected between 0 and 1"):
-        GapParams(smallest=2)
+        GapPolicy(smallest=2)
     with pytest.raises(InputError, match="finest: 0; expected 1 or more"):
-        GapParams(finest=0)
+        GapPolicy(finest=0)

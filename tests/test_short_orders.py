@@ -7,8 +7,9 @@ from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.plan.space.given_order import drive_given_order
 from netsp.plan.space.judge import verify_mission
+from netsp.plan.space.mission_policy import OrderPolicy
 from netsp.plan.space.places import Places
-from netsp.plan.space.short_orders import OrderPolicy, short_order_tour
+from netsp.plan.space.short_orders import short_order_tour
 from netsp.plan.space.space_plan import SHORT_ORDER, plans, water_of
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission

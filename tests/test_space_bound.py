@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from netsp.base.clock import NEVER, Clock
 from netsp.base.errors import InputError
 from netsp.plan.solve_problem import solve
+from netsp.plan.space.mission_policy import PotentialPolicy, StatePolicy
 from netsp.plan.space.path_bound import LegBounds, bound_of_all
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import Water
 from netsp.plan.space.potential import (
-    PotentialParams,
     Region,
     edges_of,
     has_room,
@@ -24,7 +24,6 @@ from netsp.plan.space.potential import (
     steepest,
 )  # fmt: skip
 from netsp.plan.space.space_legs import Ways
-from netsp.plan.space.states import Effort
 from netsp.plan.space.upright import bound_of_upright
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
@@ -156,10 +155,10 @@ def test_no_bound_of_all_tours_is_above_a_tour_through_a_slot_that_the_cells_clo
     water = Water.of(mission, scene, scene.field())
     places = Places.of(mission, water.field)
     # what was found goes round the wall, as it does where cells close the slot
-    ways = Ways(water, places, Effort.of(len(places)))
+    ways = Ways(water, places, StatePolicy().effort(len(places)))
     round_ = np.array([[-2, 0, 0], [-0.3, 3.1, 0], [0.3, 3.1, 0], [2, 0, 0]], dtype=float)
     ways.tethers.update({0: [round_], 1: [round_]})
-    bound = bound_of_all(ways, [0, 1], None, params=PotentialParams(2_000, 16_000))
+    bound = bound_of_all(ways, [0, 1], None, potential=PotentialPolicy(2_000, 16_000))
     legs = [
         through((-2, 0, 0), (2, y, 0), 0.0, width, 0.4, 0.1) for y in (0.5, -0.5)
     ]  # fmt: skip
@@ -171,8 +170,8 @@ def test_a_path_that_was_measured_does_not_raise_the_bound(tmp_path):
     mission, scene = mission_by_a_slot(0.3, tmp_path)
     water = Water.of(mission, scene, scene.field())
     places = Places.of(mission, water.field)
-    ways = Ways(water, places, Effort.of(len(places)))
-    legs = LegBounds(ways, [0, 1], PotentialParams(2_000, 16_000))
+    ways = Ways(water, places, StatePolicy().effort(len(places)))
+    legs = LegBounds(ways, [0, 1], PotentialPolicy(2_000, 16_000))
     straight = np.linalg.norm(legs.points[0] - legs.points[1])
     assert legs.costs[0, 1] == pytest.approx(straight)
     ways.tethers[0] = [np.array([[-2, 0, 0], [0, 3.5, 0], [2, 0.5, 0]], dtype=float)]
@@ -211,4 +210,4 @@ def test_the_bound_among_upright_solids_ends_with_the_clock_of_the_run(monkeypat
 
 def test_parameters_out_of_range_are_refused():
     with pytest.raises(InputError, match="max_cells: 10; expected 15000 or more"):
-        PotentialParams(max_cells=10)
+        PotentialPolicy(max_cells=10)

@@ -15,12 +15,13 @@ from netsp.command.main import main
 from netsp.hsignature.wordtable import times, times_inverse
 from netsp.plan.space.board import Board
 from netsp.plan.space.judge import verify_mission
-from netsp.plan.space.path_bound import bound_of_all
+from netsp.plan.space.mission_policy import PotentialPolicy, StatePolicy
+from netsp.plan.space.path_bound import LegBounds, bound_of_all
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import Water, has_room
+from netsp.plan.space.planning_context import Water, along, has_room
 from netsp.plan.space.space_legs import Legs, Ways
 from netsp.plan.space.space_plan import _best_driven, plan
-from netsp.plan.space.states import Effort, first_states
+from netsp.plan.space.states import first_states
 from netsp.plan.space.triangle_labels import LENGTHS, STEPS, axes_of, lower_end, nth_axis, staircase
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
@@ -323,7 +324,7 @@ def test_a_detour_past_the_free_end_of_a_bar_saves_the_way_back_around_it(monkey
 
 def test_a_leg_that_arrives_in_one_direction_only_is_gone_in_that_direction():
     water, places = free_bar()
-    states = first_states(water, places, 19.8, Effort.of(2), Clock())
+    states = first_states(water, places, 19.8, StatePolicy().effort(2), Clock())
     a, b = states.of[0][0], states.of[1][0]
     line = places.points[[0, 1]]
     for v, w, path in ((a, b, line), (b, a, line[::-1])):
@@ -338,7 +339,7 @@ def test_a_leg_that_arrives_in_one_direction_only_is_gone_in_that_direction():
 
 def test_a_tour_whose_only_way_is_forbidden_when_the_time_is_up_is_not_driven_again(monkeypatch):
     water, places = free_bar()
-    states = first_states(water, places, 19.8, Effort.of(2), Clock())
+    states = first_states(water, places, 19.8, StatePolicy().effort(2), Clock())
     a, b = states.of[0][0], states.of[1][0]
     own_way, driven = Board._own_way, Board.driven
     # the robot gets to b by way of a alone, and whatever is driven is at fault on that leg
@@ -356,22 +357,26 @@ def test_a_tour_whose_only_way_is_forbidden_when_the_time_is_up_is_not_driven_ag
     assert not board.leads_to([a, b])
 
 
-def test_ways_made_of_tethers_are_ways_of_their_words_and_no_bound_rests_on_them(posts):
+def test_ways_made_of_tethers_are_ways_of_their_words_and_no_bound_exceeds_them(posts):
     _, mission = posts
     scene = mission.load_scene()
     field = scene.field()
     water, places = Water.of(mission, scene, field), Places.of(mission, field)
-    effort = Effort.of(len(places))
+    effort = StatePolicy().effort(len(places))
     states = first_states(water, places, mission.tether_length, effort, Clock())
     tethers = {n: [states.all[s].tether.nodes for s in of] for n, of in states.of.items()}
     ways = Ways(water, places, effort, tethers)
     made = 0
     for n in range(len(places)):
         ways.prepare(n, search=False)
+    legs = LegBounds(ways, list(range(len(places))), PotentialPolicy(max_cells=15_000))
+    for u, v in itertools.combinations(range(1, len(legs.points)), 2):
+        legs.raised(u, v, Clock())
     for n, m in itertools.permutations(range(len(places)), 2):
         for word, path in ways.known(n, m):
             assert water.number(path) == word
             assert has_room(field, path, mission)
             made += len(path) > 2
-        assert all(len(path) == 2 for _, path in ways.sought(n, m))
+        lengths = [along(path) for _, path in ways.known(n, m)]
+        assert all(length >= legs.costs[n + 1, m + 1] - 1e-6 for length in lengths)
     assert made

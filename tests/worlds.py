@@ -6,10 +6,9 @@ import numpy as np
 from hypothesis import strategies as st
 
 from netsp import Circle, Problem
-from netsp.plan.space.mission_solver import MissionPolicy
-from netsp.plan.space.potential import PotentialParams
+from netsp.plan.space.mission_policy import MissionPolicy, PotentialPolicy
 
-FEW_CELLS = MissionPolicy(potential=PotentialParams(max_cells=120_000))
+FEW_CELLS = MissionPolicy(potential=PotentialPolicy(max_cells=120_000))
 """Policy for missions: bounds with fewer cells than by default take a tenth of the time."""
 
 

@@ -73,7 +73,8 @@ def solve(
 
         style.check_format(plot)
     from netsp.command.stages import Stages
-    from netsp.plan.space.mission_solver import MissionPolicy, solve_mission
+    from netsp.plan.space.mission_policy import MissionPolicy
+    from netsp.plan.space.mission_solver import solve_mission
 
     clock = command_clock(time_limit or TIME_LIMIT)
     begin = time.monotonic()

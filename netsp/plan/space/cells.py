@@ -19,23 +19,21 @@ from netsp.base.clock import Flag, abandoned, end_if_abandoned
 from netsp.base.compiled.dynamic_array import write_ints
 from netsp.base.compiled.kernel import kernel
 from netsp.base.errors import InputError
+from netsp.plan.space.mission_policy import WordPolicy
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.sampling import Field, distance
 
-LEAST_ROOM = 0.3
-"""Share of a cell's size that its centre must be from all solids."""
+FREE = 1
+"""Code of a cell whose centre is free, a bit of its flags."""
 
-MOST_CELLS = 6_000_000
-"""So many take about 0.4 GiB with their labels."""
+OPEN = 2
+"""Code of a cell whose 26 neighbours have all edges and squares, a bit of its flags."""
 
-HALVINGS = 4
-"""Of an edge or a square that one ball does not cover."""
+EDGE = 4
+"""Code of an edge along x, the first of three bits: along x, y and z."""
 
-FREE, OPEN = 1, 2
-"""Bits of a cell: its centre is free; so are all edges and squares of its 26 neighbours."""
-
-EDGE, SQUARE = 4, 32
-"""First of three bits each: of the edge along x, y, z; of the squares along yz, zx, xy."""
+SQUARE = 32
+"""Code of a square along y and z, the first of three bits: along yz, zx and xy."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,12 @@ class Cells:
 
     @classmethod
     def of(
-        cls, field: DistanceField, low: npt.ArrayLike, high: npt.ArrayLike, cell: float
+        cls,
+        field: DistanceField,
+        low: npt.ArrayLike,
+        high: npt.ArrayLike,
+        cell: float,
+        policy: WordPolicy | None = None,
     ) -> Cells:
         """The complex of a box in a scene.
 
@@ -86,19 +89,28 @@ class Cells:
         InputError
             A box without size, or more cells than go into memory.
         """
+        policy = policy or WordPolicy()
         low = np.asarray(low, dtype=float)
         size = np.asarray(high, dtype=float) - low
         if not (size > 0.0).all():
             raise InputError(f"bounds: expected a box, got sides {size.tolist()}")
         shape = np.maximum(1.0, np.ceil(size / cell))
-        if float(np.prod(shape)) > MOST_CELLS:
-            better = cell * (float(np.prod(shape)) / MOST_CELLS) ** (1.0 / 3.0)
+        if float(np.prod(shape)) > policy.max_cells:
+            better = cell * (float(np.prod(shape)) / policy.max_cells) ** (1.0 / 3.0)
             raise InputError(
                 f"cell: {cell:g} makes {np.prod(shape):.2g} cells, which would take "
                 f"{np.prod(shape) * 7e-8:.2g} GiB; expected {better:.2g} or more"
             )
         nx, ny, nz = (int(n) for n in shape)
-        flags = complex_of(field.arrays, low, cell, (nx, ny, nz), abandoned())
+        flags = complex_of(
+            field.arrays,
+            low,
+            cell,
+            (nx, ny, nz),
+            policy.min_room_ratio,
+            policy.max_halvings,
+            abandoned(),
+        )
         end_if_abandoned()
         return cls(field, low, cell, flags)
 
@@ -119,7 +131,13 @@ class Cells:
 
 @kernel
 def complex_of(
-    field: Field, low: Floats, cell: float, shape: tuple[int, int, int], stop: Flag
+    field: Field,
+    low: Floats,
+    cell: float,
+    shape: tuple[int, int, int],
+    min_room_ratio: float,
+    max_halvings: int,
+    stop: Flag,
 ) -> npt.NDArray[np.uint8]:
     """Return the flags of all cells. Ends early once `stop` is set."""
     nx, ny, nz = shape
@@ -137,7 +155,7 @@ def complex_of(
                     low[2] + (k + 0.5) * cell,
                 )
                 room[i, j, k] = d
-                if d >= LEAST_ROOM * cell:
+                if d >= min_room_ratio * cell:
                     flags[i, j, k] = FREE
     last = np.array([nx, ny, nz]) - 1
     at, to, centre = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64), np.empty(3)
@@ -163,7 +181,7 @@ def complex_of(
                         for c in range(3):
                             centre[c] = low[c] + (0.5 * (at[c] + to[c]) + 0.5) * cell
                         if room[i, j, k] + room[to[0], to[1], to[2]] < 1.0001 * cell and (
-                            not covered(field, centre, cell, axis, -1, HALVINGS)
+                            not covered(field, centre, cell, axis, -1, max_halvings)
                         ):
                             continue
                     flags[i, j, k] |= EDGE << axis
@@ -195,7 +213,7 @@ def complex_of(
                             centre[c] = low[c] + (at[c] + 0.5) * cell
                         centre[a] += 0.5 * cell
                         centre[b] += 0.5 * cell
-                        if not covered(field, centre, cell, a, b, HALVINGS):
+                        if not covered(field, centre, cell, a, b, max_halvings):
                             continue
                     flags[i, j, k] |= SQUARE << axis
     return flags
@@ -205,7 +223,7 @@ def complex_of(
 def covered(field: Field, centre: Floats, size: float, a: int, b: int, halvings: int) -> bool:
     """Whether balls without solids cover an edge along axis a (b < 0) or a square along a and b."""
     # (centre, half a side, halvings left) of the parts that are to be covered
-    parts, left = np.empty((4 * HALVINGS + 8, 5)), 1
+    parts, left = np.empty((4 * halvings + 8, 5)), 1
     parts[0, 0], parts[0, 1], parts[0, 2] = centre[0], centre[1], centre[2]
     parts[0, 3], parts[0, 4] = 0.5 * size, halvings
     while left > 0:

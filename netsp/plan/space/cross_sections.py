@@ -21,17 +21,17 @@ from netsp.world.scene.field import DistanceField
 from netsp.world.scene.packing import COUNT, ROW, ROWS
 
 MAX_LEAN = 1e-3
-"""Maximum tangent of the angle between the vertical and the axis of an upright solid. Depths
-measured across the axis and depths measured horizontally then differ by less than `LEAN_MARGIN`."""
+"""Tolerance for the lean of upright solids: maximum tangent of the angle between the axis and the
+vertical. Depths across the axis and horizontal depths then differ by less than `LEAN_MARGIN`."""
 
 LEAN_MARGIN = 1e-6
-"""Relative increase of a depth; covers the difference between measuring across the axis and
-measuring horizontally, at most the square of `MAX_LEAN`."""
+"""Tolerance for depths in leaning solids: relative increase of a depth, which covers the difference
+between depths across the axis and horizontal depths, at most the square of `MAX_LEAN`."""
 
 MIN_EXCESS_RATIO = 2.0
-"""Minimum height by which a solid exceeds the range at both ends, as a multiple of the depth to
-which paths may enter solids. A point of the range that is less deep in the solid is then near the
-side of the solid, not near its end."""
+"""Tolerance of the proof: minimum height by which a solid exceeds the range at both ends, as a
+multiple of the depth to which paths may enter solids. A point of the range that is less deep in the
+solid is then near the side of the solid, not near its end."""
 
 
 @dataclass(frozen=True)

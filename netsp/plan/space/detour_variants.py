@@ -14,20 +14,8 @@ from itertools import pairwise
 import numpy as np
 
 from netsp.base.arrays import Floats
+from netsp.plan.space.mission_policy import DetourPolicy
 from netsp.plan.space.planning_context import Water, along, has_room
-
-SIDES = 12
-"""Directions in which a way is bent, evenly around it."""
-
-BENDS = (0.35, 0.8)
-"""How far, as shares of what the length allows."""
-
-MOST = 4
-"""Ways on other sides that are kept, the shortest."""
-
-LOOKS = 6
-"""Places along a way from which the bent one is looked at: seen from all of them, it is the same
-once it is pulled taut."""
 
 
 def ways_beside(water: Water, known: list[Floats], farthest: float) -> list[Floats]:
@@ -49,8 +37,8 @@ def ways_beside(water: Water, known: list[Floats], farthest: float) -> list[Floa
     """
     begin, end = known[0][0], known[0][-1]
     found: list[Floats] = []
-    delta = water.mission.delta
-    for bent in _bent(begin, end, farthest):
+    delta, policy = water.mission.delta, water.policy.detours
+    for bent in _bent(begin, end, farthest, policy):
         if not _free(water, bent) or any(_seen_from(water, way, bent) for way in known + found):
             continue
         path = water.taut(bent)
@@ -59,10 +47,10 @@ def ways_beside(water: Water, known: list[Floats], farthest: float) -> list[Floa
         if all(not _alike(path, other, delta) for other in known + found):
             found.append(path)
     found.sort(key=along)
-    return found[:MOST]
+    return found[: policy.max_bent_paths]
 
 
-def _bent(begin: Floats, end: Floats, farthest: float) -> Iterator[Floats]:
+def _bent(begin: Floats, end: Floats, farthest: float, policy: DetourPolicy) -> Iterator[Floats]:
     """Ways with one bend or two, out from the straight one."""
     step = end - begin
     far = float(np.linalg.norm(step))
@@ -70,8 +58,8 @@ def _bent(begin: Floats, end: Floats, farthest: float) -> Iterator[Floats]:
         return
     u, v = across(step)
     out = 0.5 * math.sqrt(farthest**2 - far**2)
-    for share in BENDS:
-        for angle in np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False):
+    for share in policy.bend_shares:
+        for angle in np.linspace(0.0, 2.0 * math.pi, policy.n_bend_directions, endpoint=False):
             away = share * out * (math.cos(angle) * u + math.sin(angle) * v)
             yield np.array([begin, begin + 0.5 * step + away, end])
 
@@ -101,7 +89,7 @@ def _free(water: Water, path: Floats) -> bool:
 
 def _seen_from(water: Water, way: Floats, bent: Floats) -> bool:
     """Whether one can be pulled into the other, straight across."""
-    shares = np.linspace(0.0, 1.0, LOOKS + 2)[1:-1]
+    shares = np.linspace(0.0, 1.0, water.policy.detours.n_sight_lines + 2)[1:-1]
     one, other = _at(way, shares), _at(bent, shares)
     return all(water.field.line_of_sight(a, b) for a, b in zip(one, other, strict=True))
 

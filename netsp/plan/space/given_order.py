@@ -19,10 +19,6 @@ from netsp.world.planner import PlannerOptions
 from netsp.world.planner.planner import DONE
 from netsp.world.planner.predictive import PredictivePlanner
 
-MAX_PATHS = 8
-"""Largest number of paths of the planner per waypoint; a planner that needs more makes no
-progress."""
-
 
 def drive_given_order(water: Water) -> Driven | None:
     """Drive a mission in the order of its file, whatever the time.
@@ -73,7 +69,7 @@ def drive_order(water: Water, order: Sequence[tuple[int, int]], clock: Clock) ->
     planner.laid = water.laid
     robot, tether = np.array(mission.begin), water.present
     walked, legs = [robot], []
-    for _ in range(MAX_PATHS * (2 + len(order))):
+    for _ in range(water.policy.orders.max_paths_per_waypoint * (2 + len(order))):
         if clock.up:
             return None
         before = len(planner.reached)

@@ -16,6 +16,7 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError, counted
 from netsp.base.geometry import polylines
+from netsp.base.number_ranges import check_positive
 from netsp.gtsp.travel.result import relative_gap
 from netsp.judge import Check, Verification
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
@@ -30,18 +31,32 @@ from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
 from netsp.world.tether import GeodesicTether
 
-FINER = 0.5
-"""Times the mission's resolution at which the tether is driven again."""
+STATED_TOLERANCE = 1e-6
+"""Tolerance of stated figures, for their rounding in files: metres, and share of a length."""
 
-LENGTH_TOLERANCE = 0.01
-"""Share of a stated tether length, beside the mission's resolution, by which the length at another
-resolution may differ: three times the worst drives against finer ones (docs/tether.md)."""
 
-REACH = 0.99
-"""Of the tether that a plan may need at a waypoint (`netsp.plan.space.planning_context.SHARE`)."""
+@dataclass(frozen=True)
+class JudgePolicy:
+    """Accuracy that the judge of a planned mission asks for.
 
-ROUNDING = 1e-6
-"""Metres, and share of a length, that stated figures may be off."""
+    Attributes
+    ----------
+    delta_ratio
+        Resolution at which the tether is driven again, as a share of the mission's.
+    max_length_error
+        Share of a stated tether length, in addition to the mission's resolution, by which the
+        length at the other resolution may differ: three times the worst difference between two
+        resolutions (docs/tether.md).
+    tether_share
+        Share of the tether within which a waypoint must not be left out.
+    """
+
+    delta_ratio: float = 0.5
+    max_length_error: float = 0.01
+    tether_share: float = 0.99
+
+    def __post_init__(self) -> None:
+        check_positive(self)
 
 
 def verify_mission(
@@ -50,6 +65,7 @@ def verify_mission(
     scene: Scene | None = None,
     field: DistanceField | None = None,
     water: Water | None = None,
+    policy: JudgePolicy | None = None,
 ) -> Verification:
     """Judge a planned mission.
 
@@ -89,9 +105,10 @@ def verify_mission(
         scene = scene or mission.load_scene()
         check_bounds(mission, scene)
         water = Water.of(mission, scene, field or scene.field())
-    finer = GeodesicTether(water.field, FINER * mission.delta)
+    policy = policy or JudgePolicy()
+    finer = GeodesicTether(water.field, policy.delta_ratio * mission.delta)
     water = replace(water, mission=mission, model=finer)
-    return Verification(tuple(_Judge(mission, mission.tour, water).run()))
+    return Verification(tuple(_Judge(mission, mission.tour, water, policy).run()))
 
 
 def checked_mission(mission: Mission, scene: Scene, field: DistanceField) -> None:
@@ -129,6 +146,7 @@ class _Judge:
     mission: Mission
     tour: PlannedTour
     water: Water
+    policy: JudgePolicy
 
     @property
     def field(self) -> DistanceField:
@@ -168,7 +186,7 @@ class _Judge:
                 return Check(name, False, f"{_shown(line[out[0]])} is out of the scene's bounds")
         far = np.linalg.norm(line - np.array(mission.anchor), axis=1)
         k = int(far.argmax())
-        if far[k] > mission.tether_length * (1.0 + ROUNDING):
+        if far[k] > mission.tether_length * (1.0 + STATED_TOLERANCE):
             told = f"{_shown(line[k])} is {far[k]:.4g} m from the anchor"
             return Check(name, False, f"{told}, the tether {mission.tether_length:g} long")
         return Check(name, True, "all paths")
@@ -204,7 +222,7 @@ class _Judge:
             return Check(name, True, "no waypoint")
         water = self.water
         tree = ShortestTree(water.grid, np.array(mission.start), mission.places[list(left)])
-        limit = REACH * mission.tether_length - mission.delta
+        limit = self.policy.tether_share * mission.tether_length - mission.delta
         for n, k in enumerate(left):
             path = tree.path(n)
             if path is None:
@@ -281,7 +299,7 @@ class _Judge:
                     (tether.length, stop.tether_length, "at"),
                     (most, stop.longest_tether, "on the way to"),
                 ):
-                    allowed = self.mission.delta + LENGTH_TOLERANCE * stated
+                    allowed = self.mission.delta + self.policy.max_length_error * stated
                     if abs(length - stated) > allowed:
                         off.append(f"{where_} stop {k}: {length:.3f} m, stated {stated:.3f}")
         # as at the start, but to where the tour ends, which may be its reach away
@@ -292,7 +310,7 @@ class _Judge:
         return [
             Check(
                 "within the tether's length",
-                longest <= limit * (1.0 + ROUNDING),
+                longest <= limit * (1.0 + STATED_TOLERANCE),
                 f"longest {longest:.3f} of {limit:g} m, on the way to {name}",
             ),
             Check(
@@ -312,7 +330,7 @@ class _Judge:
     def _length(self) -> Check:
         length = sum(float(polylines.length(leg)) for leg in self.legs)
         stated = self.tour.length
-        good = abs(length - stated) <= ROUNDING * (1.0 + stated)
+        good = abs(length - stated) <= STATED_TOLERANCE * (1.0 + stated)
         return Check(
             "length as stated",
             good,
@@ -325,7 +343,7 @@ class _Judge:
             ("lower_bound", tour.lower_bound, tour.gap),
             ("bound_of_all", tour.bound_of_all, tour.gap_to_all),
         ):
-            slack = ROUNDING * tour.length
+            slack = STATED_TOLERANCE * tour.length
             if bound is not None and bound > tour.length + slack:
                 faults.append(f"{name} {bound:.6g} is above the length")
             right = relative_gap(tour.length, bound)

@@ -6,21 +6,42 @@ closed bars they are linking numbers: how often a loop goes through each of them
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
+from netsp.base.number_ranges import check_positive
 from netsp.hsignature import Word
-from netsp.plan.space.cells import MOST_CELLS
+from netsp.plan.space.mission_policy import WordPolicy
 from netsp.plan.space.space_signature import SpaceSignature
 from netsp.world.scene.scene import Scene
 from netsp.world.scene.surfaces import extent
 
-CELL, ROOM = 0.2, 5.0
-"""Metres of a cell, where there are not too many of them, and cells about everything."""
+
+@dataclass(frozen=True)
+class MeasurePolicy:
+    """Grid on which paths are measured.
+
+    Attributes
+    ----------
+    cell
+        Size of a cell, metres, unless there would be too many cells. Gaps narrower than a cell may
+        count as closed.
+    margin_cells
+        Cells around the scene and the path, so that paths can be closed around everything.
+    words
+        Size and accuracy of the cell complex.
+    """
+
+    cell: float = 0.2
+    margin_cells: float = 5.0
+    words: WordPolicy = field(default_factory=WordPolicy)
+
+    def __post_init__(self) -> None:
+        check_positive(self)
 
 
 @dataclass(frozen=True)
@@ -53,7 +74,12 @@ class SpaceMeasures:
 
 
 def measure_path(
-    scene: Scene, path: npt.ArrayLike, *, closed: bool | None = None, cell: float | None = None
+    scene: Scene,
+    path: npt.ArrayLike,
+    *,
+    closed: bool | None = None,
+    cell: float | None = None,
+    policy: MeasurePolicy | None = None,
 ) -> SpaceMeasures:
     """Measure a path.
 
@@ -66,7 +92,9 @@ def measure_path(
     closed : bool, optional
         Whether its end is joined to its beginning; by default if they are one point.
     cell : float, optional
-        Metres of a cell; by default 0.2, or more where the scene is large.
+        Size of a cell, metres; by default that of the policy, or more where the scene is large.
+    policy : MeasurePolicy, optional
+        Grid on which the path is measured.
 
     Returns
     -------
@@ -86,6 +114,7 @@ def measure_path(
     >>> abs(measure_path(Scene(solids=[{"torus": ring}]), loop).windings[0])
     1
     """
+    policy = policy or MeasurePolicy()
     line = np.asarray(path, dtype=float).reshape(-1, 3)
     if len(line) < 2:
         raise InputError(f"path: expected two points or more, got {len(line)}")
@@ -93,10 +122,10 @@ def measure_path(
         closed = bool(np.linalg.norm(line[0] - line[-1]) < 1e-9)
     low, high = extent(scene, line)
     if cell is None:
-        room = np.prod(high - low + 2.0 * ROOM * CELL)
-        cell = max(CELL, 1.05 * float(room / MOST_CELLS) ** (1.0 / 3.0))
-    low, high = low - ROOM * cell, high + ROOM * cell
-    words = SpaceSignature.of(scene.field(), low, high, cell, line[0])
+        room = np.prod(high - low + 2.0 * policy.margin_cells * policy.cell)
+        cell = max(policy.cell, 1.05 * float(room / policy.words.max_cells) ** (1.0 / 3.0))
+    low, high = low - policy.margin_cells * cell, high + policy.margin_cells * cell
+    words = SpaceSignature.of(scene.field(), low, high, cell, line[0], policy=policy.words)
     word = words.word(line, closed=closed)
     length = float(polylines.length(line))
     if closed:

@@ -20,7 +20,8 @@ from netsp.base.arrays import Floats
 from netsp.base.errors import InputError, LimitReachedError, interrupted
 from netsp.base.field_types import Point3
 from netsp.base.geometry import polylines
-from netsp.plan.space.planning_context import DIP, stride
+from netsp.plan.space.mission_policy import MissionPolicy
+from netsp.plan.space.planning_context import DIP_RATIO, stride
 from netsp.plan.space.space_plan import SpacePlan, plan
 from netsp.world.mission.mission import Mission, MissionState, MissionWaypoint
 from netsp.world.mission.planned_tour import PlannedStop, PlannedTour, in_file
@@ -96,6 +97,7 @@ class RepairPlanner(PredictivePlanner):
     """`PredictivePlanner` that plans the rest of a tour as a whole."""
 
     repairs: list[Repair] = field(default_factory=list)
+    policy: MissionPolicy = field(default_factory=MissionPolicy)
     _asked_for: bool = False
     _until: float = -np.inf
     _walked: list[Floats] = field(default_factory=list)
@@ -254,7 +256,7 @@ class RepairPlanner(PredictivePlanner):
         """The tether at the end of a leg; None, and why, where the robot cannot go along it."""
         if leg is None or not self.keeps_off(leg):
             return None, f"{name} is blocked"
-        step = stride(self.mission)
+        step = stride(self.mission, self.policy.tether_share)
         there, lengths = self._model.drive(tether, polylines.dense(leg, step))
         most = float(lengths.max(initial=0.0))
         if most > self.limit:
@@ -300,10 +302,11 @@ class RepairPlanner(PredictivePlanner):
             grid=self.grid,
             time_limit=self.options.planning_limit,
             seed=self.options.seed,
+            policy=self.policy,
         )
 
     def _inside(self, place: Floats) -> bool:
-        return float(self.scene.distance(place)) < DIP * self.mission.delta
+        return float(self.scene.distance(place)) < DIP_RATIO * self.mission.delta
 
     @property
     def _left(self) -> range:

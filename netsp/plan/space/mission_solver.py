@@ -11,9 +11,8 @@ no time to fly. All tours go through `_Incumbents`, which accepts none that the 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -27,16 +26,15 @@ from netsp.model.bound_scope import LowerBound, Scope
 from netsp.model.solution import Status
 from netsp.plan.solve_problem import SolverLike
 from netsp.plan.space.judge import verify_mission
-from netsp.plan.space.non_taut_moves import SAVED
+from netsp.plan.space.mission_policy import MissionPolicy
 from netsp.plan.space.passages import Resolved
 from netsp.plan.space.path_bound import bound_of_all
-from netsp.plan.space.planning_context import SHARE, Water, along, has_room
-from netsp.plan.space.potential import PotentialParams
+from netsp.plan.space.planning_context import Water, along, has_room
 from netsp.plan.space.space_plan import (
     AS_GIVEN,
+    LENGTH_ROUNDING,
     OUT_AND_BACK,
     PLANE,
-    ROUNDING,
     SHORT_ORDER,
     TAUT_LEGS,
     SpacePlan,
@@ -58,53 +56,6 @@ from netsp.world.simulator.mission_run import simulate
 
 GOING_ON = "going-straight-on"
 """Value of `solver` in tours that were found by going straight on."""
-
-
-@dataclass(frozen=True)
-class MissionPolicy:
-    """Division of the time of `solve_mission` among its stages.
-
-    Parameters
-    ----------
-    given_share : float
-        Share of the time for the flight in the order of the file, before the search. If it is too
-        short, that order is compared by its length and flown last.
-    planning_share : float
-        Share of the remaining time for tours of the plane and along states and legs.
-    bound_share : float
-        Share of the remaining time for the bound on all tours.
-    going_on_share : float
-        Share of the remaining time for the order by going straight on.
-    min_saving : float
-        Share of the time until home that a flight by going straight on must save to replace a tour
-        with a bound. Stopping within reach of the start saves less than the default.
-    first_tour_s : float
-        CPU seconds, at least 0, up to which netsp works on the first tour, even if the time limit
-        is shorter: the tour in the order of the file or, if that cannot be driven, another. A
-        smaller number leaves more missions without any tour when the limit is short; with a larger
-        one, very large missions end later.
-    potential : PotentialParams
-        Effort of the bound on each leg.
-    """
-
-    given_share: float = 0.25
-    planning_share: float = 0.7
-    bound_share: float = 0.3
-    going_on_share: float = 0.3
-    min_saving: float = 0.005
-    first_tour_s: float = 15.0
-    potential: PotentialParams = field(default_factory=PotentialParams)
-
-    def __post_init__(self) -> None:
-        """Refuse values out of range."""
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if isinstance(value, PotentialParams):  # checks itself
-                continue
-            top = math.inf if item.name.endswith("_s") else 1.0
-            if not 0.0 <= value <= top:
-                expected = "0 or more" if top > 1.0 else "a number from 0 to 1"
-                raise InputError(f"{item.name}: expected {expected}, got {value:g}")
 
 
 @dataclass(frozen=True)
@@ -286,7 +237,7 @@ class _Incumbents:
     def _needs_flight(self, found: SolvedMission) -> bool:
         """Return whether a tour counts only with a flight: it needs the part of the tether that
         plans reserve for steering."""
-        limit = SHARE * self.flights.mission.tether_length
+        limit = self.flights.policy.tether_share * self.flights.mission.tether_length
         in_plane = found.plan is not None and found.plan.kind == PLANE
         return in_plane and found.tour.longest_tether > limit
 
@@ -310,7 +261,7 @@ class _Incumbents:
     def _worth(self) -> float:
         """Return the seconds after which a flight cannot replace the incumbent."""
         seconds = None if self.best is None else self._seconds(self.best)
-        return np.inf if seconds is None else (1.0 + SAVED) * seconds
+        return np.inf if seconds is None else (1.0 + self.flights.policy.bound_worth) * seconds
 
     def _may_be_better(self, found: SolvedMission) -> bool:
         """Return whether a tour through as many waypoints may be better than the incumbent."""
@@ -320,7 +271,8 @@ class _Incumbents:
             return found.tour.length < self.best.tour.length * self._allowed(found, self.best)
         # a flight turns back within reach of each stop, and is faster by no more than that
         saved = 2.0 * mission.reach * (1 + len(found.tour.stops))
-        return (found.tour.length - saved) / mission.speed < (1.0 + SAVED) * seconds
+        allowed = (1.0 + self.flights.policy.bound_worth) * seconds
+        return (found.tour.length - saved) / mission.speed < allowed
 
     def _allowed(self, found: SolvedMission, best: SolvedMission) -> float:
         """Return the largest ratio of a tour to the incumbent at which it is accepted: a little
@@ -330,7 +282,7 @@ class _Incumbents:
         if found.tour.solver == GOING_ON and best.tour.solver not in without_bound:
             return 1.0 - self.flights.policy.min_saving
         known = found.plan is not None and found.plan.kind == TAUT_LEGS
-        return 1.0 + SAVED if known and best.tour.solver == PLANE else 1.0
+        return 1.0 + self.flights.policy.bound_worth if known and best.tour.solver == PLANE else 1.0
 
     def _is_better(self, found: SolvedMission, best: SolvedMission) -> bool:
         """Return whether a tour that passed the judge replaces the incumbent."""
@@ -350,10 +302,10 @@ class _Incumbents:
         """Return whether a tour is neither longer than the order of the file nor home later."""
         if len(found.tour.stops) > len(first.tour.stops):
             return True
-        if found.tour.length > first.tour.length * (1.0 + ROUNDING):
+        if found.tour.length > first.tour.length * (1.0 + LENGTH_ROUNDING):
             return False
         seconds, of_first = self._seconds(found), self._seconds(first)
-        return seconds is None or of_first is None or seconds <= of_first * (1.0 + ROUNDING)
+        return seconds is None or of_first is None or seconds <= of_first * (1.0 + LENGTH_ROUNDING)
 
 
 def solve_mission(
@@ -393,7 +345,7 @@ def solve_mission(
     on_progress : callable, optional
         Called with a line of text now and then.
     policy : MissionPolicy, optional
-        Division of the time among the stages.
+        Effort, time and limits.
 
     Returns
     -------
@@ -420,7 +372,7 @@ def solve_mission(
         try:
             with clock.at_least(policy.first_tour_s):
                 scene = scene or clock.bounded("reading the scene", mission.load_scene)
-                water = water_of(mission, clock, scene=scene, field=field, tell=tell)
+                water = water_of(mission, clock, scene=scene, field=field, tell=tell, policy=policy)
                 mission, cells = water.mission, water.cells
                 laid = clock.bounded("laying the tether", lambda: water.present)
                 check_tether(mission, laid.length)
@@ -600,9 +552,7 @@ def _raise_bound(
         bound = bound_of_upright(flights.mission, flights.water, some, places, part)
     elif plan.kind not in (PLANE, SHORT_ORDER) and not out.has_all_bounds:
         flights.tell("bound on all tours")
-        bound = bound_of_all(
-            plan.ways, sorted(visited), part, seed, params=flights.policy.potential
-        )
+        bound = bound_of_all(plan.ways, sorted(visited), part, seed)
         out.has_all_bounds = True
     else:
         return
@@ -630,7 +580,7 @@ def _with_bound(best: SolvedMission, bounds: Mapping[frozenset[int], float]) -> 
         for stop, place in zip(tour.stops, mission.places, strict=False)
     )
     off = 2.0 * off + float(np.linalg.norm(np.subtract(tour.home[-1], mission.start)))
-    bound = min(tour.length, max(0.0, bound - (off if off > ROUNDING else 0.0)))
+    bound = min(tour.length, max(0.0, bound - (off if off > LENGTH_ROUNDING else 0.0)))
     whole = len(tour.stops) == len(mission.waypoints)
     proven = whole and LowerBound(bound, Scope.ALL_TOURS).proves(tour.length)
     tour = tour.model_copy(
@@ -660,6 +610,7 @@ def _offer_going_on(found: _Incumbents, seed: int) -> None:
                 water.grid,
                 clock=clock.part(flights.policy.going_on_share),
                 seed=seed,
+                policy=flights.policy,
             ),
         )
     except (InputError, LimitReachedError):
@@ -781,31 +732,6 @@ def _parts(log: tuple[LogRow, ...], visited: list[int]) -> list[tuple[LogRow, ..
     ends = [int(np.argmax(next_one > k)) for k in visited]
     cuts = [0, *ends, len(log) - 1]
     return [log[a : b + 1] if b > a else (log[a], log[a]) for a, b in pairwise(cuts)]
-
-
-def better(run: Run, than: Run) -> bool:
-    """Whether a flight is better than another of the same mission.
-
-    Parameters
-    ----------
-    run : Run
-        A flight.
-    than : Run
-        The other.
-
-    Returns
-    -------
-    bool
-        It visits as many waypoints, is not longer over the limit, comes home as free, and is home
-        earlier.
-    """
-    a, b = run.summary, than.summary
-    return bool(
-        a["visited"] >= b["visited"]
-        and a["exceedance_s"] <= b["exceedance_s"]
-        and a["home"]["tether_free"] >= b["home"]["tether_free"]
-        and seconds_until_home(run) < seconds_until_home(than)
-    )
 
 
 def seconds_until_home(run: Run) -> float:

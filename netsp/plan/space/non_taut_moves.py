@@ -28,37 +28,15 @@ from netsp.gtsp.travel.graph import TravelGraph
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.board import Board, Driven, Stop
 from netsp.plan.space.detour_variants import across
+from netsp.plan.space.mission_policy import DetourPolicy
 from netsp.plan.space.planning_context import along, has_room, straight
 from netsp.plan.space.space_legs import Ways
 from netsp.plan.space.states import alike
 from netsp.roadmap.from_state import from_state
 from netsp.world.tether import Tether
 
-HOMES = 4
-"""Ways from the start to a place, along tethers of so many of its states."""
-
-PIECES = (1, 2, 3, 4, 6, 8)
-"""Stops of a piece that is moved elsewhere in the order."""
-
-MOST_ORDERS = 400
-"""Orders that are driven."""
-
-ORDERING = 0.2
-"""Of the time left, what the order without a tether may take."""
-
-SAVED = 1e-3
-"""Share of its length that a tour must be shorter to be taken: more is known of one without
-detours."""
-
-OFF, STEPS = 0.15, (0.03, 0.02, 0.01)
-"""Metres that a robot may be off at the bends of a path, and of its steps: what a tether slips off
-in steps of a decimetre, it may stay on in finer ones. It must come to hang alike in all."""
-
-FAR = 2.0
-"""Metres: on longer legs steps are longer, too."""
-
 HOME = -1
-"""In place of a place's number: the start."""
+"""Sentinel number of a place: the start."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +80,10 @@ class Detours:
     ways: Ways
     _legs: dict[tuple[int, int], list[tuple[Floats, int]]] = field(default_factory=dict)
 
+    @property
+    def _policy(self) -> DetourPolicy:
+        return self.ways.water.policy.detours
+
     def shortened(
         self, best: Driven | None, clock: Clock, tell: Callable[[str], None], seed: int = 0
     ) -> Driven | None:
@@ -126,12 +108,12 @@ class Detours:
         if clock.up and best is not None:
             return None
         states = self.board.states
-        shortest = self._shortest(clock)
+        shortest, worth = self._shortest(clock), self.ways.water.policy.bound_worth
         first = [] if best is None else [[states.all[v].point for v in best.tour]]
-        free = self._without_tether(shortest, clock.part(ORDERING), seed)
+        free = self._without_tether(shortest, clock.part(self._policy.order_share), seed)
         first += [] if free is None else [free]
         found: list[list[_Line]] = []
-        below = np.inf if best is None else (1.0 - SAVED) * best.length
+        below = np.inf if best is None else (1.0 - worth) * best.length
         for order in first:
             for there in (order, order[::-1]):
                 if clock.up or (there != order and states.begin is not None):
@@ -139,7 +121,7 @@ class Detours:
                 tell(f"detours along {len(order)} legs")
                 levels = self._driven(there, below, clock)
                 if levels is not None:
-                    found, below = levels, (1.0 - SAVED) * levels[-1][0].length
+                    found, below = levels, (1.0 - worth) * levels[-1][0].length
         if not found and best is None:
             return None
         current = first[0] if not found else [leg.place for leg in found[-1][0].legs[:-1]]
@@ -148,7 +130,7 @@ class Detours:
         while moved:
             moved = False
             for order in self._moves(current, shortest, below):
-                if clock.up or len(seen) >= MOST_ORDERS:
+                if clock.up or len(seen) >= self._policy.max_orders:
                     break
                 if tuple(order) in seen:
                     continue
@@ -156,7 +138,7 @@ class Detours:
                 tell(f"detours, {len(seen)} orders, {below:.1f} m")
                 levels = self._driven(order, below, clock, current, found)
                 if levels is not None:
-                    found, below = levels, (1.0 - SAVED) * levels[-1][0].length
+                    found, below = levels, (1.0 - worth) * levels[-1][0].length
                     current, moved = order, True
                     break
         return self._as_driven(found[-1][0]) if found else None
@@ -187,7 +169,7 @@ class Detours:
         some = [] if n == HOME else [path for _, path in self.ways.known(n, m)]
         if n == HOME:
             states = self.board.states.of.get(m, ())
-            out = (self.board.way_out(v) for v in states[:HOMES])
+            out = (self.board.way_out(v) for v in states[: self._policy.n_start_paths])
             some = [path for path in out if path is not None]
         if not any(len(path) == 2 for path in some) and straight(
             water.field, begin, end, mission.clearance
@@ -204,7 +186,7 @@ class Detours:
         u, v = across(step)
         for extra in effort.detours:
             out = 0.5 * far * math.sqrt((1.0 + extra) ** 2 - 1.0)
-            for angle in np.linspace(0.0, 2.0 * math.pi, effort.sides, endpoint=False):
+            for angle in np.linspace(0.0, 2.0 * math.pi, effort.detour_directions, endpoint=False):
                 away = out * (math.cos(angle) * u + math.sin(angle) * v)
                 yield np.array([begin, begin + 0.5 * step + away, end])
 
@@ -216,7 +198,7 @@ class Detours:
         """(n + 1, n + 1) metres between places, the last of which is the start; infinite where no
         way is known, or there is no time to look whether places far apart see each other."""
         count = len(self.ways.points)
-        looking = clock.part(ORDERING)
+        looking = clock.part(self._policy.order_share)
         out = np.full((count + 1, count + 1), np.inf)
         for m in range(count):
             for n in (HOME, *range(m)):
@@ -251,7 +233,7 @@ class Detours:
         tether."""
         begin = HOME if self.ways.places.begin is None else self.ways.places.begin
         found: set[tuple[float, tuple[int, ...]]] = set()
-        for there in _moved(list(order)):
+        for there in _moved(list(order), self._policy.piece_lengths):
             ends = np.array([begin, *there, HOME])
             far = float(shortest[ends[:-1], ends[1:]].sum())
             if far < below:
@@ -295,7 +277,7 @@ class Detours:
             )
             kept: list[_Line] = []
             for far, i, j in ahead:
-                if clock.up or len(kept) >= (1 if last else self.ways.effort.tethers):
+                if clock.up or len(kept) >= (1 if last else self.ways.effort.detour_tethers):
                     break
                 line, (path, writes) = levels[k][i], legs[k][j]
                 word = water.words.times(line.word, writes)
@@ -320,17 +302,21 @@ class Detours:
         out, or less far."""
         shares = np.linspace(0.0, 1.0, len(path))[1:-1, None]
         away = path[1:-1] - (path[0] + shares * (path[-1] - path[0]))
-        aside = OFF * away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+        aside = (
+            self._policy.position_error
+            * away
+            / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+        )
         flown, slips = None, False
         for before in (line.tether, line.flown):
-            flown, slipped = self._fine(before, path, after, STEPS[0])
+            flown, slipped = self._fine(before, path, after, self._policy.drive_steps[0])
             if flown is None:
                 return None
             slips = slips or slipped
         if not slips:
             return flown
         for step, off in product(
-            STEPS, (0.0 * aside, aside, -aside) if len(path) > 2 else (aside,)
+            self._policy.drive_steps, (0.0 * aside, aside, -aside) if len(path) > 2 else (aside,)
         ):
             other = np.vstack([path[:1], path[1:-1] + off, path[-1:]])
             for before in (line.tether, line.flown):
@@ -346,7 +332,7 @@ class Detours:
         water = self.ways.water
         way = np.vstack([before.robot[None], path[1:]])
         short = _cut(way, water.mission.reach)
-        step *= max(1.0, along(path) / FAR)
+        step *= max(1.0, along(path) / self._policy.long_leg)
         there, lengths = water.model.drive(before, polylines.dense(short, step))
         end, most = water.driven(there, np.vstack([short[-1:], path[-1:]]))
         longest = max(most, float(lengths.max(initial=0.0)))
@@ -397,10 +383,10 @@ def _path(leg: _Line) -> Floats:
     return leg.path
 
 
-def _moved(order: list[int]) -> Iterator[list[int]]:
+def _moved(order: list[int], piece_lengths: Sequence[int]) -> Iterator[list[int]]:
     """An order with a piece of it elsewhere, either way round, or turned round where it is."""
     count = len(order)
-    for size in PIECES:
+    for size in piece_lengths:
         for i in range(count - size + 1):
             piece, others = order[i : i + size], order[:i] + order[i + size :]
             for j in range(len(others) + 1):

@@ -15,8 +15,8 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock, end_if_abandoned
-from netsp.base.errors import InputError, LimitReachedError
-from netsp.plan.space.cells import LEAST_ROOM
+from netsp.base.errors import LimitReachedError
+from netsp.plan.space.mission_policy import GapPolicy, WordPolicy
 from netsp.plan.space.potential import possibly_free, steepness
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.planned_tour import UnresolvedGap
@@ -24,54 +24,6 @@ from netsp.world.paths.tree import Grid
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
 from netsp.world.simulator.mission_run import grid_box
-
-
-@dataclass(frozen=True)
-class GapParams:
-    """Effort of the search for gaps, and of the choice of a cell size that shows them.
-
-    Attributes
-    ----------
-    max_points : int
-        Largest number of fine points; the more cells may hold a gap, the fewer points each gets.
-    finest : int
-        Largest number of fine points along a side of a cell.
-    around : int
-        Cells around a gap in which its two sides may be connected; a gap with a connection that
-        close is ignored, because it saves no distance.
-    max_gaps : int
-        Largest number of gaps returned; the widest are kept.
-    max_pairs : int
-        Largest number of pairs of free cells whose connection is checked.
-    max_cells : int
-        Largest number of cells of a finer grid; the time to plan grows in proportion.
-    smallest : float
-        Smallest finer cell size, as a share of the cell size before.
-    step : float
-        Ratio of successive cell sizes that are tried.
-    time_share : float
-        Share of the remaining time for the search, more than 0 and at most 1.
-    """
-
-    max_points: int = 4_000_000
-    finest: int = 8
-    around: int = 3
-    max_gaps: int = 5
-    max_pairs: int = 2_000
-    max_cells: int = 1_000_000
-    smallest: float = 0.25
-    step: float = 0.985
-    time_share: float = 0.5
-
-    def __post_init__(self) -> None:
-        for name in ("max_points", "finest", "around", "max_gaps", "max_pairs", "max_cells"):
-            if getattr(self, name) < 1:
-                raise InputError(f"{name}: {getattr(self, name)}; expected 1 or more")
-        for name in ("smallest", "step"):
-            if not 0.0 < getattr(self, name) < 1.0:
-                raise InputError(f"{name}: {getattr(self, name)}; expected between 0 and 1")
-        if not 0.0 < self.time_share <= 1.0:
-            raise InputError(f"time_share: {self.time_share}; expected more than 0 and at most 1")
 
 
 @dataclass(frozen=True)
@@ -118,10 +70,15 @@ class GapGrid:
     high: Floats
     cell: float
     clearance: float
+    min_room_ratio: float = WordPolicy.min_room_ratio
 
     @classmethod
     def of(
-        cls, field: DistanceField, box: tuple[Floats, Floats, float], clearance: float
+        cls,
+        field: DistanceField,
+        box: tuple[Floats, Floats, float],
+        clearance: float,
+        min_room_ratio: float = WordPolicy.min_room_ratio,
     ) -> GapGrid:
         """Return the cells of a grid (`netsp.world.simulator.mission_run.grid_box`).
 
@@ -141,10 +98,12 @@ class GapGrid:
         """
         low, high, cell = box
         counts = np.maximum(1.0, np.round((high - low) / cell))  # as `Grid` counts
-        return cls(field, low, low + cell * counts, cell, clearance)
+        return cls(field, low, low + cell * counts, cell, clearance, min_room_ratio)
 
     @classmethod
-    def of_grid(cls, grid: Grid, clearance: float) -> GapGrid:
+    def of_grid(
+        cls, grid: Grid, clearance: float, min_room_ratio: float = WordPolicy.min_room_ratio
+    ) -> GapGrid:
         """Return the cells of a grid for paths.
 
         Parameters
@@ -160,7 +119,7 @@ class GapGrid:
             The cells.
         """
         high = grid.low + grid.cell * np.array(grid.free.shape)
-        return cls(grid.field, grid.low, high, grid.cell, clearance)
+        return cls(grid.field, grid.low, high, grid.cell, clearance, min_room_ratio)
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -171,7 +130,7 @@ class GapGrid:
     @property
     def least(self) -> float:
         """Least distance of the middle of a free cell from solids, metres."""
-        return max(self.clearance, LEAST_ROOM * self.cell)
+        return max(self.clearance, self.min_room_ratio * self.cell)
 
     def free(self, first: Ints, shape: tuple[int, ...]) -> Bools:
         """Return the mask of free cells in a block of cells.
@@ -230,7 +189,7 @@ def _near(parts: Ints, at: Ints) -> set[int]:
 
 
 def unresolved_gaps(
-    grid: GapGrid, params: GapParams | None = None, clock: Clock | None = None
+    grid: GapGrid, policy: GapPolicy | None = None, clock: Clock | None = None
 ) -> list[Gap]:
     """Return the gaps that have room for the robot but no free cells through them.
 
@@ -238,7 +197,7 @@ def unresolved_gaps(
     ----------
     grid : GapGrid
         The cells.
-    params : GapParams, optional
+    policy : GapPolicy, optional
         Effort.
     clock : Clock, optional
         Clock of the search.
@@ -246,7 +205,7 @@ def unresolved_gaps(
     Returns
     -------
     list of Gap
-        At most `params.max_gaps` gaps, the widest first.
+        At most `policy.max_gaps` gaps, the widest first.
 
     Raises
     ------
@@ -255,7 +214,7 @@ def unresolved_gaps(
     """
     from scipy.ndimage import binary_dilation
 
-    params, clock = params or GapParams(), clock or Clock()
+    policy, clock = policy or GapPolicy(), clock or Clock()
     shape = grid.shape
     free = grid.free(np.zeros(3, dtype=np.int64), shape)
     if free.all() or not free.any():
@@ -281,7 +240,7 @@ def unresolved_gaps(
             flag,
         )
     )
-    gaps = _gaps_between(grid, free, free, possible, params, clock)
+    gaps = _gaps_between(grid, free, free, possible, policy, clock)
     layers = _single_layers(free) & possible
     if layers.any():
         # the free cells on both sides of a single layer are only two cells apart, so leave them out
@@ -289,12 +248,12 @@ def unresolved_gaps(
         far = 2.0 * grid.cell
         gaps += [
             gap
-            for gap in _gaps_between(grid, free, apart, possible, params, clock)
+            for gap in _gaps_between(grid, free, apart, possible, policy, clock)
             if all(np.linalg.norm(gap.place - known.place) > far for known in gaps)
-            and _is_open(grid, gap, params)
+            and _is_open(grid, gap, policy)
         ]
     gaps.sort(key=lambda gap: -gap.width)
-    return gaps[: params.max_gaps]
+    return gaps[: policy.max_gaps]
 
 
 def _single_layers(free: Bools) -> Bools:
@@ -307,7 +266,7 @@ def _single_layers(free: Bools) -> Bools:
 
 
 def _gaps_between(
-    grid: GapGrid, free: Bools, ends_of: Bools, possible: Bools, params: GapParams, clock: Clock
+    grid: GapGrid, free: Bools, ends_of: Bools, possible: Bools, policy: GapPolicy, clock: Clock
 ) -> list[Gap]:
     """Return the gaps between the free cells `ends_of`."""
     from scipy.ndimage import distance_transform_edt
@@ -321,19 +280,19 @@ def _gaps_between(
     cells = np.argwhere(_parting(possible & ~ends_of, nearest))
     if not len(cells):
         return []
-    side = int(np.clip((params.max_points / len(cells)) ** (1.0 / 3.0), 2, params.finest))
+    side = int(np.clip((policy.max_points / len(cells)) ** (1.0 / 3.0), 2, policy.finest))
     ends, places, room = _links(grid, cells, nearest, side)
-    ends, places, room = _not_joined(free, ends, places, room, params, clock)
-    return _grouped(grid, ends, places, room, params)
+    ends, places, room = _not_joined(free, ends, places, room, policy, clock)
+    return _grouped(grid, ends, places, room, policy)
 
 
-def _is_open(grid: GapGrid, gap: Gap, params: GapParams) -> bool:
+def _is_open(grid: GapGrid, gap: Gap, policy: GapPolicy) -> bool:
     """Return whether fine points with room for the robot join the two sides of a gap."""
     from scipy.ndimage import label
 
     low = np.maximum(gap.sides.min(axis=0) - grid.cell, grid.low)
     high = np.minimum(gap.sides.max(axis=0) + grid.cell, grid.high)
-    spacing = grid.cell / params.finest
+    spacing = grid.cell / policy.finest
     counts = np.maximum(2, np.ceil((high - low) / spacing).astype(np.int64) + 1)
     axes = [np.linspace(low[k], high[k], counts[k]) for k in range(3)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
@@ -408,7 +367,7 @@ def _links(grid: GapGrid, cells: Ints, nearest: Ints, side: int) -> tuple[Ints, 
 
 
 def _not_joined(
-    free: Bools, ends: Ints, places: Floats, room: Floats, params: GapParams, clock: Clock
+    free: Bools, ends: Ints, places: Floats, room: Floats, policy: GapPolicy, clock: Clock
 ) -> tuple[Ints, Floats, Floats]:
     """Return the links whose two free cells are not connected nearby."""
     from scipy.ndimage import label
@@ -421,11 +380,11 @@ def _not_joined(
         end_if_abandoned()
         name = tuple(pair.ravel().tolist())
         if name not in is_apart:
-            if len(is_apart) >= params.max_pairs:
+            if len(is_apart) >= policy.max_pairs:
                 continue
             clock.check(SEARCHING)
-            first = np.maximum(pair.min(0) - params.around, 0)
-            last = pair.max(0) + params.around + 1
+            first = np.maximum(pair.min(0) - policy.around, 0)
+            last = pair.max(0) + policy.around + 1
             box = tuple(slice(a, b) for a, b in zip(first, last, strict=True))
             parts, _ = label(free[box], np.ones((3, 3, 3)))
             is_apart[name] = bool(parts[tuple(pair[0] - first)] != parts[tuple(pair[1] - first)])
@@ -434,7 +393,7 @@ def _not_joined(
 
 
 def _grouped(
-    grid: GapGrid, ends: Ints, places: Floats, room: Floats, params: GapParams
+    grid: GapGrid, ends: Ints, places: Floats, room: Floats, policy: GapPolicy
 ) -> list[Gap]:
     """Return one gap for each group of links near one another, at the place with the most room."""
     from scipy.ndimage import label
@@ -488,7 +447,7 @@ def resolving_cell(
     grid: GapGrid,
     gaps: list[Gap],
     box_of: Callable[[float], tuple[Floats, Floats, float]],
-    params: GapParams | None = None,
+    policy: GapPolicy | None = None,
     clock: Clock | None = None,
 ) -> float | None:
     """Return the largest cell size whose grid shows as many of the gaps as possible.
@@ -501,7 +460,7 @@ def resolving_cell(
         Gaps from `unresolved_gaps`.
     box_of : callable
         Takes a cell size; returns the corners of the box of such a grid and the cell size, metres.
-    params : GapParams, optional
+    policy : GapPolicy, optional
         Limits of the cell size.
     clock : Clock, optional
         Clock of the search.
@@ -516,16 +475,16 @@ def resolving_cell(
     LimitReachedError
         The time was up before a cell size was found.
     """
-    params, clock = params or GapParams(), clock or Clock()
+    policy, clock = policy or GapPolicy(), clock or Clock()
     best, shown, cell = None, 0, grid.cell
-    limit = max(params.max_cells, 1.1 * float(np.prod(grid.shape)))
-    while shown < len(gaps) and cell * params.step >= params.smallest * grid.cell:
+    limit = max(policy.max_cells, 1.1 * float(np.prod(grid.shape)))
+    while shown < len(gaps) and cell * policy.step >= policy.smallest * grid.cell:
         clock.check(SEARCHING)
-        cell *= params.step
-        finer = GapGrid.of(grid.field, box_of(cell), grid.clearance)
+        cell *= policy.step
+        finer = GapGrid.of(grid.field, box_of(cell), grid.clearance, grid.min_room_ratio)
         if float(np.prod(finer.shape)) > limit:
             break
-        around = int(np.ceil(params.around * grid.cell / cell))
+        around = int(np.ceil(policy.around * grid.cell / cell))
         count = sum(finer.joins(gap, around) for gap in gaps)
         if count > shown:
             best, shown = cell, count
@@ -566,7 +525,11 @@ class Resolved:
 
 
 def resolved_on(
-    mission: Mission, grid: Grid, params: GapParams | None = None, clock: Clock | None = None
+    mission: Mission,
+    grid: Grid,
+    policy: GapPolicy | None = None,
+    clock: Clock | None = None,
+    min_room_ratio: float = WordPolicy.min_room_ratio,
 ) -> Resolved:
     """Find the gaps that a given grid does not show. Its cell size is kept.
 
@@ -576,20 +539,24 @@ def resolved_on(
         The mission.
     grid : Grid
         Grid for paths.
-    params : GapParams, optional
+    policy : GapPolicy, optional
         Effort.
     clock : Clock, optional
         Clock of the run.
+    min_room_ratio : float
+        Minimum distance of the middle of a free cell from solids, in cells (`WordPolicy`).
 
     Returns
     -------
     Resolved
         The mission, unchanged, the cell size and the gaps.
     """
-    params, clock = params or GapParams(), clock or Clock()
+    policy, clock = policy or GapPolicy(), clock or Clock()
     try:
         gaps = unresolved_gaps(
-            GapGrid.of_grid(grid, mission.clearance), params, clock.part(params.time_share)
+            GapGrid.of_grid(grid, mission.clearance, min_room_ratio),
+            policy,
+            clock.part(policy.time_share),
         )
     except LimitReachedError:
         return Resolved(mission, grid.cell, (), None)
@@ -600,8 +567,9 @@ def resolved(
     mission: Mission,
     scene: Scene,
     field: DistanceField,
-    params: GapParams | None = None,
+    policy: GapPolicy | None = None,
     clock: Clock | None = None,
+    min_room_ratio: float = WordPolicy.min_room_ratio,
 ) -> Resolved:
     """Return a mission whose cells show the gaps of its scene, as far as possible.
 
@@ -616,36 +584,38 @@ def resolved(
         Its scene.
     field : DistanceField
         The scene's field.
-    params : GapParams, optional
+    policy : GapPolicy, optional
         Effort.
     clock : Clock, optional
         Clock of the run.
+    min_room_ratio : float
+        Minimum distance of the middle of a free cell from solids, in cells (`WordPolicy`).
 
     Returns
     -------
     Resolved
         Mission, cell size and gaps.
     """
-    params = params or GapParams()
-    searching = (clock or Clock()).part(params.time_share)
+    policy = policy or GapPolicy()
+    searching = (clock or Clock()).part(policy.time_share)
 
     def box_of(cell: float) -> tuple[Floats, Floats, float]:
         return grid_box(mission.model_copy(update={"cell": cell}), scene)
 
     box = grid_box(mission, scene)
-    grid = GapGrid.of(field, box, mission.clearance)
+    grid = GapGrid.of(field, box, mission.clearance, min_room_ratio)
     try:
-        gaps = unresolved_gaps(grid, params, searching)
+        gaps = unresolved_gaps(grid, policy, searching)
     except LimitReachedError:
         return Resolved(mission, box[2], (), None)
     if not gaps or mission.cell is not None or mission.tour is not None:
         return Resolved(mission, box[2], (), tuple(gaps))
     try:
-        cell = resolving_cell(grid, gaps, box_of, params, searching)
+        cell = resolving_cell(grid, gaps, box_of, policy, searching)
         if cell is None:
             return Resolved(mission, box[2], (), tuple(gaps))
-        finer = GapGrid.of(field, box_of(cell), mission.clearance)
-        left = unresolved_gaps(finer, params, searching)
+        finer = GapGrid.of(field, box_of(cell), mission.clearance, min_room_ratio)
+        left = unresolved_gaps(finer, policy, searching)
     except LimitReachedError:
         return Resolved(mission, box[2], (), tuple(gaps))
     far = 2.0 * grid.cell

@@ -21,54 +21,14 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock
-from netsp.base.errors import InputError
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.plan.solve_problem import solve_graph
-from netsp.plan.space.planning_context import DEEPEST, ROOM_STEP, along, straight
-from netsp.plan.space.potential import PotentialParams, Region, cells_of, path_bound
+from netsp.plan.space.mission_policy import BoundPolicy, PotentialPolicy
+from netsp.plan.space.planning_context import CLEARANCE_TOLERANCE, DEPTH_TOLERANCE, along, straight
+from netsp.plan.space.potential import Region, cells_of, path_bound
 from netsp.plan.space.space_legs import Ways
 from netsp.plan.space.upright import bound_of_upright
 from netsp.roadmap.from_state import from_state
-
-
-@dataclass(frozen=True)
-class BoundPolicy:
-    """Time and accuracy of a bound on all tours in space.
-
-    Attributes
-    ----------
-    upright_share : float
-        Share of the remaining time for the bound among upright solids, from 0 to 1.
-    max_detour_ratio : float
-        Longest path considered where no path is known, as a multiple of the straight distance;
-        more than 1.
-    max_leg_gap : float
-        Relative gap between the bound of a leg and its known length at which the bound is final,
-        from 0 to 1.
-    min_solve_s : float
-        Seconds for the solver if the time is up; more than 0, so that there is always a bound.
-    cell_s : float
-        Expected CPU seconds per cell of a potential; a grid that would exceed the remaining time is
-        skipped. At least 0.
-    """
-
-    upright_share: float = 0.4
-    max_detour_ratio: float = 2.2
-    max_leg_gap: float = 2e-3
-    min_solve_s: float = 0.3
-    cell_s: float = 8e-6
-
-    def __post_init__(self) -> None:
-        """Refuse values out of range."""
-        for name in ("upright_share", "max_leg_gap"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise InputError(f"{name}: {getattr(self, name)}; expected a number from 0 to 1")
-        if not self.max_detour_ratio > 1.0:
-            raise InputError(f"max_detour_ratio: {self.max_detour_ratio}; expected more than 1")
-        if not self.min_solve_s > 0.0:
-            raise InputError(f"min_solve_s: {self.min_solve_s}; expected more than 0")
-        if not self.cell_s >= 0.0:
-            raise InputError(f"cell_s: {self.cell_s}; expected 0 or more")
 
 
 def bound_of_all(
@@ -76,8 +36,8 @@ def bound_of_all(
     reached: list[int],
     clock: Clock | None,
     seed: int = 0,
-    params: PotentialParams | None = None,
     policy: BoundPolicy | None = None,
+    potential: PotentialPolicy | None = None,
 ) -> float | None:
     """Return a lower bound on the length of every tour through some waypoints.
 
@@ -95,17 +55,18 @@ def bound_of_all(
         Clock of the run; when it is up, the bound proven so far is returned.
     seed : int
         Random seed of the solver.
-    params : PotentialParams, optional
-        Effort for each leg.
     policy : BoundPolicy, optional
-        Time and accuracy.
+        Time and accuracy; by default those of `ways.water.policy`.
+    potential : PotentialPolicy, optional
+        Effort for each leg; by default that of `ways.water.policy`.
 
     Returns
     -------
     float or None
         Lower bound, metres; None if there was no time for one, or no waypoint besides the start.
     """
-    clock, policy = clock or Clock(), policy or BoundPolicy()
+    clock, defaults = clock or Clock(), ways.water.policy
+    policy, potential = policy or defaults.bound, potential or defaults.potential
     places, visited = ways.places, set(reached)
     some = [n for n in range(len(places)) if n == places.begin or places.waypoint[n] in visited]
     if not some:
@@ -113,7 +74,7 @@ def bound_of_all(
     upright = bound_of_upright(
         ways.water.mission, ways.water, some, places, clock.part(policy.upright_share)
     )
-    legs = LegBounds(ways, some, params or PotentialParams(), policy)
+    legs = LegBounds(ways, some, potential, policy)
     of_robot = _of_robot(legs, clock, seed)
     return max(of_robot or 0.0, upright or 0.0) or None
 
@@ -128,7 +89,7 @@ class LegBounds:
         Known paths between waypoints.
     some : list of int
         Numbers of the places, as in `ways.places`.
-    params : PotentialParams
+    potential : PotentialPolicy
         Effort for each leg.
     policy : BoundPolicy
         Time and accuracy.
@@ -145,7 +106,7 @@ class LegBounds:
 
     ways: Ways
     some: list[int]
-    params: PotentialParams
+    potential: PotentialPolicy
     policy: BoundPolicy = field(default_factory=BoundPolicy)
     points: Floats = field(init=False)
     costs: Floats = field(init=False)
@@ -193,16 +154,16 @@ class LegBounds:
         farthest = self.policy.max_detour_ratio * float(np.linalg.norm(b - a))
         longest = known if math.isfinite(known) else farthest
         level = int(self._level[u, v]) + 1
-        cells = cells_of(level, self.params)
+        cells = cells_of(level, self.potential)
         if self.policy.cell_s * cells > clock.left:
             self.final[u, v] = self.final[v, u] = True
             return False
         length = path_bound(
-            water.field, a, b, self._region(u, v), longest, cells, self.params, clock
+            water.field, a, b, self._region(u, v), longest, cells, self.potential, clock
         )
         self.costs[u, v] = self.costs[v, u] = max(before, length)
         self._level[u, v] = self._level[v, u] = level
-        if cells >= self.params.max_cells or length >= (1.0 - self.policy.max_leg_gap) * longest:
+        if cells >= self.potential.max_cells or length >= (1.0 - self.policy.max_leg_gap) * longest:
             self.final[u, v] = self.final[v, u] = True
         return bool(self.costs[u, v] > before * (1.0 + 1e-9) + 1e-9)
 
@@ -212,7 +173,7 @@ class LegBounds:
         mission, water = self.ways.water.mission, self.ways.water
         room = min(mission.clearance, float(self._room[u]), float(self._room[v]))
         # between two samples of a path the distance from solids may be half a step less
-        room = max(room - 0.5 * mission.delta - 2.0 * ROOM_STEP, -2.0 * DEEPEST)
+        room = max(room - 0.5 * mission.delta - 2.0 * CLEARANCE_TOLERANCE, -2.0 * DEPTH_TOLERANCE)
         bounds = np.array([[-np.inf] * 3, [np.inf] * 3])
         if water.bounds is not None:
             bounds = np.array(water.bounds).reshape(2, 3)

@@ -8,7 +8,7 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.errors import InputError
-from netsp.plan.space.planning_context import DIP
+from netsp.plan.space.planning_context import DIP_RATIO
 from netsp.world.mission.mission import Mission
 from netsp.world.scene.field import DistanceField
 
@@ -69,7 +69,7 @@ class Places:
             choice.append(0)
         out = cls(np.array(points), np.array(waypoint), np.array(choice), begin)
         room = field.distance(out.points)
-        tight = np.flatnonzero((room < DIP * mission.delta) & out.to_visit)
+        tight = np.flatnonzero((room < DIP_RATIO * mission.delta) & out.to_visit)
         if len(tight):
             n = tight[0]
             choice = out.choice[n]
@@ -78,7 +78,7 @@ class Places:
             )
             raise InputError(
                 f"{name}: is {'inside a solid' if room[n] < 0.0 else f'{room[n]:.3g} m from one'}; "
-                f"expected {DIP * mission.delta:.3g} m of water or more"
+                f"expected {DIP_RATIO * mission.delta:.3g} m of water or more"
             )
         return out
 

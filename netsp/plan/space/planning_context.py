@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,9 +14,10 @@ from netsp.base.arrays import Bools, Floats
 from netsp.base.clock import NEVER, Flag, end_if_abandoned
 from netsp.base.geometry import polylines
 from netsp.plan.space.cells import FREE, OPEN
+from netsp.plan.space.mission_policy import MissionPolicy
 from netsp.plan.space.passages import Resolved
 from netsp.plan.space.space_signature import SpaceSignature
-from netsp.plan.space.word_search import NONE, Found, shortest_words, way_back
+from netsp.plan.space.word_search import NO_WORD, Found, shortest_words, way_back
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.planned_tour import UnresolvedGap
 from netsp.world.paths.standoff import beside
@@ -28,24 +30,15 @@ from netsp.world.simulator.mission_run import grid_of
 from netsp.world.tether import GeodesicTether, Tether
 from netsp.world.tether.resolution import THINNEST
 
-SHARE = 0.99
-"""Of the tether that states and legs may need: the rest is for how the robot is steered, and for
-what is not seen between two steps along a leg."""
+CLEARANCE_TOLERANCE = 0.01
+"""Tolerance of clearances that are sampled along a path, metres: largest overstatement."""
 
-LONGER = 1.35
-"""Of paths along cells beside those pulled taut: 26 directions make 1.09, and round bodies more."""
+DEPTH_TOLERANCE = 1e-3
+"""Tolerance for paths inside of solids, metres; the judge accepts the same."""
 
-ROOM_STEP = 0.01
-"""Metres that the room along a path may be overstated by."""
-
-DEEPEST = 1e-3
-"""Metres that a path may be inside a solid: as the judge has it."""
-
-LIFTS = 12
-"""Times that corners are led around the outside of what they cut off."""
-
-DIP = 0.15
-"""Of delta: a tether's edges dip into a surface by an eighth of it (docs/tether.md)."""
+DIP_RATIO = 0.15
+"""Tolerance of the tether model as a share of delta: edges of a tether dip into a surface by up to
+an eighth of delta (docs/tether.md)."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +62,8 @@ class Water:
         not known.
     cells : Resolved, optional
         Cell size, and the gaps that the grid does not show; None if they were not searched for.
+    policy : MissionPolicy
+        Effort and limits of planning.
     """
 
     mission: Mission
@@ -78,9 +73,16 @@ class Water:
     model: GeodesicTether
     bounds: tuple[float, ...] | None = None
     cells: Resolved | None = None
+    policy: MissionPolicy = dataclasses.field(default_factory=MissionPolicy)
 
     @classmethod
-    def of(cls, mission: Mission, scene: Scene, field: DistanceField) -> Water:
+    def of(
+        cls,
+        mission: Mission,
+        scene: Scene,
+        field: DistanceField,
+        policy: MissionPolicy | None = None,
+    ) -> Water:
         """The water of a mission.
 
         Parameters
@@ -91,6 +93,8 @@ class Water:
             Its scene.
         field : DistanceField
             The scene's field.
+        policy : MissionPolicy, optional
+            Effort and limits of planning.
 
         Returns
         -------
@@ -102,7 +106,7 @@ class Water:
         InputError
             As of `netsp.plan.space.space_signature.SpaceSignature.of`.
         """
-        return cls.within(mission, field, grid_of(mission, scene, field), scene.bounds)
+        return cls.within(mission, field, grid_of(mission, scene, field), scene.bounds, policy)
 
     @classmethod
     def within(
@@ -111,6 +115,7 @@ class Water:
         field: DistanceField,
         grid: Grid,
         bounds: tuple[float, ...] | None = None,
+        policy: MissionPolicy | None = None,
     ) -> Water:
         """The same where a grid is at hand.
 
@@ -124,6 +129,8 @@ class Water:
             The box and the size of cells.
         bounds : tuple of float, optional
             Bounds of the scene, if known, metres.
+        policy : MissionPolicy, optional
+            Effort and limits of planning.
 
         Returns
         -------
@@ -135,11 +142,19 @@ class Water:
         InputError
             As of `netsp.plan.space.space_signature.SpaceSignature.of`.
         """
+        policy = policy or MissionPolicy()
         high = grid.low + grid.cell * np.array(grid.free.shape)
         words = SpaceSignature.of(
-            field, grid.low, high, grid.cell, mission.anchor, tolerance=DIP * mission.delta
+            field,
+            grid.low,
+            high,
+            grid.cell,
+            mission.anchor,
+            tolerance=DIP_RATIO * mission.delta,
+            policy=policy.words,
         )
-        return cls(mission, field, grid, words, GeodesicTether(field, mission.delta), bounds)
+        model = GeodesicTether(field, mission.delta)
+        return cls(mission, field, grid, words, model, bounds, policy=policy)
 
     @property
     def unresolved_gaps(self) -> tuple[UnresolvedGap, ...] | None:
@@ -216,7 +231,10 @@ class Water:
         shape = np.array(cells.flags.shape)
         root = np.array(np.unravel_index(cell, cells.flags.shape), dtype=np.int64)
         first, last = np.zeros(3, dtype=np.int64), shape - 1
-        targets, scale = np.empty((0, 3), dtype=np.int64), 100.0 * LONGER / cells.cell
+        targets, scale = (
+            np.empty((0, 3), dtype=np.int64),
+            100.0 * self.policy.max_cell_path_ratio / cells.cell,
+        )
         if isinstance(within, float):
             limits = np.array([scale * within], dtype=np.int64)
         else:
@@ -269,7 +287,7 @@ class Water:
         return [
             (int(words[s]), c.centre(way_back(found, at, int(s))))
             for s in np.argsort(far, kind="stable")
-            if words[s] != NONE
+            if words[s] != NO_WORD
         ]
 
     def taut(self, path: Floats) -> Floats:
@@ -289,7 +307,8 @@ class Water:
         line = taut(self.field, path, mission.clearance, mission.delta)
         if mission.clearance >= 0.5 * mission.delta:
             return line
-        return lifted(self.field, line, min(mission.clearance, room_at_ends(self.field, path)))
+        room = min(mission.clearance, room_at_ends(self.field, path))
+        return lifted(self.field, line, room, self.policy.max_lifts)
 
     def taut_beside(self, line: Floats) -> Floats | None:
         """Pull a tether's line taut as a path of the robot, in the line's class.
@@ -348,7 +367,7 @@ class Water:
             Metres of it on the way, as far as the steps tell: between two of them it is longer by
             half a step at most, because it gets longer by no more than the robot goes.
         """
-        step = self.mission.delta if fine else stride(self.mission)
+        step = self.mission.delta if fine else stride(self.mission, self.policy.tether_share)
         after, lengths = self.model.drive(tether, polylines.dense(path, step))
         return after, float(lengths.max(initial=tether.length))
 
@@ -403,7 +422,7 @@ def has_room(field: DistanceField, path: Floats, mission: Mission) -> bool:
         Whether it does.
     """
     return least_room(field, path) >= max(
-        min(mission.clearance, room_at_ends(field, path)) - 0.5 * mission.delta, -DEEPEST
+        min(mission.clearance, room_at_ends(field, path)) - 0.5 * mission.delta, -DEPTH_TOLERANCE
     )
 
 
@@ -425,7 +444,7 @@ def room_at_ends(field: DistanceField, path: Floats) -> float:
     return float(field.distance(path[[0, -1]]).min())
 
 
-def lifted(field: DistanceField, path: Floats, room: float) -> Floats:
+def lifted(field: DistanceField, path: Floats, room: float, max_lifts: int) -> Floats:
     """A taut path whose corners dip below a clearance, led around the outside of them.
 
     Parameters
@@ -436,24 +455,26 @@ def lifted(field: DistanceField, path: Floats, room: float) -> Floats:
         Metres.
     room : float
         Clearance that it is to keep, metres; its ends have it.
+    max_lifts : int
+        Maximum number of rounds.
 
     Returns
     -------
     ndarray, shape (m, 3)
         The same class, longer by what arcs are longer than their chords.
     """
-    for _ in range(LIFTS):
+    for _ in range(max_lifts):
         out, low = [path[0]], False
         for a, b in pairwise(path):
-            between = polylines.dense(np.array([a, b]), ROOM_STEP)[:-1]
+            between = polylines.dense(np.array([a, b]), CLEARANCE_TOLERANCE)[:-1]
             depth = field.distance(between) if len(between) else np.empty(0)
-            if len(depth) and depth.min() < room - 0.5 * DEEPEST:
+            if len(depth) and depth.min() < room - 0.5 * DEPTH_TOLERANCE:
                 lowest = between[int(depth.argmin())][None]
-                out.append(pushed_out(field, lowest, room + 0.1 * DEEPEST)[0])
+                out.append(pushed_out(field, lowest, room + 0.1 * DEPTH_TOLERANCE)[0])
                 low = True
             out.append(b)
         path = np.array(out)
-        path[1:-1] = pushed_out(field, path[1:-1], room + 0.1 * DEEPEST)
+        path[1:-1] = pushed_out(field, path[1:-1], room + 0.1 * DEPTH_TOLERANCE)
         if not low:
             break
     return path
@@ -474,11 +495,11 @@ def least_room(field: DistanceField, path: Floats) -> float:
     float
         Metres, right to a hundredth of one, or to a millionth of the path's length.
     """
-    step = max(2.0 * ROOM_STEP, along(path) / 1e6)
+    step = max(2.0 * CLEARANCE_TOLERANCE, along(path) / 1e6)
     return float(field.distance(np.vstack([path[:1], polylines.dense(path, step)])).min())
 
 
-def stride(mission: Mission) -> float:
+def stride(mission: Mission, tether_share: float) -> float:
     """Metres after which the tether's length is asked for on a leg: so many that it can be longer
     in between by no more than what is spared of the tether.
 
@@ -486,13 +507,15 @@ def stride(mission: Mission) -> float:
     ----------
     mission : Mission
         Whose tether counts.
+    tether_share : float
+        Share of the tether that legs may need.
 
     Returns
     -------
     float
         At least its delta.
     """
-    return max(mission.delta, 2.0 * (1.0 - SHARE) * mission.tether_length)
+    return max(mission.delta, 2.0 * (1.0 - tether_share) * mission.tether_length)
 
 
 def straight(field: DistanceField, a: Floats, b: Floats, clearance: float) -> bool:

@@ -11,7 +11,6 @@ function is steepest in a corner of a cell. The proof is in docs/theory.md.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,58 +20,16 @@ from netsp.base.arrays import Bools, Floats, Singles
 from netsp.base.clock import Clock, Flag
 from netsp.base.compiled.dynamic_array import more_int_rows
 from netsp.base.compiled.kernel import kernel
-from netsp.base.errors import InputError
+from netsp.plan.space.mission_policy import PotentialPolicy
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.sampling import Field, distance
 
-ROUNDING = 1e-9
-"""Relative reduction of each bound, which covers the rounding of lengths."""
+BOUND_ROUNDING = 1e-9
+"""Tolerance for the rounding of lengths: relative reduction of each bound."""
 
 SLOPE_TOLERANCE = 1e-3
-"""Largest excess of the steepest slope over one. The bound is divided by the steepest slope, so the
-excess weakens the bound by the same share and leaves it correct."""
-
-BUCKET = 0.25
-"""Width of a bucket in the queue of fast marching, in cells; narrower buckets order corners
-better."""
-
-
-@dataclass(frozen=True)
-class PotentialParams:
-    """Effort of a lower bound.
-
-    Attributes
-    ----------
-    min_cells : int
-        Number of cells of the first grid of a leg; more cells make a stronger bound, and take about
-        5 µs of CPU each.
-    max_cells : int
-        Number of cells of the finest grid of a leg; a cell takes 40 bytes.
-    growth : int
-        Ratio of the numbers of cells of two successive grids; 8 halves the size of a cell.
-    halvings : int
-        How often a cell is divided if its middle does not decide whether it is blocked.
-    rounds : int
-        How often cells with too steep a slope are slowed before the remaining excess is lowered.
-    """
-
-    min_cells: int = 15_000
-    max_cells: int = 2_000_000
-    growth: int = 8
-    halvings: int = 3
-    rounds: int = 5
-
-    def __post_init__(self) -> None:
-        for name, least in (
-            ("min_cells", 64),
-            ("max_cells", self.min_cells),
-            ("growth", 2),
-            ("halvings", 0),
-            ("rounds", 1),
-        ):
-            value = getattr(self, name)
-            if value < least:
-                raise InputError(f"{name}: {value}; expected {least} or more")
+"""Tolerance of the potential: largest excess of its steepest slope over one. The bound is divided
+by the steepest slope, so the excess weakens the bound by the same share and leaves it correct."""
 
 
 class Region(NamedTuple):
@@ -103,7 +60,7 @@ def path_bound(
     region: Region,
     longest: float,
     cells: int,
-    params: PotentialParams | None = None,
+    policy: PotentialPolicy | None = None,
     clock: Clock | None = None,
 ) -> float:
     """Return a lower bound on the length of paths between two points.
@@ -123,7 +80,7 @@ def path_bound(
         holds all paths up to this length.
     cells : int
         Approximate number of cells of the grid.
-    params : PotentialParams, optional
+    policy : PotentialPolicy, optional
         Effort.
     clock : Clock, optional
         Clock of the run; when it is up, the bound proven so far is returned.
@@ -133,7 +90,7 @@ def path_bound(
     float
         Lower bound, metres; at least the straight distance.
     """
-    params, clock = params or PotentialParams(), clock or Clock()
+    policy, clock = policy or PotentialPolicy(), clock or Clock()
     straight = float(np.linalg.norm(b - a))
     if not straight < longest < math.inf:
         return straight
@@ -159,7 +116,7 @@ def path_bound(
             longest,
             region.anchor,
             region.reach,
-            params.halvings,
+            policy.halvings,
             flag,
         )
     )
@@ -170,7 +127,7 @@ def path_bound(
         return straight
     return max(
         straight,
-        clock.interruptible(lambda: _through(possible, low, cell, a, b, longest, params, flag)),
+        clock.interruptible(lambda: _through(possible, low, cell, a, b, longest, policy, flag)),
     )
 
 
@@ -227,7 +184,7 @@ def _through(
     a: Floats,
     b: Floats,
     longest: float,
-    params: PotentialParams,
+    policy: PotentialPolicy,
     stop: Flag,
 ) -> float:
     """Return the bound of the potential about one end over possibly free cells; 0 if the flag was
@@ -247,11 +204,11 @@ def _through(
     most = longest - ball_a
     edges = edges_of(possible)
     slow, slow_cells = begin.copy(), np.ones(possible.shape, dtype=np.float32)
-    u = marched(edges, start, cell, slow, most, stop)
+    u = marched(edges, start, cell, slow, most, policy.bucket_cells, stop)
     before_b = _corners((from_b <= ball_b) & possible)
     best = 0.0
-    for k in range(2 * params.rounds):
-        if k < params.rounds:
+    for k in range(2 * policy.rounds):
+        if k < policy.rounds:
             for turn in range(16 if k == 0 else 8):
                 if stop[0]:
                     return best
@@ -269,7 +226,7 @@ def _through(
         best = max(best, ball_a + there)
         if slope <= 1.0 + SLOPE_TOLERANCE:
             break
-    return min(longest, best) * (1.0 - ROUNDING)
+    return min(longest, best) * (1.0 - BOUND_ROUNDING)
 
 
 def _corners(cells: Bools) -> Bools:
@@ -498,13 +455,14 @@ def marched(
     cell: float,
     slow: Singles,
     most: float,
+    bucket_cells: float,
     stop: Flag,
 ) -> Floats:
     """Return the distances of corners from `start` by fast marching, up to `most`, with a queue of
     buckets. Once the flag `stop` is set, the distances are incomplete."""
     nx, ny, nz = edges.shape
     u, done = np.full((nx, ny, nz), np.inf), np.zeros((nx, ny, nz), dtype=np.bool_)
-    width = BUCKET * cell
+    width = bucket_cells * cell
     buckets = int(most / width) + 3
     first = np.full(buckets, -1)
     entries, count = np.empty((4096, 2), dtype=np.int64), 0
@@ -677,14 +635,14 @@ def lower_corner(u: Floats, i: int, j: int, k: int, n: int, limit: float, tolera
             u[x, y, z] = here + share * (u[x, y, z] - here)
 
 
-def cells_of(level: int, params: PotentialParams) -> int:
+def cells_of(level: int, policy: PotentialPolicy) -> int:
     """Return the number of cells of the grid of a level.
 
     Parameters
     ----------
     level : int
         Level, from 1 on; each has `growth` times the cells of the one before.
-    params : PotentialParams
+    policy : PotentialPolicy
         Effort.
 
     Returns
@@ -692,4 +650,4 @@ def cells_of(level: int, params: PotentialParams) -> int:
     int
         Number of cells, at most `max_cells`.
     """
-    return min(params.max_cells, params.min_cells * int(params.growth ** (level - 1)))
+    return min(policy.max_cells, policy.min_cells * int(policy.growth ** (level - 1)))

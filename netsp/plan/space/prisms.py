@@ -25,8 +25,9 @@ from netsp.model.solution import Status
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.board import Driven
 from netsp.plan.space.driven_legs import LegTo, drive_legs
+from netsp.plan.space.mission_policy import PlanePolicy
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import SHARE, Water
+from netsp.plan.space.planning_context import Water
 from netsp.roadmap.explain_unreachable import shortest_tethers
 from netsp.roadmap.from_state import from_state
 from netsp.roadmap.taut import TautRoadmap
@@ -43,46 +44,10 @@ from netsp.world.scene.shapes import (
 )
 
 UPRIGHT_TOLERANCE = 1e-9
-"""Largest difference from 1 of the cosine between an upright axis and the vertical. The tolerance
-covers rounding in files."""
-
-CORNER_SEGMENTS = 4
-"""Segments of a quarter circle around the corners of a prism that grows by more than the others."""
+"""Tolerance for rounding in files: largest difference from 1 of the cosine between an upright axis
+and the vertical."""
 
 Corner = tuple[float, float]
-
-WALL_RATIO = 4.0
-"""Half width and depth of the polygon that stands for a half-space, in tether lengths. No tour gets
-around a polygon of more than one tether length."""
-
-
-@dataclass(frozen=True)
-class PlaneParams:
-    """Budget of the tours of the plane.
-
-    Parameters
-    ----------
-    max_classes : int
-        Largest number of augmented goals, at least 1; if there are more, those with the shortest
-        tethers are kept.
-    max_s : float
-        Seconds for each tour, more than 0; the limit also holds for runs without a time limit.
-    time_share : float
-        Share of the remaining time for all tours of the plane, from 0 to 1.
-    """
-
-    max_classes: int = 1000
-    max_s: float = 15.0
-    time_share: float = 0.6
-
-    def __post_init__(self) -> None:
-        """Refuse values out of range."""
-        if self.max_classes < 1:
-            raise InputError(f"max_classes: expected 1 or more, got {self.max_classes}")
-        if not self.max_s > 0.0:
-            raise InputError(f"max_s: expected more than 0, got {self.max_s:g}")
-        if not 0.0 <= self.time_share <= 1.0:
-            raise InputError(f"time_share: expected a number from 0 to 1, got {self.time_share:g}")
 
 
 @dataclass(frozen=True)
@@ -100,7 +65,7 @@ class FloorPlan:
     circles: tuple[tuple[Corner, float], ...]
     polygons: tuple[tuple[tuple[Corner, ...], float], ...]
 
-    def obstacles(self) -> tuple[tuple[Circle | Polygon, ...], float]:
+    def obstacles(self, corner_segments: int) -> tuple[tuple[Circle | Polygon, ...], float]:
         """Return obstacles of a problem, and the clearance that grows them to the solids.
 
         Returns
@@ -122,8 +87,8 @@ class FloorPlan:
                 import shapely
 
                 # chords of a somewhat larger circle, so that none cuts the corner short
-                more /= math.cos(math.pi / (4 * CORNER_SEGMENTS))
-                grown = shapely.Polygon(corners).buffer(more, quad_segs=CORNER_SEGMENTS)
+                more /= math.cos(math.pi / (4 * corner_segments))
+                grown = shapely.Polygon(corners).buffer(more, quad_segs=corner_segments)
                 polygon = Polygon(polygon=tuple(grown.exterior.coords[:-1]))
             out.append(polygon)
         return tuple(out), growth
@@ -242,7 +207,8 @@ def wall_corners(point: Floats, normal: Floats, anchor: Floats, far: float) -> t
     """
     along = np.array([-normal[1], normal[0]])
     foot = point + ((anchor[:2] - point) @ along) * along
-    wide, deep = WALL_RATIO * far * along, WALL_RATIO * far * normal
+    # no tour gets around a rectangle that extends by more than one tether length
+    wide, deep = 4.0 * far * along, 4.0 * far * normal
     corners = (foot + wide, foot - wide, foot - wide - deep, foot + wide - deep)
     return tuple((float(x), float(y)) for x, y in corners)
 
@@ -253,7 +219,7 @@ def tours_of_plan(
     places: Places,
     clock: Clock,
     seed: int = 0,
-    params: PlaneParams | None = None,
+    policy: PlanePolicy | None = None,
     whole_tether: bool = False,
 ) -> Iterator[Driven]:
     """Drive the shortest tours of the plane in a scene of upright prisms.
@@ -270,8 +236,8 @@ def tours_of_plan(
         Clock of the run; when it is up, the best tours so far are driven.
     seed : int
         Random seed of the solver.
-    params : PlaneParams, optional
-        Budget.
+    policy : PlanePolicy, optional
+        Budget; by default that of `water.policy`.
     whole_tether : bool
         Whether tours may need the whole tether, for a caller that flies them.
 
@@ -282,15 +248,16 @@ def tours_of_plan(
         the share of the tether that plans may use. Nothing in other scenes. A tour is skipped if
         the tether in space exceeds its limit.
     """
-    plan, params = floor_plan(scene, water.mission), params or PlaneParams()
+    plan, policy = floor_plan(scene, water.mission), policy or water.policy.plane
     if plan is None:
         return
-    plane = _PlaneTour(water, scene, places, plan, params)
-    for share in (1.0, SHARE) if whole_tether else (SHARE,):
+    usable = water.policy.tether_share
+    plane = _PlaneTour(water, scene, places, plan, policy)
+    for share in (1.0, usable) if whole_tether else (usable,):
         if clock.up:
             return
         try:
-            found = plane.shortest_legs(share, Clock(params.max_s, within=clock.part(0.5)), seed)
+            found = plane.shortest_legs(share, Clock(policy.max_s, within=clock.part(0.5)), seed)
         except (InputError, InfeasibleError, LimitReachedError):
             continue
         if found is not None:
@@ -299,7 +266,7 @@ def tours_of_plan(
             if driven is not None:
                 yield driven
                 longest = max(stop.most for stop in driven.stops)
-                if is_optimal and longest <= SHARE * water.mission.tether_length:
+                if is_optimal and longest <= usable * water.mission.tether_length:
                     return
 
 
@@ -311,7 +278,7 @@ class _PlaneTour:
     scene: Scene
     places: Places
     plan: FloorPlan
-    params: PlaneParams
+    policy: PlanePolicy
 
     def shortest_legs(
         self, share: float, clock: Clock, seed: int
@@ -331,7 +298,7 @@ class _PlaneTour:
             return None
         roadmap = TautRoadmap(
             self._problem(points[goals], share),
-            max_classes=self.params.max_classes,
+            max_classes=self.policy.max_classes,
             time_limit=clock.part(0.5),
         )
         graph = roadmap.to_travel_graph()
@@ -356,7 +323,10 @@ class _PlaneTour:
 
     def _problem(self, goals: Floats, share: float) -> Problem:
         """Return the problem of the plane through some goals."""
-        mission, (obstacles, growth) = self.water.mission, self.plan.obstacles()
+        mission, (obstacles, growth) = (
+            self.water.mission,
+            self.plan.obstacles(self.policy.corner_segments),
+        )
         room = float(self.water.field.distance(np.vstack([goals, mission.anchor])).min())
         bounds = self.scene.bounds
         return Problem(

@@ -9,57 +9,18 @@ proof.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock
-from netsp.base.errors import InputError
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.board import Driven
 from netsp.plan.space.given_order import drive_order
+from netsp.plan.space.mission_policy import OrderPolicy
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import Water, along, straight
 from netsp.roadmap.from_state import from_state
-
-
-@dataclass(frozen=True)
-class OrderPolicy:
-    """Effort for tours in short orders.
-
-    Parameters
-    ----------
-    blocked_ratio : float
-        Estimated length of a leg whose ends do not see one another, as a multiple of the straight
-        distance; at least 1.
-    max_rounds : int
-        Largest number of orders; at least 1.
-    max_sighted : int
-        Largest number of places whose lines of sight are tested; at least 0. With more places,
-        straight distances are the estimates.
-    max_solve_s : float
-        Seconds for the solver in each round; more than 0.
-    time_share : float
-        Share of the remaining time for all rounds, from 0 to 1.
-    """
-
-    blocked_ratio: float = 1.5
-    max_rounds: int = 4
-    max_sighted: int = 300
-    max_solve_s: float = 2.0
-    time_share: float = 0.2
-
-    def __post_init__(self) -> None:
-        """Refuse values out of range."""
-        for name, least in (("blocked_ratio", 1.0), ("max_rounds", 1), ("max_sighted", 0)):
-            if not getattr(self, name) >= least:
-                raise InputError(f"{name}: {getattr(self, name)}; expected {least:g} or more")
-        if not self.max_solve_s > 0.0:
-            raise InputError(f"max_solve_s: {self.max_solve_s}; expected more than 0")
-        if not 0.0 <= self.time_share <= 1.0:
-            raise InputError(f"time_share: {self.time_share}; expected a number from 0 to 1")
 
 
 def short_order_tour(
@@ -78,14 +39,14 @@ def short_order_tour(
     seed : int
         Random seed of the solver.
     policy : OrderPolicy, optional
-        Effort.
+        Effort; by default that of `water.policy`.
 
     Returns
     -------
     Driven or None
         The tour with the most stops, and of these the shortest; None if no order can be driven.
     """
-    policy = policy or OrderPolicy()
+    policy = policy or water.policy.orders
     clock = clock.part(policy.time_share)
     estimates = _estimates(water, places, clock, policy)
     best: Driven | None = None

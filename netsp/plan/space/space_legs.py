@@ -12,15 +12,10 @@ import numpy as np
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock
 from netsp.plan.space.detour_variants import ways_beside
+from netsp.plan.space.mission_policy import StateEffort
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import LONGER, Water, along, has_room, straight
-from netsp.plan.space.states import ROUNDS, Effort, State, States
-
-SEARCHING, PULLING = 0.3, 0.3
-"""Of the time left, what the search for ways may take, and then what those along tethers may."""
-
-NEIGHBOURS = 10
-"""Waypoints nearest to each that legs are sought to; places, where some have alternatives."""
+from netsp.plan.space.planning_context import Water, along, has_room, straight
+from netsp.plan.space.states import State, States
 
 
 @dataclass
@@ -33,7 +28,7 @@ class Ways:
         Where they are.
     places : Places
         The waypoints, and where else the robot may be.
-    effort : Effort
+    effort : StateEffort
         How many.
     tethers : dict of int to list of ndarray of shape (k, 3)
         Of some places, how tethers hang there: ways are made of these where there is no time for a
@@ -42,15 +37,14 @@ class Ways:
 
     water: Water
     places: Places
-    effort: Effort
+    effort: StateEffort
     tethers: dict[int, list[Floats]] = field(default_factory=dict)
     _known: dict[tuple[int, int], list[tuple[int, Floats]]] = field(default_factory=dict)
-    _beyond: dict[tuple[int, int], float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         apart = self.places.apart
         per = len(apart) / np.count_nonzero(self.places.choice == 0)
-        count = min(math.ceil(NEIGHBOURS * per), len(apart) - 1)
+        count = min(math.ceil(self.water.policy.states.n_neighbours * per), len(apart) - 1)
         nearest = np.argsort(apart, axis=1, kind="stable")[:, :count]
         both = np.zeros(apart.shape, dtype=bool)
         both[np.arange(len(apart))[:, None], nearest] = True
@@ -84,11 +78,11 @@ class Ways:
         if here is not None and search:
             ends = {m: words.held(self.points[m]) for m in to}
             limits = {
-                c: self.effort.farther * float(self._apart[n, m])
+                c: self.effort.max_path_ratio * float(self._apart[n, m])
                 for m, c in ends.items()
                 if c is not None
             }
-            found = water.search(True, here, self.effort.ways, limits) if limits else None
+            found = water.search(True, here, self.effort.paths, limits) if limits else None
         for m in to:
             ways = []
             if straight(water.field, self.points[n], self.points[m], water.mission.clearance):
@@ -106,9 +100,8 @@ class Ways:
             if found is None and not (pulling is not None and pulling.up):
                 self._add_along_tethers(n, m, ways)
             ways.sort(key=lambda way: along(way[1]))
-            classes = list(ways)
             if found is not None and ways:
-                farther = self.effort.farther * float(self._apart[n, m])
+                farther = self.effort.max_path_ratio * float(self._apart[n, m])
                 for path in ways_beside(water, [way for _, way in ways], farther):
                     word = water.number(path)
                     if word is not None:
@@ -120,8 +113,6 @@ class Ways:
                 if word is not None:
                     back.append((word, path[::-1]))
             self._known[n, m], self._known[m, n] = ways, back
-            if found is not None and there is not None:
-                self._beyond[n, m] = self._beyond[m, n] = self._least_beyond(n, m, classes)
 
     def _add_along_tethers(self, n: int, m: int, ways: list[tuple[int, Floats]]) -> None:
         """The shortest ways back along a tether of one place and out along one of another, pulled
@@ -136,33 +127,8 @@ class Ways:
                 if word not in found or along(path) < along(found[word]):
                     found[word] = path
         for word, path in sorted(found.items(), key=lambda way: along(way[1])):
-            if len(ways) < self.effort.ways and all(word != w for w, _ in ways):
+            if len(ways) < self.effort.paths and all(word != w for w, _ in ways):
                 ways.append((word, path))
-
-    def _least_beyond(self, n: int, m: int, ways: list[tuple[int, Floats]]) -> float:
-        """Metres that ways of other classes than those found are at least long."""
-        farther = self.effort.farther * float(self._apart[n, m])
-        if len(ways) < self.effort.ways:
-            return farther
-        # paths along cells are longer than those pulled taut by no more than that factor
-        return min(farther, along(ways[-1][1]) / LONGER)
-
-    def beyond(self, n: int, m: int) -> float:
-        """Metres that ways of other classes than those of `known` are at least long.
-
-        Parameters
-        ----------
-        n : int
-            Where they begin.
-        m : int
-            Where they end.
-
-        Returns
-        -------
-        float
-            0 where no search has told.
-        """
-        return self._beyond.get((n, m), 0.0)
 
     def prepare_all(self, clock: Clock, tell: Callable[[str], None]) -> None:
         """Seek all ways between waypoints that are near.
@@ -175,11 +141,12 @@ class Ways:
         tell : callable
             Called with a line of text now and then.
         """
-        searching, pulling = clock.part(SEARCHING), None
+        times = self.water.policy.times
+        searching, pulling = clock.part(times.path_search_share), None
         for n in range(len(self.points)):
             tell(f"ways of the robot from waypoint {n + 1} of {len(self.points)}")
             if searching.up and pulling is None:
-                pulling = clock.part(PULLING)
+                pulling = clock.part(times.tether_path_share)
             self.prepare(n, search=pulling is None, pulling=pulling)
 
     def known(self, n: int, m: int) -> list[tuple[int, Floats]]:
@@ -198,25 +165,6 @@ class Ways:
             Number of the word, and the path, metres.
         """
         return self._known.get((n, m), [])
-
-    def sought(self, n: int, m: int) -> list[tuple[int, Floats]]:
-        """The same, of those that bounds may rest on: of a search, or straight. Where ways were
-        made of tethers, there may be shorter ones.
-
-        Parameters
-        ----------
-        n : int
-            Where they begin.
-        m : int
-            Where they end.
-
-        Returns
-        -------
-        list of (int, ndarray of shape (k, 3))
-            As of `known`.
-        """
-        found = self.known(n, m)
-        return found if (n, m) in self._beyond else [way for way in found if len(way[1]) == 2]
 
 
 @dataclass
@@ -349,7 +297,8 @@ class Growth:
         key = m, writes
         if self._shortest.get(key, np.inf) > self.states.limit:
             line = np.vstack([state.tether.nodes, path[1:]])
-            length = self.states.water.model.relaxed(line, ROUNDS).length
+            rounds = self.states.water.policy.states.max_pull_rounds
+            length = self.states.water.model.relaxed(line, rounds).length
             self._shortest[key] = min(length, self._shortest.get(key, np.inf))
             return bool(length <= self.states.limit)
         return True

@@ -35,14 +35,15 @@ from netsp.plan.solver_table import SOLVERS
 from netsp.plan.space.board import Board, Driven, Stop, with_status
 from netsp.plan.space.given_order import drive_given_order
 from netsp.plan.space.judge import verify_mission
-from netsp.plan.space.non_taut_moves import SAVED, Detours
+from netsp.plan.space.mission_policy import MissionPolicy
+from netsp.plan.space.non_taut_moves import Detours
 from netsp.plan.space.passages import resolved, resolved_on
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import SHARE, Water
-from netsp.plan.space.prisms import PlaneParams, tours_of_plan
+from netsp.plan.space.planning_context import Water
+from netsp.plan.space.prisms import tours_of_plan
 from netsp.plan.space.short_orders import short_order_tour
 from netsp.plan.space.space_legs import Growth, Ways
-from netsp.plan.space.states import Effort, first_states, states_with_room
+from netsp.plan.space.states import first_states, states_with_room
 from netsp.plan.space.trees import states_of_trees
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.mission_limits import check_bounds, check_size, check_tether
@@ -52,23 +53,8 @@ from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
 from netsp.world.simulator.mission_run import grid_of
 
-ROUNDING = 1e-9
-"""Share of a length."""
-
-MOST_AGAIN = 20
-"""Times that a graph is solved again because legs were at fault."""
-
-STARTING, PLANTING, GROWING, WAYS_OUT, SOLVING = 0.3, 0.3, 0.5, 0.3, 0.5
-"""Of the time left, what first states may take, then, once ways are known, states and legs, their
-ways by the anchor, and the solver each time; the rest is for driving, and for solving again."""
-
-TAUT = 0.6
-"""Of the time left once ways are known, what tours along taut ways may take; the rest is for those
-with detours."""
-
-EARLY = 0.1
-"""Of the time left, what the solver may take while there are more states to come: its tour is then
-where the next search starts."""
+LENGTH_ROUNDING = 1e-9
+"""Tolerance for the rounding of lengths, relative."""
 
 TAUT_LEGS = "taut"
 """Kind of a plan along states and their taut legs."""
@@ -87,10 +73,6 @@ OUT_AND_BACK = "out-and-back"
 
 AS_GIVEN = "as-given"
 """Kind of a plan in the order of the mission file."""
-
-LEAST_GROWING, LEAST_SOLVING = 1.0, 0.5
-"""Seconds that legs and the solver get even if the time is up: there would be no tour, or one by
-way of the anchor."""
 
 
 @dataclass(frozen=True)
@@ -162,13 +144,14 @@ class SpacePlan:
         -------
         bool
             True if it visits more waypoints, or as many and is shorter. A tour along states and
-            legs may be longer than a tour of the plane by the share `SAVED`, because it has a
-            bound.
+            legs may be longer than a tour of the plane by `bound_worth` of the policy.
         """
         if len(self.stops) != len(other.stops):
             return len(self.stops) > len(other.stops)
         known = self.kind == TAUT_LEGS and other.kind == PLANE
-        return self.length < other.length * (1.0 + (SAVED if known else 0.0))
+        return self.length < other.length * (
+            1.0 + (self.water.policy.bound_worth if known else 0.0)
+        )
 
     def _status(self, bound: float | None) -> Status:
         """Return the status of the tour: `optimal` if a bound on all tours to all waypoints proves
@@ -245,6 +228,7 @@ def plan(
     iteration_limit: int | None = None,
     seed: int = 0,
     on_progress: Callable[[str], None] | None = None,
+    policy: MissionPolicy | None = None,
 ) -> SpacePlan:
     """Find the shortest tour of a mission's waypoints that leaves the tether free.
 
@@ -272,6 +256,8 @@ def plan(
         Of the solver.
     on_progress : callable, optional
         Called with a line of text now and then.
+    policy : MissionPolicy, optional
+        Effort, time and limits.
 
     Returns
     -------
@@ -300,6 +286,7 @@ def plan(
             iteration_limit=iteration_limit,
             seed=seed,
             on_progress=on_progress,
+            policy=policy,
         ):
             if kept is None or found.replaces(kept):
                 verdict = verify_mission(found.planned(), scene=scene, water=found.water)
@@ -327,6 +314,7 @@ def plans(
     seed: int = 0,
     whole_tether: bool = False,
     on_progress: Callable[[str], None] | None = None,
+    policy: MissionPolicy | None = None,
 ) -> Iterator[SpacePlan]:
     """Find candidate tours of a mission's waypoints, which the judge has not checked yet.
 
@@ -356,6 +344,8 @@ def plans(
         Whether tours of the plane may need the whole tether, for a caller that flies them.
     on_progress : callable, optional
         Called with a line of text at each stage.
+    policy : MissionPolicy, optional
+        Effort, time and limits; not used if `water` is given, which has its own.
 
     Yields
     ------
@@ -375,7 +365,15 @@ def plans(
     if water is None:
         if field is None or grid is None:
             scene = scene or mission.load_scene()
-        water = water_of(mission, clock, scene=scene, field=field, grid=grid, tell=on_progress)
+        water = water_of(
+            mission,
+            clock,
+            scene=scene,
+            field=field,
+            grid=grid,
+            tell=on_progress,
+            policy=policy,
+        )
     yield from _planned(water, scene, clock, on_progress or _silent, how, whole_tether)
 
 
@@ -387,6 +385,7 @@ def water_of(
     field: DistanceField | None = None,
     grid: Grid | None = None,
     tell: Callable[[str], None] | None = None,
+    policy: MissionPolicy | None = None,
 ) -> Water:
     """Make the water of a mission for a plan: check the mission, find the gaps that its grid does
     not show, refine the grid where that shows them, and find the words of the scene.
@@ -396,7 +395,7 @@ def water_of(
     mission : Mission
         The mission.
     clock : Clock
-        Clock of the run; the search for gaps takes a share of it (`GapParams`).
+        Clock of the run; the search for gaps takes a share of it (`GapPolicy`).
     scene : Scene, optional
         Scene of the mission; needed unless `field` and `grid` are given.
     field : DistanceField, optional
@@ -406,6 +405,8 @@ def water_of(
         named.
     tell : callable, optional
         Called with a line of text at each stage.
+    policy : MissionPolicy, optional
+        Effort, time and limits.
 
     Returns
     -------
@@ -419,7 +420,7 @@ def water_of(
     LimitReachedError
         The time was up before; says which work was broken off.
     """
-    tell = tell or _silent
+    tell, policy = tell or _silent, policy or MissionPolicy()
     check_size(mission)
     if field is None or grid is None:
         scene = scene or clock.bounded("reading the scene", mission.load_scene)
@@ -430,9 +431,13 @@ def water_of(
     tell("gaps that the cells do not show")
     if grid is None:
         assert scene is not None
-        find_gaps = partial(resolved, mission, scene, field, clock=clock)
+        find_gaps = partial(
+            resolved, mission, scene, field, policy.gaps, clock, policy.words.min_room_ratio
+        )
     else:
-        find_gaps = partial(resolved_on, mission, grid, clock=clock)
+        find_gaps = partial(
+            resolved_on, mission, grid, policy.gaps, clock, policy.words.min_room_ratio
+        )
     cells = clock.bounded("searching for gaps that the cells do not show", find_gaps)
     mission = cells.mission
     Places.of(mission, field)  # refuse bad waypoints before the long search for words
@@ -442,7 +447,8 @@ def water_of(
     tell("words of the scene")
     bounds = None if scene is None else scene.bounds
     water = clock.bounded(
-        "finding the words of the scene", partial(Water.within, mission, field, grid, bounds)
+        "finding the words of the scene",
+        partial(Water.within, mission, field, grid, bounds, policy),
     )
     return replace(water, cells=cells)
 
@@ -482,7 +488,7 @@ def _plan_of(water: Water, places: Places, driven: Driven, kind: str) -> SpacePl
         unreached,
         driven.free,
         water,
-        Ways(water, places, Effort.of(len(places))),
+        Ways(water, places, water.policy.states.effort(len(places))),
         kind,
     )
 
@@ -526,15 +532,23 @@ def _planned(
     whole_tether: bool,
 ) -> Iterator[SpacePlan]:
     mission, field = water.mission, water.field
+    policy, times = water.policy, water.policy.times
     places = Places.of(mission, field)
     # a robot that is farther out than the share may still come back
-    limit = max(SHARE * mission.tether_length, water.present.length * (1.0 + ROUNDING))
+    limit = max(
+        policy.tether_share * mission.tether_length, water.present.length * (1.0 + LENGTH_ROUNDING)
+    )
     check_tether(mission, water.present.length)
     in_plane = False
     if scene is not None:
-        plane = PlaneParams()
         for driven in tours_of_plan(
-            water, scene, places, clock.part(plane.time_share), how["seed"], plane, whole_tether
+            water,
+            scene,
+            places,
+            clock.part(policy.plane.time_share),
+            how["seed"],
+            policy.plane,
+            whole_tether,
         ):
             in_plane = True
             yield _plan_of(water, places, driven, PLANE)
@@ -544,8 +558,8 @@ def _planned(
         if driven_short is not None and driven_short.stops:
             yield _plan_of(water, places, driven_short, SHORT_ORDER)
     tell("shortest tethers to each waypoint")
-    effort = Effort.of(len(places))
-    states = first_states(water, places, limit, effort, clock.part(STARTING))
+    effort = water.policy.states.effort(len(places))
+    states = first_states(water, places, limit, effort, clock.part(times.first_states_share))
     if not states.reached - {len(mission.waypoints)}:
         nearest = float(np.linalg.norm(mission.places - np.array(mission.anchor), axis=1).min())
         if nearest <= limit:
@@ -556,8 +570,8 @@ def _planned(
             )
         raise InputError(
             f"waypoints: no tether within the limit reaches any of them: {limit:.4g} m "
-            f"({100 * SHARE:g} % of tether_length), and the nearest is {nearest:.4g} m from the "
-            "anchor as the crow flies"
+            f"({100 * policy.tether_share:g} % of tether_length), and the nearest is {nearest:.4g} "
+            "m from the anchor as the crow flies"
         )
     hanging = {n: [states.all[s].tether.nodes for s in of] for n, of in states.of.items()}
     ways = Ways(water, places, effort, hanging)
@@ -583,29 +597,29 @@ def _planned(
 
     ways.prepare_all(clock, tell)
     tell("trees of legs")
-    states_of_trees(states, ways, clock.part(PLANTING))
-    board.take(growth.legs, clock.part(WAYS_OUT))
+    states_of_trees(states, ways, clock.part(times.tree_share))
+    board.take(growth.legs, clock.part(times.home_path_share))
     if lacking := set(range(len(mission.waypoints))) - board.reached:
         tell("ways with room for the robot")
-        states_with_room(states, lacking, effort.words, clock.part(STARTING))
-        board.take(growth.legs, clock.part(WAYS_OUT))
-    growth.go_on(0, clock.part(PLANTING), tell)
-    taut = clock.part(TAUT)
+        states_with_room(states, lacking, effort.words, clock.part(times.first_states_share))
+        board.take(growth.legs, clock.part(times.home_path_share))
+    growth.go_on(0, clock.part(times.tree_share), tell)
+    taut = clock.part(times.taut_share)
     best: tuple[Result, Driven] | None = None
     complete = False
     for most in effort.states:
         begin = taut.elapsed
-        enough = board.legs or GROWING * taut.left >= LEAST_GROWING
-        growing = taut.part(GROWING) if enough else Clock(LEAST_GROWING)
+        enough = board.legs or times.growth_share * taut.left >= times.min_growth_s
+        growing = taut.part(times.growth_share) if enough else Clock(times.min_growth_s)
         grown = growth.go_on(most, growing, tell)
         tell("ways by the anchor")
-        complete = (board.take(growth.legs, taut.part(WAYS_OUT)) and grown) or complete
+        complete = (board.take(growth.legs, taut.part(times.home_path_share)) and grown) or complete
         last = most == effort.states[-1]
-        share = SOLVING if last else EARLY
+        share = times.solve_share if last else times.early_solve_share
         best = _better(best, _best_driven(board, taut, tell, best, share, how))
         if taut.left < taut.elapsed - begin:
             if not last and not (best is not None and best[0].status is Status.OPTIMAL):
-                best = _better(best, _best_driven(board, taut, tell, best, SOLVING, how))
+                best = _better(best, _best_driven(board, taut, tell, best, times.solve_share, how))
             break
     if not board.reached:
         raise InputError(
@@ -672,12 +686,13 @@ def _best_driven(
 ) -> tuple[Result, Driven] | None:
     """The best tour that was driven without fault. As long as there is time, the graph is solved
     again without the legs that were at fault; then the tour goes by way of the start there."""
+    times = board.water.policy.times
     again, found = 0, None
     warm = None if best is None else best[1].tour
-    while again < MOST_AGAIN or clock.up:
+    while again < times.max_solves or clock.up:
         if found is None:
             tell("order" if again == 0 else f"order, {counted(again, 'leg')} at fault forbidden")
-            solving = Clock(LEAST_SOLVING) if clock.up else clock.part(share)
+            solving = Clock(times.min_solve_s) if clock.up else clock.part(share)
             found = board.solved(solving, warm, **how)
             if found is None:
                 return None
@@ -685,7 +700,7 @@ def _best_driven(
         tell("driving the tour")
         driven = board.driven(tour)
         if driven.fault is None:
-            return with_status(result, driven, ROUNDING), driven
+            return with_status(result, driven, LENGTH_ROUNDING), driven
         joined = board.forbid(driven.fault)
         if clock.up and not (joined and board.leads_to(tour)):
             return None  # no time is left, and this tour can no longer be driven

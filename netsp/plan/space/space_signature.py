@@ -28,20 +28,17 @@ from netsp.hsignature.wordtable import (
     word_of,
 )
 from netsp.plan.space.cells import Cells
+from netsp.plan.space.mission_policy import WordPolicy
 from netsp.plan.space.triangle_labels import (
     FAR,
-    MOST_GENERATORS,
     UNKNOWN,
     Labels,
     distances,
     labelled,
     relations,
 )
-from netsp.plan.space.walk import held, walked
+from netsp.plan.space.walk import LabelledComplex, path_word, visible_cell
 from netsp.world.scene.field import DistanceField
-
-TOLERANCE = 0.015
-"""Metres: somewhat more than an eighth of the tether's default delta of 0.1 m."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +70,7 @@ class SpaceSignature:
     far: npt.NDArray[np.int32] = field(repr=False)
     generators: int
     tolerance: float
+    policy: WordPolicy
     _tables: list[Table] = field(repr=False)
 
     @classmethod
@@ -84,7 +82,8 @@ class SpaceSignature:
         cell: float,
         root: npt.ArrayLike,
         *,
-        tolerance: float = TOLERANCE,
+        tolerance: float = 0.015,
+        policy: WordPolicy | None = None,
     ) -> SpaceSignature:
         """The words of a box in a scene.
 
@@ -127,12 +126,17 @@ class SpaceSignature:
         >>> water.group.rank, len(water.product(through, beside))
         (1, 1)
         """
-        cells = Cells.of(scene, low, high, cell)
-        return cls.of_cells(cells, root, tolerance=tolerance)
+        cells = Cells.of(scene, low, high, cell, policy)
+        return cls.of_cells(cells, root, tolerance=tolerance, policy=policy)
 
     @classmethod
     def of_cells(
-        cls, cells: Cells, root: npt.ArrayLike, *, tolerance: float = TOLERANCE
+        cls,
+        cells: Cells,
+        root: npt.ArrayLike,
+        *,
+        tolerance: float = 0.015,
+        policy: WordPolicy | None = None,
     ) -> SpaceSignature:
         """The words of a complex.
 
@@ -155,18 +159,11 @@ class SpaceSignature:
         InputError
             As of `of`.
         """
+        policy = policy or WordPolicy()
         point = np.asarray(root, dtype=float)
+        no_labels = np.empty(0, dtype=np.int32)
         everywhere = np.ones(cells.flags.shape, dtype=np.uint8)
-        at = held(
-            cells.field.arrays,
-            cells.low,
-            cells.cell,
-            cells.flags,
-            everywhere,
-            point,
-            tolerance,
-            tolerance,
-        )
+        at = visible_cell(_labelled(cells, no_labels, everywhere, tolerance, policy), point)
         if at < 0:
             raise InputError(
                 f"anchor: no free cell of {cells.cell:g} m is in sight of {shown(point)}; "
@@ -176,12 +173,14 @@ class SpaceSignature:
         stop = abandoned()
         far, order = distances(cells.flags, begin, stop)
         none = packed([])
-        labels, table, generators = labelled(cells.flags, far, order, empty_table(), none, stop)
+        labels, table, generators = labelled(
+            cells.flags, far, order, empty_table(), none, policy.max_generators, stop
+        )
         end_if_abandoned()
-        if generators > MOST_GENERATORS:
+        if generators > policy.max_generators:
             raise InputError(
-                f"cell: {cells.cell:g} m finds more than {MOST_GENERATORS} holes in the scene; "
-                "expected a larger cell"
+                f"cell: {cells.cell:g} m finds more than {policy.max_generators} holes in the "
+                "scene; expected a larger cell"
             )
         words, table = relations(cells.flags, labels, order, table, none, stop)
         end_if_abandoned()
@@ -190,7 +189,7 @@ class SpaceSignature:
         )
         group = Group.of(rank, relators)
         labels, table = _renumbered(labels, table, meaning, packed(group.rules))
-        return cls(cells, begin, group, labels, far, generators, tolerance, [table])
+        return cls(cells, begin, group, labels, far, generators, tolerance, policy, [table])
 
     @property
     def exact(self) -> bool:
@@ -201,6 +200,11 @@ class SpaceSignature:
     def rules(self) -> Rules:
         """The group's rules for kernels."""
         return packed(self.group.rules)
+
+    @cached_property
+    def _complex(self) -> LabelledComplex:
+        """Return the labelled complex for kernels."""
+        return _labelled(self.cells, self.labels, self.known, self.tolerance, self.policy)
 
     @property
     def table(self) -> Table:
@@ -235,17 +239,7 @@ class SpaceSignature:
         int or None
             None where no cell is in sight.
         """
-        c = self.cells
-        at = held(
-            c.field.arrays,
-            c.low,
-            c.cell,
-            c.flags,
-            self.known,
-            np.asarray(point, dtype=float),
-            self.tolerance,
-            self.tolerance,
-        )
+        at = visible_cell(self._complex, np.asarray(point, dtype=float))
         return None if at < 0 else int(at)
 
     def word(self, path: npt.ArrayLike, *, closed: bool = False) -> Word:
@@ -320,19 +314,8 @@ class SpaceSignature:
         where : ndarray, shape (3,)
             The last point that was reached.
         """
-        c = self.cells
-        number, table, where = walked(
-            c.field.arrays,
-            c.low,
-            c.cell,
-            c.flags,
-            self.labels,
-            self.known,
-            self.table,
-            self.rules,
-            np.ascontiguousarray(line),
-            self.tolerance,
-            self.tolerance,
+        number, table, where = path_word(
+            self._complex, self.table, self.rules, np.ascontiguousarray(line)
         )
         self.keep(table)
         return (None if number < 0 else int(number)), where
@@ -415,6 +398,27 @@ class SpaceSignature:
             Its class in the abelianisation; all zero for what is contractible.
         """
         return self.group.windings(word)
+
+
+def _labelled(
+    cells: Cells,
+    labels: Labels,
+    known: npt.NDArray[np.uint8],
+    tolerance: float,
+    policy: WordPolicy,
+) -> LabelledComplex:
+    """Return a labelled complex for kernels."""
+    return LabelledComplex(
+        cells.field.arrays,
+        cells.low,
+        float(cells.cell),
+        cells.flags,
+        labels,
+        known,
+        float(tolerance),
+        policy.max_hold_cells,
+        policy.far_hold_cells,
+    )
 
 
 def _renumbered(

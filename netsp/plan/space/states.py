@@ -15,88 +15,12 @@ from netsp.base.arrays import Floats
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
+from netsp.plan.space.mission_policy import StateEffort
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import Water
 from netsp.plan.space.space_signature import shown
 from netsp.plan.space.word_search import Found
 from netsp.world.tether import Tether
-
-LONGER = 2.0
-"""Ways of the robot are no longer than so many times the longest tether."""
-
-ROUNDS = 300
-"""Of pulling a tether taut."""
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How many states and legs are sought.
-
-    Parameters
-    ----------
-    words : int
-        Shortest words of a waypoint that make states.
-    states : tuple of int
-        States of a waypoint, at most: at first, and then ever more as long as there is time.
-    ways : int
-        Classes of ways between two waypoints.
-    farther : float
-        Ways are no longer than so many times the distance.
-    detours : tuple of float
-        How much longer detours are, as shares of the leg.
-    sides : int
-        Directions of detours, evenly around a leg.
-    tethers : int
-        Kept after each leg of an order that is driven with detours.
-    """
-
-    words: int
-    states: tuple[int, ...]
-    ways: int
-    farther: float
-    detours: tuple[float, ...]
-    sides: int
-    tethers: int
-
-    @classmethod
-    def of(cls, waypoints: int) -> Effort:
-        """What takes no more than a minute or so on two cores.
-
-        Parameters
-        ----------
-        waypoints : int
-            How many there are.
-
-        Returns
-        -------
-        Effort
-            The fewer waypoints, the more for each.
-        """
-        if waypoints <= 24:
-            # around a row of piles, a way is twice as long as the distance: tours were within
-            # 0.03 % of the proven shortest among prisms with these (benchmarks/space.py)
-            return cls(
-                words=5,
-                states=(7, 14, 28),
-                ways=6,
-                farther=2.2,
-                detours=(0.02, 0.06, 0.15, 0.35),
-                sides=8,
-                tethers=8,
-            )
-        if waypoints <= 100:
-            return cls(
-                words=4,
-                states=(5, 10, 16, 32),
-                ways=4,
-                farther=1.5,
-                detours=(0.02, 0.1),
-                sides=6,
-                tethers=12,
-            )
-        return cls(
-            words=3, states=(5, 10), ways=4, farther=1.5, detours=(0.02, 0.1), sides=6, tethers=4
-        )
 
 
 @dataclass(frozen=True)
@@ -257,7 +181,7 @@ def alike(a: Tether, b: Tether, delta: float) -> bool:
 
 
 def first_states(
-    water: Water, places: Places, limit: float, effort: Effort, clock: Clock
+    water: Water, places: Places, limit: float, effort: StateEffort, clock: Clock
 ) -> States:
     """States of the shortest words of each waypoint, and the one that the mission begins in.
 
@@ -269,7 +193,7 @@ def first_states(
         The points.
     limit : float
         Longest tether, metres.
-    effort : Effort
+    effort : StateEffort
         How many.
     clock : Clock
         When it is up, one for each of the waypoints that are left.
@@ -322,7 +246,7 @@ def states_with_room(states: States, lacking: set[int], words: int, clock: Clock
     start = water.words.held(water.laid.robot)
     if start is None:
         return
-    flag, limit = clock.flag, LONGER * states.limit
+    flag, limit = clock.flag, water.policy.states.max_robot_ratio * states.limit
     found = clock.interruptible(lambda: water.search(True, start, words, limit, flag))
     for n in np.flatnonzero(np.isin(states.places.waypoint, list(lacking))):
         _take(states, int(n), found, water.laid.nodes, 1 if clock.up else words)
@@ -335,7 +259,9 @@ def _take(states: States, n: int, found: Found, begin: Floats, most: int) -> Non
     if cell is None or n == states.places.begin:
         return
     for _, way in water.ways(found, cell)[:most]:
-        tether = water.model.relaxed(np.vstack([begin, way, point]), ROUNDS)
+        tether = water.model.relaxed(
+            np.vstack([begin, way, point]), water.policy.states.max_pull_rounds
+        )
         if tether.length > states.limit:
             continue
         hangs = water.number(tether.nodes)

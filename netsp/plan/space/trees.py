@@ -16,9 +16,6 @@ from netsp.plan.space.planning_context import along
 from netsp.plan.space.space_legs import Ways
 from netsp.plan.space.states import States
 
-TRADES = (0.0, 0.05, 0.15, 0.4)
-"""Of each tree, what a metre from the start counts beside one of the leg."""
-
 
 def states_of_trees(states: States, ways: Ways, clock: Clock) -> None:
     """Drive the tether along trees; where it arrives in a state that was not there, there is one
@@ -33,10 +30,10 @@ def states_of_trees(states: States, ways: Ways, clock: Clock) -> None:
     clock : Clock
         When it is up, trees are left as they are.
     """
-    most = states.most
-    states.most += len(TRADES)
+    most, trade_offs = states.most, states.water.policy.states.tree_trade_offs
+    states.most += len(trade_offs)
     roots = [min(of, key=lambda s: states.all[s].tether.length) for of in states.of.values() if of]
-    for trade in TRADES:
+    for trade in trade_offs:
         _grow(states, ways, clock, roots, trade)
     states.most = most
 

@@ -25,20 +25,17 @@ Flags = npt.NDArray[np.uint8]
 Labels = npt.NDArray[np.int32]
 
 UNKNOWN = -1
-"""Of an edge's label."""
+"""Sentinel label of an edge whose word is not known."""
 
 FAR = np.iinfo(np.int32).max
-"""Distance of a cell that no path reaches."""
+"""Sentinel distance of a cell that no path reaches."""
 
 STEPS = np.array([s for s in np.ndindex(3, 3, 3) if s != (1, 1, 1)], dtype=np.int64) - 1
 LENGTHS = np.round(100.0 * np.sqrt((STEPS**2).sum(1))).astype(np.int64)
 """Of the 26 steps, in hundredths of a cell: whole numbers make buckets of equal lengths."""
 
-BUCKETS = 174
-"""More than the longest step."""
-
-MOST_GENERATORS = 2_000
-"""Before relations eliminate any; beyond that, a scene is refused."""
+BUCKETS = int(LENGTHS.max()) + 1
+"""Number of buckets of a queue by distance, one more than the longest step."""
 
 
 @kernel
@@ -170,6 +167,7 @@ def labelled(
     order: npt.NDArray[np.int32],
     table: Table,
     rules: Rules,
+    max_generators: int,
     stop: Flag,
 ) -> tuple[Labels, Table, int]:
     """Return a label for every edge between cells that are reached, and how many generators there
@@ -182,7 +180,7 @@ def labelled(
     table
         With their words.
     generators
-        Their number; more than MOST_GENERATORS if that is passed: not all labels are known then.
+        Their number; more than `max_generators` if that is passed: not all labels are known then.
     """
     nx, ny, nz = flags.shape
     labels = np.full(3 * nx * ny * nz, UNKNOWN, dtype=np.int32)
@@ -233,7 +231,7 @@ def labelled(
             if labels[edge] != UNKNOWN or far[other] > far[cell]:
                 continue
             generators += 1
-            if generators > MOST_GENERATORS:
+            if generators > max_generators:
                 return labels, table, generators
             word, table = times_letter(table, rules, 0, generators)
             labels[edge] = word

@@ -19,11 +19,9 @@ from netsp.model.problem import Circle, Polygon, Problem
 from netsp.plan.solve_problem import solve
 from netsp.plan.space.cross_sections import Depths, cross_sections, level_range
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import DEEPEST, DIP, Water
+from netsp.plan.space.planning_context import DEPTH_TOLERANCE, DIP_RATIO, Water
+from netsp.plan.space.potential import BOUND_ROUNDING
 from netsp.world.mission.mission import Mission
-
-ROUNDING = 1e-9
-"""Relative reduction of the bound, which covers the rounding of lengths."""
 
 
 def bound_of_upright(
@@ -55,7 +53,7 @@ def bound_of_upright(
     # the judge lets a path dip into solids a little, and a tether between its nodes a little more:
     # among obstacles shrunk by the larger depth both are free, and the taut tether is no longer
     # than its model
-    dip = max(2.0 * DEEPEST, DIP * mission.delta)
+    dip = max(2.0 * DEPTH_TOLERANCE, DIP_RATIO * mission.delta)
     obstacles = upright_obstacles(water, dip)
     if not obstacles or clock.up:
         return None
@@ -75,7 +73,7 @@ def bound_of_upright(
         return None  # no bound in the plane, so none in space
     if bound is None or bound.scope is not Scope.ALL_TOURS:
         return None
-    return bound.length * (1.0 - ROUNDING)
+    return bound.length * (1.0 - BOUND_ROUNDING)
 
 
 def upright_obstacles(water: Water, dip: float) -> list[Circle | Polygon]:

@@ -21,24 +21,13 @@ from netsp.base.geometry import polylines
 from netsp.gtsp.search import Instance, best_classes
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.plan.solve_problem import solve_graph
-from netsp.plan.space.planning_context import SHARE, straight, stride
+from netsp.plan.space.mission_policy import MissionPolicy
+from netsp.plan.space.planning_context import straight, stride
 from netsp.plan.space.states import alike
 from netsp.world.mission.mission import Mission
 from netsp.world.paths.tree import Grid, ShortestTree, taut
 from netsp.world.scene.field import DistanceField
 from netsp.world.tether import GeodesicTether, Tether
-
-NEIGHBOURS = 12
-"""Waypoints nearest to each that legs are sought to."""
-
-MOST_CLASSES = 3
-"""Classes of tether kept for each waypoint."""
-
-ROUNDS = 150
-"""Of pulling a tether taut."""
-
-ITERATIONS = 400
-"""Of the search for an order."""
 
 
 @dataclass
@@ -57,7 +46,13 @@ class _Classes:
 
 
 def order_by_going_on(
-    mission: Mission, field: DistanceField, grid: Grid, *, clock: Clock, seed: int = 0
+    mission: Mission,
+    field: DistanceField,
+    grid: Grid,
+    *,
+    clock: Clock,
+    seed: int = 0,
+    policy: MissionPolicy | None = None,
 ) -> tuple[int, ...]:
     """The shortest order of a mission's waypoints along classes and legs of going straight on.
 
@@ -72,7 +67,9 @@ def order_by_going_on(
     clock : Clock
         When it is up, the best order so far is returned.
     seed : int
-        Of the solver.
+        Random seed of the solver.
+    policy : MissionPolicy, optional
+        Effort, and share of the tether.
 
     Returns
     -------
@@ -86,7 +83,8 @@ def order_by_going_on(
     LimitReachedError
         The time was up before legs were known.
     """
-    graph, points, start = waypoint_graph(mission, field, grid, clock)
+    policy = policy or MissionPolicy()
+    graph, points, start = waypoint_graph(mission, field, grid, clock, policy)
     given = [start.index(n) + 1 for n in range(len(mission.waypoints)) if n in start]
     instance = Instance.of(graph)
     _, warm = best_classes(np.array(given), instance.start, instance.costs)
@@ -94,7 +92,7 @@ def order_by_going_on(
         graph,
         "lns",
         time_limit=clock,
-        iteration_limit=ITERATIONS,
+        iteration_limit=policy.going_on.max_iterations,
         seed=seed,
         warm_start=[int(v) for v in instance.original(warm)],
     )
@@ -103,7 +101,11 @@ def order_by_going_on(
 
 
 def waypoint_graph(
-    mission: Mission, field: DistanceField, grid: Grid, clock: Clock | None = None
+    mission: Mission,
+    field: DistanceField,
+    grid: Grid,
+    clock: Clock | None = None,
+    policy: MissionPolicy | None = None,
 ) -> tuple[TravelGraph, list[int], list[int]]:
     """Classes and legs of a mission.
 
@@ -119,6 +121,8 @@ def waypoint_graph(
         The grid that paths are sought on.
     clock : Clock, optional
         When it is up, there is no graph.
+    policy : MissionPolicy, optional
+        Effort, and share of the tether.
 
     Returns
     -------
@@ -136,9 +140,9 @@ def waypoint_graph(
     LimitReachedError
         The time was up.
     """
-    clock = clock or Clock()
+    clock, policy = clock or Clock(), policy or MissionPolicy()
     model = GeodesicTether(field, mission.delta)
-    anchor, limit = np.array(mission.anchor), SHARE * mission.tether_length
+    anchor, limit = np.array(mission.anchor), policy.tether_share * mission.tether_length
     points = mission.places
     tree = ShortestTree(grid, anchor, points)
     found = _Classes([], [])
@@ -147,12 +151,12 @@ def waypoint_graph(
         path = tree.path(n)
         if path is None:
             continue
-        tether = model.relaxed(path[::-1], 2 * ROUNDS)
+        tether = model.relaxed(path[::-1], policy.going_on.max_pull_rounds)
         if tether.length <= limit:
             found.point.append(n)
             found.tether.append(tether)
     near = np.argsort(np.linalg.norm(points[:, None] - points[None], axis=2), axis=1)[
-        :, 1 : NEIGHBOURS + 1
+        :, 1 : policy.going_on.n_neighbours + 1
     ]
     direct: dict[tuple[int, int], float] = {}
     v = 0
@@ -163,11 +167,13 @@ def waypoint_graph(
             if not straight(field, points[n], points[m], mission.clearance):
                 continue
             path = np.array([points[n], points[m]])
-            there, lengths = model.drive(found.tether[v], polylines.dense(path, stride(mission)))
+            there, lengths = model.drive(
+                found.tether[v], polylines.dense(path, stride(mission, policy.tether_share))
+            )
             if lengths.max() > limit:
                 continue
             w = found.find(int(m), there, mission.delta)
-            if w is None and found.point.count(int(m)) < MOST_CLASSES:
+            if w is None and found.point.count(int(m)) < policy.going_on.max_classes:
                 w = len(found.point)
                 found.point.append(int(m))
                 found.tether.append(there)

@@ -1,13 +1,14 @@
-"""From a path to cells that lie beside it: which edges of the complex it runs along.
+"""Words of paths from the edges of the complex that run beside them.
 
-A point holds on to a cell that it sees. While the point moves and when it takes hold of another
-cell, the triangles in between are looked at: if no solid is in them, nothing can lie between the
-path and the edges, and what the edges' labels say is true of the path.
+A point holds on to a cell that it sees. Whenever the point moves or takes hold of another cell, the
+triangles in between are checked. If they hold no solid, nothing lies between the path and the edges
+that the hold runs along, so the labels of the edges write the word of the path.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,20 +20,49 @@ from netsp.plan.space.cells import FREE
 from netsp.plan.space.triangle_labels import UNKNOWN, Flags, Labels, edge_flag, lower_end
 from netsp.world.scene.sampling import Field, distance
 
-REACH = 3
-"""A point holds on to a cell no farther than so many cells along an axis."""
 
-SIDE = 2 * REACH + 1
+class LabelledComplex(NamedTuple):
+    """A labelled complex, and how closely paths are followed through it.
 
-NEAR = 1.5
-"""From so many cells on, a nearer one is sought."""
+    Attributes
+    ----------
+    field
+        The scene.
+    low
+        (3,) corner of the box, metres.
+    cell
+        Size of a cell, metres.
+    flags
+        (nx, ny, nz) flags of `netsp.plan.space.cells`.
+    labels
+        (3 n,) labels of the edges.
+    known
+        (nx, ny, nz) nonzero for cells that points may hold on to.
+    tolerance
+        Depth to which paths may enter solids, and size of the triangles that are not divided any
+        further, metres.
+    max_hold, far_hold
+        `max_hold_cells` and `far_hold_cells` of `netsp.plan.space.mission_policy.WordPolicy`.
+    """
+
+    field: Field
+    low: Floats
+    cell: float
+    flags: Flags
+    labels: Labels
+    known: Flags
+    tolerance: float
+    max_hold: int
+    far_hold: float
 
 
 @kernel
-def triangle_free(field: Field, p: Floats, q: Floats, r: Floats, fine: float, into: float) -> bool:
-    """Whether no solid is in a triangle: balls without solids cover it, but for parts smaller than
-    `fine` whose middle may be as deep as `into` in a surface. A bar of a radius greater than both
-    together cannot pass through."""
+def is_triangle_free(field: Field, p: Floats, q: Floats, r: Floats, tolerance: float) -> bool:
+    """Return whether no solid is in a triangle.
+
+    Balls without solids cover the triangle, except parts smaller than the tolerance, whose middle
+    may be that deep in a solid. No bar of a radius of twice the tolerance can pass through.
+    """
     parts, left = np.empty((64, 9)), 1
     for c in range(3):
         parts[0, c], parts[0, 3 + c], parts[0, 6 + c] = p[c], q[c], r[c]
@@ -52,11 +82,11 @@ def triangle_free(field: Field, p: Floats, q: Floats, r: Floats, fine: float, in
         d = distance(field, x, y, z)
         if d >= radius:
             continue
-        if d < -into:
+        if d < -tolerance:
             return False
-        if radius <= fine:
+        if radius <= tolerance:
             continue
-        # the longest side is halved, so that parts get no thinner
+        # halve the longest side, so that parts get no thinner
         ab = (a0 - b0) ** 2 + (a1 - b1) ** 2 + (a2 - b2) ** 2
         bc = (b0 - c0) ** 2 + (b1 - c1) ** 2 + (b2 - c2) ** 2
         ca = (c0 - a0) ** 2 + (c1 - a1) ** 2 + (c2 - a2) ** 2
@@ -79,9 +109,9 @@ def triangle_free(field: Field, p: Floats, q: Floats, r: Floats, fine: float, in
 
 
 @kernel
-def centre_of(low: Floats, cell: float, i: int, j: int, k: int) -> Floats:
-    """Of a cell, metres."""
-    out = np.empty(3)
+def cell_centre(complex_: LabelledComplex, i: int, j: int, k: int) -> Floats:
+    """Return the centre (3,) of a cell, metres."""
+    low, cell, out = complex_.low, complex_.cell, np.empty(3)
     out[0] = low[0] + (i + 0.5) * cell
     out[1] = low[1] + (j + 0.5) * cell
     out[2] = low[2] + (k + 0.5) * cell
@@ -89,77 +119,61 @@ def centre_of(low: Floats, cell: float, i: int, j: int, k: int) -> Floats:
 
 
 @kernel
-def held(
-    field: Field,
-    low: Floats,
-    cell: float,
-    flags: Flags,
-    known: Flags,
-    p: Floats,
-    fine: float,
-    into: float,
-) -> int:
-    """The nearest cell that a point sees, of those that are known; -1 if there is none. It depends
-    on the point alone."""
+def visible_cell(complex_: LabelledComplex, p: Floats) -> int:
+    """Return the nearest known cell that a point sees, -1 if there is none; the cell depends on the
+    point alone."""
+    low, cell, flags, reach = complex_.low, complex_.cell, complex_.flags, complex_.max_hold
     nx, ny, nz = flags.shape
     at = np.empty(3, dtype=np.int64)
     for axis in range(3):
         at[axis] = min(max(math.floor((p[axis] - low[axis]) / cell), 0), flags.shape[axis] - 1)
-    number = SIDE**3
+    number = (2 * reach + 1) ** 3
     far, cells, count = np.empty(number), np.empty(number, dtype=np.int64), 0
-    for i in range(max(at[0] - REACH, 0), min(at[0] + REACH + 1, nx)):
-        for j in range(max(at[1] - REACH, 0), min(at[1] + REACH + 1, ny)):
-            for k in range(max(at[2] - REACH, 0), min(at[2] + REACH + 1, nz)):
-                if flags[i, j, k] & FREE and known[i, j, k]:
-                    c = centre_of(low, cell, i, j, k)
+    for i in range(max(at[0] - reach, 0), min(at[0] + reach + 1, nx)):
+        for j in range(max(at[1] - reach, 0), min(at[1] + reach + 1, ny)):
+            for k in range(max(at[2] - reach, 0), min(at[2] + reach + 1, nz)):
+                if flags[i, j, k] & FREE and complex_.known[i, j, k]:
+                    c = cell_centre(complex_, i, j, k)
                     far[count] = (p[0] - c[0]) ** 2 + (p[1] - c[1]) ** 2 + (p[2] - c[2]) ** 2
                     cells[count] = (i * ny + j) * nz + k
                     count += 1
     for n in order_of(far[:count]):
         i, j, k = cells[n] // (ny * nz), cells[n] // nz % ny, cells[n] % nz
-        c = centre_of(low, cell, i, j, k)
-        if triangle_free(field, p, p, c, fine, into):
+        c = cell_centre(complex_, i, j, k)
+        if is_triangle_free(complex_.field, p, p, c, complex_.tolerance):
             return int(cells[n])
     return -1
 
 
 @kernel
-def moved(
-    field: Field,
-    low: Floats,
-    cell: float,
-    flags: Flags,
-    labels: Labels,
-    p: Floats,
-    begin: int,
-    end: int,
-    ahead: Floats,
-    fine: float,
-    into: float,
+def moved_hold(
+    complex_: LabelledComplex, p: Floats, begin: int, end: int, ahead: Floats
 ) -> tuple[int, Ints]:
-    """From one cell to another that a point takes hold of, along edges that it sees.
+    """Move the hold of a point from one cell to another, along edges that the point sees.
 
     Parameters
     ----------
     begin, end
-        Cells; end -1: the first from which the point sees what it needs to, to go on to `ahead`.
+        Cells; with an end of -1, the first cell found from which the point can go on to `ahead`.
 
     Returns
     -------
     cell
-        Where it ends; -1 if there is no such way.
+        Cell at the end; -1 if no edges lead there.
     edges
-        (m,) 1 + edge, negative where it is run along backwards.
+        (m,) 1 + number of each edge, negative where the hold runs along it backwards.
     """
+    low, cell, flags, labels = complex_.low, complex_.cell, complex_.flags, complex_.labels
+    field, tolerance, reach = complex_.field, complex_.tolerance, complex_.max_hold
     _nx, ny, nz = flags.shape
     middle = np.empty(3, dtype=np.int64)
     for axis in range(3):
         middle[axis] = min(max(math.floor((p[axis] - low[axis]) / cell), 0), flags.shape[axis] - 1)
-    number = SIDE**3
-    came = np.zeros(number, dtype=np.int64)  # 1 + place before; 0 where it was not yet
-    along = np.zeros(number, dtype=np.int64)
+    number = (2 * reach + 1) ** 3
+    came = np.zeros(number, dtype=np.int64)  # 1 + index before; 0 if not reached yet
+    edge_to = np.zeros(number, dtype=np.int64)
     queue, head, tail = np.empty(number, dtype=np.int64), 0, 1
-    start = place_of(begin, middle, ny, nz)
+    start = index_in_block(begin, middle, reach, ny, nz)
     if start < 0:
         return -1, np.empty(0, dtype=np.int64)
     queue[0], came[start] = begin, -1
@@ -168,8 +182,8 @@ def moved(
         here = queue[head]
         head += 1
         i, j, k = here // (ny * nz), here // nz % ny, here % nz
-        c = centre_of(low, cell, i, j, k)
-        if here == end or (end < 0 and triangle_free(field, p, ahead, c, fine, into)):
+        c = cell_centre(complex_, i, j, k)
+        if here == end or (end < 0 and is_triangle_free(field, p, ahead, c, tolerance)):
             found = here
             break
         for side in range(6):
@@ -180,57 +194,50 @@ def moved(
             edge = 3 * lower_end(here, axis, sign, ny, nz) + axis
             if labels[edge] == UNKNOWN:
                 continue
-            place = place_of(there, middle, ny, nz)
-            if place < 0 or came[place] != 0:
+            index = index_in_block(there, middle, reach, ny, nz)
+            if index < 0 or came[index] != 0:
                 continue
-            d = centre_of(low, cell, there // (ny * nz), there // nz % ny, there % nz)
-            if not triangle_free(field, p, c, d, fine, into):
+            d = cell_centre(complex_, there // (ny * nz), there // nz % ny, there % nz)
+            if not is_triangle_free(field, p, c, d, tolerance):
                 continue
-            came[place] = 1 + place_of(here, middle, ny, nz)
-            along[place] = sign * (1 + edge)
+            came[index] = 1 + index_in_block(here, middle, reach, ny, nz)
+            edge_to[index] = sign * (1 + edge)
             queue[tail] = there
             tail += 1
     if found < 0:
         return -1, np.empty(0, dtype=np.int64)
     edges, count = np.empty(number, dtype=np.int64), 0
-    place = place_of(found, middle, ny, nz)
-    while came[place] > 0:
-        edges[count] = along[place]
+    index = index_in_block(found, middle, reach, ny, nz)
+    while came[index] > 0:
+        edges[count] = edge_to[index]
         count += 1
-        place = came[place] - 1
+        index = came[index] - 1
     return found, edges[:count][::-1].copy()
 
 
 @kernel
-def place_of(cell: int, middle: Ints, ny: int, nz: int) -> int:
-    """Of a cell in the box around another; -1 outside of it."""
-    i = cell // (ny * nz) - middle[0] + REACH
-    j = cell // nz % ny - middle[1] + REACH
-    k = cell % nz - middle[2] + REACH
-    if i < 0 or j < 0 or k < 0 or i >= SIDE or j >= SIDE or k >= SIDE:
+def index_in_block(cell: int, middle: Ints, reach: int, ny: int, nz: int) -> int:
+    """Return the index of a cell in the block of cells around another; -1 outside of it."""
+    side = 2 * reach + 1
+    i = cell // (ny * nz) - middle[0] + reach
+    j = cell // nz % ny - middle[1] + reach
+    k = cell % nz - middle[2] + reach
+    if i < 0 or j < 0 or k < 0 or i >= side or j >= side or k >= side:
         return -1
-    return int((i * SIDE + j) * SIDE + k)
+    return int((i * side + j) * side + k)
 
 
 @kernel
-def walked(
-    field: Field,
-    low: Floats,
-    cell: float,
-    flags: Flags,
-    labels: Labels,
-    known: Flags,
-    table: Table,
-    rules: Rules,
-    path: Floats,
-    fine: float,
-    into: float,
+def path_word(
+    complex_: LabelledComplex, table: Table, rules: Rules, path: Floats
 ) -> tuple[int, Table, Floats]:
-    """The word of a path (k, 3): its number, the table, and where it could not be told any further
-    (a number of -1) or the path's end."""
-    _nx, ny, nz = flags.shape
+    """Return the number of the word of a path (k, 3), the table, and the last point reached.
+
+    The number is -1 if the path runs through a solid, out of the box or through a closed gap.
+    """
+    cell, tolerance = complex_.cell, complex_.tolerance
     p = path[0].copy()
-    hold = held(field, low, cell, flags, known, p, fine, into)
+    hold = visible_cell(complex_, p)
     word = 0
     if hold < 0:
         return -1, table, p
@@ -242,66 +249,72 @@ def walked(
         while share < 1.0:
             step = min(step, 1.0 - share)
             q = begin + (share + step) * (end - begin)
-            c = centre_of(low, cell, hold // (ny * nz), hold // nz % ny, hold % nz)
-            if not triangle_free(field, p, q, c, fine, into):
-                there, edges = moved(field, low, cell, flags, labels, p, hold, -1, q, fine, into)
+            c = centre_of_number(complex_, hold)
+            if not is_triangle_free(complex_.field, p, q, c, tolerance):
+                there, edges = moved_hold(complex_, p, hold, -1, q)
                 if there < 0:
-                    if step * long < 0.25 * fine:
+                    if step * long < 0.25 * tolerance:
                         return -1, table, p
                     step *= 0.5
                     continue
-                word, table = along_edges(labels, table, rules, word, edges)
+                word, table = with_edges(complex_.labels, table, rules, word, edges)
                 hold = there
             share += step
             p = q
-            # the nearest beside, as long as that is seen: the hold stays short
-            while True:
-                nearer, edge = closer(field, low, cell, flags, labels, p, hold, fine, into)
-                if nearer < 0:
-                    break
-                one = np.empty(1, dtype=np.int64)
-                one[0] = edge
-                word, table = along_edges(labels, table, rules, word, one)
-                hold = nearer
-            # something may stand between the hold and nearer cells: around it before it is too far
-            c = centre_of(low, cell, hold // (ny * nz), hold // nz % ny, hold % nz)
-            if max(abs(p[0] - c[0]), abs(p[1] - c[1]), abs(p[2] - c[2])) > NEAR * cell:
-                near = held(field, low, cell, flags, known, p, fine, into)
-                if near >= 0:
-                    there, edges = moved(
-                        field, low, cell, flags, labels, p, hold, near, p, fine, into
-                    )
-                    if there >= 0:
-                        word, table = along_edges(labels, table, rules, word, edges)
-                        hold = there
+            hold, word, table = nearest_hold(complex_, table, rules, p, hold, word)
             step = min(2.0 * step, cell / max(long, 1e-12))
-    last = held(field, low, cell, flags, known, p, fine, into)
+    last = visible_cell(complex_, p)
     if last < 0:
         return -1, table, p
-    there, edges = moved(field, low, cell, flags, labels, p, hold, last, p, fine, into)
+    there, edges = moved_hold(complex_, p, hold, last, p)
     if there < 0:
         return -1, table, p
-    word, table = along_edges(labels, table, rules, word, edges)
+    word, table = with_edges(complex_.labels, table, rules, word, edges)
     return word, table, p
 
 
 @kernel
-def closer(
-    field: Field,
-    low: Floats,
-    cell: float,
-    flags: Flags,
-    labels: Labels,
-    p: Floats,
-    hold: int,
-    fine: float,
-    into: float,
-) -> tuple[int, int]:
-    """The neighbour of a cell that is nearest to a point, if that is nearer and can be taken hold
-    of, and the edge to it (as of `moved`); -1 if there is none."""
+def nearest_hold(
+    complex_: LabelledComplex, table: Table, rules: Rules, p: Floats, hold: int, word: int
+) -> tuple[int, int, Table]:
+    """Return the hold of a point, moved to nearer cells, and the word and table after that."""
+    # go to nearer neighbours while the point sees them: this keeps the hold short
+    while True:
+        nearer, edge = nearer_neighbour(complex_, p, hold)
+        if nearer < 0:
+            break
+        one = np.empty(1, dtype=np.int64)
+        one[0] = edge
+        word, table = with_edges(complex_.labels, table, rules, word, one)
+        hold = nearer
+    # a solid may stand between the hold and nearer cells: go around it before the hold is too far
+    c = centre_of_number(complex_, hold)
+    far = complex_.far_hold * complex_.cell
+    if max(abs(p[0] - c[0]), abs(p[1] - c[1]), abs(p[2] - c[2])) > far:
+        near = visible_cell(complex_, p)
+        if near >= 0:
+            there, edges = moved_hold(complex_, p, hold, near, p)
+            if there >= 0:
+                word, table = with_edges(complex_.labels, table, rules, word, edges)
+                hold = there
+    return hold, word, table
+
+
+@kernel
+def centre_of_number(complex_: LabelledComplex, number: int) -> Floats:
+    """Return the centre (3,) of a cell by its number, metres."""
+    _nx, ny, nz = complex_.flags.shape
+    return cell_centre(complex_, number // (ny * nz), number // nz % ny, number % nz)
+
+
+@kernel
+def nearer_neighbour(complex_: LabelledComplex, p: Floats, hold: int) -> tuple[int, int]:
+    """Return the neighbour of a cell that is nearest to a point, and the edge to it as in
+    `moved_hold`; -1 if no visible neighbour is nearer than the cell."""
+    flags, labels = complex_.flags, complex_.labels
     _nx, ny, nz = flags.shape
     i, j, k = hold // (ny * nz), hold // nz % ny, hold % nz
-    c = centre_of(low, cell, i, j, k)
+    c = cell_centre(complex_, i, j, k)
     least = (p[0] - c[0]) ** 2 + (p[1] - c[1]) ** 2 + (p[2] - c[2]) ** 2 - 1e-9
     nearest, by = -1, 0
     for side in range(6):
@@ -312,18 +325,18 @@ def closer(
         edge = 3 * lower_end(hold, axis, sign, ny, nz) + axis
         if labels[edge] == UNKNOWN:
             continue
-        d = centre_of(low, cell, there // (ny * nz), there // nz % ny, there % nz)
+        d = cell_centre(complex_, there // (ny * nz), there // nz % ny, there % nz)
         far = (p[0] - d[0]) ** 2 + (p[1] - d[1]) ** 2 + (p[2] - d[2]) ** 2
-        if far < least and triangle_free(field, p, c, d, fine, into):
+        if far < least and is_triangle_free(complex_.field, p, c, d, complex_.tolerance):
             least, nearest, by = far, there, sign * (1 + edge)
     return nearest, by
 
 
 @kernel
-def along_edges(
+def with_edges(
     labels: Labels, table: Table, rules: Rules, word: int, edges: Ints
 ) -> tuple[int, Table]:
-    """A word and then those of edges, as of `moved`."""
+    """Return a word followed by the words of edges as in `moved_hold`, and the table."""
     for e in edges:
         label = labels[abs(e) - 1]
         if label == 0:

@@ -32,8 +32,8 @@ from netsp.plan.space.triangle_labels import (
 )
 from netsp.world.paths.tree import ONWARD
 
-NONE = -1
-"""Word of a slot that is empty."""
+NO_WORD = -1
+"""Sentinel word of an empty slot."""
 
 
 class Found(NamedTuple):
@@ -44,7 +44,7 @@ class Found(NamedTuple):
     first
         (3,) the cell of the box with the lowest numbers.
     word
-        (nx, ny, nz, k) number of the word, NONE where there is none.
+        (nx, ny, nz, k) number of the word, NO_WORD where there is none.
     far
         (nx, ny, nz, k) hundredths of a cell.
     step
@@ -105,7 +105,7 @@ def shortest_words(
     """
     _, ny, nz = flags.shape
     sx, sy, sz = last[0] - first[0] + 1, last[1] - first[1] + 1, last[2] - first[2] + 1
-    word = np.full((sx, sy, sz, most), NONE, dtype=np.int32)
+    word = np.full((sx, sy, sz, most), NO_WORD, dtype=np.int32)
     far = np.full((sx, sy, sz, most), np.iinfo(np.int32).max, dtype=np.int32)
     step = np.full((sx, sy, sz, most), -1, dtype=np.int8)
     slot = np.zeros((sx, sy, sz, most), dtype=np.int8)
@@ -198,7 +198,7 @@ def shortest_words(
             for c in range(sz):
                 for m in range(most):
                     if not done[a, b, c, m]:
-                        word[a, b, c, m] = NONE
+                        word[a, b, c, m] = NO_WORD
     return Found(first, word, far, step, slot), table
 
 
