@@ -20,6 +20,21 @@ BAD_OPENINGS = {
 }  # fmt: skip
 """First words of docstrings that hang on another sentence, except `The` before a head noun."""
 
+ARTICLES = {"the", "a", "an", "all", "every", "each", "any", "no", "one", "two", "both"}
+"""First words with which no docstring of a function begins: it begins with a verb."""
+
+KINDS = ("tolerance", "sentinel", "code", "column", "index", "format", "physical", "unit")
+"""First words of the docstrings of numbers that nobody chose."""
+
+NAMES = {
+    "told", "take", "of", "some", "own", "most", "least", "few", "there", "back", "here", "said",
+    "heard", "asked",
+}  # fmt: skip
+"""Names that say nothing to a stranger."""
+
+PARTS = {"most", "least", "told", "way", "ways", "said", "heard", "asked"}
+"""Parts of names for which there is a field's term: max, min, on, path."""
+
 PRONOUNS = re.compile(r"\b(so many|the first of these|that many|the others? of|those that)\b", re.I)
 
 Place = tuple[str, int, str]
@@ -53,9 +68,11 @@ class Tree:
                     yield file, node
 
     def constants(self) -> Iterator[tuple[Path, ast.stmt, str, object]]:
-        """Yield the module-level names that are bound to numbers, with their values."""
+        """Yield the module-level names that are bound to chosen numbers, with their values."""
         for file, tree in self.trees.items():
-            for node in tree.body:
+            for node, following in zip(tree.body, [*tree.body[1:], None], strict=True):
+                if _string(following).lower().startswith(KINDS):
+                    continue
                 if isinstance(node, ast.Assign) and len(node.targets) == 1:
                     targets, value = node.targets[0], node.value
                 elif isinstance(node, ast.AnnAssign) and node.value is not None:
@@ -92,6 +109,13 @@ _NUMERIC = (
 )  # fmt: skip
 
 
+def _string(node: ast.stmt | None) -> str:
+    """Return the text of a statement that is a string, or an empty one."""
+    value = getattr(node, "value", None) if isinstance(node, ast.Expr) else None
+    text = value.value if isinstance(value, ast.Constant) else ""
+    return text if isinstance(text, str) else ""
+
+
 def _lines(tree: Tree) -> list[Place]:
     return [
         (str(f.relative_to(tree.root.parent)), k, "")
@@ -117,7 +141,8 @@ def _rooms(tree: Tree) -> list[Place]:
     return [
         (path.name, 1, "")
         for path in sorted(tree.root.iterdir())
-        if path.suffix == ".py" or (path / "__init__.py").exists()
+        if (path.suffix == ".py" and not path.stem.startswith("__"))
+        or (path / "__init__.py").exists()
     ]
 
 
@@ -186,7 +211,39 @@ def _openings(tree: Tree) -> list[Place]:
         first = words[0].rstrip(",.:").lower() if words else ""
         if first in BAD_OPENINGS and not (first == "the" and len(words) > 2):
             found.append(tree.place(file, node, text.splitlines()[0]))
+    for file, function in tree.functions():
+        text = ast.get_docstring(function) or ""
+        is_property = any("property" in ast.unparse(d) for d in function.decorator_list)
+        first = text.split()[0].rstrip(",.:").lower() if text else ""
+        if text and not is_property and (first in ARTICLES or not first[0].isalpha()):
+            found.append(tree.place(file, function, text.splitlines()[0]))
     return found
+
+
+def _identifiers(tree: Tree) -> list[Place]:
+    found = []
+    for file, module in tree.trees.items():
+        seen = set()
+        for node in ast.walk(module):
+            name = _defined(node)
+            words = set(name.lower().strip("_").split("_"))
+            if name not in seen and (name.strip("_") in NAMES or words & PARTS):
+                seen.add(name)
+                found.append(tree.place(file, node, name))
+    return found
+
+
+def _defined(node: ast.AST) -> str:
+    """Return the name that a node defines or binds, or an empty string."""
+    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+        return node.name
+    if isinstance(node, ast.arg):
+        return node.arg
+    if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+        return node.id
+    if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+        return node.attr
+    return ""
 
 
 def _pronouns(tree: Tree) -> list[Place]:
@@ -208,16 +265,17 @@ def _skips(tree: Tree) -> list[Place]:
 
 ROWS: dict[str, tuple[str, Callable[[Tree], list[Place]]]] = {
     "lines": ("lines", _lines),
-    "rooms": ("names at the root", _rooms),
+    "rooms": ("rooms and modules at the root", _rooms),
     "basenames": ("modules whose basename is not unique", _names_twice),
-    "constants": ("module-level names of numbers", _constants),
+    "constants": ("module-level names of chosen numbers", _constants),
     "ambiguous": (
         "names of numbers in several modules with different values",
         _ambiguous_constants,
     ),
     "long": (f"functions of more than {MAX_LINES} lines", _long),
     "parameters": (f"functions of more than {MAX_PARAMETERS} parameters", _many_parameters),
-    "openings": ("docstrings that open with a pronoun or preposition", _openings),
+    "openings": ("docstrings that open with no verb or head noun", _openings),
+    "identifiers": ("names that the language rules forbid, once a file", _identifiers),
     "pronouns": ("docstrings with a pronoun for a number", _pronouns),
     "skips": ("`# fmt: skip`", _skips),
 }
