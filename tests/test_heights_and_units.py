@@ -13,6 +13,7 @@ from netsp.command.main import main
 from netsp.exchange.maps import read_site
 from netsp.exchange.maps.csv_table import from_table
 from netsp.exchange.maps.goal_depths import surface_warning, with_depth
+from netsp.exchange.maps.import_policy import DEFAULT_READ
 from netsp.exchange.maps.path_file import read_paths
 from netsp.exchange.maps.projection import Projection
 from netsp.model.problem import Problem
@@ -341,7 +342,8 @@ def test_transparency_means_what_map_server_takes_it_for(tmp_path, form, mode, p
     image = Image.new(form, (2, 2), pixel if form == "LA" else (*(pixel[:1] * 3), pixel[1]))
     image.save(tmp_path / "m.png")
     occupied, unknown = _kinds(
-        *_values(tmp_path / "m.png"), MapFile(image="m.png", resolution=1.0, mode=mode)
+        *_values(tmp_path / "m.png", DEFAULT_READ.max_image_cells),
+        MapFile(image="m.png", resolution=1.0, mode=mode),
     )
     assert (occupied.all(), unknown.all()) == (kinds == "occupied", kinds == "unknown")
 

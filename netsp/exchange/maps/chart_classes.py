@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from netsp.exchange.maps.feature import Feature
+from netsp.exchange.maps.import_policy import DEFAULT_IMPORT, ImportPolicy
 from netsp.exchange.maps.word_tables import words
 
 STANDING = words(
@@ -32,7 +33,7 @@ COVERAGE = "M_COVR"
 """Class of areas that the chart covers (`CATCOV` 1) or does not cover (2)."""
 
 COVERED = 1
-"""Value of `CATCOV` of an area with data."""
+"""Code of an area with data in `CATCOV`."""
 
 UNSURVEYED = "UNSARE"
 """Class of areas whose depth nobody knows."""
@@ -44,22 +45,19 @@ CONTOURS = "DEPCNT"
 """Class of depth contours (`VALDCO`)."""
 
 BUOYANT_BEACON = 7
-"""Value of `BCNSHP` of a beacon that floats."""
+"""Code of a beacon that floats in `BCNSHP`."""
 
 MOORING_BUOY = 7
-"""Value of `CATMOR` of a mooring buoy."""
+"""Code of a mooring buoy in `CATMOR`."""
 
 VIRTUAL_DISTANCE_MARK = 1
-"""Value of `CATDIS` of a distance mark that is not installed."""
+"""Code of a distance mark that is not installed in `CATDIS`."""
 
 MOORED = "floats on a mooring whose place the chart does not give"
 """Reason to leave out buoys."""
 
 EQUIPMENT = "equipment; what carries it is a feature of its own"
 """Reason to leave out lights, signs and the like."""
-
-CARRIER_DISTANCE = 1e-5
-"""Distance up to which equipment stands on a feature, degrees: a metre, a chart's resolution."""
 
 _GROUPS: dict[str, str] = {
     MOORED: ("BOYCAR BOYINB BOYISD BOYLAT BOYSAW BOYSPP BOYWTW LITFLT LITVES"),
@@ -151,7 +149,7 @@ def chart_kind(feature: Feature) -> ChartDecision:
     return ChartDecision("ignore", REASONS.get(layer, UNKNOWN))
 
 
-def lone_equipment(features: Sequence[Feature]) -> set[str]:
+def lone_equipment(features: Sequence[Feature], policy: ImportPolicy = DEFAULT_IMPORT) -> set[str]:
     """Return the equipment that no feature of a chart carries, so that something must stand there.
 
     Parameters
@@ -178,7 +176,9 @@ def lone_equipment(features: Sequence[Feature]) -> set[str]:
         return set()
     tree = shapely.STRtree([carrier.shape for carrier in carriers])
     own, _ = tree.query(
-        [feature.shape for feature in equipment], predicate="dwithin", distance=CARRIER_DISTANCE
+        [feature.shape for feature in equipment],
+        predicate="dwithin",
+        distance=policy.carrier_distance,
     )
     carried = set(own.tolist())
     return {feature.where for k, feature in enumerate(equipment) if k not in carried}

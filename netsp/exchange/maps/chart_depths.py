@@ -23,7 +23,7 @@ from netsp.exchange.maps.chart_classes import (
     sounding_depth,
 )
 from netsp.exchange.maps.feature import Feature
-from netsp.exchange.maps.options import FLOOR_CELLS
+from netsp.exchange.maps.import_policy import DEFAULT_IMPORT, ImportPolicy
 from netsp.exchange.maps.sea_floor import Danger, DepthArea, SeaFloor, sea_floor
 
 if TYPE_CHECKING:
@@ -177,6 +177,7 @@ def chart_floor(
     plane: Callable[[shapely.Geometry], Any],
     window: CropWindow | None,
     cell: float | None,
+    policy: ImportPolicy = DEFAULT_IMPORT,
 ) -> tuple[SeaFloor, FloorFeatures]:
     """Return the sea floor of a chart, and the features that it is made of.
 
@@ -189,7 +190,7 @@ def chart_floor(
     window : CropWindow or None
         What the floor is to hold; None holds all depth areas.
     cell : float or None
-        Side of its cells, metres; None takes `FLOOR_CELLS` along a side.
+        Side of its cells, metres; None takes `policy.floor_cells` along the longer side.
 
     Returns
     -------
@@ -244,7 +245,7 @@ def chart_floor(
         corners = np.array([a.shape.bounds for a in areas])
         low, high = corners[:, :2].min(axis=0), corners[:, 2:].max(axis=0)
         box = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
-    side = cell if cell is not None else max(box[2] - box[0], box[3] - box[1]) / FLOOR_CELLS
+    side = cell if cell is not None else max(box[2] - box[0], box[3] - box[1]) / policy.floor_cells
     floor = sea_floor(
         areas,
         np.vstack(contours),
@@ -253,6 +254,7 @@ def chart_floor(
         side,
         soundings=np.vstack(soundings),
         dangers=dangers,
+        policy=policy.read,
     )
     return floor, found
 

@@ -16,6 +16,7 @@ from netsp.base.errors import InputError, UnansweredError, counted
 from netsp.base.files import check_file
 from netsp.exchange.maps.chart_classes import SOUNDINGS
 from netsp.exchange.maps.feature import Feature, Map
+from netsp.exchange.maps.import_policy import DEFAULT_READ, ReadPolicy
 from netsp.exchange.maps.vector import gdal_options, read_plain, read_rows
 from netsp.exchange.maps.word_tables import words
 from netsp.model.import_record import MAX_NAMED
@@ -26,20 +27,17 @@ NUMBERED = re.compile(r"\.(\d{3})$")
 CELL = ".000"
 """Extension of cells."""
 
-HEAD = 8192
-"""Bytes that hold the description and the first record of a chart, and more."""
-
-LEADER = 24
-"""Bytes of the leader of a record of ISO/IEC 8211."""
+LEADER_BYTES = 24
+"""Format ISO/IEC 8211: size of the leader of a record."""
 
 UPDATE = 2
-"""Value of EXPP (purpose of the exchange) of an update."""
+"""Code of an update in EXPP (purpose of the exchange)."""
 
 LATITUDE_LONGITUDE = 1
-"""Value of COUN (unit of coordinates) of degrees."""
+"""Code of degrees in COUN (unit of coordinates)."""
 
 WGS_84 = 2
-"""Value of HDAT (horizontal datum) of WGS 84."""
+"""Code of WGS 84 in HDAT (horizontal datum)."""
 
 GDAL_OPTIONS = {
     "OGR_S57_OPTIONS": "UPDATES=APPLY,SPLIT_MULTIPOINT=OFF,ADD_SOUNDG_DEPTH=OFF,RECODE_BY_DSSI=ON"
@@ -91,7 +89,7 @@ class CellIdentity:
     update: int
 
 
-def is_chart(file: str | Path) -> bool:
+def is_chart(file: str | Path, policy: ReadPolicy = DEFAULT_READ) -> bool:
     """Return whether a file is a chart, an update or a catalogue of charts, by name or content.
 
     Parameters
@@ -113,11 +111,13 @@ def is_chart(file: str | Path) -> bool:
         return False
     if path.suffix.lower() == ".zip":
         return bool(_cells_in_archive(path))
-    head = _head(path)
+    head = _head(path, policy)
     return _is_exchange_file(head) and b"DSID" in head
 
 
-def read_chart(file: str | Path, crs: str | None, units: str | None) -> Map:
+def read_chart(
+    file: str | Path, crs: str | None, units: str | None, policy: ReadPolicy = DEFAULT_READ
+) -> Map:
     """Return a chart as a map, with the updates that lie beside it.
 
     Depths and lengths are in metres, and soundings have heights: their z is negative.
@@ -142,18 +142,18 @@ def read_chart(file: str | Path, crs: str | None, units: str | None) -> Map:
     InputError
         Not a cell, in a unit that is not known, or not readable.
     """
-    _refuse_containers(Path(file))
+    _refuse_containers(Path(file), policy)
     check_file(file)
-    cell = _identity(file)
+    cell = _identity(file, policy)
     if crs is not None:
         raise InputError(f"--crs: {file} is always in degrees; leave the option out")
-    updates, notes = _updates(Path(file), cell)
+    updates, notes = _updates(Path(file), cell, policy)
     with tempfile.TemporaryDirectory() as folder, gdal_options(GDAL_OPTIONS):
         plain = Path(folder) / f"cell{CELL}"
         shutil.copyfile(file, plain)
         for number, update in enumerate(updates, 1):  # GDAL applies them from 001 on
             shutil.copyfile(update, plain.with_suffix(f".{number:03d}"))
-        found = read_plain(file, plain, None)
+        found = read_plain(file, plain, None, policy)
         (head,) = read_rows(file, plain, "DSID", notes) or [{}]
     _check_coordinates(file, head)
     depth, length = _units(file, head, found, units)
@@ -197,7 +197,7 @@ def _in_metres(feature: Feature, depth: float, length: float) -> Feature:
 # Checks before the file is read
 
 
-def _refuse_containers(path: Path) -> None:
+def _refuse_containers(path: Path, policy: ReadPolicy) -> None:
     """Refuse folders, archives and catalogues of charts, and name the cells in them."""
     catalogue = False
     if path.is_dir():
@@ -205,7 +205,8 @@ def _refuse_containers(path: Path) -> None:
     elif path.suffix.lower() == ".zip":
         cells, what = _cells_in_archive(path), "an archive of charts; unpack it"
     else:
-        catalogue = path.is_file() and b"CATD" in _head(path) and b"DSID" not in _head(path)
+        head = _head(path, policy) if path.is_file() else b""
+        catalogue = b"CATD" in head and b"DSID" not in head
         cells, what = _cells_in(path.parent), "the catalogue of an exchange set"
         if not catalogue:
             return
@@ -230,10 +231,10 @@ def _cells_in_archive(path: Path) -> list[str]:
         return []
 
 
-def _head(path: str | Path) -> bytes:
+def _head(path: str | Path, policy: ReadPolicy) -> bytes:
     try:
         with open(path, "rb") as stream:
-            return stream.read(HEAD)
+            return stream.read(policy.identity_bytes)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
 
@@ -243,7 +244,7 @@ def _is_exchange_file(head: bytes) -> bool:
     return head[:5].isdigit() and head[5:7] in (b"1L", b"2L", b"3L")
 
 
-def _identity(file: str | Path) -> CellIdentity:
+def _identity(file: str | Path, policy: ReadPolicy) -> CellIdentity:
     """Return the identity of a chart file, from its first record (field DSID).
 
     Raises
@@ -251,7 +252,7 @@ def _identity(file: str | Path) -> CellIdentity:
     InputError
         Not a cell of S-57.
     """
-    head = _head(file)
+    head = _head(file, policy)
     if b"INT.IHO.S-1" in head:
         raise InputError(f"{file}: is a chart of S-101; expected one of S-57")
     found = _first_field(head, b"DSID") if _is_exchange_file(head) else None
@@ -273,10 +274,10 @@ def _first_field(head: bytes, tag: bytes) -> bytes | None:
     """Return a field of the first record behind the description, None without it."""
     try:
         start = int(head[:5])
-        leader = head[start : start + LEADER]
+        leader = head[start : start + LEADER_BYTES]
         base = int(leader[12:17])
         sizes = [int(leader[k : k + 1]) for k in (23, 20, 21)]  # of tag, length and position
-        directory = head[start + LEADER : start + base].rstrip(b"\x1e")
+        directory = head[start + LEADER_BYTES : start + base].rstrip(b"\x1e")
         step = sum(sizes)
         for k in range(0, len(directory) - step + 1, step):
             entry = directory[k : k + step]
@@ -289,7 +290,7 @@ def _first_field(head: bytes, tag: bytes) -> bytes | None:
     return None
 
 
-def _updates(file: Path, cell: CellIdentity) -> tuple[list[Path], list[str]]:
+def _updates(file: Path, cell: CellIdentity, policy: ReadPolicy) -> tuple[list[Path], list[str]]:
     """Return the updates beside a cell that follow it without a gap, and notes on the others."""
     beside: dict[int, Path] = {}
     for path in sorted(file.parent.iterdir()):
@@ -300,7 +301,7 @@ def _updates(file: Path, cell: CellIdentity) -> tuple[list[Path], list[str]]:
     others: dict[str, list[str]] = {}
     expected = cell.update + 1
     for number, path in sorted(beside.items()):
-        own = _update_edition(path)
+        own = _update_edition(path, policy)
         if number <= cell.update:
             continue  # a reissued cell already contains this update
         if own is None:
@@ -322,9 +323,9 @@ def _updates(file: Path, cell: CellIdentity) -> tuple[list[Path], list[str]]:
     return applied, notes
 
 
-def _update_edition(path: Path) -> str | None:
+def _update_edition(path: Path, policy: ReadPolicy) -> str | None:
     """Return the edition that an update belongs to, None where it is none."""
-    head = _head(path)
+    head = _head(path, policy)
     found = _first_field(head, b"DSID") if _is_exchange_file(head) else None
     texts = found[7:].split(b"\x1f") if found is not None else []
     if found is None or len(texts) < 3 or found[5] != UPDATE:

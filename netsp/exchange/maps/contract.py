@@ -14,6 +14,7 @@ from netsp.base.errors import InputError
 from netsp.base.validated import shown
 from netsp.exchange.maps.chart_classes import chart_kind
 from netsp.exchange.maps.feature import Feature
+from netsp.exchange.maps.import_policy import DEFAULT_IMPORT, ImportPolicy
 from netsp.exchange.maps.word_tables import tags
 
 SHAPES = {
@@ -37,9 +38,6 @@ A `GeometryCollection` is a block of a drawing.
 """
 
 KINDS = (*SHAPES, "ignore")
-
-MAX_REASON = 300
-"""Characters of a reason; `why` of a feature of kind ignore is cut off there."""
 
 WORDS = {
     **dict.fromkeys(("base", "bases", "anchor", "vessel", "ship"), "base"),
@@ -206,7 +204,12 @@ class Decision:
 
 
 def kind_of(
-    feature: Feature, kinds: Mapping[str, str], *, chart: bool, layers: Container[str] = ()
+    feature: Feature,
+    kinds: Mapping[str, str],
+    *,
+    chart: bool,
+    layers: Container[str] = (),
+    policy: ImportPolicy = DEFAULT_IMPORT,
 ) -> Decision:
     """Decide what a feature is.
 
@@ -250,7 +253,7 @@ def kind_of(
     elif by_shape is not None:
         decision = Decision(by_shape, "as asked for")
     elif said is not None:
-        why = str(feature.get("why") or "its kind is ignore")[:MAX_REASON]
+        why = str(feature.get("why") or "its kind is ignore")[: policy.max_reason_length]
         decision = Decision(said if isinstance(said, str) else "", why)
     elif word is not None:
         decision = Decision(word, "its layer is named ignore")

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from netsp.exchange.maps.import_policy import DEFAULT_OUTLINES, OutlinePolicy
+
 if TYPE_CHECKING:
     import shapely
 
-CROP_CORNERS = 64
-"""Corners of the polygon that obstacles are clipped to; it holds the circle of reach."""
-
-MIN_AREA = 1e-9
-"""Area of a cut part up to which it is rounding, m²."""
+AREA_TOLERANCE = 1e-9
+"""Tolerance of rounding: cut parts with a smaller area are dropped, m²."""
 
 
 @dataclass(frozen=True)
@@ -33,13 +32,22 @@ class CropWindow:
         (x, y) of the circle, metres.
     radius
         Of the circle, metres.
+    n_corners
+        Number of corners of the polygon.
     """
 
     center: tuple[float, float]
     radius: float
+    n_corners: int = DEFAULT_OUTLINES.crop_corners
 
     @classmethod
-    def about(cls, bases: Sequence[Sequence[float]], reach: float, margin: float) -> CropWindow:
+    def about(
+        cls,
+        bases: Sequence[Sequence[float]],
+        reach: float,
+        margin: float,
+        policy: OutlinePolicy = DEFAULT_OUTLINES,
+    ) -> CropWindow:
         """Return the window that holds the reach of a tether from each of some bases.
 
         Parameters
@@ -62,15 +70,16 @@ class CropWindow:
         circle = shapely.minimum_bounding_circle(shapely.MultiPoint(places))
         middle = places[0] if len(places) == 1 else np.array(circle.centroid.coords[0])
         away = float(np.hypot(*(places - middle).T).max())
-        return cls((float(middle[0]), float(middle[1])), (away + reach) * (1.0 + margin))
+        radius = (away + reach) * (1.0 + margin)
+        return cls((float(middle[0]), float(middle[1])), radius, policy.crop_corners)
 
     @cached_property
     def polygon(self) -> shapely.Polygon:
         """Polygon of `CROP_CORNERS` corners that holds the circle."""
         import shapely
 
-        outer = self.radius / math.cos(math.pi / CROP_CORNERS)
-        turn = 2.0 * math.pi * np.arange(CROP_CORNERS) / CROP_CORNERS
+        outer = self.radius / math.cos(math.pi / self.n_corners)
+        turn = 2.0 * math.pi * np.arange(self.n_corners) / self.n_corners
         made = shapely.Polygon(
             np.column_stack([np.cos(turn), np.sin(turn)]) * outer + np.array(self.center)
         )
@@ -179,5 +188,5 @@ def _polygons(shape: Any) -> list[Any]:
     return [
         p
         for p in getattr(shape, "geoms", [shape])
-        if p.geom_type == "Polygon" and p.area > MIN_AREA
+        if p.geom_type == "Polygon" and p.area > AREA_TOLERANCE
     ]

@@ -26,9 +26,9 @@ from netsp.exchange.maps.contract import WORDS, words_in
 from netsp.exchange.maps.dxf_shapes import WITHOUT_WIDTH, shape_damage, simple_entities
 from netsp.exchange.maps.dxf_tags import Drawing, Record, Tag, read_drawing, written
 from netsp.exchange.maps.feature import Change, Feature, Map, Unread, change_notes
+from netsp.exchange.maps.import_policy import DEFAULT_IMPORT, ImportPolicy
 from netsp.exchange.maps.vector import (
     LOCAL,
-    MOST_FEATURES,
     GdalLayer,
     gdal_options,
     in_degrees,
@@ -36,7 +36,7 @@ from netsp.exchange.maps.vector import (
     read_layer,
     shape_from_gdal,
 )
-from netsp.exchange.maps.wkb_shapes import MAX_NESTING, NotFiniteError, ShapeError, collected
+from netsp.exchange.maps.wkb_shapes import NotFiniteError, ShapeError, collected
 from netsp.exchange.maps.word_tables import words
 
 if TYPE_CHECKING:
@@ -88,8 +88,8 @@ SOLIDS = words(
 
 ENDLESS = {"XLINE", "RAY"}
 
-EXTERNAL = 4
-"""Flag (70) of a block that stands for another drawing."""
+EXTERNAL_BLOCK = 4
+"""Code: flag (70) of a block that stands for another drawing."""
 
 PAPER = "*paper_space"
 DIMENSION_LAYER = "defpoints"
@@ -98,35 +98,12 @@ DIMENSION_LAYER = "defpoints"
 LABELLED = ("POINT", "CIRCLE", "INSERT")
 """Types of entities that stand for one place, and take the name of a text beside it."""
 
-OPTIONS = {
-    "DXF_MERGE_BLOCK_GEOMETRIES": "FALSE",
-    "DXF_INLINE_BLOCKS": "TRUE",
-    "DXF_FEATURE_LIMIT_PER_BLOCK": str(MOST_FEATURES),
-}
-
-
-@dataclass(frozen=True)
-class LabelRule:
-    """Rule by which a text is the name of a point, a circle or a block beside it.
-
-    Attributes
-    ----------
-    max_distance
-        Largest distance of the text from the place, in heights of the text; positive.
-    """
-
-    max_distance: float = 4.0
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.max_distance < math.inf:
-            raise InputError(f"max_distance: expected a positive number, got {self.max_distance!r}")
-
 
 def read_dxf(
     file: str | Path,
     crs: str | None = None,
     units: str | None = None,
-    labels: LabelRule | None = None,
+    policy: ImportPolicy = DEFAULT_IMPORT,
 ) -> Map:
     """Return a DXF drawing as a map.
 
@@ -153,7 +130,7 @@ def read_dxf(
     """
     check_file(file)
     drawing = read_drawing(file, read_bytes(file))
-    reader = _Reader(file, drawing, labels or LabelRule())
+    reader = _Reader(file, drawing, policy)
     metres, note = _unit(file, drawing, units)
     found = reader.map(metres, note)
     return found if crs in (None, LOCAL) else in_degrees(found, str(crs), file)
@@ -199,10 +176,10 @@ class _Entity:
 class _Reader:
     """Reader of one drawing."""
 
-    def __init__(self, file: str | Path, drawing: Drawing, labels: LabelRule) -> None:
+    def __init__(self, file: str | Path, drawing: Drawing, policy: ImportPolicy) -> None:
         self.file = file
         self.drawing = drawing
-        self.labels = labels
+        self.policy = policy
         self.encoding = _encoding(drawing.header)
         self.hidden = {
             self.text(r.get(2)).lower(): "off" if r.number(62) < 0 else "frozen"
@@ -223,10 +200,10 @@ class _Reader:
     def map(self, metres: float | None, note: str) -> Map:
         """Return the map."""
         kept = [e for e in map(self.entity, self.drawing.entities) if e is not None]
-        if sum(self.layers.values()) > MOST_FEATURES:
+        if sum(self.layers.values()) > self.policy.read.max_features:
             raise InputError(
                 f"{self.file}: {sum(self.layers.values()):,} entities; expected at most "
-                f"{MOST_FEATURES:,}"
+                f"{self.policy.read.max_features:,}"
             )
         self.shapes(kept)
         features = [f for entity in kept for f in self.features(entity)]
@@ -304,7 +281,7 @@ class _Reader:
         block = record.get(2).lower()
         if kind == "INSERT" and block not in self.blocks:
             return f"its block {self.text(record.get(2))!r} is not in the drawing"
-        if kind == "INSERT" and int(self.head(block).number(70)) & EXTERNAL:
+        if kind == "INSERT" and int(self.head(block).number(70)) & EXTERNAL_BLOCK:
             return (
                 f"another drawing ({self.text(self.head(block).get(1)) or block}): bind it to this "
                 "one, or import it, too"
@@ -338,7 +315,7 @@ class _Reader:
     def holds_itself(self, block: str, above: tuple[str, ...] = ()) -> bool:
         """Return whether a block refers to itself, perhaps through others."""
         name = block.lower()
-        if name in above or len(above) >= MAX_NESTING:
+        if name in above or len(above) >= self.policy.read.max_geometry_depth:
             return True
         if name not in self.cyclic:
             self.cyclic[name] = any(
@@ -383,10 +360,11 @@ class _Reader:
         """Give entities the shapes that GDAL reads, by handles that are made for that."""
         if not entities:
             return
-        if (total := sum(self.size(entity.record) for entity in entities)) > MOST_FEATURES:
+        total = sum(self.size(entity.record) for entity in entities)
+        if total > self.policy.read.max_features:
             raise InputError(
                 f"{self.file}: {total:,} entities in all its blocks; expected at most "
-                f"{MOST_FEATURES:,}"
+                f"{self.policy.read.max_features:,}"
             )
         by_handle = {f"{k + 0x100000:X}": entity for k, entity in enumerate(entities)}
         try:
@@ -409,7 +387,7 @@ class _Reader:
             if data is None:
                 continue  # it has no piece then, and is named below
             try:
-                shape, changes = shape_from_gdal(data)
+                shape, changes = shape_from_gdal(data, self.policy.read)
             except NotFiniteError as error:
                 self.complaints.append(f"{self.file}: {entity.where}: {error}")
                 entity.failure = "complained of"
@@ -427,10 +405,15 @@ class _Reader:
 
     def from_gdal(self, by_handle: dict[str, _Entity]) -> GdalLayer:
         """Return what GDAL reads of some entities."""
-        with tempfile.TemporaryDirectory() as folder, gdal_options(OPTIONS):
+        options = {
+            "DXF_MERGE_BLOCK_GEOMETRIES": "FALSE",
+            "DXF_INLINE_BLOCKS": "TRUE",
+            "DXF_FEATURE_LIMIT_PER_BLOCK": str(self.policy.read.max_features),
+        }
+        with tempfile.TemporaryDirectory() as folder, gdal_options(options):
             plain = Path(folder) / "drawing.dxf"
             plain.write_text(written(self.plain(by_handle)), encoding="latin-1", newline="\n")
-            return read_layer(self.file, plain, "entities", self.notes)
+            return read_layer(self.file, plain, "entities", self.notes, self.policy.read)
 
     def damaged(self, entities: list[tuple[str, _Entity]], error: InputError) -> str:
         """Return the message on the entity that makes GDAL fail, found by bisection."""
@@ -631,7 +614,7 @@ class _Reader:
         pairs = []
         for t, (_, layer, record) in enumerate(self.texts):
             at = shapely.Point(record.number(10), record.number(20))
-            reach = self.labels.max_distance * (record.number(40) or 1.0)
+            reach = self.policy.max_label_distance * (record.number(40) or 1.0)
             for k in places.get(layer, []):
                 away = at.distance(shapely.force_2d(features[k].marker or features[k].shape))
                 if away <= reach:
@@ -642,7 +625,10 @@ class _Reader:
             if t not in taken and k not in names:
                 taken.add(t)
                 names[k] = t
-        labels = {t: _label(self.text(self.texts[t][2].all_text())) for t in taken}
+        labels = {
+            t: _label(self.text(self.texts[t][2].all_text()), self.policy.max_label_length)
+            for t in taken
+        }
         count = Counter(labels.values())
         out = list(features)
         for k, t in names.items():
@@ -729,18 +715,14 @@ def _encoding(header: dict[str, str]) -> str:
     return "cp1252"
 
 
-def _label(text: str) -> str:
+def _label(text: str, max_length: int) -> str:
     """Return a text without its formatting (MTEXT), in one line."""
     plain = re.sub(r"\\[ACFHQTWfp][^;\\]*;", "", text)
     plain = re.sub(r"\\S([^;]*);", r"\1", plain)
     plain = re.sub(r"\\[PN~]", " ", plain)
     plain = re.sub(r"\\[LlOoKk]", "", plain)
     plain = re.sub(r"[{}]", "", plain).replace("%%d", "°").replace("%%u", "").replace("%%o", "")
-    return " ".join(plain.split())[:MAX_LABEL]
-
-
-MAX_LABEL = 60
-"""Characters of a text that a name keeps."""
+    return " ".join(plain.split())[:max_length]
 
 
 def _has_kind(layer: str) -> bool:

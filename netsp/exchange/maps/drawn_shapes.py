@@ -8,24 +8,18 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.geometry.polygons import union
+from netsp.exchange.maps.import_policy import DEFAULT_OUTLINES, OutlinePolicy
 
 if TYPE_CHECKING:
     import shapely
 
-FEWEST_OF_CIRCLE = 16
-"""Corners that a drawn circle has at least."""
-
-ROUND = 2e-3
-"""Share of the radius by which corners of a circle may be off: degrees of a map have few places."""
-
-MIN_SIDE = 1e-6
-"""Shortest side of a polygon; shorter ones are rounding, metres."""
-
-EVEN = 0.1
-"""Share by which the steps between the corners of a circle may differ."""
+SIDE_TOLERANCE = 1e-6
+"""Tolerance of rounding: shorter sides of a polygon are dropped, metres."""
 
 
-def circle_of(ring: Floats) -> tuple[tuple[float, float], float] | None:
+def circle_of(
+    ring: Floats, policy: OutlinePolicy = DEFAULT_OUTLINES
+) -> tuple[tuple[float, float], float] | None:
     """The circle that a ring of corners stands for: drawings and buffers have no other way to say
     it. The circle is through the corners, so that it holds the ring.
 
@@ -39,13 +33,13 @@ def circle_of(ring: Floats) -> tuple[tuple[float, float], float] | None:
     tuple or None
         Centre and radius; None for any other ring.
     """
-    if len(ring) < FEWEST_OF_CIRCLE:
+    if len(ring) < policy.min_circle_corners:
         return None
     centre = ring.mean(0)
     off = np.hypot(*(ring - centre).T)
     steps = np.hypot(*(np.roll(ring, -1, axis=0) - ring).T)
-    even = np.ptp(steps) <= EVEN * steps.mean()
-    if not even or np.ptp(off) > ROUND * off.mean():
+    even = np.ptp(steps) <= policy.max_step_spread * steps.mean()
+    if not even or np.ptp(off) > policy.max_radius_spread * off.mean():
         return None
     return (float(centre[0]), float(centre[1])), float(off.max())
 
@@ -99,7 +93,9 @@ def simple_polygons(shape: shapely.Geometry, inner: Any) -> tuple[list[shapely.P
     return out, notes
 
 
-def outline_of(polygon: shapely.Polygon) -> dict[str, Any]:
+def outline_of(
+    polygon: shapely.Polygon, policy: OutlinePolicy = DEFAULT_OUTLINES
+) -> dict[str, Any]:
     """Return a polygon without holes as an obstacle of a problem file: a circle where it is one.
 
     Parameters
@@ -115,8 +111,8 @@ def outline_of(polygon: shapely.Polygon) -> dict[str, Any]:
     import shapely
 
     ring = shapely.get_coordinates(polygon.exterior)[:-1]
-    ring = ring[np.hypot(*(ring - np.roll(ring, -1, axis=0)).T) > MIN_SIDE]
-    circle = circle_of(ring)
+    ring = ring[np.hypot(*(ring - np.roll(ring, -1, axis=0)).T) > SIDE_TOLERANCE]
+    circle = circle_of(ring, policy)
     if circle is not None:
         return {"center": circle[0], "radius": circle[1]}
     return {"polygon": ring.tolist()}

@@ -6,14 +6,17 @@ import numpy as np
 
 from netsp.exchange.maps.dxf_tags import POLYFACE_FACE, Record
 
-FLAG_POLYGON_MESH, FLAG_POLYFACE = 16, 64
-"""Flags (70) of a POLYLINE that is a mesh of rows and columns, or one of faces."""
+FLAG_POLYGON_MESH = 16
+"""Code: flag (70) of a POLYLINE that is a mesh of rows and columns."""
+
+FLAG_POLYFACE = 64
+"""Code: flag (70) of a POLYLINE that is a mesh of faces."""
 
 WITHOUT_WIDTH = 8 | FLAG_POLYGON_MESH | FLAG_POLYFACE
-"""Flags (70) of polylines in space and of meshes, which have no width."""
+"""Code: flags (70) of polylines in space and of meshes, which have no width."""
 
 CLOSED_MULTILINE = 2
-"""Flag (71) of an MLINE whose last vertex is joined to its first."""
+"""Code: flag (71) of an MLINE whose last vertex is joined to its first."""
 
 
 def simple_entities(record: Record) -> list[Record]:

@@ -31,7 +31,7 @@ REQUIRED_CODES = {
 """Group codes without a default, by the type of entity (Autodesk's reference)."""
 
 POLYFACE_FACE = 128
-"""Flag (70) of a vertex that lists corners of a face and has no place."""
+"""Code: flag (70) of a vertex that lists corners of a face and has no place."""
 
 BINARY = b"AutoCAD Binary DXF\r\n\x1a\x00"
 """First bytes of a binary drawing."""

@@ -11,6 +11,7 @@ from netsp.base.errors import InputError
 from netsp.base.files import read_bytes
 from netsp.base.validated import shown
 from netsp.exchange.maps.feature import Feature, Map, Unread
+from netsp.exchange.maps.import_policy import DEFAULT_IMPORT, ImportPolicy
 from netsp.exchange.maps.mission_commands import FENCE, RALLY, ItemFeatures, add_polygon
 from netsp.exchange.maps.waypoint_list import is_waypoint_list, read_waypoint_list
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     import shapely
 
 
-def read_fence_list(file: str | Path) -> Map:
+def read_fence_list(file: str | Path, policy: ImportPolicy = DEFAULT_IMPORT) -> Map:
     """Read a fence as a map: bounds.
 
     Parameters
@@ -38,14 +39,14 @@ def read_fence_list(file: str | Path) -> Map:
         No such list.
     """
     if is_waypoint_list(file):
-        return read_waypoint_list(file)
+        return read_waypoint_list(file, policy)
     places = [_lonlat(cells, where) for where, cells in _rows(file)]
     if len(places) < 4:
         raise InputError(
             f"{file}: expected a fence: the place to return to, then three corners or more, each "
             f"as latitude and longitude, got {len(places)} lines"
         )
-    found = ItemFeatures([], [], [], [])
+    found = ItemFeatures(policy)
     found.unread.append(
         Unread(
             "fence[0]",
@@ -58,7 +59,7 @@ def read_fence_list(file: str | Path) -> Map:
     return Map(tuple(found.features), True, found.layers(), (), (), tuple(found.unread))
 
 
-def read_rally_list(file: str | Path) -> Map:
+def read_rally_list(file: str | Path, policy: ImportPolicy = DEFAULT_IMPORT) -> Map:
     """Read rally points as a map: places for emergencies, which are left out.
 
     Parameters
@@ -77,7 +78,7 @@ def read_rally_list(file: str | Path) -> Map:
         No such list.
     """
     if is_waypoint_list(file):
-        return read_waypoint_list(file)
+        return read_waypoint_list(file, policy)
     features = []
     for k, (where, cells) in enumerate(_rows(file)):
         if cells[0].upper() != "RALLY":

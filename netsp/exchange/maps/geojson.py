@@ -12,6 +12,7 @@ from netsp.base.errors import InputError, UnansweredError
 from netsp.base.files import read_text
 from netsp.base.validated import parse_json_object, shown
 from netsp.exchange.maps.feature import Feature, Map, Unread, with_tags
+from netsp.exchange.maps.import_policy import DEFAULT_READ, ReadPolicy
 
 if TYPE_CHECKING:
     import shapely
@@ -31,11 +32,8 @@ COLLECTION = "GeometryCollection"
 RECORD_SEPARATOR = "\x1e"
 """Character before each text of a sequence (RFC 8142)."""
 
-MAX_NESTING = 8
-"""Collections within collections that are read; RFC 7946 (3.1.8) advises against any."""
 
-
-def read_geojson(file: str | Path, crs: str | None) -> Map:
+def read_geojson(file: str | Path, crs: str | None, policy: ReadPolicy = DEFAULT_READ) -> Map:
     """A GeoJSON file as a map.
 
     Parameters
@@ -55,10 +53,12 @@ def read_geojson(file: str | Path, crs: str | None) -> Map:
     InputError
         Not GeoJSON, or it names another coordinate system than WGS 84.
     """
-    return _map(file, _checked_features(read_text(file), str(file), crs), crs)
+    return _map(file, _checked_features(read_text(file), str(file), crs), crs, policy)
 
 
-def read_geojson_sequence(file: str | Path, crs: str | None) -> Map:
+def read_geojson_sequence(
+    file: str | Path, crs: str | None, policy: ReadPolicy = DEFAULT_READ
+) -> Map:
     """Return a sequence of GeoJSON texts as a map.
 
     Parameters
@@ -89,7 +89,7 @@ def read_geojson_sequence(file: str | Path, crs: str | None) -> Map:
             features += _checked_features(part, called, crs)
     if not features:
         raise InputError(f"{file}: cannot be read as a map: holds no GeoJSON")
-    return _map(file, features, crs)
+    return _map(file, features, crs, policy)
 
 
 def _checked_features(text: str, called: str, crs: str | None) -> list[Any]:
@@ -105,7 +105,7 @@ def _checked_features(text: str, called: str, crs: str | None) -> list[Any]:
     return features
 
 
-def _map(file: str | Path, features: list[Any], crs: str | None) -> Map:
+def _map(file: str | Path, features: list[Any], crs: str | None, policy: ReadPolicy) -> Map:
     """Return the map of features, named by their numbers."""
     found: list[Feature] = []
     unread: list[Unread] = []
@@ -113,7 +113,7 @@ def _map(file: str | Path, features: list[Any], crs: str | None) -> Map:
     for k, feature in enumerate(features):
         where = f"features[{k}]"
         try:
-            for part in _feature(feature, where, degrees=crs is None):
+            for part in _feature(feature, where, policy, degrees=crs is None):
                 (unread if isinstance(part, Unread) else found).append(part)  # type: ignore[arg-type]
         except _NowhereError as error:
             unread.append(Unread(where, "", str(error)))
@@ -146,7 +146,7 @@ def _is_wgs84(crs: Any) -> bool:
     return "CRS84" in text or "4326" in text
 
 
-def _feature(data: Any, where: str, *, degrees: bool) -> list[Feature | Unread]:
+def _feature(data: Any, where: str, policy: ReadPolicy, *, degrees: bool) -> list[Feature | Unread]:
     """Return a feature, or one for each part of a GeometryCollection; empty parts are unread."""
     if not isinstance(data, dict) or "geometry" not in data:
         raise InputError(f"{where}: expected a feature with a geometry")
@@ -158,7 +158,7 @@ def _feature(data: Any, where: str, *, degrees: bool) -> list[Feature | Unread]:
     properties = with_tags(properties)
     identity = data.get("id")
     named = "" if identity is None else str(identity)
-    parts = list(_parts(geometry, where))
+    parts = list(_parts(geometry, where, policy.max_collection_depth))
     if not parts:
         raise _NowhereError("is an empty collection of geometries")
     out: list[Feature | Unread] = []
@@ -172,21 +172,23 @@ def _feature(data: Any, where: str, *, degrees: bool) -> list[Feature | Unread]:
     return out
 
 
-def _parts(geometry: dict[str, Any], where: str, depth: int = 0) -> Iterator[tuple[str, Any]]:
+def _parts(
+    geometry: dict[str, Any], where: str, max_depth: int, depth: int = 0
+) -> Iterator[tuple[str, Any]]:
     """Yield the geometries of a collection, with what messages call them."""
     if geometry.get("type") != COLLECTION:
         yield where, geometry
         return
     inner = geometry.get("geometries")
-    if not isinstance(inner, list) or depth >= MAX_NESTING:
+    if not isinstance(inner, list) or depth >= max_depth:
         raise InputError(
-            f"{where}: expected a list of geometries, nested at most {MAX_NESTING} times"
+            f"{where}: expected a list of geometries, nested at most {max_depth} times"
         )
     for k, part in enumerate(inner):
         place = f"{where}.geometries[{k}]"
         if not isinstance(part, dict):
             raise InputError(f"{place}: expected a geometry, got {shown(part)}")
-        yield from _parts(part, place, depth + 1)
+        yield from _parts(part, place, max_depth, depth + 1)
 
 
 def _shape(geometry: dict[str, Any], where: str, *, degrees: bool) -> shapely.Geometry:

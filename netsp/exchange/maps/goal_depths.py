@@ -6,9 +6,6 @@ from netsp.base.errors import counted
 from netsp.base.field_types import checked_argument
 from netsp.model.problem import Problem
 
-MAX_LISTED = 3
-"""Goals that a warning names."""
-
 HEIGHTS_REMEDY = "give depths as positive numbers, or z as negative ones"
 """What to do about goals of a map that are above the water."""
 
@@ -53,7 +50,7 @@ def surface_warning(
     return f"all goals are at depth 0; if they are deeper, {remedy}"
 
 
-def height_warning(problem: Problem, remedy: str) -> str | None:
+def height_warning(problem: Problem, remedy: str, max_named: int = 3) -> str | None:
     """Return a warning where goals are above the water; None otherwise.
 
     Parameters
@@ -62,9 +59,11 @@ def height_warning(problem: Problem, remedy: str) -> str | None:
         Problem that was imported or is to be exported.
     remedy : str
         What to do, or what is done.
+    max_named : int
+        Maximum number of goals that the warning names.
     """
     above = [problem.goal_name(k) for k, g in enumerate(problem.goals) if g.position[2] > 0.0]
     if not above:
         return None
-    named = f"{', '.join(above[:MAX_LISTED])}{', …' if len(above) > MAX_LISTED else ''}"
+    named = f"{', '.join(above[:max_named])}{', …' if len(above) > max_named else ''}"
     return f"{counted(len(above), 'goal')} above the water ({named}): {remedy}"

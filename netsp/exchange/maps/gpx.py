@@ -12,10 +12,8 @@ from netsp.base.errors import InputError, counted
 from netsp.base.files import read_bytes
 from netsp.base.validated import shown
 from netsp.exchange.maps.feature import Feature, Map, Unread
+from netsp.exchange.maps.import_policy import DEFAULT_IMPORT, DEFAULT_READ, ImportPolicy, ReadPolicy
 from netsp.exchange.maps.time_stamps import seconds_of
-
-MAX_HEIGHT = 12_000.0
-"""Largest height or depth in a file, metres; no place on the earth exceeds it."""
 
 HEADER = ("name", "desc", "author", "email", "url", "urlname", "time", "keywords", "bounds")
 """Elements of GPX 1.0 that describe the whole file."""
@@ -60,7 +58,11 @@ class GpxLine:
     points: tuple[GpxPoint, ...]
 
 
-def read_gpx(file: str | Path, on_note: Callable[[str], None] | None = None) -> list[GpxLine]:
+def read_gpx(
+    file: str | Path,
+    on_note: Callable[[str], None] | None = None,
+    policy: ReadPolicy = DEFAULT_READ,
+) -> list[GpxLine]:
     """Read the tracks and routes of a GPX file.
 
     Parameters
@@ -93,7 +95,7 @@ def read_gpx(file: str | Path, on_note: Callable[[str], None] | None = None) -> 
         name = f"{kind}[{count[kind] - 1}]"
         parts = [points for _, points in _parts(element)]
         points = [p for part in parts for p in part]
-        read = tuple(_point(p, f"{file}: {name}: point {k}") for k, p in enumerate(points))
+        read = tuple(_point(p, f"{file}: {name}: point {k}", policy) for k, p in enumerate(points))
         if len(read) < 2:
             say(f"{name} left out: has fewer than two points")
             continue
@@ -126,7 +128,7 @@ def _root(file: str | Path) -> ElementTree.Element:
     return root
 
 
-def read_gpx_map(file: str | Path) -> Map:
+def read_gpx_map(file: str | Path, policy: ImportPolicy = DEFAULT_IMPORT) -> Map:
     """Read a GPX file as a map: waypoints are goals, tracks and routes paths.
 
     Parameters
@@ -163,12 +165,12 @@ def read_gpx_map(file: str | Path) -> Map:
             continue
         try:
             if kind == "wpt":
-                point = _point(element, where)
+                point = _point(element, where, policy.read)
                 at = shapely.Point(point.longitude, point.latitude, point.height or 0.0)
                 features.append(Feature(where, kind, "", _properties(element, "goal"), at))
                 continue
             lines = [
-                (name, [_point(p, f"{name}: point {k}") for k, p in enumerate(part)])
+                (name, [_point(p, f"{name}: point {k}", policy.read) for k, p in enumerate(part)])
                 for name, part in ((where + own, part) for own, part in _parts(element))
             ]
         except InputError as error:
@@ -217,20 +219,20 @@ def _text(element: ElementTree.Element, name: str) -> str | None:
     return next((child.text for child in element if _tag(child) == name), None)
 
 
-def _point(element: ElementTree.Element, where: str) -> GpxPoint:
+def _point(element: ElementTree.Element, where: str, policy: ReadPolicy) -> GpxPoint:
     latitude = _number(element.get("lat"), 90.0, f"{where}: lat")
     longitude = _number(element.get("lon"), 180.0, f"{where}: lon")
     height = _text(element, "ele")
     depth = next((e.text for e in element.iter() if _tag(e) == "depth" and e.text), None)
     if depth is not None:  # of an extension, as dive computers write it
-        height = str(0.0 - _number(depth, MAX_HEIGHT, f"{where}: depth"))
+        height = str(0.0 - _number(depth, policy.max_height, f"{where}: depth"))
     time = _text(element, "time")
     return GpxPoint(
         latitude,
         longitude,
         None
         if height is None or not height.strip()
-        else _number(height, MAX_HEIGHT, f"{where}: ele"),
+        else _number(height, policy.max_height, f"{where}: ele"),
         None if time is None or not time.strip() else seconds_of(time, f"{where}: time"),
     )
 

@@ -26,20 +26,14 @@ from netsp.base.errors import InputError
 from netsp.base.files import MOST_BYTES, read_bytes
 from netsp.base.validated import shown
 from netsp.exchange.maps.feature import Change, Feature, Map, Unread, change_notes, with_tags
-from netsp.exchange.maps.vector import MOST_FEATURES
+from netsp.exchange.maps.import_policy import DEFAULT_READ, ReadPolicy
 from netsp.exchange.maps.wkb_shapes import ShapeError, area_of, ring_of
 
 if TYPE_CHECKING:
     import shapely
 
-MAX_DEPTH = 100
-"""Elements within elements that are read; more would exceed Python's stack."""
-
 ZIP = b"PK\x03\x04"
 """First bytes of an archive."""
-
-MAX_PAGES = 1000
-"""Pages of one map that are read."""
 
 CONTAINERS = ("Folder", "Document")
 OVERLAYS = ("GroundOverlay", "ScreenOverlay", "PhotoOverlay", "Tour")
@@ -68,7 +62,7 @@ CLAMPED = "heights that clampToGround ignores: z 0, the surface"
 HIDDEN = "hidden in the viewer (visibility 0): read like those that are shown"
 
 
-def read_kml(file: str | Path, crs: str | None = None) -> Map:
+def read_kml(file: str | Path, crs: str | None = None, policy: ReadPolicy = DEFAULT_READ) -> Map:
     """Return a KML or KMZ file as a map, with the pages that it links to.
 
     Parameters
@@ -88,7 +82,7 @@ def read_kml(file: str | Path, crs: str | None = None) -> Map:
     InputError
         Not KML, or too large.
     """
-    reader = _Reader(file, degrees=crs is None)
+    reader = _Reader(file, degrees=crs is None, policy=policy)
     reader.seen.add(f"\n{Path(file).resolve()}")
     if zipfile.is_zipfile(file):
         archive = _Archive.of(file)
@@ -183,6 +177,7 @@ class _Reader:
 
     file: str | Path
     degrees: bool
+    policy: ReadPolicy
     features: list[Feature] = field(default_factory=list)
     unread: list[Unread] = field(default_factory=list)
     changes: list[Change] = field(default_factory=list)
@@ -238,10 +233,10 @@ class _Reader:
         self.size += len(page.data)
         if self.size > MOST_BYTES:
             raise InputError(f"{self.file}: unpacks to more than {MOST_BYTES / 2**20:g} MiB")
-        if len(self.seen) > MAX_PAGES:
-            raise InputError(f"{self.file}: links to more than {MAX_PAGES} pages")
+        if len(self.seen) > self.policy.max_pages:
+            raise InputError(f"{self.file}: links to more than {self.policy.max_pages} pages")
         called = str(self.file) if is_root else f"{self.file}: {page.name}"
-        root = _parsed(page.data, called)
+        root = _parsed(page.data, called, self.policy.max_element_depth)
         if root.tag not in ("kml", *CONTAINERS, "Placemark", "NetworkLink", *OVERLAYS):
             raise InputError(f"{called}: expected a kml element, got {shown(root.tag)}")
         # KML 2.1: a Schema gives placemarks another name
@@ -285,9 +280,10 @@ class _Reader:
         number = self.numbers.get(layer, 0)
         self.numbers[layer] = number + 1
         self.count += 1
-        if self.count > MOST_FEATURES:
+        if self.count > self.policy.max_features:
             raise InputError(
-                f"{self.file}: more than {MOST_FEATURES:,} features; expected at most that many"
+                f"{self.file}: more than {self.policy.max_features:,} features; expected at most "
+                "that many"
             )
         return f"{layer}[{number}]"
 
@@ -392,7 +388,7 @@ def _target(href: str, page: _Page) -> tuple[_Archive | None, str | Path, Path] 
     return None, beside.resolve(), page.folder
 
 
-def _parsed(data: bytes, called: str) -> Element:
+def _parsed(data: bytes, called: str, max_depth: int) -> Element:
     """Return the root of a page, names without their prefixes."""
     builder = TreeBuilder()
     depth = 0
@@ -400,8 +396,8 @@ def _parsed(data: bytes, called: str) -> Element:
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal depth
         depth += 1
-        if depth > MAX_DEPTH:
-            raise InputError(f"{called}: elements nested more than {MAX_DEPTH} times")
+        if depth > max_depth:
+            raise InputError(f"{called}: elements nested more than {max_depth} times")
         builder.start(tag.rpartition(":")[2], attributes)
 
     def end(tag: str) -> None:

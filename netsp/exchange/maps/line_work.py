@@ -10,15 +10,10 @@ import numpy as np
 
 from netsp.base.arrays import Floats, Ints
 from netsp.base.geometry.polygons import union
+from netsp.exchange.maps.import_policy import DEFAULT_OUTLINES, OutlinePolicy
 
 if TYPE_CHECKING:
     import shapely
-
-MITRE_LIMIT = 2.0
-"""Largest distance of a corner of a widened line from the line, in half widths (shapely)."""
-
-MAX_TURN_COSINE = -0.5
-"""Cosine of the turn from which the parts of a line are widened apart: a turn of 120 degrees."""
 
 
 def lines_of(shape: shapely.Geometry) -> list[shapely.LineString]:
@@ -128,7 +123,9 @@ def is_land(line: shapely.LineString, area: shapely.Polygon | None = None) -> bo
     return bool(ahead < 0.5 * ring.length)
 
 
-def widened(line: shapely.LineString, width: float) -> shapely.Geometry:
+def widened(
+    line: shapely.LineString, width: float, policy: OutlinePolicy = DEFAULT_OUTLINES
+) -> shapely.Geometry:
     """Return the area within half a width of a line, with square ends.
 
     Parameters
@@ -149,14 +146,16 @@ def widened(line: shapely.LineString, width: float) -> shapely.Geometry:
     ahead = np.diff(points, axis=0)
     ahead /= np.hypot(*ahead.T)[:, None]
     # where a line turns back, buffers with mitred joins end flat: its parts overlap there instead
-    back = 1 + np.flatnonzero((ahead[1:] * ahead[:-1]).sum(axis=1) < MAX_TURN_COSINE)
-    stops = [0, *back.tolist(), len(points) - 1]
-    parts = [
-        part for a, b in itertools.pairwise(stops) for part in _simple_parts(points[a : b + 1])
-    ]
+    turns_back = (ahead[1:] * ahead[:-1]).sum(axis=1) < -policy.reversal_cosine
+    ends = [0, *(1 + np.flatnonzero(turns_back)).tolist(), len(points) - 1]
+    parts = [part for a, b in itertools.pairwise(ends) for part in _simple_parts(points[a : b + 1])]
     return union(
         shapely.buffer(
-            parts, 0.5 * width, cap_style="square", join_style="mitre", mitre_limit=MITRE_LIMIT
+            parts,
+            0.5 * width,
+            cap_style="square",
+            join_style="mitre",
+            mitre_limit=policy.mitre_limit,
         )
     )
 

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from netsp.base.errors import counted
 from netsp.exchange.maps.feature import Feature, Unread
+from netsp.exchange.maps.import_policy import DEFAULT_IMPORT, ImportPolicy
 
 if TYPE_CHECKING:
     import shapely
@@ -60,8 +61,14 @@ POLYGONS = {5001: True, 5002: False}
 CIRCLES = {5003: True, 5004: False}
 """Items of a fence: whether the vehicle stays inside. A polygon has an item for each corner."""
 
-ABOVE_SEA, ABOVE_HOME, ABOVE_TERRAIN = (0, 5), (3, 6), (10, 11)
-"""Frames with latitude and longitude, by what altitudes count from."""
+FRAMES_ABOVE_SEA = (0, 5)
+"""Codes of frames in degrees whose altitudes count from mean sea level."""
+
+FRAMES_ABOVE_HOME = (3, 6)
+"""Codes of frames in degrees whose altitudes count from home."""
+
+FRAMES_ABOVE_TERRAIN = (10, 11)
+"""Codes of frames in degrees whose altitudes count from the terrain."""
 
 FRAME_NAMES = {
     1: "LOCAL_NED",
@@ -75,13 +82,6 @@ FRAME_NAMES = {
     21: "LOCAL_FLU",
 }
 
-MAX_PASS_S = 1.0
-"""Longest hold at a bend that is passed, s, in files where other waypoints hold longer: netsp and
-ArduSub hold bends for a second, because a vehicle flies through waypoints without a hold."""
-
-HOME_RADIUS_M = 0.1
-"""Distance of a waypoint from home up to which it is at home, m; files state centimetres."""
-
 WAYPOINTS, BENDS, COMMANDS = "waypoints", "bends", "commands"
 FENCE, RALLY, HOME = "fence", "rally points", "home"
 """Layers of a mission file."""
@@ -89,9 +89,6 @@ FENCE, RALLY, HOME = "fence", "rally points", "home"
 INSIDE = {"kind": "bounds", "fence": "inclusion"}
 """Properties of a fence within which the vehicle stays; of several fences it stays within all, as
 ArduPilot takes them unless its option for the union of inclusion areas is set."""
-
-CIRCLE_CORNERS = 64
-"""Corners of the polygon, on the circle, that stands for a round inclusion fence."""
 
 
 @dataclass(frozen=True)
@@ -145,10 +142,11 @@ class ItemFeatures:
         Lines without the name of the file.
     """
 
-    features: list[Feature]
-    unread: list[Unread]
-    complaints: list[str]
-    notes: list[str]
+    policy: ImportPolicy = DEFAULT_IMPORT
+    features: list[Feature] = field(default_factory=list)
+    unread: list[Unread] = field(default_factory=list)
+    complaints: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     def layers(self) -> dict[str, int]:
         """Return the number of features of each layer."""
@@ -162,6 +160,7 @@ def features_of_items(
     items: Sequence[MissionItem],
     home_altitude: float | None,
     home: tuple[float, float] | None = None,
+    policy: ImportPolicy = DEFAULT_IMPORT,
 ) -> ItemFeatures:
     """Return the features of mission items: goals, fences, and what is neither.
 
@@ -179,10 +178,10 @@ def features_of_items(
     ItemFeatures
         One feature for each item; one for all corners of a polygon.
     """
-    out = ItemFeatures([], [], [], [])
+    out = ItemFeatures(policy)
     stops = [i for i in items if i.command in VISITED and i.lonlat is not None]
     has_marks = any(i.mark is not None for i in stops)
-    is_passed = _passing_rule(stops, home)
+    is_passed = _passing_rule(stops, home, policy)
     terrain: list[str] = []
     above_sea = False
     fences = [i for i in items if i.command in (*POLYGONS, *CIRCLES)]
@@ -205,11 +204,11 @@ def features_of_items(
             else is_passed(item)
         )
         z = item.place[2]
-        if item.frame in ABOVE_TERRAIN:
+        if item.frame in FRAMES_ABOVE_TERRAIN:
             if not is_bend:
                 terrain.append(item.where)
             z = None
-        elif item.frame in ABOVE_SEA and z is not None:
+        elif item.frame in FRAMES_ABOVE_SEA and z is not None:
             above_sea = above_sea or not is_bend
             z -= home_altitude or 0.0
         out.features.append(_visited(item, (lon, lat), z, is_bend=is_bend, by_mark=has_marks))
@@ -233,7 +232,7 @@ def features_of_items(
 
 
 def _passing_rule(
-    stops: Sequence[MissionItem], home: tuple[float, float] | None
+    stops: Sequence[MissionItem], home: tuple[float, float] | None, policy: ImportPolicy
 ) -> Callable[[MissionItem], bool]:
     """Return the rule that tells bends from goals by the seconds for which the vehicle holds.
 
@@ -247,15 +246,15 @@ def _passing_rule(
         from netsp.exchange.maps.projection import Projection
 
         away = Projection(home[1], home[0]).to_plane([(last[1], last[0])])
-        if math.hypot(*away[0]) <= HOME_RADIUS_M and any(h != holds[-1] for h in holds):
+        if math.hypot(*away[0]) <= policy.home_radius and any(h != holds[-1] for h in holds):
             return lambda item: item.hold_s == holds[-1]
-    if any(h is not None and h > MAX_PASS_S for h in holds):
-        return lambda item: item.hold_s is not None and item.hold_s <= MAX_PASS_S
+    if any(h is not None and h > policy.max_pass_s for h in holds):
+        return lambda item: item.hold_s is not None and item.hold_s <= policy.max_pass_s
     return lambda item: False
 
 
 def _is_geographic(item: MissionItem) -> bool:
-    return item.frame in (*ABOVE_SEA, *ABOVE_HOME, *ABOVE_TERRAIN)
+    return item.frame in (*FRAMES_ABOVE_SEA, *FRAMES_ABOVE_HOME, *FRAMES_ABOVE_TERRAIN)
 
 
 def _layer(item: MissionItem) -> str:
@@ -397,10 +396,11 @@ def add_circle(
         return
     from netsp.exchange.maps.projection import Projection
 
-    turn = [2.0 * math.pi * k / CIRCLE_CORNERS for k in range(CIRCLE_CORNERS)]
+    n_corners = out.policy.outlines.circle_corners
+    turn = [2.0 * math.pi * k / n_corners for k in range(n_corners)]
     ring = [(radius * math.cos(a), radius * math.sin(a)) for a in turn]
     places = Projection(center[1], center[0]).to_earth(ring)[:, ::-1]
-    out.notes.append(f"{where}: the round fence becomes a polygon of {CIRCLE_CORNERS} corners")
+    out.notes.append(f"{where}: the round fence becomes a polygon of {n_corners} corners")
     out.features.append(Feature(where, FENCE, "", INSIDE, shapely.Polygon(places)))
 
 

@@ -24,6 +24,7 @@ from netsp.base.field_types import Number, Positive
 from netsp.base.files import check_file, read_text
 from netsp.base.validated import Model, explain, shown
 from netsp.exchange.maps.drawn_shapes import simple_polygons
+from netsp.exchange.maps.import_policy import DEFAULT_IMPORT, ImportPolicy
 from netsp.model.problem import Problem
 
 if TYPE_CHECKING:
@@ -33,19 +34,7 @@ IMAGES = (".png", ".pgm")
 FILES = (".yaml", ".yml")
 
 MODES = ("1", "L", "LA", "P", "RGB", "RGBA", "I", "I;16", "I;16B", "I;16L")
-"""Of Pillow: those whose values are known to run from black to white."""
-
-MOST_PIECES = 20_000
-"""Of occupied cells that hang together: more are noise, among which nobody plans."""
-
-MOST_CELLS = 100_000_000
-"""Of an image: 10 km by 10 km at a metre."""
-
-GROWN, SIMPLIFIED = 0.55, (0.45, 0.3, 0.15, 0.0)
-"""Of the tolerance: outlines are grown by the first and then simplified by one of the others, so
-that they hold every occupied cell and go no farther beyond than the tolerance. That is checked:
-what simplifies polygons may move the start of a ring by more than it is told, or make it cross
-itself."""
+"""Modes of Pillow whose values are known to run from black to white."""
 
 
 class MapFile(Model):
@@ -81,6 +70,7 @@ def read_occupancy(
     unknown_is_free: bool = False,
     name: str | None = None,
     on_note: Callable[[str], None] | None = None,
+    policy: ImportPolicy = DEFAULT_IMPORT,
 ) -> Problem:
     """The problem of an occupancy image, in metres of the map's own coordinates.
 
@@ -124,7 +114,7 @@ def read_occupancy(
         raise InputError(
             f"--tolerance: expected at least a tenth of the cell of {cell:g} m, got {slack:g}"
         )
-    values, alpha = _values(image)
+    values, alpha = _values(image, policy.read.max_image_cells)
     note = on_note or (lambda text: None)
     occupied, unknown = _kinds(values, alpha, said)
     if alpha is not None:
@@ -141,7 +131,7 @@ def read_occupancy(
         if not unknown_is_free:
             occupied = occupied | unknown
     points = [base, *(_place(g) for g in goals)]
-    polygons, told = _polygons(occupied, said, slack, points)
+    polygons, told = _polygons(occupied, said, slack, points, policy)
     for text in told:
         note(text)
     rows, columns = values.shape
@@ -235,7 +225,7 @@ def _rasterio() -> Any:
     return rasterio
 
 
-def _values(image: Path) -> tuple[Floats, Floats | None]:
+def _values(image: Path, max_cells: int) -> tuple[Floats, Floats | None]:
     """Return the means of the colours, (rows, columns) from 0 (black) to 255, the first row at the
     top, and how opaque each cell is, from 0 to 255; None where all are."""
     check_file(image)
@@ -246,9 +236,9 @@ def _values(image: Path) -> tuple[Floats, Floats | None]:
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             with Image.open(image, formats=("PNG", "PPM")) as opened:
                 columns, rows = opened.size
-                if columns * rows > MOST_CELLS:
+                if columns * rows > max_cells:
                     raise InputError(
-                        f"{image}: {columns} x {rows} cells; expected at most {MOST_CELLS:g} in all"
+                        f"{image}: {columns} x {rows} cells; expected at most {max_cells:g} in all"
                     )
                 if opened.mode not in MODES:
                     raise InputError(
@@ -310,7 +300,11 @@ def _apply(m: tuple[float, ...], column: float, row: float) -> tuple[float, floa
 
 
 def _polygons(
-    occupied: Bools, said: MapFile, tolerance: float, points: Sequence[Any]
+    occupied: Bools,
+    said: MapFile,
+    tolerance: float,
+    points: Sequence[Any],
+    policy: ImportPolicy,
 ) -> tuple[list[shapely.Polygon], list[str]]:
     """Simple polygons about the occupied cells, and what is to be said of them."""
     import shapely
@@ -327,21 +321,26 @@ def _polygons(
     ]
     if not cells:
         return [], []
-    if len(cells) > MOST_PIECES:
+    max_pieces = policy.read.max_image_pieces
+    if len(cells) > max_pieces:
         raise InputError(
             f"{said.image}: {len(cells):,} separate pieces of obstacles; expected at most "
-            f"{MOST_PIECES:,}: a map without noise"
+            f"{max_pieces:,}: a map without noise"
         )
     exact = shapely.union_all(cells)
-    grown = exact.buffer(GROWN * tolerance, quad_segs=4)
+    grown = exact.buffer(policy.outlines.growth * tolerance, quad_segs=4)
     parts = list(getattr(grown, "geoms", [grown]))
-    own = shapely.STRtree(cells)
+    tree = shapely.STRtree(cells)
+    shares = policy.outlines.simplifications
     outlines = shapely.union_all(
         [
             _simplified(
-                p, shapely.union_all([cells[k] for k in own.query(p, "intersects")]), tolerance
+                part,
+                shapely.union_all([cells[k] for k in tree.query(part, "intersects")]),
+                tolerance,
+                shares,
             )
-            for p in parts
+            for part in parts
         ]
     )
     free = [shapely.Point(float(p[0]), float(p[1])) for p in points]
@@ -349,11 +348,11 @@ def _polygons(
 
 
 def _simplified(
-    grown: shapely.Polygon, cells: shapely.Geometry, tolerance: float
+    grown: shapely.Polygon, cells: shapely.Geometry, tolerance: float, shares: tuple[float, ...]
 ) -> shapely.Geometry:
     """An outline with fewer corners that holds its cells and goes no farther than the tolerance."""
     most = cells.buffer(tolerance, quad_segs=16)
-    for share, whole in itertools.product(SIMPLIFIED, (False, True)):
+    for share, whole in itertools.product(shares, (False, True)):
         out = grown.simplify(share * tolerance, preserve_topology=whole)
         if out.geom_type == "Polygon" and out.is_valid and out.covers(cells) and most.covers(out):
             return out

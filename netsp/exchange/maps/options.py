@@ -8,10 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from netsp.base.errors import InputError
+from netsp.exchange.maps.import_policy import DEFAULT_IMPORT, ImportPolicy
 from netsp.exchange.maps.selection import Selection
-
-FLOOR_CELLS = 256
-"""Cells along a side of a sea floor for which no size is given: a mesh that is drawn at once."""
 
 
 @dataclass(frozen=True)
@@ -75,9 +73,11 @@ class SiteOptions:
     floor
         Whether the sea floor of a chart is made.
     floor_cell
-        Side of its cells, metres; None takes `FLOOR_CELLS` along a side.
+        Side of its cells, metres; None takes the number of cells of the policy.
     crop_margin
         Share of the tether's length by which the cropped map is larger than its reach; 0 or more.
+    policy
+        Limits and rules of the import.
     """
 
     tether: float | None = None
@@ -97,6 +97,7 @@ class SiteOptions:
     floor: bool = False
     floor_cell: float | None = None
     crop_margin: float = 0.05
+    policy: ImportPolicy = DEFAULT_IMPORT
 
     def __post_init__(self) -> None:
         if self.line_width is not None and not 0.0 < self.line_width < math.inf:

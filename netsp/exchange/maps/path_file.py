@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from netsp.base.field_types import LARGEST
 from netsp.base.files import read_text
 from netsp.base.validated import parse_json_object, shown
 from netsp.exchange.maps.gpx import read_gpx
+from netsp.exchange.maps.import_policy import DEFAULT_READ, ReadPolicy
 from netsp.exchange.maps.projection import Projection
 from netsp.exchange.maps.time_stamps import NO_VALUES, TimeStamps, seconds_of
 from netsp.model.problem import Problem
@@ -30,6 +31,9 @@ ENDINGS = (".csv", ".csv.gz", ".txt", ".json", ".geojson", ".gpx")
 """Endings of files with paths."""
 
 FRAMES = ("local", "global")
+
+Line = tuple[str, list[list[float]], Mapping[str, Any]]
+"""Place of a line in its file, its positions, and the properties of its feature."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,12 @@ class FoundPath:
     notes: tuple[str, ...] = ()
 
 
-def read_paths(file: str | Path, problem: Problem, frame: str | None = None) -> list[FoundPath]:
+def read_paths(
+    file: str | Path,
+    problem: Problem,
+    frame: str | None = None,
+    policy: ReadPolicy = DEFAULT_READ,
+) -> list[FoundPath]:
     """Read the paths of a file.
 
     Parameters
@@ -85,11 +94,11 @@ def read_paths(file: str | Path, problem: Problem, frame: str | None = None) -> 
     lower = name.lower()
     stem = name[: -len(".csv.gz")] if lower.endswith(".csv.gz") else Path(file).stem
     if lower.endswith(".gpx"):
-        found = _of_gpx(file, problem, stem)
+        found = _of_gpx(file, problem, stem, policy)
     elif lower.endswith((".csv", ".csv.gz", ".txt")):
-        found = [_of_table(file, problem, stem)]
+        found = [_of_table(file, problem, stem, policy)]
     elif lower.endswith((".json", ".geojson")):
-        found = _of_json(file, problem, stem, frame)
+        found = _of_json(file, problem, stem, frame, policy)
     else:
         raise InputError(f"{file}: expected a path in a file that ends in {', '.join(ENDINGS)}")
     for path in found:
@@ -115,10 +124,10 @@ def _to_plane(problem: Problem, latlon: Sequence[tuple[float, float]], where: st
     return np.asarray(projection.to_plane(latlon))
 
 
-def _of_gpx(file: str | Path, problem: Problem, stem: str) -> list[FoundPath]:
+def _of_gpx(file: str | Path, problem: Problem, stem: str, policy: ReadPolicy) -> list[FoundPath]:
     out = []
     notes: list[str] = []
-    lines = read_gpx(file, lambda text: notes.append(f"{file}: {text}"))
+    lines = read_gpx(file, lambda text: notes.append(f"{file}: {text}"), policy)
     for k, line in enumerate(lines):
         xy = _to_plane(problem, [(p.latitude, p.longitude) for p in line.points], str(file))
         heights = [p.height for p in line.points]
@@ -137,7 +146,7 @@ def _of_gpx(file: str | Path, problem: Problem, stem: str) -> list[FoundPath]:
     return [replace(path, notes=tuple(notes)) for path in out]
 
 
-def _of_table(file: str | Path, problem: Problem, stem: str) -> FoundPath:
+def _of_table(file: str | Path, problem: Problem, stem: str, policy: ReadPolicy) -> FoundPath:
     wanted = "columns x, y or lon, lat"
     try:
         table = read_table(file, positional=("x", "y", "z"))
@@ -164,7 +173,8 @@ def _of_table(file: str | Path, problem: Problem, stem: str) -> FoundPath:
     is_global = plane == ("longitude", "latitude")
     stamps = None
     if clock in table:
-        stamps = TimeStamps(table.columns[clock][1], lambda text: notes.append(f"{file}: {text}"))
+        meaning = table.columns[clock][1]
+        stamps = TimeStamps(meaning, lambda text: notes.append(f"{file}: {text}"), policy)
     for k, number in enumerate(table.lines):
         if _is_gap(table, k, quantities, is_global=is_global):
             gaps += 1
@@ -236,7 +246,9 @@ def _seconds(text: str, where: str) -> float:
     return _number(text, where) if _is_number(text) else seconds_of(text, where)
 
 
-def _of_json(file: str | Path, problem: Problem, stem: str, frame: str | None) -> list[FoundPath]:
+def _of_json(
+    file: str | Path, problem: Problem, stem: str, frame: str | None, policy: ReadPolicy
+) -> list[FoundPath]:
     text = read_text(file).removeprefix("\ufeff")
     if text.lstrip().startswith("["):
         points = read_path(file)
@@ -250,13 +262,18 @@ def _of_json(file: str | Path, problem: Problem, stem: str, frame: str | None) -
         if len(solution.path) < 2:
             raise InputError(f"{file}: the solution has no path; expected one with a tour")
         return [FoundPath(stem, np.array(solution.path, dtype=float))]
-    return _of_geojson(file, data, problem, stem, frame)
+    lines = list(_lines(data, str(file), "", {}, policy.max_collection_depth))
+    return _of_geojson(file, data, lines, problem, stem, frame)
 
 
 def _of_geojson(
-    file: str | Path, data: Mapping[str, Any], problem: Problem, stem: str, frame: str | None
+    file: str | Path,
+    data: Mapping[str, Any],
+    lines: list[Line],
+    problem: Problem,
+    stem: str,
+    frame: str | None,
 ) -> list[FoundPath]:
-    lines = list(_lines(data, str(file), "", {}))
     if not lines:
         raise InputError(
             f"{file}: expected GeoJSON with a LineString or MultiLineString, got "
@@ -301,10 +318,12 @@ def _times_of(properties: Mapping[str, Any], count: int, where: str) -> Floats |
     return np.array([_seconds(str(v), f"{where}: times[{k}]") for k, v in enumerate(given)])
 
 
-def _lines(data: Any, file: str, where: str, properties: Mapping[str, Any], depth: int = 0) -> Any:
+def _lines(
+    data: Any, file: str, where: str, properties: Mapping[str, Any], max_depth: int
+) -> Iterator[Line]:
     """Yield each line of GeoJSON: its place in the file, its positions and its properties."""
     here = f"{file}: {where}" if where else file
-    if not isinstance(data, Mapping) or depth > 8:
+    if not isinstance(data, Mapping) or max_depth < 0:
         raise InputError(f"{here}: expected a GeoJSON object, got {shown(data)}")
     kind = data.get("type")
     if kind == "FeatureCollection":
@@ -312,17 +331,17 @@ def _lines(data: Any, file: str, where: str, properties: Mapping[str, Any], dept
         if not isinstance(features, list):
             raise InputError(f"{here}: features: expected a list, got {shown(features)}")
         for k, feature in enumerate(features):
-            yield from _lines(feature, file, f"features[{k}]", {}, depth + 1)
+            yield from _lines(feature, file, f"features[{k}]", {}, max_depth - 1)
     elif kind == "Feature":
         if data.get("geometry") is not None:
             own = data.get("properties")
             yield from _lines(
-                data["geometry"], file, where, own if isinstance(own, dict) else {}, depth + 1
+                data["geometry"], file, where, own if isinstance(own, dict) else {}, max_depth - 1
             )
     elif kind == "GeometryCollection":
         parts = data.get("geometries")
         for part in parts if isinstance(parts, list) else []:
-            yield from _lines(part, file, where, properties, depth + 1)
+            yield from _lines(part, file, where, properties, max_depth - 1)
     elif kind == "LineString":
         yield where, _positions(data.get("coordinates"), here), properties
     elif kind == "MultiLineString":

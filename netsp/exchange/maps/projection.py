@@ -21,8 +21,8 @@ from netsp.base.validated import shown
 if TYPE_CHECKING:
     from netsp.model.problem import Problem
 
-FARTHEST = 1e7
-"""Metres from the base: a quarter of the way around the earth."""
+QUARTER_MERIDIAN = 1e7
+"""Physical constant: distance from the equator to a pole, m; farther points are refused."""
 
 
 class Projection:
@@ -149,9 +149,9 @@ class Projection:
             No pairs of finite numbers, or points that are farther off than the projection reaches.
         """
         d = _pairs("xy", xy) - self.base
-        if len(d) and not np.abs(d).max() <= FARTHEST:
+        if len(d) and not np.abs(d).max() <= QUARTER_MERIDIAN:
             raise InputError(
-                f"xy: expected points within {FARTHEST / 1e3:g} km of the base, got one "
+                f"xy: expected points within {QUARTER_MERIDIAN / 1e3:g} km of the base, got one "
                 f"{np.abs(d).max() / 1e3:.4g} km off"
             )
         c, s = math.cos(math.radians(self.heading)), math.sin(math.radians(self.heading))

@@ -59,6 +59,7 @@ from netsp.exchange.maps.feature import Feature, Map
 from netsp.exchange.maps.fence_list import read_fence_list, read_rally_list
 from netsp.exchange.maps.geojson import read_geojson, read_geojson_sequence
 from netsp.exchange.maps.gpx import read_gpx_map
+from netsp.exchange.maps.import_policy import DEFAULT_IMPORT, ImportPolicy
 from netsp.exchange.maps.kml_pages import read_kml
 from netsp.exchange.maps.ledger import Ledger
 from netsp.exchange.maps.line_work import is_land, lines_of, outlines, widened
@@ -86,12 +87,6 @@ EARTH_READERS = {
     ".ral": read_rally_list,
 }
 """Readers of formats that are in degrees always, by extension."""
-
-MAX_LISTED = 20
-"""Properties that a message lists."""
-
-MAX_NAME = 200
-"""Characters of a file's name that a problem keeps."""
 
 
 @dataclass(frozen=True)
@@ -199,7 +194,7 @@ def import_site(
     if said.units is not None and said.units not in UNITS:
         raise InputError(f"units: expected one of {', '.join(UNITS)}, got {shown(said.units)}")
     kinds, fields = words_of(said.maps)
-    found = read_map(file, said.crs, said.units)
+    found = read_map(file, said.crs, said.units, said.policy)
     for layer in kinds:
         if layer not in found.layer_names and layer not in SHAPE_LAYERS:
             raise InputError(
@@ -209,9 +204,10 @@ def import_site(
     properties = {str(name).lower() for feature in found.features for name in feature.properties}
     for ours, theirs in fields.items():
         if theirs not in properties:
+            listed = sorted(properties)[: said.policy.max_listed_properties]
             raise InputError(
                 f"--map: no feature of {file} has the property {theirs!r}, which is to be its "
-                f"{ours}; there are {', '.join(sorted(properties)[:MAX_LISTED]) or 'none'}"
+                f"{ours}; there are {', '.join(listed) or 'none'}"
             )
     site = _Site(file, found, said, kinds, fields, projection)
     problem = site.problem(name or Path(file).stem)
@@ -266,7 +262,12 @@ def read_site(
     return found.problem
 
 
-def read_map(file: str | Path, crs: str | None = None, units: str | None = None) -> Map:
+def read_map(
+    file: str | Path,
+    crs: str | None = None,
+    units: str | None = None,
+    policy: ImportPolicy = DEFAULT_IMPORT,
+) -> Map:
     """Return a map of any format.
 
     Parameters
@@ -297,41 +298,23 @@ def read_map(file: str | Path, crs: str | None = None, units: str | None = None)
     if reader is not None:
         if crs is not None:
             raise InputError(f"--crs: {file} is in degrees always; expected no system")
-        return reader(file)
-    if is_chart(file):
-        return read_chart(file, crs, units)
+        return reader(file, policy)
+    if is_chart(file, policy.read):
+        return read_chart(file, crs, units, policy.read)
     if suffix == ".dxf":
-        return read_dxf(file, crs, units)
+        return read_dxf(file, crs, units, policy)
     if suffix in (".kml", ".kmz"):
-        found = read_kml(file, crs)
+        found = read_kml(file, crs, policy.read)
     elif suffix in (".geojson", ".json"):
-        found = read_geojson(file, crs)
+        found = read_geojson(file, crs, policy.read)
     elif suffix in SEQUENCE_SUFFIXES:
-        found = read_geojson_sequence(file, crs)
+        found = read_geojson_sequence(file, crs, policy.read)
     else:
-        return read_vector(file, crs)
+        return read_vector(file, crs, policy.read)
     return found if crs is None else in_degrees(found, crs, file)
 
 
-DEGREES = 0.01
-"""Of the tether's length: a plane that spans less is taken for one of degrees."""
-
-BASE_OFF = 0.01
-"""Distance of a given base from the file's own from which on a note says so, m: coordinates of a
-centimetre are written with seven decimals of a degree."""
-
 SKIP_OPTION = "; leave out what is out of reach with --skip-unreachable"
-
-MAX_HEIGHT_GAP = 0.005
-"""Largest distance in metres between a depth and the height of the same point that needs no note:
-files round heights to a centimetre."""
-
-MIN_SHARE = 5e-4
-"""Smallest share of the tether's reach without chart or depth that a note reports: 0.05 %, because
-smaller shares may be rounding of areas."""
-
-MOST_OF_A_KIND = 5
-"""Goals out of reach that are told one by one."""
 
 
 @dataclass
@@ -354,7 +337,7 @@ class _Site:
     floor: SeaFloor | None = None
 
     def __post_init__(self) -> None:
-        self.is_chart = self.map.is_chart
+        self.is_chart, self.policy = self.map.is_chart, self.said.policy
         for name, value in (("draught", self.said.draught), ("floor", self.said.floor or None)):
             if value is not None and not self.is_chart:
                 raise InputError(
@@ -387,7 +370,10 @@ class _Site:
         reach = None
         if tether is not None:
             reach = CropWindow.about(
-                [anchor, *candidates], tether + clearance, self.said.crop_margin
+                [anchor, *candidates],
+                tether + clearance,
+                self.said.crop_margin,
+                self.policy.outlines,
             )
         if self.is_chart if self.said.crop is None else self.said.crop:
             self.window = reach
@@ -424,7 +410,7 @@ class _Site:
                 **({"bounds": bounds} if bounds else {}),
                 **self._origin(),
                 "site": Site(
-                    file=Path(self.file).name[:MAX_NAME],
+                    file=Path(self.file).name[: self.policy.max_file_name_length],
                     imported=self.ledger.records(),
                     cropped=self.cropped,
                 ),
@@ -455,10 +441,16 @@ class _Site:
             self.ledger.leave_out(unread, unread.reason)
         wrong: dict[str, list[str]] = {}
         layers = self.map.layer_names
-        lone = lone_equipment(self.map.features) if self.is_chart else set()
+        lone = lone_equipment(self.map.features, self.policy) if self.is_chart else set()
         for feature in self.map.features:
             try:
-                decision = kind_of(feature, self.kinds, chart=self.is_chart, layers=layers)
+                decision = kind_of(
+                    feature,
+                    self.kinds,
+                    chart=self.is_chart,
+                    layers=layers,
+                    policy=self.policy,
+                )
             except InputError as error:
                 what = str(error).removeprefix(feature.where)
                 wrong.setdefault(what, []).append(feature.where)
@@ -507,7 +499,9 @@ class _Site:
             )
         if not self.said.floor or self.complaints:
             return
-        self.floor, found = chart_floor(free, self._plane, self.window, self.said.floor_cell)
+        self.floor, found = chart_floor(
+            free, self._plane, self.window, self.said.floor_cell, self.policy
+        )
         for feature in found.used:  # a shallow area is an obstacle, too
             if self.ledger.is_left_out(feature):
                 self.ledger.use(feature, "floor")
@@ -538,7 +532,7 @@ class _Site:
             )
 
     def _note_share(self, share: float, what: str) -> None:
-        if share >= MIN_SHARE:
+        if share >= self.policy.min_noted_share:
             self.notes.append(f"{100.0 * share:.2g} % of the tether's reach {what}")
 
     def _table_places(
@@ -610,7 +604,7 @@ class _Site:
         if own is not None:
             there = self._plane(own.shape)
             away = float(np.hypot(there.x - x, there.y - y))
-            if away > BASE_OFF:
+            if away > self.policy.max_base_shift:
                 self.notes.append(
                     f"{own.where}: the base is at the place that was given, {_metres(away)} away; "
                     "only the properties of the file's base are used"
@@ -764,7 +758,10 @@ class _Site:
                 self._complain(
                     f"{self._called(feature)}: encloses nothing; expected a polygon with an area"
                 )
-            return [{"feature": feature, **outline_of(polygon)} for polygon in polygons]
+            return [
+                {"feature": feature, **outline_of(polygon, self.policy.outlines)}
+                for polygon in polygons
+            ]
 
         pointlike: list[Feature] = []
         for feature in progress.each(features):
@@ -847,7 +844,7 @@ class _Site:
             if width is None:
                 narrow.append(feature)
             else:
-                out += area(feature, widened(line, width))
+                out += area(feature, widened(line, width, self.policy.outlines))
         if narrow:
             layer = narrow[0].layer
             places = list(dict.fromkeys(f.where for f in narrow))
@@ -868,7 +865,7 @@ class _Site:
         import shapely
 
         rims = [
-            widened(line, width)
+            widened(line, width, self.policy.outlines)
             for feature, line in pieces
             if self._number(feature, "width") is not None and (width := self._width(feature))
         ]
@@ -959,7 +956,7 @@ class _Site:
             return
         z = float(at.z) * (1.0 if self.map.geographic else self._unit)
         # files write 0 where they have no height
-        if z and abs(z + depth) > MAX_HEIGHT_GAP:
+        if z and abs(z + depth) > self.policy.max_height_gap:
             self.notes.append(
                 f"{self._called(feature)}: its depth of {depth:g} m is taken, and its height of "
                 f"{z:g} m is not"
@@ -1183,7 +1180,12 @@ class _Site:
             return None, []
         ring: list[list[float]] = shapely.get_coordinates(polygons[0].exterior)[:-1].tolist()
         islands = [
-            {"feature": feature, "name": None, "where": feature.where, **outline_of(polygon)}
+            {
+                "feature": feature,
+                "name": None,
+                "where": feature.where,
+                **outline_of(polygon, self.policy.outlines),
+            }
             for hole in holes
             for polygon in simple_polygons(hole, lambda p: False)[0]
         ]
@@ -1222,7 +1224,7 @@ class _Site:
         span = float(np.ptp(places * self._unit, axis=0).max())
         small = bool((np.abs(places) <= [180.0, 90.0]).all())
         whole = bool((places == np.round(places)).all())
-        if small and not whole and span <= DEGREES * tether:
+        if small and not whole and span <= self.policy.max_degrees_span * tether:
             self._complain(
                 f"coordinates span {span:g} m, and the tether is {_metres(tether)} long: they look "
                 "like degrees; expected metres",
@@ -1254,7 +1256,7 @@ class _Site:
                         feature,
                         f"farther from the base than the tether is long ({_metres(tether)})",
                     )
-        elif len(far) > MOST_OF_A_KIND:
+        elif len(far) > self.policy.max_listed_goals:
             away, goal = max(far, key=lambda f: f[0])
             self._complain(
                 f"{len(far)} goals are farther from the base than the tether is long "

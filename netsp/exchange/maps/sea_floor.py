@@ -13,6 +13,7 @@ from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
 from netsp.base.files import write_text
 from netsp.base.validated import shown
+from netsp.exchange.maps.import_policy import DEFAULT_READ, ReadPolicy
 
 if TYPE_CHECKING:
     import shapely
@@ -21,10 +22,7 @@ SUFFIXES = (".asc", ".tif", ".tiff")
 """Formats that a sea floor is written in: ESRI's text grid, and GeoTIFF."""
 
 NO_HEIGHT = -9999.0
-"""Value of cells whose depth the chart does not give."""
-
-MAX_CELLS = 2000
-"""Cells along a side: a floor has twice as many triangles as cells."""
+"""Sentinel for the height of cells whose depth the chart does not give."""
 
 
 @dataclass(frozen=True)
@@ -126,6 +124,7 @@ def sea_floor(
     *,
     soundings: Floats | None = None,
     dangers: Sequence[Danger] = (),
+    policy: ReadPolicy = DEFAULT_READ,
 ) -> SeaFloor:
     """Return the sea floor that a chart's depths give.
 
@@ -166,10 +165,10 @@ def sea_floor(
     """
     west, south, east, north = box
     columns, rows = (max(2, int(np.ceil(span / cell))) for span in (east - west, north - south))
-    if max(columns, rows) > MAX_CELLS:
+    if max(columns, rows) > policy.max_floor_cells:
         raise InputError(
-            f"floor: {columns} x {rows} cells of {cell:g} m; expected at most {MAX_CELLS} along a "
-            "side, so larger cells"
+            f"floor: {columns} x {rows} cells of {cell:g} m; expected at most "
+            f"{policy.max_floor_cells} along a side, so larger cells"
         )
     spots = np.empty((0, 3)) if soundings is None else soundings
     x: Floats = west + cell * np.arange(0.5, columns)

@@ -10,19 +10,17 @@ from datetime import UTC, datetime
 from netsp.base.axes import Column
 from netsp.base.errors import InputError
 from netsp.base.validated import shown
+from netsp.exchange.maps.import_policy import DEFAULT_READ, ReadPolicy
 from netsp.exchange.maps.word_tables import words
 
 NO_VALUES = words("nan -nan null none na n/a <null> #n/a #nv inf +inf -inf - -- ---") | {""}
 """Cells, in lower case, that hold nothing."""
 
-MAX_SECONDS = 1e11
-"""Bound on times, s: the year 5138. Larger numbers without a unit are milliseconds or less."""
-
 FINER = ((1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds"))
 """Units of times since 1970 that are finer than seconds."""
 
 DAY_S = 86_400.0
-"""Length of a day, s."""
+"""Unit: length of a day, s."""
 
 CLOCK = re.compile(r"(\d{1,3}):([0-5]\d):([0-5]\d(?:[.,]\d*)?)")
 """Clock time or elapsed time: hours, minutes, seconds."""
@@ -53,8 +51,13 @@ class TimeStamps:
     [86399.5, 86401.0]
     """
 
-    def __init__(self, meaning: Column, on_note: Callable[[str], None]) -> None:
-        self.on_note = on_note
+    def __init__(
+        self,
+        meaning: Column,
+        on_note: Callable[[str], None],
+        policy: ReadPolicy = DEFAULT_READ,
+    ) -> None:
+        self.on_note, self.policy = on_note, policy
         self.scale: float | None = None
         if meaning.unit or meaning.factor != 1.0:
             self.scale = meaning.factor
@@ -95,12 +98,13 @@ class TimeStamps:
             return self._clock_seconds(clock)
         assert number is not None
         if self.scale is None:
-            self.scale, unit = unit_of_time(number)
+            self.scale, unit = unit_of_time(number, self.policy)
             if unit:
                 self.on_note(f"times are taken as {unit} since 1970")
         value = number * self.scale
-        if not abs(value) < MAX_SECONDS:
-            raise InputError(f"{where}: expected seconds below {MAX_SECONDS:g}, got {shown(text)}")
+        max_time_s = self.policy.max_time_s
+        if not abs(value) < max_time_s:
+            raise InputError(f"{where}: expected seconds below {max_time_s:g}, got {shown(text)}")
         return value
 
     def _clock_seconds(self, clock: re.Match[str]) -> float:
@@ -167,7 +171,7 @@ def _number(text: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def unit_of_time(value: float) -> tuple[float, str]:
+def unit_of_time(value: float, policy: ReadPolicy = DEFAULT_READ) -> tuple[float, str]:
     """Return the unit of a time whose column names none.
 
     Parameters
@@ -188,4 +192,4 @@ def unit_of_time(value: float) -> tuple[float, str]:
     ((1.0, ''), (0.001, 'milliseconds'))
     """
     units = ((1.0, ""), *FINER)
-    return next((unit for unit in units if abs(value) * unit[0] < MAX_SECONDS), units[0])
+    return next((unit for unit in units if abs(value) * unit[0] < policy.max_time_s), units[0])

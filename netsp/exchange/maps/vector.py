@@ -23,13 +23,11 @@ from netsp.base.axes import height_axis, map_unit
 from netsp.base.errors import InputError, UnansweredError
 from netsp.base.files import check_file, read_bytes
 from netsp.exchange.maps.feature import Change, Feature, Map, Unread, change_notes, with_tags
+from netsp.exchange.maps.import_policy import DEFAULT_READ, ReadPolicy
 from netsp.exchange.maps.wkb_shapes import NotFiniteError, ShapeError, collected, shape_of
 
 if TYPE_CHECKING:
     import shapely
-
-MOST_FEATURES = 100_000
-"""Of a map: more make no problem that anybody solves."""
 
 PLANE_SYSTEMS = ("LOCAL_CS", "ENGCRS", "ENGINEERINGCRS")
 """First words of systems without a place on the earth, in well-known text."""
@@ -61,7 +59,7 @@ LOCAL = "local"
 """The coordinate system of a map without a place on the earth."""
 
 
-def read_vector(file: str | Path, crs: str | None) -> Map:
+def read_vector(file: str | Path, crs: str | None, policy: ReadPolicy = DEFAULT_READ) -> Map:
     """Return a file of any format that GDAL reads as a map.
 
     Parameters
@@ -84,10 +82,12 @@ def read_vector(file: str | Path, crs: str | None) -> Map:
     """
     check_file(file)
     with _readable(file) as plain:
-        return read_plain(file, plain, crs)
+        return read_plain(file, plain, crs, policy)
 
 
-def read_plain(file: str | Path, plain: str | Path, crs: str | None) -> Map:
+def read_plain(
+    file: str | Path, plain: str | Path, crs: str | None, policy: ReadPolicy = DEFAULT_READ
+) -> Map:
     """Return a file as a map from a copy of it that GDAL reads.
 
     Parameters
@@ -109,14 +109,14 @@ def read_plain(file: str | Path, plain: str | Path, crs: str | None) -> Map:
     InputError
         As of `read_vector`.
     """
-    found = _Found(file)
+    found = _Found(file, policy)
     places: dict[str, bool] = {}
     is_osm = Path(file).suffix.lower() in OSM_SUFFIXES
     for name, kind in gdal_layers(file, plain, found.notes):
         if kind is None:
-            found.add_table(name, _row_count(plain, name))
+            found.add_table(name, _row_count(plain, name, policy.max_features))
             continue
-        layer = read_layer(file, plain, name, found.notes)
+        layer = read_layer(file, plain, name, found.notes, policy)
         if is_osm and not layer.shapes:
             continue  # GDAL has the same five layers for every file
         own = crs if crs is not None else layer.crs
@@ -197,7 +197,9 @@ def gdal_layers(file: str | Path, plain: str | Path, notes: list[str]) -> list[t
     return [(str(name), kind) for name, kind in layers]
 
 
-def read_layer(file: str | Path, plain: str | Path, layer: str, notes: list[str]) -> GdalLayer:
+def read_layer(
+    file: str | Path, plain: str | Path, layer: str, notes: list[str], policy: ReadPolicy
+) -> GdalLayer:
     """Read one layer with GDAL.
 
     Parameters
@@ -224,9 +226,10 @@ def read_layer(file: str | Path, plain: str | Path, layer: str, notes: list[str]
     meta, ids, shapes, columns = _call(
         file, notes, _pyogrio().raw.read, plain, layer=layer, return_fids=True, force_2d=False
     )
-    if len(shapes) > MOST_FEATURES:
+    if len(shapes) > policy.max_features:
         raise InputError(
-            f"{file}: layer {layer!r}: {len(shapes):,} features; expected at most {MOST_FEATURES:,}"
+            f"{file}: layer {layer!r}: {len(shapes):,} features; expected at most "
+            f"{policy.max_features:,}"
         )
     names = [str(name) for name in meta["fields"]]
     properties = [
@@ -355,16 +358,16 @@ def _layer_names(file: str | Path) -> dict[str, str]:
     return dict.fromkeys(names or [Path(file).stem], "wkbUnknown")
 
 
-def _row_count(file: str | Path, layer: str) -> int:
+def _row_count(file: str | Path, layer: str, max_rows: int) -> int:
     found = _call(file, [], _pyogrio().read_info, file, layer=layer, force_feature_count=True)
-    return min(max(int(found["features"]), 0), MOST_FEATURES)
+    return min(max(int(found["features"]), 0), max_rows)
 
 
 class _Found:
     """Features, notes and complaints found in a file so far."""
 
-    def __init__(self, file: str | Path) -> None:
-        self.file = file
+    def __init__(self, file: str | Path, policy: ReadPolicy) -> None:
+        self.file, self.policy = file, policy
         self.notes: list[str] = []
         self.features: list[Feature] = []
         self.unread: list[Unread] = []
@@ -411,7 +414,7 @@ class _Found:
         """Return the shape of a feature, or the parts of a collection, with their names."""
         if data is None:
             raise ShapeError("has no geometry")
-        shape, changes = shape_from_gdal(data)
+        shape, changes = shape_from_gdal(data, self.policy)
         parts = list(parts_of(shape, where))
         if not parts:
             raise ShapeError("has no geometry")
@@ -441,7 +444,7 @@ def _shore(shape: shapely.Geometry) -> shapely.Geometry:
     )
 
 
-def shape_from_gdal(data: bytes) -> tuple[shapely.Geometry, tuple[str, ...]]:
+def shape_from_gdal(data: bytes, policy: ReadPolicy) -> tuple[shapely.Geometry, tuple[str, ...]]:
     """Return a shape that GDAL gives, whatever its type, and what was changed in it.
 
     Parameters
@@ -462,7 +465,7 @@ def shape_from_gdal(data: bytes) -> tuple[shapely.Geometry, tuple[str, ...]]:
         shape = shapely.from_wkb(data, on_invalid="ignore")
     changes: tuple[str, ...] = ()
     if shape is None or getattr(shape, "has_m", False):
-        shape, changes = shape_of(data)
+        shape, changes = shape_of(data, policy)
     if not np.isfinite(shapely.get_coordinates(shape)).all():
         raise NotFiniteError
     if "Polygon" in shape.geom_type and not shape.is_empty and not shape.length:

@@ -9,12 +9,18 @@ from netsp.base.errors import InputError
 from netsp.base.files import read_text
 from netsp.base.validated import shown
 from netsp.exchange.maps.feature import Map
-from netsp.exchange.maps.mission_commands import ABOVE_SEA, MissionItem, add_home, features_of_items
+from netsp.exchange.maps.import_policy import DEFAULT_IMPORT, ImportPolicy
+from netsp.exchange.maps.mission_commands import (
+    FRAMES_ABOVE_SEA,
+    MissionItem,
+    add_home,
+    features_of_items,
+)
 
 HEAD = re.compile(r"QGC\s+WPL\s+1[0-9]0\s*")
 
-COLUMNS = 12
-"""Number, current, frame, command, four parameters, latitude, longitude, altitude, autocontinue."""
+COLUMN_COUNT = 12
+"""Format QGC WPL 110: number, current, frame, command, four parameters, place, autocontinue."""
 
 
 def is_waypoint_list(file: str | Path) -> bool:
@@ -29,7 +35,7 @@ def is_waypoint_list(file: str | Path) -> bool:
     return HEAD.fullmatch(first) is not None
 
 
-def read_waypoint_list(file: str | Path) -> Map:
+def read_waypoint_list(file: str | Path, policy: ImportPolicy = DEFAULT_IMPORT) -> Map:
     """Read a waypoint list as a map.
 
     Parameters
@@ -52,11 +58,12 @@ def read_waypoint_list(file: str | Path) -> Map:
     if not lines or HEAD.fullmatch(lines[0][1]) is None:
         got = lines[0][1] if lines else ""
         raise InputError(f"{file}: expected QGC WPL 110 in the first line, got {shown(got)}")
-    rows = [_row(n, line, f"{file}: line {k}") for n, (k, line) in enumerate(lines[1:])]
+    max_number = policy.read.max_number
+    rows = [_row(n, line, f"{file}: line {k}", max_number) for n, (k, line) in enumerate(lines[1:])]
     home = rows[0] if rows and _is_home(rows[0], lines[1][1]) else None
     items = rows[1:] if home is not None else rows
     altitude = None if home is None else home.place[2]
-    found = features_of_items(items, altitude, None if home is None else home.lonlat)
+    found = features_of_items(items, altitude, None if home is None else home.lonlat, policy)
     if home is not None:
         add_home(found, home.where, home.lonlat)
     return Map(
@@ -72,17 +79,17 @@ def read_waypoint_list(file: str | Path) -> Map:
 def _is_home(item: MissionItem, line: str) -> bool:
     """Return whether an item is home, which ArduPilot stores as waypoint 0, above the sea."""
     number = line.split()[0]
-    return int(float(number)) == 0 and item.command == 16 and item.frame in ABOVE_SEA
+    return int(float(number)) == 0 and item.command == 16 and item.frame in FRAMES_ABOVE_SEA
 
 
-def _row(index: int, line: str, where: str) -> MissionItem:
+def _row(index: int, line: str, where: str, max_number: float) -> MissionItem:
     cells = line.split()
     try:
         numbers = [float(cell) for cell in cells]
     except ValueError:
         numbers = []
-    if len(numbers) != COLUMNS or not all(abs(v) <= 1e9 for v in numbers):
-        raise InputError(f"{where}: expected {COLUMNS} numbers, got {shown(line)}")
+    if len(numbers) != COLUMN_COUNT or not all(abs(v) <= max_number for v in numbers):
+        raise InputError(f"{where}: expected {COLUMN_COUNT} numbers, got {shown(line)}")
     lat, lon, altitude = numbers[8:11]
     return MissionItem(
         f"waypoints[{index}]",

@@ -6,6 +6,7 @@ the outline of what they cover from above, and rings that are not closed are clo
 
 from __future__ import annotations
 
+import enum
 import itertools
 import math
 import struct
@@ -16,30 +17,37 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.geometry.polygons import union
+from netsp.exchange.maps.import_policy import DEFAULT_READ, ReadPolicy
 
 if TYPE_CHECKING:
     import shapely
 
-MAX_ARC_STEP = math.radians(4.0)
-"""Largest step between the points of an arc, radians: GDAL's, so that all formats are alike."""
 
-MAX_NESTING = 32
-"""Geometries within geometries that are read; damaged files could nest without end."""
+class Wkb(enum.IntEnum):
+    """Codes of geometry types in well-known binary."""
 
-POINT, LINE, POLYGON = 1, 2, 3
-MULTI_POINT, MULTI_LINE, MULTI_POLYGON, COLLECTION = 4, 5, 6, 7
-ARCS, COMPOUND_CURVE, CURVE_POLYGON, MULTI_CURVE, MULTI_SURFACE = 8, 9, 10, 11, 12
-POLYHEDRAL_SURFACE, TIN, TRIANGLE = 15, 16, 17
-FACES = (POLYHEDRAL_SURFACE, TIN)
+    POINT = 1
+    LINE = 2
+    POLYGON = 3
+    MULTI_POINT = 4
+    MULTI_LINE = 5
+    MULTI_POLYGON = 6
+    COLLECTION = 7
+    ARCS = 8
+    COMPOUND_CURVE = 9
+    CURVE_POLYGON = 10
+    MULTI_CURVE = 11
+    MULTI_SURFACE = 12
+    POLYHEDRAL_SURFACE = 15
+    TIN = 16
+    TRIANGLE = 17
+
+
+FACES = (Wkb.POLYHEDRAL_SURFACE, Wkb.TIN)
 COLLECTIONS = (
-    MULTI_POINT,
-    MULTI_LINE,
-    MULTI_POLYGON,
-    COLLECTION,
-    MULTI_CURVE,
-    MULTI_SURFACE,
-    POLYHEDRAL_SURFACE,
-    TIN,
+    *(Wkb.MULTI_POINT, Wkb.MULTI_LINE, Wkb.MULTI_POLYGON, Wkb.COLLECTION),
+    *(Wkb.MULTI_CURVE, Wkb.MULTI_SURFACE),
+    *FACES,
 )
 
 CLOSED = "a ring is not closed: closed by its first corner"
@@ -58,7 +66,9 @@ class NotFiniteError(ShapeError):
         super().__init__("expected finite coordinates")
 
 
-def shape_of(data: bytes) -> tuple[shapely.Geometry, tuple[str, ...]]:
+def shape_of(
+    data: bytes, policy: ReadPolicy = DEFAULT_READ
+) -> tuple[shapely.Geometry, tuple[str, ...]]:
     """Return the shape of well-known binary of any type.
 
     Parameters
@@ -90,7 +100,7 @@ def shape_of(data: bytes) -> tuple[shapely.Geometry, tuple[str, ...]]:
     """
     import shapely
 
-    reader = _Reader(data)
+    reader = _Reader(data, policy)
     try:
         shape = reader.geometry()
     except (struct.error, IndexError, MemoryError):
@@ -185,7 +195,7 @@ def outline_of_faces(faces: list[shapely.Geometry], changes: list[str]) -> shape
     return wall
 
 
-def arc_points(start: Floats, middle: Floats, end: Floats) -> Floats:
+def arc_points(start: Floats, middle: Floats, end: Floats, max_step: float) -> Floats:
     """Return points along the arc through three points, both ends among them.
 
     Parameters
@@ -214,7 +224,7 @@ def arc_points(start: Floats, middle: Floats, end: Floats) -> Floats:
             turn -= 2.0 * math.pi
     radius = float(np.hypot(*(a - centre)))
     first = math.atan2(*(a - centre)[::-1])
-    steps = max(2, math.ceil(abs(turn) / MAX_ARC_STEP - 1e-9))
+    steps = max(2, math.ceil(abs(turn) / max_step - 1e-9))
     share = np.linspace(0.0, 1.0, steps + 1)
     at = first + turn * share
     plane = centre + radius * np.column_stack([np.cos(at), np.sin(at)])
@@ -235,6 +245,7 @@ class _Reader:
     """Reader of one geometry."""
 
     data: bytes
+    policy: ReadPolicy
     at: int = 0
 
     def __post_init__(self) -> None:
@@ -243,31 +254,39 @@ class _Reader:
     def geometry(self, depth: int = 0, *, is_face: bool = False) -> shapely.Geometry:
         import shapely
 
-        if depth > MAX_NESTING:
-            raise ShapeError(f"geometries nested more than {MAX_NESTING} times")
+        if depth > self.policy.max_geometry_depth:
+            raise ShapeError(f"geometries nested more than {self.policy.max_geometry_depth} times")
         kind, order, has_z, has_m = self._head()
         size = 2 + has_z + has_m
-        if kind == POINT:
+        if kind == Wkb.POINT:
             return self._point(self._floats(1, size, order)[:, : 2 + has_z])
-        if kind in (LINE, ARCS):
+        if kind in (Wkb.LINE, Wkb.ARCS):
             points = self._points(order, size)[:, : 2 + has_z]
-            return _line(_along_arcs(points) if kind == ARCS else points)
-        if kind in (POLYGON, TRIANGLE):
+            return _line(
+                _along_arcs(points, self.policy.max_arc_step) if kind == Wkb.ARCS else points
+            )
+        if kind in (Wkb.POLYGON, Wkb.TRIANGLE):
             count = self._count(order)
             rings = [self._points(order, size)[:, : 2 + has_z] for _ in range(count)]
             # faces that stand upright are lines from above, as they should be
             area = area_of(rings, [] if is_face else self.changes)
-            return area if kind == POLYGON or is_face else outline_of_faces([area], self.changes)
-        count = self._count(order) if kind in (*COLLECTIONS, COMPOUND_CURVE, CURVE_POLYGON) else 0
-        if kind in (COMPOUND_CURVE, CURVE_POLYGON) or kind in COLLECTIONS:
+            return (
+                area if kind == Wkb.POLYGON or is_face else outline_of_faces([area], self.changes)
+            )
+        count = (
+            self._count(order)
+            if kind in (*COLLECTIONS, Wkb.COMPOUND_CURVE, Wkb.CURVE_POLYGON)
+            else 0
+        )
+        if kind in (Wkb.COMPOUND_CURVE, Wkb.CURVE_POLYGON) or kind in COLLECTIONS:
             parts = [self.geometry(depth + 1, is_face=kind in FACES) for _ in range(count)]
         else:
             raise ShapeError(f"its geometry is of a type that is not read (number {kind})")
         parts = [p for p in parts if not p.is_empty]
-        if kind == COMPOUND_CURVE:
+        if kind == Wkb.COMPOUND_CURVE:
             pieces = [np.asarray(shapely.get_coordinates(p, include_z=has_z)) for p in parts]
             return _line(_joined(pieces))
-        if kind == CURVE_POLYGON:
+        if kind == Wkb.CURVE_POLYGON:
             rings = [np.asarray(shapely.get_coordinates(p, include_z=has_z)) for p in parts]
             return area_of(rings, self.changes)
         if kind in FACES:
@@ -353,11 +372,14 @@ def _line(points: Floats) -> shapely.Geometry:
     return shapely.LineString(points)
 
 
-def _along_arcs(points: Floats) -> Floats:
+def _along_arcs(points: Floats, max_step: float) -> Floats:
     """Return the points along arcs, each through a corner, a middle and the next corner."""
     if len(points) < 3 or len(points) % 2 == 0:
         return points
-    arcs = [arc_points(*points[k : k + 3]) for k in range(0, len(points) - 2, 2)]
+    arcs = [
+        arc_points(points[k], points[k + 1], points[k + 2], max_step)
+        for k in range(0, len(points) - 2, 2)
+    ]
     return _joined(arcs)
 
 
