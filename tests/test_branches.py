@@ -14,6 +14,7 @@ from netsp.base.errors import InfeasibleError, LimitReachedError
 from netsp.plan.random_worlds import FAMILIES, random_world
 from netsp.roadmap import taut_legs as legs_of
 from netsp.roadmap.branches import OPEN
+from netsp.roadmap.roadmap_policy import LegPolicy, RoadmapPolicy
 from netsp.roadmap.taut import TautRoadmap
 from netsp.roadmap.taut_legs import TautLegs
 from netsp.roadmap.tethertree import GrowingTree
@@ -168,14 +169,15 @@ def none_pulled(monkeypatch):
 
 @pytest.mark.parametrize("together", [False, True])
 def test_tethers_that_cannot_be_pulled_are_searched_for_and_grow_the_same_tree(
-    monkeypatch, searches, request, together
+    searches, request, together
 ):
     problem = random_world(3, goals=6, obstacles=8, tether_length=330.0)
-    one, other = TautRoadmap(problem), TautRoadmap(problem)
+    one = TautRoadmap(problem)
+    joint = LegPolicy(min_joint_searches=0 if together else len(one.cluster))
+    other = TautRoadmap(problem, RoadmapPolicy(legs=joint))
     tree = one.legs._grown(NEVER)
     searches.clear()
     request.getfixturevalue("none_pulled")
-    monkeypatch.setattr(legs_of, "SEARCHED_TOGETHER", 0 if together else len(one.cluster))
     same = other.legs._grown(NEVER)
     assert len(searches) == (0 if together else len(one.cluster) - 1)
     assert (same.node == tree.node).all()

@@ -25,7 +25,10 @@ from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
 from netsp.model.problem import State
 from netsp.plan.random_worlds import random_world
+from netsp.roadmap.class_alternatives import graph_of_choices
 from netsp.roadmap.from_state import graph_from_state
+from netsp.roadmap.roadmap_policy import LegPolicy, RoadmapPolicy
+from netsp.roadmap.taut import TautRoadmap
 from tests.test_contract import random_graph
 from tests.test_even_crossings import small
 
@@ -334,7 +337,7 @@ def test_a_proof_over_rows_finds_the_optimum_of_one_over_a_matrix(
 
 
 @functools.cache
-def graphs_by_kind():
+def graphs_by_kind(policy=None):
     """Return travel graphs whose legs are those of another one, changed, by what changed them."""
     plain = small(3, goals=6, tether_length=150.0)
     goals = [g.model_dump() for g in plain.goals]
@@ -345,21 +348,29 @@ def graphs_by_kind():
     here = whole.tour[2]
     state = State(position=plain.goals[here.goal].position, signature=here.signature)
     left = tuple(plain.goals[v.goal] for v in whole.tour[3:])
+
+    def build(problem):
+        graph = TautRoadmap(problem, policy).to_travel_graph()
+        graph.before = problem.precedences
+        return graph
+
     return {
-        "plain": travel_graph(plain),
-        "with alternatives": travel_graph(choices),
-        "from a state": graph_from_state(plain.model_copy(update={"goals": left, "state": state})),
-        "without precedences": travel_graph(plain).unordered(),
+        "plain": build(plain),
+        "with alternatives": graph_of_choices(choices, build),
+        "from a state": graph_from_state(
+            plain.model_copy(update={"goals": left, "state": state}), policy
+        ),
+        "without precedences": build(plain).unordered(),
     }
 
 
 @pytest.mark.parametrize(
     "kind", ["plain", "with alternatives", "from a state", "without precedences"]
 )
-def test_legs_in_blocks_are_those_rounded_and_ways_no_longer(kind, monkeypatch):
-    graph = graphs_by_kind()[kind]
-    monkeypatch.setattr("netsp.roadmap.taut_legs.BLOCK", 5)
-    monkeypatch.setattr("netsp.roadmap.taut_legs.BLOCK_LEGS", 17 * len(graph))
+def test_legs_in_blocks_are_those_rounded_and_ways_no_longer(kind):
+    count = len(graphs_by_kind()[kind])
+    legs = LegPolicy(block_rows=5, max_block_legs=17 * count)
+    graph = graphs_by_kind(RoadmapPolicy(legs=legs))[kind]
     assert graph.legs_in_blocks
     expected = graph.costs_rounded(np.arange(len(graph)))
     for asked in None, np.random.default_rng(0).permutation(len(graph))[:23]:

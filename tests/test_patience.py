@@ -13,8 +13,8 @@ from netsp.command.main import main
 from netsp.command.patience import Patience, span
 from netsp.command.stages import Stages
 from netsp.plan.random_worlds import random_world
-from netsp.roadmap import explain_unreachable
 from netsp.roadmap.explain_unreachable import shortest_tethers
+from netsp.roadmap.roadmap_policy import ReachPolicy, RoadmapPolicy
 
 ROOT = Path(__file__).parent.parent
 
@@ -76,22 +76,22 @@ def test_spans_are_told_in_hours_minutes_and_seconds():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_obstacles_that_no_path_touches_change_no_tether(monkeypatch, seed):
+def test_obstacles_that_no_path_touches_change_no_tether(seed):
     problem = random_world(seed, goals=8, tether_length=300.0, obstacles=40, radii=(5.0, 20.0))
     far = [Circle(center=(5000.0 + 50.0 * k, 9000.0), radius=20.0) for k in range(10)]
     more = problem.model_copy(update={"obstacles": (*problem.obstacles, *far), "bounds": None})
     whole = shortest_tethers(more)
-    monkeypatch.setattr(explain_unreachable, "MANY_OBSTACLES", 0)
-    assert shortest_tethers(more) == pytest.approx(whole, rel=1e-8)
+    near = RoadmapPolicy(reach=ReachPolicy(max_whole_obstacles=0))
+    assert shortest_tethers(more, policy=near) == pytest.approx(whole, rel=1e-8)
     # and where the first guess is too near
-    monkeypatch.setattr(explain_unreachable, "FARTHER", 0.3)
-    assert shortest_tethers(more) == pytest.approx(whole, rel=1e-8)
+    nearer = RoadmapPolicy(reach=ReachPolicy(max_whole_obstacles=0, first_ratio=0.3))
+    assert shortest_tethers(more, policy=nearer) == pytest.approx(whole, rel=1e-8)
 
 
-def test_a_goal_behind_a_wall_that_is_far_around_needs_the_whole_way(monkeypatch):
+def test_a_goal_behind_a_wall_that_is_far_around_needs_the_whole_way():
     wall = [Circle(center=(10.0, y), radius=3.0) for y in range(-60, 61, 4)]
     problem = Problem(base=(0, 0), goals=[(20, 0)], tether_length=10, obstacles=wall)
     whole = shortest_tethers(problem)
-    monkeypatch.setattr(explain_unreachable, "MANY_OBSTACLES", 0)
+    near = RoadmapPolicy(reach=ReachPolicy(max_whole_obstacles=0))
     assert whole[0] > 120.0
-    assert shortest_tethers(problem) == pytest.approx(whole, rel=1e-8)
+    assert shortest_tethers(problem, policy=near) == pytest.approx(whole, rel=1e-8)

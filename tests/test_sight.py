@@ -18,7 +18,7 @@ from netsp.base.geometry.kernels import (
     segment_segment_distance,
 )
 from netsp.roadmap.outline import build_outline
-from netsp.roadmap.sight import SightPolicy
+from netsp.roadmap.roadmap_policy import SightPolicy
 from netsp.roadmap.tangents import tangent_rows
 
 

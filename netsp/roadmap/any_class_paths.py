@@ -22,14 +22,9 @@ from netsp.gtsp.travel.tether_blind_legs import Detours
 from netsp.hsignature import signature
 from netsp.model.problem import Problem
 from netsp.roadmap.outline import Outline, build_outline
+from netsp.roadmap.roadmap_policy import DetourPolicy, RoadmapPolicy
 from netsp.roadmap.shortest import ContactGraph, ShortestPaths
 from netsp.roadmap.tangents import build_tangents
-
-AROUND = 8
-"""Places for sub-goals around an obstacle."""
-
-OFF = 0.05
-"""How far off the boundary they lie, as a share of the obstacle's size."""
 
 
 def taut_detours(
@@ -37,6 +32,7 @@ def taut_detours(
     with_sub_goals: bool,
     check: Callable[[], None] = lambda: None,
     clock: Clock | None = None,
+    policy: RoadmapPolicy | None = None,
 ) -> Detours:
     """The detours over tangents and arcs: exact shortest paths.
 
@@ -47,7 +43,8 @@ def taut_detours(
     clock
         The clock of the run; when it is up, LimitReachedError is raised.
     """
-    places, side = sub_goals(problem, with_sub_goals)
+    policy = policy or RoadmapPolicy()
+    places, side = sub_goals(problem, with_sub_goals, policy.detours)
     check()
     outline = build_outline(problem, clock)
     outline = replace(
@@ -55,18 +52,22 @@ def taut_detours(
         points=np.vstack([outline.points, places]),
         places=np.vstack([outline.places, places]),
     )
-    tangents = build_tangents(outline, np.inf, clock)
+    tangents = build_tangents(outline, np.inf, clock, policy.sight)
     check()
-    graph = ContactGraph(outline, tangents)
+    graph = ContactGraph(outline, tangents, policy=policy)
     check()
     return tabulate(problem, outline, graph, np.arange(graph.points), places, side, check)
 
 
-def sub_goals(problem: Problem, wanted: bool = True) -> tuple[Floats, Ints]:
+def sub_goals(
+    problem: Problem, wanted: bool = True, policy: DetourPolicy | None = None
+) -> tuple[Floats, Ints]:
     """Places (k, 2) beside the obstacles, relative to the base, and the obstacle of each; none if
     they are not wanted."""
     if not wanted:
         return np.zeros((0, 2)), np.zeros(0, dtype=np.int64)
+    policy = policy or DetourPolicy()
+    around = policy.sub_goals_per_obstacle
     origin = problem.points[0, :2]
     shapes = [o.shape(problem.clearance) for o in problem.obstacles]
     solid = shapely.union_all([s.buffer(1e-6 * problem.scale) for s in shapes])
@@ -75,15 +76,15 @@ def sub_goals(problem: Problem, wanted: bool = True) -> tuple[Floats, Ints]:
     for i, (shape, middle) in enumerate(zip(shapes, problem.representative_points, strict=True)):
         xmin, ymin, xmax, ymax = shape.bounds
         size = max(xmax - xmin, ymax - ymin)
-        for k in range(AROUND):
-            angle = 2.0 * np.pi * k / AROUND
+        for k in range(around):
+            angle = 2.0 * np.pi * k / around
             sense = np.array([np.cos(angle), np.sin(angle)])
             ray = shapely.LineString([middle, middle + 2.0 * size * sense])
             inside = shape.intersection(ray)
             reach = max(
                 float(np.hypot(*(np.array(c) - middle))) for c in shapely.get_coordinates(inside)
             )
-            p = middle + (reach + OFF * size) * sense
+            p = middle + (reach + policy.sub_goal_offset * size) * sense
             in_bounds = problem.bounds is None or (
                 problem.bounds[0] <= p[0] <= problem.bounds[2]
                 and problem.bounds[1] <= p[1] <= problem.bounds[3]

@@ -15,6 +15,7 @@ from netsp.base.arrays import Floats, Ints
 from netsp.base.compiled.kernel import kernel
 from netsp.model.problem import Circle, Problem
 from netsp.roadmap.outline import Outline
+from netsp.roadmap.roadmap_policy import PathPolicy
 from netsp.roadmap.slits import Slits
 from netsp.roadmap.tangents import TangentGraph
 
@@ -23,16 +24,16 @@ CX, CY, RADIUS, BEGIN, END = range(5)
 show; END is infinite where all do."""
 
 LETTERS, AFTER_LETTERS, OWNER = range(3)
-"""Columns of whole numbers of a node: where the letters of its whole arc begin and end, and an
+"""Columns of the integers of a node: where the letters of its whole arc begin and end, and an
 obstacle whose arc it is, -1 for points."""
 
 LENGTH, LEAVES, ARRIVES, TURN, ALONG = range(5)
-"""Columns of a departure: length, angles at both ends, angle from the arrival to the first
-departure there, and from the first departure of its own arc to itself."""
+"""Columns of the floats of a departure: length, angles at both ends, angle from the arrival to the
+first departure there, and from the first departure of its own arc to itself."""
 
 FIRST, SEGMENT, AFTER_SEGMENT, ARRIVAL, AFTER_ARRIVAL, GAPS = range(6)
-"""And of whole numbers: the first departure at its end, and rows into the letters: of the segment,
-of the arc to that departure, and of the arc before itself."""
+"""Columns of the integers of a departure: the first departure at its end, and rows into the letters
+of the segment, of the arc to that departure, and of the arc before itself."""
 
 XMIN, YMIN, XMAX, YMAX, ROUND, RAY_X, RAY_Y, RANK = range(8)
 FIRST_EDGE, AFTER_EDGES, GROWTH, MIDDLE_X, MIDDLE_Y = range(8, 13)
@@ -61,7 +62,9 @@ class Arcs(NamedTuple):
     edges
         (k, 4) of polygons.
     points
-        How many nodes are directed arcs; points follow.
+        Number of nodes that are directed arcs; points follow.
+    max_bends, max_backward_turn
+        Those of `PathPolicy`.
     """
 
     of: Ints
@@ -75,10 +78,19 @@ class Arcs(NamedTuple):
     solid: Floats
     edges: Floats
     points: int
+    max_bends: int
+    max_backward_turn: float
 
 
-def arcs_of(problem: Problem, outline: Outline, graph: TangentGraph, slits: Slits) -> Arcs:
+def arcs_of(
+    problem: Problem,
+    outline: Outline,
+    graph: TangentGraph,
+    slits: Slits,
+    policy: PathPolicy | None = None,
+) -> Arcs:
     """What paths are pulled over."""
+    policy = policy or PathPolicy()
     arcs, nodes = len(graph.arcs), len(graph.start) - 1
     disk = np.zeros((nodes, 5))
     disk[: 2 * arcs] = np.repeat(graph.arcs, 2, axis=0)
@@ -130,6 +142,8 @@ def arcs_of(problem: Problem, outline: Outline, graph: TangentGraph, slits: Slit
         solid,
         blockers.edges,
         2 * arcs,
+        policy.max_bends,
+        policy.max_backward_turn,
     )
 
 

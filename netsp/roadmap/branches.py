@@ -27,11 +27,12 @@ from netsp.roadmap.slits import Ends, Slits, longest_word, room_for
 from netsp.roadmap.taut_by_word import NODE, SAME_ANGLE, SLID, path_for, pull
 from netsp.roadmap.tethertree import TetherTree
 
-BACK = 1e-9
-"""Radians that a path may slide backwards: it is then longer than the taut one by their square."""
+SLIDE_TOLERANCE = 1e-9
+"""Tolerance of the angle slid on an arc, radians. A path that slides backwards by so little is
+longer than the taut one by the square of the angle."""
 
 OPEN = -1.0
-"""Instead of a length that is not known yet."""
+"""Sentinel: a length that is not known yet."""
 
 
 class Branches(NamedTuple):
@@ -174,7 +175,7 @@ def fill(
     order, out, row = branches.order, lengths.out, lengths.row
     whole = len(out) == len(order)  # then what comes before is known from the other end
     longest = longest_word(ends.row)
-    room, path = room_for(longest, slits), path_for(longest)
+    room, path = room_for(longest, slits), path_for(longest, arcs.max_bends)
     while i < len(order) and stop[0] == 0:
         u = order[i]
         while j < len(order) and row[i] >= 0 and point[u] != 0:
@@ -208,7 +209,10 @@ def _fill_in_numpy(
     order, out, row = branches.order, lengths.out, lengths.row
     whole, place = len(out) == len(order), point[order]
     longest = interpreted(longest_word)(ends.row)
-    room, path = interpreted(room_for)(longest, slits), interpreted(path_for)(longest)
+    room, path = (
+        interpreted(room_for)(longest, slits),
+        interpreted(path_for)(longest, arcs.max_bends),
+    )
     pull_one, note_alike = interpreted(pull), interpreted(spread)
     while i < len(order) and stop[0] == 0:
         u = order[i]
@@ -344,6 +348,6 @@ def _fork(
 def _from_angle(bend: int, least: float, branches: Branches) -> int:
     """The place at which what leaves a bend from an angle on begins."""
     k, after = branches.row[bend], branches.row[bend + 1]
-    while k < after and branches.angle[k] < least - BACK:
+    while k < after and branches.angle[k] < least - SLIDE_TOLERANCE:
         k += 1
     return int(branches.begin[k]) if k < after else int(branches.end[bend])

@@ -11,7 +11,7 @@ from netsp.gtsp.travel.choices import with_choices
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.model.problem import Problem
 from netsp.roadmap.explain_unreachable import shortest_tethers
-from netsp.roadmap.reachable_goals import HAIR
+from netsp.roadmap.reachable_goals import REACH_TOLERANCE
 
 
 def nearest_places(problem: Problem) -> list[int]:
@@ -60,7 +60,7 @@ def graph_of_choices(problem: Problem, build: Callable[[Problem], TravelGraph]) 
         raise InputError(
             "state: alternatives are chosen before the robot is out; expected one of each choice"
         )
-    within = shortest_tethers(problem) <= problem.tether_length * (1.0 + HAIR)
+    within = shortest_tethers(problem) <= problem.tether_length * (1.0 + REACH_TOLERANCE)
     clusters = problem.clusters
     for c in range(1, problem.visits + 1):
         if not within[clusters == c].any():

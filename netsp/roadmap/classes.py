@@ -21,19 +21,6 @@ from netsp.roadmap.explore import NON_LOOPING, Found, run_explore
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.trie import Trie
 
-STATES_PER_CLASS = 200
-"""So many states of the search for every class that may be kept, then the search is given up."""
-
-FIRST_EXCESS, GROWTH, SHRINK = 1 / 64, 4.0, 16.0
-"""A goal by itself is first searched for with this share of the tether beyond what it needs at
-least; the share grows while there are too few classes and shrinks while there are too many."""
-
-STEPS = 16
-"""Searches for one goal at most."""
-
-SHARE = 0.3
-"""Of the time, the part that may go into classes before a roadmap makes do with some."""
-
 
 @dataclass(frozen=True)
 class Classes:
@@ -63,11 +50,11 @@ def find_classes(paths: TautPaths, rule: int, most: int, clock: Clock) -> Classe
     """
     search = _Search(paths, rule, most, clock)
     search.ready()
-    search.clock = Clock(SHARE * clock.left, within=clock)
+    search.clock = Clock(search.policy.max_time_share * clock.left, within=clock)
     found = search.everything()
     if found is not None:
         return found
-    search.clock = Clock(SHARE * clock.left, within=clock)
+    search.clock = Clock(search.policy.max_time_share * clock.left, within=clock)
     return search.shortest()
 
 
@@ -75,6 +62,7 @@ class _Search:
     def __init__(self, paths: TautPaths, rule: int, most: int, clock: Clock) -> None:
         self.paths, self.rule, self.most, self.clock = paths, rule, most, clock
         self.whole = clock
+        self.policy = paths.policy.classes
         self.problem = paths.problem
         points = self.problem.points
         self.goals = len(points) - 1
@@ -98,7 +86,7 @@ class _Search:
                 trie,
                 margin=self.paths.outline.margin,
                 rule=self.rule,
-                cap=max(1_000_000, STATES_PER_CLASS * self.most),
+                cap=max(1_000_000, self.policy.states_per_class * self.most),
                 within=self.within,
                 most=4 * self.most + 1000,
                 stop=self.clock.flag,
@@ -109,7 +97,9 @@ class _Search:
             return None
         missing = sorted(set(range(1, self.goals + 1)) - {g for g, _ in best})
         if missing:
-            raise unreached(self.problem, self.paths.outline, missing, self.whole)
+            raise unreached(
+                self.problem, self.paths.outline, missing, self.whole, self.paths.policy
+            )
         rows = sorted((g, length, trie.word(w)) for (g, w), length in best.items())
         return _together(rows, math.inf)
 
@@ -121,7 +111,9 @@ class _Search:
         planar, before = contacts.tree(0)
         missing = [g for g in range(1, self.goals + 1) if planar[g] > self.within[g]]
         if missing:
-            raise unreached(self.problem, self.paths.outline, missing, self.whole)
+            raise unreached(
+                self.problem, self.paths.outline, missing, self.whole, self.paths.policy
+            )
         rays = self.problem.representative_points - self.paths.outline.origin
         rows: list[tuple[int, float, Word]] = []
         left_out = math.inf
@@ -144,15 +136,15 @@ class _Search:
         known: list[tuple[float, Word]] = []
         known_to = least
         low, high = 0.0, math.inf  # excesses known to give too few, too many
-        excess = FIRST_EXCESS * max(most - least, 0.0)
-        for _ in range(STEPS):
+        excess = self.policy.first_excess * max(most - least, 0.0)
+        for _ in range(self.policy.max_searches):
             reach = min(least + excess + self.paths.margin, most)
             found, words = self._within(g, rest.to_end, reach, share)
             if found is None:
                 high = excess
                 if self.clock.up:
                     break
-                excess = max(low + (high - low) / SHRINK, 0.0)
+                excess = max(low + (high - low) / self.policy.shrink, 0.0)
                 continue
             known, known_to = words, reach
             if reach >= most:
@@ -161,7 +153,7 @@ class _Search:
             if len(words) >= share or self.clock.up:
                 break
             low = excess
-            excess = max(GROWTH * excess, 1e-6 * most)
+            excess = max(self.policy.growth * excess, 1e-6 * most)
             if excess >= high:
                 excess = low + 0.5 * (high - low)
         if len(known) > share:
@@ -183,7 +175,7 @@ class _Search:
                 trie,
                 margin=self.paths.outline.margin,
                 rule=self.rule,
-                cap=max(20_000, STATES_PER_CLASS * share),
+                cap=max(20_000, self.policy.states_per_class * share),
                 toward=(g, rest),
                 within=within,
                 most=8 * share + 64,

@@ -13,21 +13,18 @@ from netsp.base.clock import Clock
 from netsp.base.errors import InfeasibleError, counted
 from netsp.model.problem import Circle, Problem
 from netsp.roadmap.outline import Outline, build_outline
+from netsp.roadmap.roadmap_policy import RoadmapPolicy
 from netsp.roadmap.shortest import ContactGraph
 
 if TYPE_CHECKING:
     import shapely
 
 
-MANY_OBSTACLES = 100
-"""With more, those that no path can touch are left out."""
-
-FARTHER = 1.2
-"""Times the distance, as which the ways to goals are long, at first."""
-
-
 def shortest_tethers(
-    problem: Problem, outline: Outline | None = None, clock: Clock | None = None
+    problem: Problem,
+    outline: Outline | None = None,
+    clock: Clock | None = None,
+    policy: RoadmapPolicy | None = None,
 ) -> Floats:
     """Return the shortest tether that reaches each goal, in any class.
 
@@ -50,19 +47,20 @@ def shortest_tethers(
     LimitReachedError
         The clock was up before they were known.
     """
+    policy = policy or RoadmapPolicy()
     points = problem.points
     far = np.hypot(*(points[1:, :2] - points[0, :2]).T)
     away = np.array([o.signed_distance(points[0, :2]) for o in problem.obstacles])
-    within = FARTHER * float(far.max(initial=0.0)) + problem.clearance
+    within = policy.reach.first_ratio * float(far.max(initial=0.0)) + problem.clearance
     while True:
         near = away <= within + problem.clearance
-        if len(away) <= MANY_OBSTACLES or near.all():
+        if len(away) <= policy.reach.max_whole_obstacles or near.all():
             outline = outline or build_outline(problem, clock)
-            planar = ContactGraph(outline, clock=clock).lengths([0])[0, 1:]
+            planar = ContactGraph(outline, clock=clock, policy=policy).lengths([0])[0, 1:]
             break
         some = tuple(o for o, there in zip(problem.obstacles, near, strict=True) if there)
         local = build_outline(problem.model_copy(update={"obstacles": some}), clock)
-        planar = ContactGraph(local, clock=clock).lengths([0])[0, 1:]
+        planar = ContactGraph(local, clock=clock, policy=policy).lengths([0])[0, 1:]
         # a path no longer than that does not get to the others
         longest = float(planar[np.isfinite(planar)].max(initial=0.0))
         if longest <= within:
@@ -77,11 +75,15 @@ def explain_unreached(problem: Problem, outline: Outline, missing: list[int]) ->
 
 
 def unreached(
-    problem: Problem, outline: Outline, missing: list[int], clock: Clock | None = None
+    problem: Problem,
+    outline: Outline,
+    missing: list[int],
+    clock: Clock | None = None,
+    policy: RoadmapPolicy | None = None,
 ) -> InfeasibleError:
     """Return the error about goals (as point numbers, base 0) that no admissible tether reaches;
     LimitReachedError when the clock is up before it is known why."""
-    needed = shortest_tethers(problem, outline, clock)
+    needed = shortest_tethers(problem, outline, clock, policy)
     return why_unreached(problem, needed, [g - 1 for g in missing])
 
 

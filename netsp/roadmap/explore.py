@@ -29,15 +29,15 @@ from netsp.roadmap.pending_letters import MAX_PENDING, XMAX, XMIN, YMAX, YMIN
 from netsp.roadmap.tangents import TangentGraph
 from netsp.roadmap.trie import CORE, LETTER, PARENT, Trie, add_child, trie_child
 
-SAME = 1e4
-"""Two arrivals at a directed arc with one word are one path when their lengths agree to this many
-margins (1e-6 of the size). Where outlines touch from inside, hopping between them and back takes no
-length but rounding; less tolerance would let that go on for ever."""
+ARRIVAL_TOLERANCE = 1e4
+"""Tolerance of the lengths of two arrivals at a directed arc with one word, in margins of the
+outline (1e-6 of the size): within it they are one path. Where outlines touch from inside, hopping
+between them takes no length but rounding, and would go on for ever with a smaller tolerance."""
 
 Letters = npt.NDArray[np.int32]
 
 GIVEN, NON_LOOPING, ALL = range(3)
-"""Which words may join the trie: none but those given, those that do not loop, or all."""
+"""Codes of the words that may join the trie: only the given ones, those that do not loop, all."""
 
 
 class Net(NamedTuple):
@@ -106,11 +106,12 @@ class Ask(NamedTuple):
 
 
 NODE, NEXT, WORD, BEFORE, TAKEN = range(5)
-"""Columns of a state, which is an arrival: node, first departure there, word, the state before and
-the departure taken from it."""
+"""Columns of a state's integers. A state is an arrival: its node, the first departure there, its
+word, the state before and the departure taken from that state."""
 
 TURN, REACHED, SLID = range(3)
-"""Its angle to the first departure, length at arrival, angle slid before the departure taken."""
+"""Columns of a state's floats: angle to the first departure, length at arrival, and angle slid
+before the departure taken."""
 
 
 @kernel
@@ -433,7 +434,7 @@ def run_explore(
         graph.longest_step,
     )
     wide = graph.pending + margin * np.array([-1.0, -1.0, 1.0, 1.0, 0.0])
-    words = Words(graph.letters, wide, rule, SAME * margin)
+    words = Words(graph.letters, wide, rule, ARRIVAL_TOLERANCE * margin)
     ask = Ask(
         keep,
         no_limit if cap is None else cap,

@@ -32,14 +32,12 @@ from netsp.model.problem import Goal, Problem
 from netsp.model.solution import Status
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.reach_bounds import ways_by_parity
-from netsp.roadmap.taut import MAX_CLASSES, TautRoadmap
+from netsp.roadmap.roadmap_policy import RoadmapPolicy
+from netsp.roadmap.taut import TautRoadmap
 from netsp.roadmap.taut_legs import TautLegs
 
-ENOUGH = 10.0 * OPTIMALITY_TOLERANCE
-"""A path is called optimal when its bound is within this share of it."""
-
-FAR = 50.0
-"""In units of the tether length: the present tether is looked for up to this length."""
+PATH_GAP_TOLERANCE = 10.0 * OPTIMALITY_TOLERANCE
+"""Tolerance of the gap of a path that is called optimal."""
 
 
 class GraphFromState(TravelGraph):
@@ -143,7 +141,9 @@ class GraphFromState(TravelGraph):
             # path
             if own is not None and self.legs_left_out:
                 own = dataclasses.replace(own, scope=Scope.PART)
-            closed = [b for b in (low, own) if b is not None and b.gap(length) <= ENOUGH]
+            closed = [
+                b for b in (low, own) if b is not None and b.gap(length) <= PATH_GAP_TOLERANCE
+            ]
             status = Status.optimal_of(closed[0].scope) if closed else Status.FEASIBLE
         return dataclasses.replace(
             result,
@@ -282,9 +282,10 @@ class _OpenedLegs:
 
 def graph_from_state(
     problem: Problem,
+    policy: RoadmapPolicy | None = None,
     *,
     classes: str = "all",
-    max_classes: int = MAX_CLASSES,
+    max_classes: int | None = None,
     time_limit: TimeLimit = None,
     limits_paths: bool = True,
 ) -> GraphFromState:
@@ -301,6 +302,7 @@ def graph_from_state(
     """
     state = problem.state
     assert state is not None
+    policy = policy or RoadmapPolicy()
     clock = Clock.of(time_limit)
     last = len(problem.goals) + 1
     limit = problem.tether_length
@@ -310,7 +312,7 @@ def graph_from_state(
     # a tether that is out may be far longer than a limit that was lowered since
     around = max([np.hypot(*(np.array(state.position[:2]) - plain.base[:2])), plain.scale])
     within = clock if limits_paths else None
-    far = TautPaths(placed, FAR * max(limit, float(around)), within)
+    far = TautPaths(placed, policy.max_state_ratio * max(limit, float(around)), within, policy)
     try:
         planar = far.planar_length(0, last, word)
     except NetspError:
@@ -321,6 +323,7 @@ def graph_from_state(
     # the goals' classes as ever; the state's own may be one that no tour would choose
     roadmap = TautRoadmap(
         plain,
+        policy,
         classes=classes,
         max_classes=max_classes,
         time_limit=clock,
@@ -329,7 +332,9 @@ def graph_from_state(
     cluster = np.append(roadmap.cluster, last)
     words = [*roadmap.signatures, word]
     lengths = np.append(roadmap.planar, planar)
-    legs = TautLegs(TautPaths(placed, limit + max(limit, planar), within), cluster, words, lengths)
+    legs = TautLegs(
+        TautPaths(placed, limit + max(limit, planar), within, policy), cluster, words, lengths
+    )
     part = TravelGraph(
         cluster,
         words,

@@ -38,15 +38,19 @@ from netsp.base.geometry.kernels import (
 from netsp.base.geometry.polygons import counterclockwise
 from netsp.model.problem import Circle, Problem
 
-MARGIN = 1e-10
-EPSILON = 1e-12
+GROWTH_MARGIN = 1e-10
+"""Tolerance of obstacles that touch: further growth of each, as a share of the problem's size."""
+
+COVER_TOLERANCE = 1e-12
+"""Tolerance of the test whether an obstacle covers a point, as a share of the problem's size."""
+
 OUTLINING = "outlining the obstacles"
 """Name of the stage in messages about the time limit."""
 
 STAND_OFF = 1e-8
-"""How far from a grown boundary a point is kept, as a fraction of the size: far enough that its
-tangents are well conditioned even at the tiny arcs of a polygon without clearance, near enough that
-no length changes by more."""
+"""Tolerance of a point on a grown boundary: the distance to which it is moved off, as a share of
+the problem's size. Tangents at the tiny arcs of a polygon without clearance are then well
+conditioned, and no length changes by more."""
 
 
 @kernel
@@ -114,7 +118,7 @@ def build_outline(problem: Problem, clock: Clock | None = None) -> Outline:
         The time was up before the outline was complete.
     """
     scale = problem.scale
-    margin, eps = MARGIN * scale, EPSILON * scale
+    margin, eps = GROWTH_MARGIN * scale, COVER_TOLERANCE * scale
     origin = np.array(problem.base[:2])
     blockers, disks = _grow(problem, origin, problem.clearance + margin, eps)
     bounds = np.array(problem.bounds if problem.bounds else (-np.inf, -np.inf, np.inf, np.inf))

@@ -22,18 +22,12 @@ from netsp.model.problem import Problem
 from netsp.roadmap.arcs import Arcs, arcs_of
 from netsp.roadmap.explore import ALL, Found, run_explore
 from netsp.roadmap.outline import Outline, build_outline, is_free
+from netsp.roadmap.roadmap_policy import RoadmapPolicy
 from netsp.roadmap.shortest import ContactGraph
 from netsp.roadmap.slits import Ends, Slits, build_slits, flattened, slit_lengths
-from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
+from netsp.roadmap.tangents import TangentGraph, build_tangents
 from netsp.roadmap.taut_by_word import pull_each, pull_one
 from netsp.roadmap.trie import Trie
-
-FIRST, DEEPEST, LEAST = 1.02, 1.3, 1 / 32
-"""A path is sought up to the first multiple of the distance, then up to more, in steps that grow to
-the second, from the third share of the longest possible on."""
-
-MOST_KNOWN = 5000
-"""Paths that are remembered."""
 
 
 class UnknownPathError(NetspError):
@@ -50,10 +44,8 @@ class TautPaths:
         then only what the tether can touch is looked at.
     clock
         The clock of the run; without a clock, no work is cut short.
-    max_states
-        Largest number of departures expanded for one path in the search among the paths of all
-        words. This search is the last resort, if the search for the word finds no path; a million
-        departures take about half a second.
+    policy
+        Policy of the roadmap.
 
     Raises
     ------
@@ -66,13 +58,13 @@ class TautPaths:
         problem: Problem,
         longest: float | None = None,
         clock: Clock | None = None,
-        max_states: int = 1_000_000,
+        policy: RoadmapPolicy | None = None,
     ) -> None:
         self.problem = problem
-        self.max_states = max_states
+        self.policy = policy or RoadmapPolicy()
         self.outline: Outline = build_outline(problem, clock)
         reach = problem.tether_length if longest is None else longest
-        self.tangents: TangentGraph = build_tangents(self.outline, reach, clock)
+        self.tangents: TangentGraph = build_tangents(self.outline, reach, clock, self.policy.sight)
         self._longest = 2.0 * problem.tether_length if longest is None else longest
         # what rounding and the extra growth of obstacles can add to a length
         self.margin = 100.0 * self.outline.margin
@@ -82,7 +74,7 @@ class TautPaths:
     @cached_property
     def contacts(self) -> ContactGraph:
         """Shortest paths in any class over the same tangents."""
-        return ContactGraph(self.outline, self.tangents)
+        return ContactGraph(self.outline, self.tangents, policy=self.policy)
 
     def bounds_in_any_class(self, up: Callable[[], bool]) -> Floats:
         """Return (points, points) lower bounds on 3D paths between points, in any class.
@@ -97,7 +89,7 @@ class TautPaths:
     @cached_property
     def arcs(self) -> Arcs:
         """What a path of a word is pulled over."""
-        return arcs_of(self.problem, self.outline, self.tangents, self.slits)
+        return arcs_of(self.problem, self.outline, self.tangents, self.slits, self.policy.paths)
 
     @cached_property
     def slits(self) -> Slits:
@@ -241,7 +233,7 @@ class TautPaths:
         """
         key = (a, b, tuple(word))
         if key not in self._known:
-            if len(self._known) >= MOST_KNOWN:
+            if len(self._known) >= self.policy.paths.max_known:
                 self._known.clear()
             self._known[key] = self._search(a, b, word, longest, stop)
         return self._known[key]
@@ -288,7 +280,7 @@ class TautPaths:
         """Search for the path of a word, as `_sought`, among the paths of all words.
 
         The search prunes no pending letter. It also returns None if it needs more than
-        `max_states`.
+        `PathPolicy.max_states`.
         """
         rest = self.contacts.rest(b).to_end
         for limit in self._limits(a, b, longest):
@@ -301,7 +293,7 @@ class TautPaths:
                 margin=self.outline.margin,
                 rule=ALL,
                 toward=(b, rest),
-                cap=self.max_states,
+                cap=self.policy.paths.max_states,
                 stop=stop,
             )
             for w in np.unique(found.word[found.goal == b]).tolist():
@@ -317,13 +309,14 @@ class TautPaths:
         is far cheaper, and a class has only one taut path."""
         most = (self._longest if longest is None else longest) + self.margin
         apart = math.dist(self.outline.points[a], self.outline.points[b])
-        limit, step = min(FIRST * apart + self.margin, most), FIRST
+        policy = self.policy.paths
+        limit, step = min(policy.first_ratio * apart + self.margin, most), policy.first_ratio
         while True:
             yield limit
             if limit >= most:
                 return
-            step = min(step**2, DEEPEST)
-            limit = min(max(step * limit, LEAST * most), most)
+            step = min(step**2, policy.max_growth)
+            limit = min(max(step * limit, policy.min_second_share * most), most)
 
     def tethers(
         self, goals: Sequence[int], words: Sequence[Word], longest: float, stop: Flag
@@ -365,7 +358,7 @@ class TautPaths:
 
     def _polyline(self, a: int, b: int, pieces: Sequence[tuple[int, float]]) -> Floats:
         """Tangents and circumscribed arcs as one polyline, finer where a gap is narrow."""
-        step = ARC_STEP
+        step = self.policy.paths.max_chord_turn
         for _ in range(12):
             xy = self._draw(a, b, pieces, step)
             if is_free(xy, self.outline.blockers):

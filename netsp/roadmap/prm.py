@@ -32,17 +32,9 @@ from netsp.roadmap.explain_unreachable import unreached
 from netsp.roadmap.letters import segment_letters
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.paths import TautPaths, UnknownPathError
+from netsp.roadmap.roadmap_policy import RoadmapPolicy
 from netsp.roadmap.shortest import MilestoneGraph
 from netsp.roadmap.taut_legs import TautLegs
-
-SAMPLES = 1000
-"""Milestones, as in the paper."""
-
-SHARE = 0.4
-"""Of the time, the part that sampling may take."""
-
-MAX_AUGMENTED = 2_000_000
-"""Most vertices of the augmented graph (milestone, word)."""
 
 
 class PrmRoadmap:
@@ -81,25 +73,31 @@ class PrmRoadmap:
     def __init__(
         self,
         problem: Problem,
+        policy: RoadmapPolicy | None = None,
         *,
-        samples: int = SAMPLES,
+        samples: int | None = None,
         seed: int = 0,
         shortcut: bool = False,
-        max_augmented: int = MAX_AUGMENTED,
+        max_augmented: int | None = None,
         time_limit: TimeLimit = None,
     ) -> None:
+        self.policy = policy or RoadmapPolicy()
+        prm = self.policy.prm
+        samples = prm.samples if samples is None else samples
         if not isinstance(samples, (int, np.integer)) or samples < 1:
             raise InputError(
                 f"roadmap 'prm': samples: expected a positive whole number, got {samples!r}"
             )
         self.problem = problem
         clock = Clock.of(time_limit)
-        self.paths = TautPaths(problem, clock=clock)
+        self.paths = TautPaths(problem, clock=clock, policy=self.policy)
         outline = self.paths.outline
         fixed = problem.points.copy()
         fixed[:, :2] = outline.points
         self.clock = clock
-        sampled = _sample(problem, outline, samples, seed, Clock(SHARE * clock.left, within=clock))
+        sampled = _sample(
+            problem, outline, samples, seed, Clock(prm.max_time_share * clock.left, within=clock)
+        )
         self.complete = len(sampled[0]) >= samples
         local = np.vstack([fixed, sampled[0]])
         self.milestones: Floats = local + np.append(outline.origin, 0.0)
@@ -115,7 +113,7 @@ class PrmRoadmap:
             self.edges,
             _edge_letters(self.edges, exact, outline.rays),
             problem.tether_length,
-            max_augmented,
+            prm.max_augmented if max_augmented is None else max_augmented,
             clock.flag,
         )
         self.complete &= self.augmented.complete
@@ -189,7 +187,7 @@ class PrmRoadmap:
     ) -> Detours:
         """Detours in any class along the milestones; sub-goals are joined as base and goals are."""
         del clock  # nothing compiled takes long here
-        places, side = sub_goals(self.problem, with_sub_goals)
+        places, side = sub_goals(self.problem, with_sub_goals, self.policy.detours)
         outline = self.paths.outline
         fixed = len(self.problem.points)
         local = self.milestones - np.append(outline.origin, 0.0)
@@ -215,7 +213,7 @@ class PrmRoadmap:
             needs = np.hypot(reach, points[:, 2] - points[0, 2])[: len(points)]
             beyond = [k for k in missing if needs[k] > self.problem.tether_length]
             if beyond:
-                raise unreached(self.problem, self.paths.outline, beyond)
+                raise unreached(self.problem, self.paths.outline, beyond, policy=self.policy)
             k = missing[0]
             more = f" and {len(missing) - 1} more goals" if len(missing) > 1 else ""
             raise LimitReachedError(

@@ -19,19 +19,6 @@ from netsp.roadmap.explore import ALL, run_explore
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.trie import LETTER, PARENT, Trie
 
-FIRST, GROWTH = 1.5, 1.25
-"""Ways are sought up to the first multiple of the greatest distance of a goal to its nearest, then
-up to ever more."""
-
-LEAST = 1e-3
-"""Share of the tether that they are sought up to at least."""
-
-MOST_PATHS = 1_000_000
-"""With so many no longer ones are sought."""
-
-MOST_STEPS = 20_000_000
-"""Departures that are looked at from one goal."""
-
 Found = tuple[Ints, Floats, npt.NDArray[np.uint64]]
 """(k,) other goals, (k,) lengths in the plan, (k, w) bits."""
 
@@ -43,15 +30,16 @@ def ways_by_parity(paths: TautPaths, up: Callable[[], bool]) -> WaysByParity | N
     apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
     np.fill_diagonal(apart, np.inf)
     nearest = float(apart.min(axis=1).max(initial=0.0))
-    reach, best = max(FIRST * nearest, LEAST * tether), None
+    policy = paths.policy.parity
+    reach, best = max(policy.first_ratio * nearest, policy.min_tether_share * tether), None
     if up():
         return None
     from_base = _from(paths, 0, tether + paths.margin)
-    while from_base is not None and reach < GROWTH * tether:
+    while from_base is not None and reach < policy.growth * tether:
         found = _within(paths, min(reach, tether), from_base[0], best is None, up)
         if found is None:
             break
-        best, reach = found, reach * GROWTH
+        best, reach = found, reach * policy.growth
     return best
 
 
@@ -67,7 +55,7 @@ def _within(
             return None
         each.append(found[0])
         count += found[1]
-        if count > MOST_PATHS and not first:
+        if count > paths.policy.parity.max_paths and not first:
             return None
     ends: Ints = np.vstack(
         [np.column_stack([np.full(len(goal), a), goal]) for a, (goal, _, _) in enumerate(each)]
@@ -85,7 +73,12 @@ def _from(paths: TautPaths, a: int, reach: float) -> tuple[Found, int] | None:
     words = max(1, -(-len(paths.outline.rays) // BITS))
     trie = Trie.root(reach)
     found = run_explore(
-        paths.tangents, a, trie, margin=paths.outline.margin, rule=ALL, cap=MOST_STEPS
+        paths.tangents,
+        a,
+        trie,
+        margin=paths.outline.margin,
+        rule=ALL,
+        cap=paths.policy.parity.max_states,
     )
     if found.capped:
         return None

@@ -9,19 +9,19 @@ import numpy as np
 from netsp.base.errors import InfeasibleError, counted
 from netsp.model.problem import Goal, Problem
 from netsp.roadmap.explain_unreachable import shortest_tethers, why_unreached
-
-MAX_EXPLAINED = 5
-"""Enclosed goals whose obstacles are named: to find them takes longer than to find the goals."""
+from netsp.roadmap.roadmap_policy import RoadmapPolicy
 
 UNREACHED = "out of the tether's reach among the obstacles"
 """Reason to leave a goal out, in the record of an import."""
 
-HAIR = 1e-6
-"""Relative; what is so little too far is left to the roadmap to judge."""
+REACH_TOLERANCE = 1e-6
+"""Tolerance of the tether that a goal needs, relative: nearer calls are left to the roadmap."""
 
 
 def within_reach(
-    problem: Problem, removable: Collection[str] | None = None
+    problem: Problem,
+    removable: Collection[str] | None = None,
+    policy: RoadmapPolicy | None = None,
 ) -> tuple[Problem, list[str]]:
     """The problem without the goals that its tether cannot reach.
 
@@ -31,6 +31,8 @@ def within_reach(
         Any.
     removable : collection of str, optional
         Goals that may be left out; default all.
+    policy : RoadmapPolicy, optional
+        Policy of the search for paths, and how many enclosed goals are explained.
 
     Returns
     -------
@@ -44,8 +46,9 @@ def within_reach(
     InfeasibleError
         No goal is in reach.
     """
-    needed = shortest_tethers(problem)
-    far = needed > problem.tether_length * (1.0 + HAIR)
+    policy = policy or RoadmapPolicy()
+    needed = shortest_tethers(problem, policy=policy)
+    far = needed > problem.tether_length * (1.0 + REACH_TOLERANCE)
     if removable is not None:
         far &= np.array([g.name in removable for g in problem.goals])
     if not far.any():
@@ -54,7 +57,7 @@ def within_reach(
     enclosed = 0
     for k in np.flatnonzero(far).tolist():
         enclosed += bool(np.isinf(needed[k]))
-        if np.isinf(needed[k]) and enclosed > MAX_EXPLAINED:
+        if np.isinf(needed[k]) and enclosed > policy.reach.max_explained:
             why.append(f"{problem.goal_label(k)} cannot be reached with a tether of any length")
         else:
             why.append(str(why_unreached(problem, needed, [k])))
@@ -68,7 +71,7 @@ def within_reach(
     return problem.model_copy(update={"goals": goals}), why
 
 
-def unreached_note(before: Sequence[Goal], after: Sequence[Goal]) -> str:
+def unreached_note(before: Sequence[Goal], after: Sequence[Goal], max_names: int = 5) -> str:
     """Return one line on viewpoints that a tether cannot reach.
 
     Parameters
@@ -77,6 +80,8 @@ def unreached_note(before: Sequence[Goal], after: Sequence[Goal]) -> str:
         All of them.
     after : sequence of Goal
         Those in reach.
+    max_names : int
+        Maximum number of names in the line.
 
     Returns
     -------
@@ -85,7 +90,7 @@ def unreached_note(before: Sequence[Goal], after: Sequence[Goal]) -> str:
     """
     kept = {goal.name for goal in after}
     names = [str(goal.name) for goal in before if goal.name not in kept]
-    shown = ", ".join(names[:MAX_EXPLAINED]) + (", …" if len(names) > MAX_EXPLAINED else "")
+    shown = ", ".join(names[:max_names]) + (", …" if len(names) > max_names else "")
     return (
         f"{counted(len(names), 'viewpoint')} left out: the tether cannot reach there among the "
         f"obstacles ({shown})"

@@ -11,22 +11,8 @@ import numpy as np
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock
 from netsp.roadmap.outline import Outline, is_free
-from netsp.roadmap.tangents import ARC_STEP, JOINING, TangentGraph, build_tangents
-
-WAYS_AROUND = (1.5, 3.0)
-"""Points are sought within so many times the straight line to them, one after the other, then
-anywhere."""
-
-AT_ONCE = 16
-"""Sources of shortest paths between two looks at the clock."""
-
-ARCS_AT_ONCE = 1024
-"""Number of arcs whose contacts are joined between two checks of the clock."""
-
-
-def _limits(straight: float) -> list[float]:
-    """Of searches for what is so far away; goals over one place are no distance apart."""
-    return [*(way * straight for way in WAYS_AROUND if straight > 0.0), np.inf]
+from netsp.roadmap.roadmap_policy import RoadmapPolicy
+from netsp.roadmap.tangents import JOINING, TangentGraph, build_tangents
 
 
 class ShortestPaths(Protocol):
@@ -67,13 +53,18 @@ class ContactGraph:
     """
 
     def __init__(
-        self, outline: Outline, tangents: TangentGraph | None = None, clock: Clock | None = None
+        self,
+        outline: Outline,
+        tangents: TangentGraph | None = None,
+        clock: Clock | None = None,
+        policy: RoadmapPolicy | None = None,
     ) -> None:
         from scipy.sparse import csr_array
 
+        self.policy = policy = policy or RoadmapPolicy()
         self.outline = outline
         if tangents is None:
-            tangents = build_tangents(outline, np.inf, clock)
+            tangents = build_tangents(outline, np.inf, clock, policy.sight)
         t = self.tangents = tangents
         arcs, points = len(t.arcs), len(t.points)
         self.points = points
@@ -87,9 +78,10 @@ class ContactGraph:
         rows, cols, cost = [leave], [arrive], [t.length]
         self.arc = np.full(points + 2 * edges, -1, dtype=np.int64)
         self.angle = np.zeros(points + 2 * edges)
+        each = policy.contacts.arcs_per_check
         outward, inward = _by_number(tail // 2, arcs), _by_number(t.target // 2, arcs)
         for a in range(arcs):
-            if clock is not None and a % ARCS_AT_ONCE == ARCS_AT_ONCE - 1:
+            if clock is not None and a % each == each - 1:
                 clock.check(JOINING)
             out_e, in_e = outward[a], inward[a]
             contact = np.concatenate([leave[out_e], arrive[in_e]])
@@ -130,10 +122,11 @@ class ContactGraph:
             (points,).
         """
         planar = np.zeros((self.points, self.points))
-        for first in range(0, self.points, AT_ONCE):
+        count = self.policy.contacts.sources_per_check
+        for first in range(0, self.points, count):
             if up():
                 break
-            rows = range(first, min(first + AT_ONCE, self.points))
+            rows = range(first, min(first + count, self.points))
             planar[rows] = self.lengths(rows)
         planar[~np.isfinite(planar)] = 0.0
         x, y = self.outline.points.T
@@ -163,10 +156,15 @@ class ContactGraph:
         )
         return d, before.astype(np.int64)
 
+    def _limits(self, straight: float) -> list[float]:
+        """Return the limits of the searches for a point at a distance; one if the distance is 0."""
+        ratios = self.policy.contacts.limit_ratios
+        return [*(ratio * straight for ratio in ratios if straight > 0.0), np.inf]
+
     def tree_to(self, source: int, target: int) -> Ints:
         """The node before each on shortest paths from a point, as far as another point."""
         straight = math.dist(self.outline.points[source], self.outline.points[target])
-        for limit in _limits(straight):
+        for limit in self._limits(straight):
             length, before = self.tree(source, limit)
             if np.isfinite(length[target]):
                 break
@@ -177,7 +175,7 @@ class ContactGraph:
         if most >= self.points:
             return self.tree(source)
         straight = np.sort(np.hypot(*(self.outline.points - self.outline.points[source]).T))
-        for limit in _limits(float(straight[most - 1])):
+        for limit in self._limits(float(straight[most - 1])):
             length, before = self.tree(source, limit)
             if np.isfinite(length[: self.points]).sum() >= most:
                 break
@@ -186,7 +184,7 @@ class ContactGraph:
     def draw(self, source: int, target: int, before: Ints) -> Floats:
         """(k, 2) polyline; arcs as circumscribed chords, finer where a gap is narrow."""
         nodes = _walk_back(source, target, before)
-        step = ARC_STEP
+        step = self.policy.paths.max_chord_turn
         for _ in range(12):
             xy = self._polyline(nodes, step)
             if is_free(xy, self.outline.blockers):

@@ -11,7 +11,6 @@ rule out: who stays is tested exactly (`netsp.roadmap.tangents`).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -19,54 +18,16 @@ import numpy as np
 from netsp.base.arrays import Bools, Floats, Ints, Singles
 from netsp.base.compiled.dynamic_array import more_int_rows
 from netsp.base.compiled.kernel import kernel
-from netsp.base.errors import InputError
 from netsp.base.geometry.box_tree import BoxTree, build_box_tree, spatial_order
 from netsp.base.geometry.kernels import TWO_PI, Blockers, point_segment_distance
+from netsp.roadmap.roadmap_policy import SightPolicy
 
-SLACK = 1e-6
-"""Angle (radians) by which a pencil reaches beyond its arc, and relative length by which horizons
-are put farther: more than tolerances and single precision can amount to."""
+HORIZON_TOLERANCE = 1e-6
+"""Tolerance of horizons: angle, radians, by which a pencil reaches beyond its arc, and share by
+which its horizons are put farther. Rounding to single precision is less."""
 
-TOUCHING = 4.0
-"""Disks nearer than this multiple of the sum of their radii are always tested exactly."""
-
-SEPARATE = 1.1
-"""A blocker must stay clear of a disk by this factor to give it a horizon: the directions to what
-is nearly touched are ill-conditioned."""
-
-CHORD = 1.05
-"""No less than asin(x) / x for x up to 1/2."""
-
-NARROW = 0.05
-"""Fraction of a sector. What the radius of a disk shifts directions by less is bounded instead of
-computed."""
-
-
-@dataclass(frozen=True)
-class SightPolicy:
-    """Policy of how pairs that cannot see each other are ruled out.
-
-    Parameters
-    ----------
-    sectors : int
-        Number of sectors of each pencil; at least 8. More rule out more pairs and take more memory
-        and time themselves: 8 bytes for each arc and sector.
-    min_pairs : int
-        From this many pairs on, horizons are computed; at least 0. Fewer pairs are all tested.
-    block : int
-        Number of arcs that a thread joins at one time, and whose pairs are then in memory; at
-        least 1.
-    """
-
-    sectors: int = 32
-    min_pairs: int = 100_000
-    block: int = 1024
-
-    def __post_init__(self) -> None:
-        for name, least in (("sectors", 8), ("min_pairs", 0), ("block", 1)):
-            value = getattr(self, name)
-            if value < least:
-                raise InputError(f"{name}: expected at least {least}, got {value}")
+ARCSINE_RATIO = 1.05
+"""Tolerance of arcsines that are not computed: asin(x) is at most this times x for x up to 1/2."""
 
 
 class Horizons(NamedTuple):
@@ -80,11 +41,16 @@ class Horizons(NamedTuple):
         (pencils,) direction in which the first sector begins.
     width
         (pencils,) angle of a sector.
+    min_distance_ratio, min_clearance_ratio, max_shift_share
+        Those of `SightPolicy`.
     """
 
     farthest: Singles
     low: Floats
     width: Floats
+    min_distance_ratio: float
+    min_clearance_ratio: float
+    max_shift_share: float
 
 
 class Targets(NamedTuple):
@@ -112,18 +78,28 @@ def make_targets(place: Floats) -> Targets:
     return Targets(order, tree, last)
 
 
-def empty_horizons(place: Floats, arc_count: int, full: Bools, sectors: int) -> Horizons:
+def empty_horizons(place: Floats, arc_count: int, full: Bools, policy: SightPolicy) -> Horizons:
     """Return horizons at infinity."""
     start, span = np.zeros(len(place)), np.full(len(place), TWO_PI)
     part = np.flatnonzero(~full)
     start[part] = place[part, 3]
     span[part] = place[part, 4] - place[part, 3]
-    whole = span + 2.0 * SLACK >= TWO_PI
-    start, span = np.where(whole, 0.0, start - SLACK), np.where(whole, TWO_PI, span + 2.0 * SLACK)
+    whole = span + 2.0 * HORIZON_TOLERANCE >= TWO_PI
+    start, span = (
+        np.where(whole, 0.0, start - HORIZON_TOLERANCE),
+        np.where(whole, TWO_PI, span + 2.0 * HORIZON_TOLERANCE),
+    )
     turned = np.column_stack([start + 0.5 * math.pi, start - 0.5 * math.pi])
     low = np.concatenate([turned[:arc_count].ravel(), start[arc_count:]])
-    width = np.concatenate([np.repeat(span[:arc_count], 2), span[arc_count:]]) / sectors
-    return Horizons(np.full((len(low), sectors), np.inf, dtype=np.float32), low, width)
+    width = np.concatenate([np.repeat(span[:arc_count], 2), span[arc_count:]]) / policy.sectors
+    return Horizons(
+        np.full((len(low), policy.sectors), np.inf, dtype=np.float32),
+        low,
+        width,
+        policy.min_distance_ratio,
+        policy.min_clearance_ratio,
+        policy.max_shift_share,
+    )
 
 
 @kernel
@@ -133,7 +109,7 @@ def _lower(
     """Put the horizon of all sectors wholly within an angle, which begins so far after the first
     sector, no farther than a length."""
     sectors = farthest.shape[1]
-    far *= 1.0 + SLACK
+    far *= 1.0 + HORIZON_TOLERANCE
     begin %= TWO_PI
     end = begin + angle
     for k in range(math.ceil(begin / width), min(sectors, math.floor(end / width))):
@@ -174,6 +150,7 @@ def _block(
     farthest: Singles,
     low: float,
     width: float,
+    max_shift_share: float,
 ) -> None:
     """Lower horizons to what a connected set blocks that has the disks of a radius about p and q in
     it and stays clear of the pencil's own disk.
@@ -189,14 +166,14 @@ def _block(
     a, b = math.hypot(ux, uy), math.hypot(vx, vy)
     near = min(a, b)
     cross, dot = ux * vy - uy * vx, ux * vx + uy * vy
-    is_slim = abs(offset) + radius < NARROW * width * near
+    is_slim = abs(offset) + radius < max_shift_share * width * near
     if is_slim and dot > 0.0 and abs(cross) < 0.5 * width * a * b:
         return  # most edges subtend less than a sector
     first = math.atan2(uy, ux)
     # the set subtends less than half a turn
     turn = math.atan2(cross, dot)
     if is_slim:
-        shift = CHORD * abs(offset) / near
+        shift = ARCSINE_RATIO * abs(offset) / near
         begin = first + min(turn, 0.0) + shift
         end = first + max(turn, 0.0) - shift
     else:
@@ -221,6 +198,8 @@ def find_horizons(
     """Lower the horizons of pencils `begin` to `end` - 1 to what blocks them; some stay too far
     when the flag of a clock is set."""
     farthest, lows, widths = horizons.farthest, horizons.low, horizons.width
+    min_clearance_ratio = horizons.min_clearance_ratio
+    max_shift_share = horizons.max_shift_share
     box, skip = blockers.tree.box, blockers.tree.skip
     tree_first, tree_stop, part = blockers.tree.first, blockers.tree.stop, blockers.part
     edges, circles, grow, eps = blockers.edges, blockers.circles, blockers.grow, blockers.eps
@@ -240,7 +219,7 @@ def find_horizons(
             near = _distance(cx, cy, box, node)
             if near > 2.0 * r:
                 away, angle = _subtended(cx, cy, box, node)
-                shift = CHORD * r / near
+                shift = ARCSINE_RATIO * r / near
                 if angle + 2.0 * shift < width:
                     continue
                 away -= low + shift
@@ -265,6 +244,7 @@ def find_horizons(
                         farthest,
                         low,
                         width,
+                        max_shift_share,
                     )
             if skip[node] > node + 1:
                 one, other = node + 1, skip[node + 1]
@@ -278,7 +258,7 @@ def find_horizons(
                 if e < 0:
                     d = math.hypot(circles[o, 0] - cx, circles[o, 1] - cy)
                     radius = circles[o, 2] - 2.0 * eps
-                    if radius > 0.0 and d > SEPARATE * (r + radius):
+                    if radius > 0.0 and d > min_clearance_ratio * (r + radius):
                         _block(
                             cx,
                             cy,
@@ -291,6 +271,7 @@ def find_horizons(
                             farthest,
                             low,
                             width,
+                            max_shift_share,
                         )
                     continue
                 radius = grow[o] - 2.0 * eps
@@ -302,7 +283,7 @@ def find_horizons(
                 d = point_segment_distance(
                     cx, cy, edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
                 )
-                if d > SEPARATE * (r + radius):
+                if d > min_clearance_ratio * (r + radius):
                     far = max(math.hypot(ux, uy), math.hypot(vx, vy))
                     _block(
                         cx,
@@ -316,6 +297,7 @@ def find_horizons(
                         farthest,
                         low,
                         width,
+                        max_shift_share,
                     )
 
 
@@ -352,7 +334,7 @@ def _may_see(direction: float, length: float, pencil: int, horizons: Horizons) -
     sectors = horizons.farthest.shape[1]
     if k >= sectors:
         # rounding may put the first direction last
-        whole = abs(width * sectors - TWO_PI) < SLACK
+        whole = abs(width * sectors - TWO_PI) < HORIZON_TOLERANCE
         return bool(whole and horizons.farthest[pencil, 0] >= length)
     return bool(horizons.farthest[pencil, k] >= length)
 
@@ -390,7 +372,7 @@ def pairs_in_sight(
                 near = _distance(cx, cy, box, node)
                 if near > 2.0 * r:
                     away, angle = _subtended(cx, cy, box, node)
-                    shift = CHORD * r / near
+                    shift = ARCSINE_RATIO * r / near
                     if _is_hidden(
                         away - low - shift,
                         angle + 2.0 * shift,
@@ -410,7 +392,7 @@ def pairs_in_sight(
                         continue
                     dx, dy, rj = place[j, 0] - cx, place[j, 1] - cy, place[j, 2]
                     d = math.hypot(dx, dy)
-                    visible = d <= TOUCHING * (r + rj)
+                    visible = d <= horizons.min_distance_ratio * (r + rj)
                     for tj in range(1 if j >= a_count else 2):
                         if visible:
                             break

@@ -32,9 +32,7 @@ from netsp.base.clock import NEVER, Flag
 from netsp.base.compiled.kernel import kernel
 from netsp.hsignature import Word
 from netsp.model.problem import Circle, Problem
-
-ROWS = 64
-"""Rows of the matrix that one thread takes at a time."""
+from netsp.roadmap.roadmap_policy import LegPolicy
 
 
 class Slits(NamedTuple):
@@ -121,6 +119,7 @@ def slit_lengths(
     signatures: Sequence[Word],
     rows: Ints | None = None,
     stop: Flag = NEVER,
+    policy: LegPolicy | None = None,
 ) -> Floats:
     """(V, V) planar lengths among slits of the legs between vertices; 0 within a cluster.
 
@@ -135,6 +134,7 @@ def slit_lengths(
     stop
         Of a clock; unfinished when it is set.
     """
+    policy = policy or LegPolicy()
     n = len(cluster)
     letters, row = flattened(signatures)
     whole = rows is None
@@ -142,7 +142,9 @@ def slit_lengths(
     out = np.zeros((len(asked), n))
     ends = Ends(places[cluster], slits.cells(places[:, 0])[cluster], letters, row)
     args = (asked, whole, cluster, ends, slits, out, stop)
-    blocks = [(k, min(k + ROWS, len(asked))) for k in range(0, len(asked), ROWS)]
+    blocks = [
+        (k, min(k + policy.bound_rows, len(asked))) for k in range(0, len(asked), policy.bound_rows)
+    ]
     if len(blocks) < 4:
         _rows(0, len(asked), *args)
     else:

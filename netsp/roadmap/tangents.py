@@ -25,23 +25,22 @@ from netsp.base.geometry.kernels import TWO_PI, Blockers, segment_blocked
 from netsp.roadmap.letters import arc_letters, segment_letters
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.pending_letters import pending_boxes
+from netsp.roadmap.roadmap_policy import SightPolicy
 from netsp.roadmap.sight import (
-    SightPolicy,
     empty_horizons,
     find_horizons,
     make_targets,
     pairs_in_sight,
 )
 
-ARC_STEP = math.radians(3.0)
-"""Arcs are drawn as circumscribed chords of at most this turn: 0.023 % longer than the arc."""
-
 JOINING = "finding tangents between the corners of obstacles"
+"""Name of the stage in messages about the time limit."""
+
 WRITING = "finding the rays that tangents cross"
-"""Work that a clock may end, as its messages call it."""
+"""Name of the stage in messages about the time limit."""
 
 ANGLE_TOLERANCE = 1e-7
-"""A departure this little before the arrival counts as straight on (radians)."""
+"""Tolerance of contact angles, radians: a departure so little before the arrival is straight on."""
 
 
 @dataclass(frozen=True)
@@ -174,7 +173,7 @@ def tangent_rows(
         steps = 4 * len(pairs) * (1 + len(blockers.tree.skip))
         return clock.finish(JOINING, steps, lambda stop: rows_of(pairs, stop))
     targets = make_targets(place)
-    horizons = empty_horizons(place, len(arcs), full, policy.sectors)
+    horizons = empty_horizons(place, len(arcs), full, policy)
     pencils = len(horizons.low)
     steps = pencils * policy.sectors * 8
 

@@ -26,11 +26,8 @@ from netsp.roadmap.classes import find_classes
 from netsp.roadmap.explore import ALL, NON_LOOPING
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.reach_bounds import ways_by_parity
+from netsp.roadmap.roadmap_policy import RoadmapPolicy
 from netsp.roadmap.taut_legs import TautLegs
-
-MAX_CLASSES = 22_000
-"""Default for the most augmented goals a travel graph may have: all legs of so many take 1.8 GiB
-in single precision."""
 
 RULES = {"all": ALL, "non-looping": NON_LOOPING}
 """Which classes a roadmap holds, by name."""
@@ -67,12 +64,16 @@ class TautRoadmap:
     def __init__(
         self,
         problem: Problem,
+        policy: RoadmapPolicy | None = None,
         *,
         classes: str = "all",
-        max_classes: int = MAX_CLASSES,
+        max_classes: int | None = None,
         time_limit: TimeLimit = None,
         limits_paths: bool = True,
     ) -> None:
+        self.policy = policy or RoadmapPolicy()
+        if max_classes is None:
+            max_classes = self.policy.classes.max_classes
         if not isinstance(max_classes, (int, np.integer)) or max_classes < 1:
             raise InputError(f"max_classes: expected a positive whole number, got {max_classes!r}")
         if classes not in RULES:
@@ -80,7 +81,9 @@ class TautRoadmap:
         self.problem = problem
         self.rule: KeptClasses = "non-looping" if RULES[classes] == NON_LOOPING else "all"
         self.clock = Clock.of(time_limit)
-        self.paths = TautPaths(problem, clock=self.clock if limits_paths else None)
+        self.paths = TautPaths(
+            problem, clock=self.clock if limits_paths else None, policy=self.policy
+        )
         self.outline, self.tangents = self.paths.outline, self.paths.tangents
         self._margin = self.paths.margin
         self._z = problem.points[:, 2]
@@ -98,7 +101,7 @@ class TautRoadmap:
             self.tethers,
             self.legs,
             roadmap="taut",
-            detours=partial(taut_detours, self.problem),
+            detours=partial(taut_detours, self.problem, policy=self.policy),
             between=self.paths.bounds_in_any_class,
             classes=self.rule if self.complete else "shortest",
             least_left_out=self.least_left_out,

@@ -65,31 +65,26 @@ from netsp.roadmap.arcs import (
 from netsp.roadmap.slits import HIGH, LINE, LOW, Ends, Room, Slits, longest_word, room_for, string
 from netsp.roadmap.tangents import ANGLE_TOLERANCE
 
-MOST_NODES = 256
-"""Arcs that a path may bend around; longer ones are searched for."""
-
 SAME_ANGLE = 1e-6
-"""Radians, between angles that are one."""
+"""Tolerance of angles on an arc that count as one, radians."""
 
-ON_LINE = 1e-9
-"""A string that runs along the line of a slit is taken off it by that share of its length."""
+SLIT_LINE_TOLERANCE = 1e-9
+"""Tolerance of a string that runs along the line of a slit: it is taken off the line by this share
+of its length."""
 
-TOUCH = 1e-9
-"""Share of a circle's radius that goes no deeper than touching."""
-
-LITTLE_BACK = 0.5
-"""Radians that a string may seem to go back on an arc on which it bends twice in a row."""
+TOUCH_TOLERANCE = 1e-9
+"""Tolerance of a segment that touches a circle, as a share of the radius."""
 
 NOT_PULLED = -1.0
-"""Instead of a length."""
+"""Sentinel: the length of a path that was not found."""
 
 ARRIVING, LEAVING, X_IN, Y_IN, X_OUT, Y_OUT, STRIP, SLID = range(8)
-"""Columns of a node of a path: angles on its arc where the string first and last bends (arrival and
-departure are less than half a turn from them, so that whole turns are counted); where the string is
-then, and the strip that it comes from; and the angle slid before the departure."""
+"""Columns of the floats of a path's node: angles on its arc where the string first and last bends
+(arrival and departure are less than half a turn from them, so that whole turns are counted); where
+the string is then; the strip that it comes from; and the angle slid before the departure."""
 
 NODE, EDGE = range(2)
-"""And of whole numbers: directed arc or point, and departure."""
+"""Columns of the integers of a path's node: directed arc or point, and departure."""
 
 
 class Path(NamedTuple):
@@ -109,11 +104,11 @@ class Path(NamedTuple):
 
 
 @kernel
-def path_for(longest: int) -> Path:
+def path_for(longest: int, max_bends: int) -> Path:
     """For words of at most twice so many letters."""
     return Path(
-        np.empty((MOST_NODES, 8)),
-        np.empty((MOST_NODES, 2), dtype=np.int64),
+        np.empty((max_bends, 8)),
+        np.empty((max_bends, 2), dtype=np.int64),
         np.empty(2 * longest + 64, dtype=np.int64),
     )
 
@@ -188,6 +183,7 @@ def pull(
         arcs.edges,
         path.real,
         path.whole,
+        arcs.max_backward_turn,
     )
     length = _proven(
         u,
@@ -213,7 +209,7 @@ def pull_each(
 ) -> None:
     """The lengths of (k,) taut paths as of `pull`, into `out`."""
     longest = longest_word(ends.row)
-    room, path = room_for(longest, slits), path_for(longest)
+    room, path = room_for(longest, slits), path_for(longest, arcs.max_bends)
     for k in range(len(us)):
         out[k], _, _ = pull(us[k], vs[k], ends, point, slits, arcs, room, path)
 
@@ -223,7 +219,7 @@ def pull_one(ends: Ends, point: Ints, slits: Slits, arcs: Arcs) -> tuple[float, 
     """The taut path between two ends: its length as of `pull`, departures and angles slid before
     them."""
     longest = longest_word(ends.row)
-    path = path_for(longest)
+    path = path_for(longest, arcs.max_bends)
     length, _, count = pull(0, 1, ends, point, slits, arcs, room_for(longest, slits), path)
     return length, path.whole[:count, EDGE].copy(), path.real[:count, SLID].copy()
 
@@ -241,6 +237,7 @@ def _tightened(
     edges: Floats,
     at: Floats,
     on: Ints,
+    max_backward_turn: float,
 ) -> int:
     """How many nodes a path has when it is pulled taut; 0 where it could not be.
 
@@ -256,14 +253,14 @@ def _tightened(
     i, left = 0, 16 + 8 * count
     while i + 1 < count:
         left -= 1
-        if left < 0 or count + 1 >= MOST_NODES:
+        if left < 0 or count + 1 >= len(at):
             return 0
         a, b = on[i, NODE], on[i + 1, NODE]
         if a == b:
             # on along the arc, from where it was left to where it was met again
             sense = 1.0 - 2.0 * (a % 2)
             on_by = sense * (at[i + 1, ARRIVING] - at[i, LEAVING])
-            turns = math.floor((on_by + LITTLE_BACK) / TWO_PI)
+            turns = math.floor((on_by + max_backward_turn) / TWO_PI)
             at[i, LEAVING] = at[i + 1, LEAVING] - sense * turns * TWO_PI
             at[i, X_OUT], at[i, Y_OUT] = at[i + 1, X_OUT], at[i + 1, Y_OUT]
             _close_up(i + 1, count, at, on)
@@ -395,7 +392,7 @@ def _named(
         count += 1
         before = new
         x, y = here_x, here_y
-        if count + 2 >= MOST_NODES:
+        if count + 2 >= len(at):
             return 0
     on[count, NODE] = to
     _note(count, place[v, 0], place[v, 1], float(cell[v]), at)
@@ -470,7 +467,10 @@ def _between(
         if solid[o, ROUND] >= 0.0:
             cx, cy = solid[o, MIDDLE_X] - px, solid[o, MIDDLE_Y] - py
             t = min(max(cx * ux + cy * uy, 0.0), length)
-            if math.hypot(cx - t * ux, cy - t * uy) >= solid[o, ROUND] - TOUCH * solid[o, ROUND]:
+            if (
+                math.hypot(cx - t * ux, cy - t * uy)
+                >= solid[o, ROUND] - TOUCH_TOLERANCE * solid[o, ROUND]
+            ):
                 continue
         elif not enters_polygon(
             px,
@@ -491,7 +491,7 @@ def _between(
             # past the side on which the string has not its representative point; where it runs
             # straight along its line, the strip that it is in tells
             sx, sy = at[i + 1, X_IN] - at[i, X_OUT], at[i + 1, Y_IN] - at[i, Y_OUT]
-            shift = ON_LINE * (abs(sx) + abs(sy))
+            shift = SLIT_LINE_TOLERANCE * (abs(sx) + abs(sy))
             shift = shift if solid[o, RANK] < at[i + 1, STRIP] else -shift
             rx, ry = solid[o, RAY_X] - at[i, X_OUT] - shift, solid[o, RAY_Y] - at[i, Y_OUT]
             left = sx * ry - sy * rx < 0.0

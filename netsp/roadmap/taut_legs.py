@@ -22,24 +22,7 @@ from netsp.roadmap.taut_by_word import Path, path_along, pull_each
 from netsp.roadmap.tethertree import GrowingTree, TetherTree
 
 ROUNDED_DOWN = 1.0 - 2.0**-23
-"""Of a length, what single precision rounds to no more than the length."""
-
-BLOCK = 256
-"""Rows of a matrix that are worked on at a time, so that what is in between stays small."""
-
-BLOCK_LEGS = 64_000_000
-"""At a time where not all are held, a quarter of a GiB: a leg that many share is pulled in every
-block again."""
-
-FEW = 20_000
-"""So many legs asked for in a matrix are pulled one by one, hundredths of a second; as many at a
-time where there are more."""
-
-MANY = 1500
-"""Of so many classes or fewer it is soon known where all tethers part."""
-
-SEARCHED_TOGETHER = 20
-"""More tethers than these that could not be pulled are looked for by one search."""
+"""Format of single precision: a length times this is rounded to no more than the length."""
 
 
 class TautLegs:
@@ -63,6 +46,7 @@ class TautLegs:
         self, paths: TautPaths, cluster: Ints, signatures: Sequence[Word], planar: Floats
     ) -> None:
         self.paths, self.cluster, self.planar = paths, cluster, planar
+        self.policy = paths.policy.legs
         self.signatures = list(signatures)
         self._z = paths.problem.points[:, 2]
         self._tree: TetherTree | None = None
@@ -77,10 +61,14 @@ class TautLegs:
         is given and false, anything. LimitReachedError when the clock is up before all of many are
         found; among `UNTIMED` vertices they are, whatever the clock says."""
         vertices = np.asarray(vertices, dtype=np.int64)
-        if asked is None and len(vertices) <= UNTIMED and len(self.cluster) > MANY:
+        if (
+            asked is None
+            and len(vertices) <= UNTIMED
+            and len(self.cluster) > self.policy.max_parted_classes
+        ):
             # one by one, whatever the time: to know where all tethers part takes a while
             asked = np.ones((len(vertices), len(vertices)), dtype=bool)
-        if asked is not None and asked.sum() <= max(FEW, 2 * len(vertices)):
+        if asked is not None and asked.sum() <= max(self.policy.max_single_legs, 2 * len(vertices)):
             return self._few(vertices, asked)
         return self._all(vertices, np.float64, 1.0, clock)
 
@@ -98,7 +86,7 @@ class TautLegs:
         vertices = np.asarray(vertices, dtype=np.int64)
         clock, n = clock or Clock(), len(vertices)
         _found(clock, lambda: self._grown(clock.flag), n)
-        size = max(BLOCK, BLOCK_LEGS // max(n, 1))
+        size = max(self.policy.block_rows, self.policy.max_block_legs // max(n, 1))
         branches = branches_of(self._grown(clock.flag), vertices)
         places = np.arange(n) if rows is None else np.sort(branches.rank[rows])
         out: Floats = np.empty((min(size, len(places)), n), dtype=np.float32)  # type: ignore[assignment]
@@ -132,7 +120,7 @@ class TautLegs:
             self._fill(vertices, share, out, stop, branches, branches.order)
 
         # what takes a fraction of a second is measured all the same, or there would be no tour
-        if n <= UNTIMED and len(self.cluster) <= MANY:
+        if n <= UNTIMED and len(self.cluster) <= self.policy.max_parted_classes:
             whole(NEVER)
         else:
             clock = clock or Clock()
@@ -154,10 +142,11 @@ class TautLegs:
         self, vertices: Ints, share: float, out: Floats, stop: Flag, branches: Branches, row: Ints
     ) -> None:
         """The legs between goals, into (r, k) `out`; unfinished when the flag is set."""
-        for first in range(0, len(out), BLOCK):
+        rows = self.policy.block_rows
+        for first in range(0, len(out), rows):
             if stop[0]:
                 return
-            out[first : first + BLOCK] = OPEN
+            out[first : first + rows] = OPEN
         paths, (every, points) = self.paths, self._ends
         letters, at = flattened([self.signatures[v] for v in vertices])
         ends = Ends(every.place[vertices], every.cell[vertices], letters, at)
@@ -215,7 +204,7 @@ class TautLegs:
         growing = GrowingTree(len(point))
         missing = growing.pull(ends, point, paths.slits, paths.arcs, stop).tolist()
         known: dict[int, Path] = {}
-        if len(missing) > SEARCHED_TOGETHER and not stop[0]:
+        if len(missing) > self.policy.min_joint_searches and not stop[0]:
             known = self._tethers(missing, stop)
         for v in missing:
             if stop[0]:
@@ -272,14 +261,17 @@ class TautLegs:
         )
         stop = NEVER if clock is None else clock.flag
         words = [self.signatures[v] for v in vertices]
-        low = slit_lengths(self.paths.slits, self.paths.outline.places, cluster, words, rows, stop)
+        low = slit_lengths(
+            self.paths.slits, self.paths.outline.places, cluster, words, rows, stop, self.policy
+        )
         if stop[0]:
             raise LimitReachedError(
                 f"time limit reached while bounding the legs between {len(vertices)} homotopy "
                 "classes; lower tether_length or raise the limit"
             )
-        for first in range(0, len(own), BLOCK):
-            part, block = own[first : first + BLOCK], low[first : first + BLOCK]
+        size = self.policy.block_rows
+        for first in range(0, len(own), size):
+            part, block = own[first : first + size], low[first : first + size]
             np.maximum(block, np.abs(planar[part][:, None] - planar[None, :]), out=block)
             # rounding must not lift a bound above the length
             block -= self.paths.margin
@@ -349,15 +341,17 @@ class TautLegs:
         us, vs = np.ascontiguousarray(us), np.ascontiguousarray(vs)
         out = np.empty(len(us))
 
+        count = self.policy.max_single_legs
+
         def some(first: int) -> None:
-            k = slice(first, first + FEW)
+            k = slice(first, first + count)
             pull_each(us[k], vs[k], ends, point, paths.slits, paths.arcs, out[k])
 
-        if len(us) <= FEW:
+        if len(us) <= count:
             some(0)
         else:
             with ThreadPoolExecutor(os.cpu_count()) as pool:
-                list(pool.map(some, range(0, len(us), FEW)))
+                list(pool.map(some, range(0, len(us), count)))
         return out
 
     @cached_property

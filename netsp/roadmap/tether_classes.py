@@ -20,14 +20,9 @@ from netsp.model.problem import Goal, Problem
 from netsp.roadmap.explore import ALL, Found, run_explore
 from netsp.roadmap.outline import STAND_OFF, Outline, build_outline, pushed_out
 from netsp.roadmap.paths import TautPaths
+from netsp.roadmap.roadmap_policy import RoadmapPolicy
 from netsp.roadmap.tangents import TangentGraph, assembled, tangent_rows
 from netsp.roadmap.trie import Trie
-
-FIRST, GROWTH = 1.05, 1.25
-"""A shortest path is sought up to the first multiple of the distance, then up to ever more."""
-
-MOST_STEPS = 5_000_000
-"""Departures that are looked at for one place."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +51,8 @@ class Tethers:
     ----------
     problem : Problem
         Its base, obstacles, bounds and tether length count.
+    policy : RoadmapPolicy, optional
+        Policy of the search for paths.
 
     Examples
     --------
@@ -67,7 +64,8 @@ class Tethers:
     [(1,), ()]
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, policy: RoadmapPolicy | None = None) -> None:
+        self.policy = policy or RoadmapPolicy()
         self.problem = problem.model_copy(update={"state": None})
         whole = build_outline(self.problem)
         self._outline = dataclasses.replace(whole, points=whole.points[:1], places=whole.places[:1])
@@ -75,7 +73,9 @@ class Tethers:
         close = near <= problem.tether_length
         self._arcs: Floats = whole.arcs[close]
         self._full: Bools = whole.full[close]
-        self._rows = tangent_rows(self._outline, self._arcs, self._full, problem.tether_length)
+        self._rows = tangent_rows(
+            self._outline, self._arcs, self._full, problem.tether_length, policy=self.policy.sight
+        )
 
     def to(self, x: float, y: float, word: Word | None = None, z: float = 0.0) -> TautTether | None:
         """The taut tether to a place.
@@ -107,14 +107,14 @@ class Tethers:
             return None
         if word is not None:
             return there.of_class(reduce(tuple(word)))
-        limit = FIRST * there.apart
+        limit = self.policy.tethers.first_ratio * there.apart
         while True:
             found = there.everything(min(limit, there.most))
             if len(found.goal):
                 return there.along(found, int(np.argmin(found.length)))
             if limit >= there.most or found.capped:
                 return None
-            limit *= GROWTH
+            limit *= self.policy.tethers.growth
 
     def classes(self, x: float, y: float, z: float = 0.0) -> list[TautTether]:
         """All taut tethers to a place within the tether's length, the shortest first.
@@ -131,7 +131,7 @@ class Tethers:
         Returns
         -------
         list of TautTether
-            One for each class; with very long tethers those found within `MOST_STEPS`.
+            One for each class; with very long tethers those found within `TetherPolicy.max_states`.
 
         Raises
         ------
@@ -166,16 +166,26 @@ class Tethers:
             points=np.vstack([self._outline.points, free]),
             places=np.vstack([self._outline.places, xy]),
         )
-        own = tangent_rows(outline, self._arcs, self._full, problem.tether_length, since=1)
+        own = tangent_rows(
+            outline,
+            self._arcs,
+            self._full,
+            problem.tether_length,
+            since=1,
+            policy=self.policy.sight,
+        )
         tangents = assembled(outline, self._arcs, self._full, np.vstack([self._rows, own]))
         goal = Goal.model_construct(position=(px, py, pz), name=None, choice=None, after=())
-        return _Place(problem.model_copy(update={"goals": (goal,)}), outline, tangents)
+        return _Place(problem.model_copy(update={"goals": (goal,)}), outline, tangents, self.policy)
 
 
 class _Place(TautPaths):
     """Taut paths between the base (point 0) and one place (point 1), whose tangents are there."""
 
-    def __init__(self, problem: Problem, outline: Outline, tangents: TangentGraph) -> None:
+    def __init__(
+        self, problem: Problem, outline: Outline, tangents: TangentGraph, policy: RoadmapPolicy
+    ) -> None:
+        self.policy = policy
         self.problem, self.outline, self.tangents = problem, outline, tangents
         self._longest = problem.tether_length
         self.margin = 100.0 * outline.margin
@@ -197,7 +207,7 @@ class _Place(TautPaths):
             rule=ALL,
             keep=True,
             toward=(0, nowhere),
-            cap=MOST_STEPS,
+            cap=self.policy.tethers.max_states,
         )
 
     def along(self, found: Found, hit: int) -> TautTether:

@@ -19,11 +19,11 @@ from netsp.roadmap.slits import Ends, Slits, longest_word, room_for
 from netsp.roadmap.taut_by_word import EDGE, NODE, SAME_ANGLE, SLID, Path, path_for, pull
 
 AT, PARENT, CHILD, SIBLING = range(4)
-"""Columns of a bend: its directed arc, the bend before (-1 at the root), the last bend found after
-it, and the one of the same parent that was found before it (-1 for none)."""
+"""Columns of the integers of a bend: its directed arc, the bend before (-1 at the root), the last
+bend found after it, and the one of the same parent that was found before it (-1 for none)."""
 
 TURNED, REACHED = range(2)
-"""And the angle slid on the arc before on the way to it, and the length of tether up to it."""
+"""Columns of the floats of a bend: angle slid on the arc before, and length of tether up to it."""
 
 
 class TetherTree(NamedTuple):
@@ -134,7 +134,7 @@ def _grown(
     stop: Ints,
 ) -> tuple[Ints, Floats, int]:
     longest = longest_word(ends.row)
-    room, path = room_for(longest, slits), path_for(longest)
+    room, path = room_for(longest, slits), path_for(longest, arcs.max_bends)
     for v in range(1, len(point)):
         if stop[0] != 0:
             break

@@ -23,8 +23,8 @@ from netsp.model.bound_scope import Scope
 from netsp.model.problem import Problem
 from netsp.roadmap.paths import TautPaths, UnknownPathError
 
-ROUNDING = 1e-9
-"""Radians."""
+TURNING_TOLERANCE = 1e-9
+"""Tolerance of the sum of angles by which a tether turns, radians: a rounding."""
 
 
 def turnings(problem: Problem, graph: TravelGraph) -> Floats:
@@ -90,7 +90,7 @@ def within_turning(problem: Problem, graph: TravelGraph, most: float) -> TravelG
     if math.isinf(most):
         return graph
     turning = turnings(problem, graph)
-    part = graph.subgraph(np.flatnonzero(turning <= most + ROUNDING))
+    part = graph.subgraph(np.flatnonzero(turning <= most + TURNING_TOLERANCE))
     # the limit is the problem's: no class that breaks it is in an admissible tour
     part.declared_scope = graph.scope
     part.classes, part.least_left_out = graph.classes, graph.least_left_out

@@ -28,8 +28,9 @@ from netsp.plan.answer import to_solution
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.tour_plan import HOME, Leg, legs_of
 from netsp.roadmap.explain_unreachable import explain_unreached
-from netsp.roadmap.from_state import FAR, GraphFromState, graph_from_state
+from netsp.roadmap.from_state import GraphFromState, graph_from_state
 from netsp.roadmap.paths import TautPaths, UnknownPathError
+from netsp.roadmap.roadmap_policy import RoadmapPolicy
 
 REPLAN_S = 2.0
 """Seconds that planning the rest of a tour may take; the robot holds its place meanwhile."""
@@ -91,7 +92,9 @@ def broken(
             label = problem.obstacle_label(obstacle)
             return f"{label} blocks the path to {_label(problem, leg)}", legs
     rest = problem.model_copy(update={"goals": tuple(problem.goals[g] for g in left)})
-    tethers = TautPaths(rest, FAR * max(problem.tether_length, polylines.length(tether)))
+    tethers = TautPaths(
+        rest, RoadmapPolicy().max_state_ratio * max(problem.tether_length, polylines.length(tether))
+    )
     now: list[Leg] = []
     for k, leg in enumerate(legs):
         word = concatenate(word, crossings(leg.path[:, :2], rays))
@@ -329,7 +332,7 @@ def _home(problem: Problem, state: State, tether: Floats, why: str) -> tuple[Leg
     Where the taut path is not found, the leg follows the tether as it lies.
     """
     placed = problem.model_copy(update={"goals": (Goal(position=state.position),), "state": None})
-    longest = FAR * max(problem.tether_length, polylines.length(tether))
+    longest = RoadmapPolicy().max_state_ratio * max(problem.tether_length, polylines.length(tether))
     try:
         back = TautPaths(placed, longest).path(0, 1, state.signature)[::-1]
     except UnknownPathError:

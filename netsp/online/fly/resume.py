@@ -27,8 +27,8 @@ from netsp.online.fly.flight_policy import FlightPolicy
 from netsp.online.fly.stopped import RefusedError
 from netsp.online.guard.state_file import GuardState
 from netsp.plan.tour_plan import HOME, legs_of
-from netsp.roadmap.from_state import FAR
 from netsp.roadmap.paths import TautPaths, UnknownPathError
+from netsp.roadmap.roadmap_policy import RoadmapPolicy
 
 BeginsAt = Callable[[Floats], Begun]
 """Function that returns how a flight begins, given the position of the vehicle, shape (3,)."""
@@ -156,7 +156,8 @@ def from_word(problem: Problem, word: Word, state: RunState) -> BeginsAt:
         goal = Goal(position=outside(problem, place))
         placed = problem.model_copy(update={"goals": (goal,), "state": None})
         try:
-            path = TautPaths(placed, FAR * problem.tether_length).path(0, 1, word)
+            longest = RoadmapPolicy().max_state_ratio * problem.tether_length
+            path = TautPaths(placed, longest).path(0, 1, word)
         except UnknownPathError:
             raise RefusedError(
                 f"no tether of class {', '.join(map(str, word)) or 'straight'} reaches the "
