@@ -14,6 +14,7 @@ from netsp.base.errors import InputError
 from netsp.command.main import main
 from netsp.plan.cover import cover
 from netsp.plan.cover.choose import by_program, choose, greedy, merged, pruned, simple_bound
+from netsp.plan.cover.cover_policy import CoverPolicy
 from netsp.plan.cover.viewpoints import Viewer, coarser, spread
 from netsp.world import Scene
 from netsp.world.mission.equipment import Camera
@@ -98,7 +99,9 @@ def test_lines_of_sight_keep_to_their_limits():
     place = np.array([2.9, 0.1, -4.0])
     seen = {}
     for incidence, farthest in ((80.0, 2.5), (40.0, 2.5), (80.0, 1.3)):
-        viewer = Viewer(field, patches, CAMERA, 1.2, 0.3, np.radians(incidence), farthest, len)
+        viewer = Viewer(
+            field, patches, CAMERA, 1.2, 0.3, np.radians(incidence), farthest, len, CoverPolicy()
+        )
         seen[incidence, farthest] = viewer.seen_from(place, np.pi)
         there = np.flatnonzero(seen[incidence, farthest])
         sight = place - patches.centres[there]

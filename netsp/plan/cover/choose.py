@@ -20,10 +20,7 @@ import numpy as np
 
 from netsp.base.arrays import Bools, ComparesArrays, Floats, Ints
 from netsp.base.clock import Clock
-
-LARGEST = 4_000_000
-"""Entries of the matrix that the integer program is given; of more there is no bound but the
-simplest."""
+from netsp.plan.cover.cover_policy import CoverPolicy
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +39,9 @@ class Choice(ComparesArrays):
     bound: int
 
 
-def choose(sees: Bools, areas: Floats, share: float, clock: Clock) -> Choice:
+def choose(
+    sees: Bools, areas: Floats, share: float, clock: Clock, policy: CoverPolicy | None = None
+) -> Choice:
     """Choose viewpoints.
 
     Parameters
@@ -55,17 +54,20 @@ def choose(sees: Bools, areas: Floats, share: float, clock: Clock) -> Choice:
         Of what any of them sees, by area.
     clock : Clock
         When it is up, the integer program ends with what it has.
+    policy : CoverPolicy, optional
+        Limit of the integer program.
 
     Returns
     -------
     Choice
         As few as were found.
     """
+    policy = policy or CoverPolicy()
     matrix, weights = merged(sees, areas)
     needed = share * float(weights.sum())
     taken = pruned(matrix, weights, greedy(matrix, weights, needed), needed)
     bound = simple_bound(matrix, weights, needed)
-    if matrix.sum() <= LARGEST and not clock.up and bound < len(taken):
+    if matrix.sum() <= policy.max_matrix_entries and not clock.up and bound < len(taken):
         better, proven = by_program(matrix, weights, needed, clock)
         bound = max(bound, proven)
         if better is not None and len(better) < len(taken):

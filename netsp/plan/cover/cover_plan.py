@@ -14,6 +14,7 @@ from netsp.base.errors import InputError
 from netsp.base.field_types import Point3, checked_argument
 from netsp.base.geometry import polylines
 from netsp.plan.cover.choose import Choice, choose
+from netsp.plan.cover.cover_policy import CoverPolicy
 from netsp.plan.cover.viewpoint_swaps import alternatives
 from netsp.plan.cover.viewpoints import Viewer, Viewpoints, coarser, viewpoints_of
 from netsp.world.mission.equipment import Camera
@@ -26,18 +27,8 @@ from netsp.world.scene.surfaces import extent
 from netsp.world.simulator.coverage import Patches, patches_of
 from netsp.world.simulator.mission_run import grid_of
 
-LOOKING = 0.6
-"""Of the time left, what the search for viewpoints may take; the rest is for choosing."""
-
-LONGER, MORE = 1.1, 0.2
-"""A tether whose length is not given is so many times the longest of the shortest tethers to the
-waypoints, and so many metres more."""
-
-ENDLESS = 1e6
-"""Metres of tether, until it is known how many are needed."""
-
-SHARE = 0.99
-"""Of the tether that may be needed to stand at a viewpoint, as planners allow."""
+UNKNOWN_TETHER_LENGTH = 1e6
+"""Sentinel: length of a tether of which it is not known yet how long it must be, metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +89,7 @@ def cover(
     time_limit: TimeLimit = 60.0,
     seed: int = 0,
     on_progress: Callable[[str], None] | None = None,
+    policy: CoverPolicy | None = None,
 ) -> Cover:
     """Place waypoints around the solids, meshes and clouds of a scene.
 
@@ -131,6 +123,8 @@ def cover(
         Of all that is random.
     on_progress : callable, optional
         Called with a line of text now and then.
+    policy : CoverPolicy, optional
+        Policy of the search for viewpoints and of the choice among them.
 
     Returns
     -------
@@ -143,7 +137,7 @@ def cover(
     InputError
         Values out of their ranges; an anchor in a solid; nothing that can be seen.
     """
-    camera = camera or Camera()
+    policy, camera = policy or CoverPolicy(), camera or Camera()
     tell = on_progress or (lambda _: None)
     with until_interrupt(time_limit) as clock:
         standoff = 0.5 * camera.range if standoff is None else standoff
@@ -154,7 +148,7 @@ def cover(
                 scene="-",
                 anchor=anchor,
                 start=start or anchor,
-                tether_length=ENDLESS,
+                tether_length=UNKNOWN_TETHER_LENGTH,
                 waypoints=(MissionWaypoint(position=anchor),),
             ),
             scene,
@@ -177,11 +171,11 @@ def cover(
             clearance=clearance,
             camera=camera,
             inspect=inspect,
-            tether_length=tether_length or ENDLESS,
+            tether_length=tether_length or UNKNOWN_TETHER_LENGTH,
         )
         reach = clock.bounded(
             "finding where the robot gets to",
-            lambda: _Reach.of(mission, scene, field, patches, standoff),
+            lambda: _Reach.of(mission, scene, field, patches, standoff, policy),
         )
         viewer = Viewer(
             field,
@@ -192,8 +186,9 @@ def cover(
             math.radians(incidence),
             farthest,
             reach.allowed,
+            policy,
         )
-        looking = clock.part(LOOKING)
+        looking = clock.part(policy.search_time_share)
         found = viewpoints_of(viewer, np.random.default_rng(seed), looking, tell)
         if not len(found) or not found.sees.any():
             raise InputError(
@@ -201,7 +196,7 @@ def cover(
                 "expected a shorter stand-off or clearance, or a longer tether"
             )
         tell(f"choosing among {len(found)} viewpoints")
-        choice = choose(found.sees, patches.areas, share, clock)
+        choice = choose(found.sees, patches.areas, share, clock, policy)
         return _made(mission, scene, patches, found, choice, reach, share)
 
 
@@ -244,10 +239,17 @@ class _Reach:
     field: DistanceField
     grid: Grid
     bounds: tuple[Floats, Floats] | None
+    policy: CoverPolicy
 
     @classmethod
     def of(
-        cls, mission: Mission, scene: Scene, field: DistanceField, patches: Patches, standoff: float
+        cls,
+        mission: Mission,
+        scene: Scene,
+        field: DistanceField,
+        patches: Patches,
+        standoff: float,
+        policy: CoverPolicy,
     ) -> _Reach:
         """With a grid about everything that viewpoints may be at."""
         low, high = extent(scene, np.vstack([patches.centres, mission.every_place]))
@@ -263,7 +265,7 @@ class _Reach:
         bounds = None
         if scene.bounds is not None:
             bounds = np.array(scene.bounds[:3]), np.array(scene.bounds[3:])
-        return cls(mission, field, grid_of(there, scene, field), bounds)
+        return cls(mission, field, grid_of(there, scene, field), bounds, policy)
 
     def allowed(self, places: Floats) -> Bools:
         """Which of some places (n, 3) the robot gets to, within the bounds."""
@@ -271,7 +273,7 @@ class _Reach:
         if self.bounds is not None:
             good &= (places >= self.bounds[0]).all(axis=1) & (places <= self.bounds[1]).all(axis=1)
         anchor = np.array(self.mission.anchor)
-        limit = SHARE * self.mission.tether_length
+        limit = self.policy.max_tether_share * self.mission.tether_length
         good &= np.linalg.norm(places - anchor, axis=1) <= limit
         inside = np.flatnonzero(good)
         if len(inside):
@@ -288,7 +290,7 @@ class _Reach:
             path = tree.path(k)
             if path is not None:
                 out[k] = polylines.length(path)
-                if out[k] > SHARE * self.mission.tether_length:
+                if out[k] > self.policy.max_tether_share * self.mission.tether_length:
                     out[k] = polylines.length(taut(self.field, path, 0.0, self.mission.delta))
         return out
 
@@ -302,13 +304,13 @@ def _made(
     reach: _Reach,
     share: float,
 ) -> Cover:
-    chosen = found.only(choice.chosen)
+    chosen, policy = found.only(choice.chosen), reach.policy
     length = mission.tether_length
-    if length == ENDLESS:
+    if length == UNKNOWN_TETHER_LENGTH:
         longest = float(reach.tethers(chosen.places).max())
-        length = round(LONGER * longest + MORE, 2)
+        length = round(policy.tether_ratio * longest + policy.tether_spare, 2)
     needed = share * float(patches.areas[found.sees.any(axis=0)].sum())
-    others_of = alternatives(found, choice.chosen, patches.areas, needed)
+    others_of = alternatives(found, choice.chosen, patches.areas, needed, policy)
     own = [_viewpoint(found, k) for k in choice.chosen]
     waypoints = tuple(
         MissionWaypoint(

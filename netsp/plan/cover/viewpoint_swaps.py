@@ -5,13 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from netsp.base.arrays import Floats, Ints
+from netsp.plan.cover.cover_policy import CoverPolicy
 from netsp.plan.cover.viewpoints import Viewpoints
 
-MOST, MOST_PLACES = 2, 150
-"""Alternatives of a viewpoint; and places in all, for a tour chooses among them."""
 
-
-def alternatives(found: Viewpoints, chosen: Ints, areas: Floats, needed: float) -> list[list[int]]:
+def alternatives(
+    found: Viewpoints,
+    chosen: Ints,
+    areas: Floats,
+    needed: float,
+    policy: CoverPolicy | None = None,
+) -> list[list[int]]:
     """Alternatives of each chosen viewpoint.
 
     Every patch that is seen gets one owner among the chosen. Who takes a viewpoint's place loses
@@ -29,6 +33,8 @@ def alternatives(found: Viewpoints, chosen: Ints, areas: Floats, needed: float) 
         Of the patches.
     needed : float
         Area that is to be seen.
+    policy : CoverPolicy, optional
+        Limits of the numbers of alternatives and places.
 
     Returns
     -------
@@ -36,7 +42,8 @@ def alternatives(found: Viewpoints, chosen: Ints, areas: Floats, needed: float) 
         Numbers of the alternatives of each.
     """
     out: list[list[int]] = [[] for _ in chosen]
-    most = min(MOST, MOST_PLACES // max(len(chosen), 1) - 1)
+    policy = policy or CoverPolicy()
+    most = min(policy.max_alternatives, policy.max_places // max(len(chosen), 1) - 1)
     if most <= 0 or len(chosen) < 2:
         return out
     sees = found.sees[chosen]

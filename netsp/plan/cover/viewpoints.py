@@ -17,22 +17,10 @@ import numpy as np
 
 from netsp.base.arrays import Bools, ComparesArrays, Floats, Ints
 from netsp.base.clock import Clock
+from netsp.plan.cover.cover_policy import CoverPolicy
 from netsp.world.mission.equipment import Camera
 from netsp.world.scene.field import DistanceField
 from netsp.world.simulator.coverage import Coverage, Patches
-
-SPACING = 0.25
-"""Of the width that the camera sees at the stand-off: from one patch that is stood before to the
-next."""
-
-TRIES = 24
-"""Places at other angles and distances for a patch that is not seen yet."""
-
-AT_ONCE = 100
-"""Patches not seen yet, for which places are sought together."""
-
-NEARER = 0.4
-"""Of the stand-off: as near as that the robot goes where there is no other place."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +82,8 @@ class Viewer:
         Metres that a patch may be away.
     allowed : callable
         Which of some places (n, 3) the robot gets to.
+    policy : CoverPolicy
+        How densely places are tried.
     """
 
     field: DistanceField
@@ -104,6 +94,7 @@ class Viewer:
     incidence: float
     farthest: float
     allowed: Callable[[Floats], Bools]
+    policy: CoverPolicy
 
     def seen_from(self, place: Floats, heading: float) -> Bools:
         """Which patches are seen.
@@ -215,7 +206,7 @@ def viewpoints_of(
     """
     patches, camera = viewer.patches, viewer.camera
     width = 2.0 * viewer.standoff * math.tan(math.radians(0.5 * camera.field_of_view))
-    targets = spread(patches.centres, SPACING * width)
+    targets = spread(patches.centres, viewer.policy.patch_spacing * width)
     tell(f"looking at the structure from before {len(targets)} of {len(patches.areas)} patches")
     straight = np.zeros((len(targets), 3))
     places, before = viewer.before(targets, straight, np.full(len(targets), viewer.standoff))
@@ -224,7 +215,9 @@ def viewpoints_of(
     hidden = np.flatnonzero(~seen)
     rng.shuffle(hidden)
     # one after the other, for a place that shows one often shows its neighbours
-    for part in np.array_split(hidden, max(1, math.ceil(len(hidden) / AT_ONCE))):
+    for part in np.array_split(
+        hidden, max(1, math.ceil(len(hidden) / viewer.policy.patches_per_round))
+    ):
         left = part[~seen[part]]
         if clock.up or not len(left):
             continue
@@ -245,12 +238,14 @@ def viewpoints_of(
 
 def _around(viewer: Viewer, patches: Ints, rng: np.random.Generator) -> tuple[Ints, Floats, Floats]:
     """For each patch, other angles and distances to look at it from; straight first."""
-    many = np.repeat(patches, TRIES)
+    tries = viewer.policy.views_per_hidden_patch
+    many = np.repeat(patches, tries)
     off = rng.normal(size=(len(many), 3)) * rng.uniform(0.0, 1.2, len(many))[:, None]
-    least, most = NEARER * viewer.standoff, min(viewer.farthest, 2.0 * viewer.standoff)
+    least = viewer.policy.min_standoff_ratio * viewer.standoff
+    most = min(viewer.farthest, 2.0 * viewer.standoff)
     far = rng.uniform(min(least, most), most, len(many))
-    far[np.arange(len(many)) % TRIES < TRIES // 2] = viewer.standoff
-    off[::TRIES] = 0.0
+    far[np.arange(len(many)) % tries < tries // 2] = viewer.standoff
+    off[::tries] = 0.0
     return many, off, far
 
 

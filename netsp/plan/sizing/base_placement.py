@@ -31,6 +31,7 @@ from netsp.mip.goal_relaxation import ROUNDING
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE, LowerBound, Scope, strongest
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution, Status
+from netsp.plan.sizing.sizing_policy import SizingPolicy
 from netsp.plan.solve_problem import solve, solve_graph
 from netsp.roadmap.outline import build_outline
 from netsp.roadmap.shortest import ContactGraph
@@ -38,10 +39,8 @@ from netsp.roadmap.shortest import ContactGraph
 if TYPE_CHECKING:
     import pandas
 
-MOST_CANDIDATES = 10_000
-
-HAIR = 1e-9
-"""Relative rounding of distances."""
+CROP_TOLERANCE = 1e-9
+"""Tolerance of the radius of the part of a map that was imported, relative: a rounding."""
 
 HEAD = (
     "rank",
@@ -230,6 +229,7 @@ def best_base(
     time_limit: TimeLimit = None,
     seed: int = 0,
     on_candidate: Callable[[Candidate, int], None] | None = None,
+    policy: SizingPolicy | None = None,
 ) -> BaseSearch:
     """The base, among candidates, from which the tour of a problem is shortest.
 
@@ -249,6 +249,8 @@ def best_base(
         Of all that is random.
     on_candidate : callable, optional
         Called with every candidate that was solved, and how many may still be better.
+    policy : SizingPolicy, optional
+        Limit of the number of candidates.
 
     Returns
     -------
@@ -262,7 +264,7 @@ def best_base(
     """
     if problem.state is not None:
         raise InputError("state: a base is chosen before the robot is out; expected none")
-    places = _places(problem, candidates)
+    places = _places(problem, candidates, policy or SizingPolicy())
     _check_crop(problem, places, names)
     with until_interrupt(time_limit) as clock:
         rated = _rated(problem, places, names, clock, seed)
@@ -331,7 +333,7 @@ def _at(problem: Problem, position: Sequence[float]) -> Problem:
     return Problem.model_validate({**data, "base": tuple(position)})
 
 
-def _places(problem: Problem, candidates: npt.ArrayLike) -> Floats:
+def _places(problem: Problem, candidates: npt.ArrayLike, policy: SizingPolicy) -> Floats:
     """(k, 3) finite places."""
     try:
         given = np.atleast_2d(np.asarray(candidates, dtype=float))
@@ -341,8 +343,9 @@ def _places(problem: Problem, candidates: npt.ArrayLike) -> Floats:
         raise InputError(f"candidates: expected rows of x, y or x, y, z, got shape {given.shape}")
     if not np.isfinite(given).all():
         raise InputError("candidates: expected finite coordinates")
-    if len(given) > MOST_CANDIDATES:
-        raise InputError(f"candidates: {len(given):,}; expected at most {MOST_CANDIDATES:,}")
+    most = policy.max_candidates
+    if len(given) > most:
+        raise InputError(f"candidates: {len(given):,}; expected at most {most:,}")
     if given.shape[1] == 2:
         given = np.column_stack([given, np.full(len(given), problem.base[2])])
     return given
@@ -355,7 +358,7 @@ def _check_crop(problem: Problem, places: Floats, names: Sequence[str | None] | 
         return
     away = np.hypot(*(places[:, :2] - np.array(circle.center)).T)
     beyond = np.flatnonzero(
-        away + problem.tether_length + problem.clearance > circle.radius * (1.0 + HAIR)
+        away + problem.tether_length + problem.clearance > circle.radius * (1.0 + CROP_TOLERANCE)
     )
     if len(beyond):
         first = int(beyond[0])

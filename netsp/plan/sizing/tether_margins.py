@@ -23,13 +23,11 @@ from netsp.base.errors import InputError, NetspError
 from netsp.base.field_types import checked_argument
 from netsp.model.problem import Circle, Problem
 from netsp.model.solution import MAX_FRICTION, Solution, tension_ratio
+from netsp.plan.sizing.sizing_policy import SizingPolicy
 from netsp.roadmap.paths import TautPaths
 
 if TYPE_CHECKING:
     import pandas
-
-STEPS = 40
-"""Of a bisection: to 1e-12 of where it began."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +119,13 @@ class Margins:
         return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def margins(problem: Problem, solution: Solution, friction: float = 0.0) -> Margins:
+def margins(
+    problem: Problem,
+    solution: Solution,
+    friction: float = 0.0,
+    *,
+    policy: SizingPolicy | None = None,
+) -> Margins:
     """The margins of a tour.
 
     Parameters
@@ -132,6 +136,8 @@ def margins(problem: Problem, solution: Solution, friction: float = 0.0) -> Marg
         With a tour that fits.
     friction : float
         Coefficient of friction of the tether on obstacles, 0 to 10.
+    policy : SizingPolicy, optional
+        How exactly the margin is found.
 
     Returns
     -------
@@ -156,7 +162,7 @@ def margins(problem: Problem, solution: Solution, friction: float = 0.0) -> Marg
     slack = min(s.slack for s in stops)
     if slack < -problem.tolerance:
         raise InputError(f"solution: its tether is {-slack:.6g} too short; expected one that fits")
-    least, limited_by = _obstacles(problem, solution)
+    least, limited_by = _obstacles(problem, solution, policy or SizingPolicy())
     beside = _nearest(problem, np.array(solution.path))
     return Margins(
         least, limited_by, max(slack, 0.0), max(min(beside, slack), 0.0), friction, stops
@@ -206,7 +212,7 @@ def _nearest(problem: Problem, path: Floats) -> float:
     return out
 
 
-def _obstacles(problem: Problem, solution: Solution) -> tuple[float, str]:
+def _obstacles(problem: Problem, solution: Solution, policy: SizingPolicy) -> tuple[float, str]:
     """The largest growth for which all tethers were measured to fit, and what ends it."""
     if not problem.obstacles:
         return math.inf, "there are no obstacles"
@@ -223,7 +229,7 @@ def _obstacles(problem: Problem, solution: Solution) -> tuple[float, str]:
     why = _complaint(problem, solution, high)
     if why is None:
         return high, reason
-    for _ in range(STEPS):
+    for _ in range(policy.bisections):
         middle = 0.5 * (low + high)
         found = _complaint(problem, solution, middle)
         if found is None:

@@ -39,20 +39,18 @@ from netsp.gtsp.travel.result import Result
 from netsp.model.bound_scope import LowerBound, Scope
 from netsp.model.problem import Problem
 from netsp.model.solution import Status
+from netsp.plan.sizing.sizing_policy import SizingPolicy
 from netsp.plan.solve_problem import solve_graph, travel_graph
 from netsp.roadmap.explain_unreachable import shortest_tethers
 
 if TYPE_CHECKING:
     import pandas
 
-MEASURED = 1500
-"""Vertices among which all legs are measured at once, for all steps together."""
+REQUEST_TOLERANCE = 1e-7
+"""Tolerance of a tether for which a roadmap is built, relative: it is made so much longer."""
 
-ROOM = 1e-7
-"""Share that is added to the tethers of which a roadmap is asked."""
-
-SAME = 1e-9
-"""Share by which lengths of tours and of tethers may differ and be the same."""
+STEP_TOLERANCE = 1e-9
+"""Tolerance of lengths of tours and of tethers that are the same, relative."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +153,7 @@ class TetherCurve(Drawn):
         float
             Its length; inf where no tour is known.
         """
-        fits = [s.length for s in self.steps if s.tether <= tether * (1.0 + SAME)]
+        fits = [s.length for s in self.steps if s.tether <= tether * (1.0 + STEP_TOLERANCE)]
         return min(fits, default=np.inf)
 
     def to_json(self) -> str:
@@ -236,6 +234,7 @@ def tether_curve(
     time_limit: TimeLimit = None,
     seed: int = 0,
     on_step: Callable[[Step], None] | None = None,
+    policy: SizingPolicy | None = None,
 ) -> TetherCurve:
     """The shortest tour of a problem as a function of its tether's length.
 
@@ -253,6 +252,8 @@ def tether_curve(
         Of all that is random.
     on_step : callable, optional
         Called with every step, from the longest tether down.
+    policy : SizingPolicy, optional
+        How many classes are measured at the start.
 
     Returns
     -------
@@ -280,11 +281,16 @@ def tether_curve(
             )
         problem = problem.model_copy(update={"tether_length": longest})
     with until_interrupt(time_limit) as clock:
-        return _staircase(problem, solver, clock, seed, on_step)
+        return _staircase(problem, solver, clock, seed, on_step, policy or SizingPolicy())
 
 
 def _staircase(
-    problem: Problem, solver: str, clock: Clock, seed: int, on_step: Callable[[Step], None] | None
+    problem: Problem,
+    solver: str,
+    clock: Clock,
+    seed: int,
+    on_step: Callable[[Step], None] | None,
+    policy: SizingPolicy,
 ) -> TetherCurve:
     """Solve for shorter and shorter tethers, until the time is up or no tour is left."""
     shortest = _of_choices(problem, shortest_tethers(problem))
@@ -292,12 +298,12 @@ def _staircase(
     graph = travel_graph(problem.model_copy(update={"tether_length": useful}), time_limit=clock)
     curve: list[Step] = []
     limit, bound, whole = problem.tether_length, 0.0, False
-    if len(graph) <= MEASURED:
+    if len(graph) <= policy.max_measured_classes:
         with graph.on_clock(clock):
             _ = graph.costs
     while True:
         first = not curve
-        fits = graph.tethers <= limit if first else graph.tethers < limit * (1.0 - SAME)
+        fits = graph.tethers <= limit if first else graph.tethers < limit * (1.0 - STEP_TOLERANCE)
         fits[0] = True
         if len(np.unique(graph.cluster[fits])) <= graph.goal_count:
             whole = True
@@ -323,7 +329,7 @@ def _staircase(
             tuple(int(g) - 1 for g in graph.goal[tour[1:]]),
         )
         limit = needs
-        if curve and step.length <= curve[-1].length * (1.0 + SAME):
+        if curve and step.length <= curve[-1].length * (1.0 + STEP_TOLERANCE):
             before = curve.pop()
             step = Step(
                 needs, before.until, before.length, before.lower_bound, before.status, step.order
@@ -351,13 +357,13 @@ def _useful(problem: Problem, shortest: float, solver: str, clock: Clock, seed: 
     from the shortest sufficient tether."""
     if not shortest < problem.tether_length:
         return problem.tether_length  # out of reach, which will be said; or no choice
-    least = min(shortest * (1.0 + ROOM), problem.tether_length)
+    least = min(shortest * (1.0 + REQUEST_TOLERANCE), problem.tether_length)
     graph = travel_graph(problem.model_copy(update={"tether_length": least}), time_limit=clock)
     with graph.on_clock(clock):
         known = solve_graph(graph, solver, time_limit=clock, seed=seed).length
     if known is None:
         return problem.tether_length
-    return min(max(0.5 * known * (1.0 + ROOM), least), problem.tether_length)
+    return min(max(0.5 * known * (1.0 + REQUEST_TOLERANCE), least), problem.tether_length)
 
 
 def _shortest(
