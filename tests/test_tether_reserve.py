@@ -12,7 +12,12 @@ from netsp import Circle, InputError, Problem, solve
 from netsp.command.main import main
 from netsp.online.execute import ExecutionOptions, Surprises, execute
 from netsp.online.execute.execution_log import describe_execution
-from netsp.online.execute.tether_limits import RESOLUTION, describe_limits, limit_periods, overruns
+from netsp.online.execute.tether_limits import (
+    TETHER_TOLERANCE,
+    describe_limits,
+    limit_periods,
+    overruns,
+)
 from netsp.online.execute.tether_reserve import ReservePolicy
 from netsp.online.execute.tour_repair import repair, reserved_limit
 from netsp.online.fly import tour_flight
@@ -46,7 +51,7 @@ def check_limits(run):
     when it was not."""
     s, met = run.summary, True
     for row in run.rows:
-        if row.tether <= row.limit * (1.0 + RESOLUTION):
+        if row.tether <= row.limit * (1.0 + TETHER_TOLERANCE):
             met = True
         elif met and row.shortening:
             met = False  # the limit was lowered just now

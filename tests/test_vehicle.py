@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from netsp import InputError
 from netsp.world.simulator.current import Water
 from netsp.world.vehicle import VEHICLES, make_vehicle
-from netsp.world.vehicle.control import HORIZON, PredictiveControl, solve_positive, within
+from netsp.world.vehicle.control import PredictiveControl, solve_positive, within
 from netsp.world.vehicle.dynamics import (
     ALLOCATION,
     INERTIA,
-    THRUST,
+    MAX_THRUST,
     derivative,
     linearised,
     step,
@@ -123,10 +123,10 @@ def test_it_follows_a_circle_to_centimetres_whatever_the_current(water):
 @given(st.lists(st.floats(-50, 50), min_size=3, max_size=3))
 def test_no_thruster_is_asked_for_more_than_it_gives(far):
     control = PredictiveControl()
-    aims = np.tile(np.r_[far, np.zeros(5)], (HORIZON, 1))
+    aims = np.tile(np.r_[far, np.zeros(5)], (len(control.thrusts), 1))
     for _ in range(3):
         force = control.force(np.zeros(8), aims, STILL)
-        assert (np.abs(control.thrusts) <= THRUST).all()
+        assert (np.abs(control.thrusts) <= MAX_THRUST).all()
         assert force == pytest.approx(ALLOCATION @ control.thrusts[0])
 
 
@@ -186,5 +186,5 @@ def test_top_speeds_are_those_that_the_thrusters_allow():
     """1.5 m/s ahead, as published; abeam and up what the drag leaves of four and two thrusters."""
     ahead = fastest((1, 0, 0))
     assert 1.35 < ahead <= 1.51
-    across = math.sqrt(4 * THRUST * math.sqrt(0.5) / 217)
+    across = math.sqrt(4 * MAX_THRUST * math.sqrt(0.5) / 217)
     assert fastest((0, 1, 0)) == pytest.approx(across, rel=0.1)

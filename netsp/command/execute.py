@@ -139,11 +139,11 @@ def _problem(args: argparse.Namespace) -> int:
     from netsp.model.problem import Problem
     from netsp.model.solution import Solution
     from netsp.online.execute.events import Surprises
+    from netsp.online.execute.execute_policy import RepairPolicy
     from netsp.online.execute.execution_files import write_execution
     from netsp.online.execute.execution_log import ExecutionOptions, describe_execution
     from netsp.online.execute.tether_reserve import ReservePolicy
     from netsp.online.execute.tour_execution import execute
-    from netsp.online.execute.tour_repair import REPLAN_S
     from netsp.view.pictures.execution import save_execution
 
     if args.solution is None:
@@ -154,12 +154,15 @@ def _problem(args: argparse.Namespace) -> int:
     surprises = Surprises.load(args.surprise) if args.surprise else None
     if surprises is not None:
         surprises.check(problem, args.surprise)
+    planning_limit = args.planning_limit
+    if planning_limit is None:
+        planning_limit = RepairPolicy.time_limit_s
     options = ExecutionOptions(
         speed=SPEED if args.speed is None else args.speed, vehicle=args.vehicle,
         delta=args.delta, repair=args.planner == "repair",
         current=vector(args.current, "--current") if args.current else (0.0, 0.0, 0.0),
         gusts=args.gusts or 0.0, seed=args.seed,
-        planning_limit=REPLAN_S if args.planning_limit is None else args.planning_limit,
+        planning_limit=planning_limit,
         reserve_policy=ReservePolicy(args.reserve),
     )  # fmt: skip
     show = not args.quiet and sys.stderr.isatty()

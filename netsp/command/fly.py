@@ -300,10 +300,10 @@ def _flown(
     from netsp.base.files import output_folder
     from netsp.command.execute import show_execution
     from netsp.online.execute.events import Surprises
+    from netsp.online.execute.execute_policy import RepairPolicy
     from netsp.online.execute.execution_log import ExecutionOptions
     from netsp.online.execute.run_record import RunRecord
     from netsp.online.execute.tether_reserve import ReservePolicy
-    from netsp.online.execute.tour_repair import REPLAN_S
     from netsp.online.fly.flight_rehearsal import rehearse
     from netsp.online.fly.flight_time import FlightClock
     from netsp.online.fly.tour_flight import check_options, fly
@@ -311,9 +311,12 @@ def _flown(
     from netsp.online.link.session import Session
     from netsp.online.link.udp import UdpLink
 
+    planning_limit = args.planning_limit
+    if planning_limit is None:
+        planning_limit = RepairPolicy.time_limit_s
     options = ExecutionOptions(
         speed=args.speed, reach=args.reach, seed=args.seed,
-        planning_limit=REPLAN_S if args.planning_limit is None else args.planning_limit,
+        planning_limit=planning_limit,
         reserve_policy=ReservePolicy(args.reserve),
     )  # fmt: skip
     assert surprises is None or isinstance(surprises, Surprises)

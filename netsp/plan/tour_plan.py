@@ -14,7 +14,7 @@ from netsp.model.problem import Problem
 from netsp.model.solution import Solution
 
 HOME = -1
-"""The goal of the last leg."""
+"""Sentinel for the base in place of a goal: the goal of the last leg."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from netsp.base.field_types import NonNegative, Point2, Point3, Positive, checke
 from netsp.base.files import FileModel
 from netsp.base.validated import Model, shown
 from netsp.model.problem import WIDEST, Circle, GoalLike, Obstacle, Polygon, Problem
+from netsp.online.execute.execute_policy import ExecutePolicy
 
 
 def _which(value: Any) -> Any:
@@ -28,11 +29,6 @@ def _which(value: Any) -> Any:
 
 Which = Annotated[Annotated[int, Field(ge=0)] | str, BeforeValidator(_which)]
 """An obstacle or goal: its index, or its name; where it has none, `#index` as messages say."""
-
-
-SPECK = 1e-4
-"""Of the tether: what appears and is smaller, on a site that has its place on the earth, was meant
-in degrees."""
 
 
 class Move(Model):
@@ -142,7 +138,7 @@ class Surprises(FileModel):
                 raise InputError(f"{where}events[{k}]: {error}") from None
 
 
-def changed(problem: Problem, event: Event) -> Problem:
+def changed(problem: Problem, event: Event, policy: ExecutePolicy = ExecutePolicy()) -> Problem:
     """The problem after an event; goals keep their numbers, cancelled ones too, and so do the
     obstacles but for those that vanish. Goals inside obstacles are left to the caller.
 
@@ -172,9 +168,10 @@ def changed(problem: Problem, event: Event) -> Problem:
         raise InputError(f"{event.kind}: {complaint}")
     if event.appear is not None and problem.origin is not None:
         box = event.appear.shape(0.0).bounds
-        if max(box[2] - box[0], box[3] - box[1]) < SPECK * problem.tether_length:
+        size = max(box[2] - box[0], box[3] - box[1])
+        if size < policy.min_obstacle_ratio * problem.tether_length:
             raise InputError(
-                f"appear: is {max(box[2] - box[0], box[3] - box[1]):.1g} {problem.units} across; "
+                f"appear: is {size:.1g} {problem.units} across; "
                 "expected coordinates of the problem, from its base on, not degrees"
             )
     if event.add_goal is not None:

@@ -15,6 +15,7 @@ from netsp.base.reprs import Drawn
 from netsp.hsignature import Word
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
+from netsp.online.execute.execute_policy import ExecutePolicy, RepairPolicy
 from netsp.online.execute.tether_limits import (
     LimitPeriod,
     Overrun,
@@ -23,7 +24,6 @@ from netsp.online.execute.tether_limits import (
     overruns,
 )
 from netsp.online.execute.tether_reserve import ReservePolicy
-from netsp.online.execute.tour_repair import REPLAN_S
 from netsp.plan.tour_plan import HOME
 
 if TYPE_CHECKING:
@@ -56,6 +56,8 @@ class ExecutionOptions:
         Of the gusts and of the solver.
     reserve_policy : ReservePolicy
         How much tether repairs keep in reserve.
+    policy : ExecutePolicy
+        Steps and thresholds.
     """
 
     speed: float = 0.5
@@ -63,11 +65,12 @@ class ExecutionOptions:
     reach: float = 0.1
     delta: float | None = None
     repair: bool = True
-    planning_limit: float = REPLAN_S
+    planning_limit: float = RepairPolicy.time_limit_s
     current: Point3 = (0.0, 0.0, 0.0)
     gusts: float = 0.0
     seed: int = 0
     reserve_policy: ReservePolicy = field(default_factory=ReservePolicy)
+    policy: ExecutePolicy = ExecutePolicy()
 
 
 @dataclass(frozen=True)

@@ -21,13 +21,11 @@ from netsp.base.files import FileModel, make_folder, write_text
 from netsp.base.validated import Model
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
+from netsp.online.execute.execute_policy import ExecutePolicy
 from netsp.online.execute.execution_log import ExecutionRow
 
 LOG, STATE, PROBLEM, SOLUTION = "log.csv", "state.json", "problem.json", "solution.json"
 """Files of a run that are written while it goes on."""
-
-PERIOD_S = 1.0
-"""Seconds of the run between two states."""
 
 
 GoalIndex = Annotated[Integer, Field(ge=0)]
@@ -164,8 +162,13 @@ class RunRecord:
         The plan at the start.
     """
 
-    def __init__(self, folder: str | Path, solution: Solution) -> None:
-        self.folder, self.solution = Path(folder), solution
+    def __init__(
+        self,
+        folder: str | Path,
+        solution: Solution,
+        policy: ExecutePolicy = ExecutePolicy(),
+    ) -> None:
+        self.folder, self.solution, self.policy = Path(folder), solution, policy
         self._problem: Problem | None = None
         self._sha256 = ""
         self._state: RunState | None = None
@@ -191,7 +194,7 @@ class RunRecord:
             log_file.write(",".join(map(str, cells)) + "\n")
         changed = problem is not self._problem
         if changed or row.time >= self._due:
-            self._due = row.time + PERIOD_S
+            self._due = row.time + self.policy.state_interval_s
             self.keep(problem, state())
 
     def keep(self, problem: Problem, state: RunState) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats
 
-RESOLUTION = 1e-4
-"""Relative accuracy of the tether model; a smaller excess does not count as over the limit."""
+TETHER_TOLERANCE = 1e-4
+"""Tolerance of tether lengths, relative: the accuracy of the tether model."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def overruns(t: Floats, tether: Floats, limit: Floats, shortening: Bools) -> lis
     shortening : ndarray of bool, shape (n,)
         Whether the limit was lowered below the tether, which is being shortened.
     """
-    over = tether > limit * (1.0 + RESOLUTION)
+    over = tether > limit * (1.0 + TETHER_TOLERANCE)
     # a row tells how it is from then on, until the next
     ends = np.append(t[1:], t[-1:])
     key = np.column_stack([np.where(over, limit, 0.0), over & shortening])

@@ -29,7 +29,7 @@ from netsp.online.execute.execution_log import (
 )
 from netsp.online.execute.repair_warm_up import make_ready, should_make_ready
 from netsp.online.execute.run_record import Begun, LeftOut, RunRecord, RunState
-from netsp.online.execute.tether_limits import RESOLUTION
+from netsp.online.execute.tether_limits import TETHER_TOLERANCE
 from netsp.online.execute.tether_reserve import ReservedLimit
 from netsp.online.execute.tour_repair import Repair, broken, reachable, repair, reserved_limit
 from netsp.plan.tour_plan import HOME, Leg, legs_of
@@ -39,16 +39,6 @@ from netsp.world.simulator.current import Water
 from netsp.world.tether import GeodesicTether, Tether
 from netsp.world.tether.resolution import coarsest_delta, suggested_delta
 from netsp.world.vehicle import Vehicle, make_vehicle
-
-HOLD_STEP = 0.1
-"""Seconds between two rows of the log while the robot holds its place."""
-
-LEG_ALLOWANCE = 3.0
-"""A goal is left out when its leg takes this many times as long as it should, and a minute."""
-
-
-LINKED_STEP = 0.2
-"""Seconds of a step of a vehicle that is not simulated."""
 
 
 class StopsFlightError(Exception):
@@ -125,9 +115,13 @@ class _Run:
             self.tether = self.model.lay(np.array(solution.start_tether))
         self.live = live
         self.vehicle = live or make_vehicle(options.vehicle, self.start, options.speed)
-        self.step = 0.1 if options.vehicle != "kinematic" else self.delta / options.speed
+        self.policy = options.policy
         if live is not None:
-            self.step = LINKED_STEP
+            self.step = self.policy.live_step_s
+        elif options.vehicle != "kinematic":
+            self.step = self.policy.dynamic_step_s
+        else:
+            self.step = self.delta / options.speed
         self.water = Water(options.current, options.gusts, options.seed)
         self.mode, self.fresh, self.leg_s = "tour", True, 0.0
         self.shorten = False
@@ -177,7 +171,7 @@ class _Run:
             round(self.now, 6), x, y, z, goal, mode, self.tether.length, limit, self.shorten,
             self._is_over_limit,
         )  # fmt: skip
-        if len(self.out.rows) % 10 == 0:
+        if len(self.out.rows) % self.policy.tether_rows == 0:
             self.out.tethers.append((row.time, self.tether.nodes.copy()))
         self.out.rows.append(row)
         return row
@@ -200,7 +194,8 @@ class _Run:
         is_there = (
             len(self.path) == 1 and float(np.linalg.norm(self.vehicle.position - end)) <= near
         )
-        is_late = self.leg_s > 60.0 + LEG_ALLOWANCE * self.legs[0].length / self.options.speed
+        policy, leg_s = self.policy, self.legs[0].length / self.options.speed
+        is_late = self.leg_s > policy.leg_grace_s + policy.max_leg_time_ratio * leg_s
         if self.retreat is not None:
             if is_there or is_late or self.tether.length <= self.retreat.length:
                 done, self.retreat = self.retreat, None
@@ -313,7 +308,7 @@ class _Run:
         try:
             if event.kind == "push" and self.live is not None:
                 raise InputError("push: a real vehicle says itself where it is")
-            changed(self.problem, event)
+            changed(self.problem, event, self.policy)
         except InputError as error:
             self._enter_log(event.kind, "ignored", f"cannot be: {error}", 0.0)
             return
@@ -331,7 +326,7 @@ class _Run:
         """An event after the end."""
         self._enter_log(event.kind, "ignored", f"came at {event.time:g} s, after the end", 0.0)
         if event.add_goal is not None:
-            problem = changed(self.problem, event)
+            problem = changed(self.problem, event, self.policy)
             self.problem = self.out.problem = problem
             self.out.left_out[len(problem.goals) - 1] = "was added after the end"
 
@@ -343,7 +338,7 @@ class _Run:
     def _enter_changed(self, event: Event) -> None:
         """The world after an event: what has come to stand on the tether or the robot has pushed
         them aside, to the nearer side; what is gone lets the tether go."""
-        problem = changed(self.problem, event)
+        problem = changed(self.problem, event, self.policy)
         self._enter(problem)
         if event.kind not in ("appear", "vanish", "move"):
             return
@@ -373,7 +368,7 @@ class _Run:
 
     @property
     def _is_over_limit(self) -> bool:
-        return self.tether.length > self.problem.tether_length * (1.0 + RESOLUTION)
+        return self.tether.length > self.problem.tether_length * (1.0 + TETHER_TOLERANCE)
 
     def _reserved(self, goals: list[int]) -> ReservedLimit:
         """Return the length of tether that a plan through goals may use."""
@@ -418,10 +413,19 @@ class _Run:
             self._follow(polylines.dense(way, 0.5 * self.delta)[1:])
         begin = time.perf_counter()
         try:
+            options = self.options
             made = repair(
-                self.problem, self.vehicle.position, self.tether.nodes, left, self.options.speed,
-                why, self.options.seed, self.options.planning_limit, self.reserve,
-            )  # fmt: skip
+                self.problem,
+                self.vehicle.position,
+                self.tether.nodes,
+                left,
+                options.speed,
+                why,
+                options.seed,
+                options.planning_limit,
+                self.reserve,
+                self.policy.repair,
+            )
         except Exception as error:
             if interrupted(error):
                 raise KeyboardInterrupt from error
@@ -453,7 +457,7 @@ class _Run:
         until = self.now + seconds
         while self.now < until:
             self.note()
-            self.now = min(self.now + HOLD_STEP, until)
+            self.now = min(self.now + self.policy.hold_step_s, until)
         self.mode = mode
 
     def _enter_log(self, event: str, response: str, reason: str, spent: float) -> None:

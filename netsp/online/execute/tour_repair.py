@@ -23,6 +23,7 @@ from netsp.gtsp.travel.result import Result
 from netsp.hsignature import concatenate, crossings, signature
 from netsp.model.problem import Circle, Goal, Problem, State
 from netsp.model.solution import Status
+from netsp.online.execute.execute_policy import RepairPolicy
 from netsp.online.execute.tether_reserve import ReservedLimit
 from netsp.plan.answer import to_solution
 from netsp.plan.solve_problem import solve_graph
@@ -31,12 +32,6 @@ from netsp.roadmap.explain_unreachable import explain_unreached
 from netsp.roadmap.from_state import GraphFromState, graph_from_state
 from netsp.roadmap.paths import TautPaths, UnknownPathError
 from netsp.roadmap.roadmap_policy import RoadmapPolicy
-
-REPLAN_S = 2.0
-"""Seconds that planning the rest of a tour may take; the robot holds its place meanwhile."""
-
-MOST_CLASSES = 4_000
-"""Most classes that a repair looks at; of more, the shortest of every goal."""
 
 
 @dataclass(frozen=True)
@@ -139,9 +134,17 @@ def _in_the_way(problem: Problem, path: Floats) -> int | None:
 
 
 def repair(
-    problem: Problem, robot: Floats, tether: Floats, left: list[int], speed: float, why: str,
-    seed: int = 0, limit: float = REPLAN_S, reserve: float = 0.0,
-) -> Repair:  # fmt: skip
+    problem: Problem,
+    robot: Floats,
+    tether: Floats,
+    left: list[int],
+    speed: float,
+    why: str,
+    seed: int = 0,
+    limit: float = RepairPolicy.time_limit_s,
+    reserve: float = 0.0,
+    policy: RepairPolicy = RepairPolicy(),
+) -> Repair:
     """Return a plan from the present state through the goals `left` (numbers in the problem, in
     their order) and home. Goals that cannot be reached are left out, with the reason.
 
@@ -160,7 +163,7 @@ def repair(
     """
     with until_interrupt(limit) as clock:
         try:
-            made = _repaired(problem, robot, tether, left, speed, why, seed, clock, reserve)
+            made = _repaired(problem, robot, tether, left, speed, why, seed, clock, reserve, policy)
         except NetspError:
             if clock.stopped:
                 raise KeyboardInterrupt from None
@@ -171,9 +174,17 @@ def repair(
 
 
 def _repaired(
-    problem: Problem, robot: Floats, tether: Floats, left: list[int], speed: float, why: str,
-    seed: int, clock: Clock, reserve: float,
-) -> Repair:  # fmt: skip
+    problem: Problem,
+    robot: Floats,
+    tether: Floats,
+    left: list[int],
+    speed: float,
+    why: str,
+    seed: int,
+    clock: Clock,
+    reserve: float,
+    policy: RepairPolicy,
+) -> Repair:
     """Return a plan as `repair` does, with what the clock leaves time for."""
     word = signature(tether[:, :2], problem.representative_points)
     state = State(position=outside(problem, robot), signature=word)
@@ -184,8 +195,8 @@ def _repaired(
     reserved = reserved_limit(problem, order, reserve)
     rest = _rest(problem, order, state, reserved.length)
     graph = graph_from_state(
-        rest, max_classes=MOST_CLASSES, time_limit=clock, limits_paths=False
-    )  # fmt: skip
+        rest, max_classes=policy.max_classes, time_limit=clock, limits_paths=False
+    )
     with graph.within.on_clock(clock):
         local = _keeping_order(graph, len(order))
     assert local.length is not None

@@ -8,21 +8,13 @@ import time
 import numpy as np
 
 from netsp.base.arrays import Floats
-from netsp.world.vehicle.control import DT, HORIZON, PredictiveControl
+from netsp.world.vehicle.control import PredictiveControl
 from netsp.world.vehicle.dynamics import step
 from netsp.world.vehicle.kinematic import advance, turned
-
-LEAD = 0.25
-"""Metres that the point which the vehicle follows runs ahead of it at most."""
-
-FINE = 5
-"""Integration steps of the simulated vehicle in one control step."""
+from netsp.world.vehicle.vehicle_policy import VehiclePolicy
 
 TOP_SPEED = 1.5
-"""m/s, ahead, as Blue Robotics states."""
-
-TRUST = 0.3
-"""Share of what a step drifted more than expected that is put down to the water."""
+"""Physical constant: top speed ahead that Blue Robotics states, m/s."""
 
 
 class BlueRov2:
@@ -31,17 +23,21 @@ class BlueRov2:
     The controller does not know the water's motion: it infers it from its drift.
     """
 
-    def __init__(self, place: Floats, speed: float) -> None:
+    def __init__(
+        self, place: Floats, speed: float, policy: VehiclePolicy = VehiclePolicy()
+    ) -> None:
+        self.policy = policy
         self.state = np.zeros(8)
         self.state[:3] = place
         self.speed = min(speed, TOP_SPEED)
         self.control_s: list[float] = []
-        self._control = PredictiveControl()
+        self._control = PredictiveControl(policy.control)
         self._carrot = np.array(place, dtype=float)
         self._drift = np.zeros(3)
-        # what is compiled is loaded before the first step
-        self._control.force(self.state, np.tile(self.state, (HORIZON, 1)), self._drift)
-        self._control = PredictiveControl()
+        # load compiled code before the first step
+        aims = np.tile(self.state, (policy.control.horizon, 1))
+        self._control.force(self.state, aims, self._drift)
+        self._control = PredictiveControl(policy.control)
 
     @property
     def position(self) -> Floats:
@@ -58,24 +54,26 @@ class BlueRov2:
         pull: Floats | None = None,
     ) -> tuple[list[Floats], int]:  # fmt: skip
         """See `netsp.world.vehicle.Vehicle`. Control steps take 0.1 s."""
-        points, behind = [], 0
+        points, behind, policy, step_s = [], 0, self.policy, self.policy.control.step_s
         if fresh:
             self._carrot = self.position
-        for _ in range(max(1, round(seconds / DT))):
+        for _ in range(max(1, round(seconds / step_s))):
             begin = time.perf_counter()
             lead = float(np.linalg.norm(self._carrot - self.position))
             on, passed = advance(
-                self._carrot, path[behind:], min(self.speed * DT, max(0.0, LEAD - lead))
+                self._carrot,
+                path[behind:],
+                min(self.speed * step_s, max(0.0, policy.max_lead - lead)),
             )
             self._carrot = on[-1]
             behind += passed
             force = self._control.force(self.state, self._aims(path[behind:], yaw), self._drift)
-            expected = step(self.state, force, self._drift, DT)
+            expected = step(self.state, force, self._drift, step_s)
             self.control_s.append(time.perf_counter() - begin)
-            for _ in range(FINE):
+            for _ in range(policy.integration_steps):
                 both = force if pull is None else force + self._in_frame(pull)
-                self.state = step(self.state, both, water, DT / FINE)
-            self._drift += TRUST * (self.state[:3] - expected[:3]) / DT
+                self.state = step(self.state, both, water, step_s / policy.integration_steps)
+            self._drift += policy.drift_gain * (self.state[:3] - expected[:3]) / step_s
             points.append(self.position)
         return points, behind
 
@@ -91,15 +89,16 @@ class BlueRov2:
         self._carrot = np.array(place)
 
     def _aims(self, path: Floats, yaw: float) -> Floats:
-        """(HORIZON, 8): where the followed point will be, and how fast, with the heading."""
-        aims = np.zeros((HORIZON, 8))
+        """(horizon, 8): where the followed point will be, and how fast, with the heading."""
+        horizon, step_s = self.policy.control.horizon, self.policy.control.step_s
+        aims = np.zeros((horizon, 8))
         heading = self.state[3] + turned(yaw - self.state[3])
         c, s = math.cos(heading), math.sin(heading)
         at, rest = self._carrot, path
-        for k in range(HORIZON):
+        for k in range(horizon):
             if k > 0:
-                on, passed = advance(at, rest, self.speed * DT)
-                velocity = (on[-1] - at) / DT - self._drift
+                on, passed = advance(at, rest, self.speed * step_s)
+                velocity = (on[-1] - at) / step_s - self._drift
                 at, rest = on[-1], rest[passed:]
             else:
                 velocity = -self._drift

@@ -12,52 +12,71 @@ products this small BLAS starts threads that wait for one another, on a busy mac
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.compiled.dynamic_array import write_floats, write_rows
 from netsp.base.compiled.kernel import kernel
-from netsp.world.vehicle.dynamics import ALLOCATION, THRUST, linearised, step_into
+from netsp.world.vehicle.dynamics import ALLOCATION, MAX_THRUST, linearised, step_into
+from netsp.world.vehicle.vehicle_policy import ControlPolicy
 
-HORIZON, DT = 20, 0.1
-"""Steps ahead, and seconds of each."""
 
-STATE_COST = np.array([200.0, 200.0, 200.0, 10.0, 5.0, 5.0, 5.0, 1.0])
-THRUST_COST, CHANGE_COST = 4e-3, 4e-3
-"""Weights of what is squared: errors in m, rad, m/s and rad/s, thrusts in N, and their changes from
-step to step."""
+class ControlWeights(NamedTuple):
+    """`ControlPolicy` for the kernel, with the weights of the state as an array (8,)."""
 
-NEWTON_STEPS = 30
+    step_s: float
+    state: Floats
+    thrust: float
+    change: float
+    max_thrust: float
+    max_newton_steps: int
 
 
 class PredictiveControl:
-    """Controller with the thrusts (HORIZON, 5) of its last solution, N."""
+    """Controller that keeps the thrusts (horizon, 5) of its last solution, N."""
 
-    def __init__(self) -> None:
-        self.thrusts = np.zeros((HORIZON, 5))
+    def __init__(self, policy: ControlPolicy = ControlPolicy()) -> None:
+        self.thrusts = np.zeros((policy.horizon, 5))
+        self._weights = ControlWeights(
+            policy.step_s,
+            np.array(policy.state_cost),
+            policy.thrust_cost,
+            policy.change_cost,
+            MAX_THRUST,
+            policy.max_newton_steps,
+        )
 
     def force(self, state: Floats, aims: Floats, water: Floats) -> Floats:
-        """The input (4,) for the next step, that thrusters within their limits give.
+        """Return the input (4,) of the next step, which the thrusters can produce.
 
         Parameters
         ----------
-        state
-            (8,).
-        aims
-            (HORIZON, 8) where to be after each step.
-        water
-            (3,) what the water is thought to do.
+        state : ndarray, shape (8,)
+            State of the vehicle, see `dynamics`.
+        aims : ndarray, shape (horizon, 8)
+            Desired states after each step.
+        water : ndarray, shape (3,)
+            Estimated velocity of the water, m/s.
         """
-        self.thrusts = improved(self.thrusts, state, aims, water, ALLOCATION)
+        self.thrusts = improved(self.thrusts, state, aims, water, ALLOCATION, self._weights)
         return np.asarray(ALLOCATION @ self.thrusts[0])
 
 
 @kernel
 def improved(
-    last: Floats, state: Floats, aims: Floats, water: Floats, allocation: Floats
+    last: Floats,
+    state: Floats,
+    aims: Floats,
+    water: Floats,
+    allocation: Floats,
+    weights: ControlWeights,
 ) -> Floats:
-    """The thrusts after one iteration, from those (n, m) of the step before."""
+    """Return the thrusts (n, m) after one iteration, from those of the step before."""
     n, m = last.shape
+    step_s, state_cost, most = weights.step_s, weights.state, weights.max_thrust
+    thrust_cost, change_cost = weights.thrust, weights.change
     guess = np.empty((n, m))
     write_rows(guess, last[1:], n - 1)
     write_floats(guess[-1], last[-1], m)
@@ -68,37 +87,37 @@ def improved(
     states, room = np.empty((n + 1, 8)), np.empty((5, 8))
     write_floats(states[0], state, 8)
     for k in range(n):
-        step_into(states[k + 1], states[k], forces[k], water, DT, room)
-    by_state, by_force = linearised(states, forces, water, DT)
+        step_into(states[k + 1], states[k], forces[k], water, step_s, room)
+    by_state, by_force = linearised(states, forces, water, step_s)
     answer = _answer(by_state, by_force, allocation)
     hessian, wish = np.zeros((m * n, m * n)), np.zeros(m * n)
     for k in range(n):
         for i in range(8):
             row = answer[8 * k + i, : m * k + m]
-            off = STATE_COST[i] * (states[k + 1, i] - aims[k, i])
+            off = state_cost[i] * (states[k + 1, i] - aims[k, i])
             for a in range(len(row)):
                 wish[a] += off * row[a]
-                _add(STATE_COST[i] * row[a], row[: a + 1], hessian[a])
+                _add(state_cost[i] * row[a], row[: a + 1], hessian[a])
     low, high = np.empty(m * n), np.empty(m * n)
     for k in range(n):
         for i in range(m):
             j = m * k + i
-            hessian[j, j] += THRUST_COST + CHANGE_COST
+            hessian[j, j] += thrust_cost + change_cost
             before = guess[k - 1, i] if k > 0 else last[0, i]
-            wish[j] += THRUST_COST * guess[k, i] + CHANGE_COST * (guess[k, i] - before)
+            wish[j] += thrust_cost * guess[k, i] + change_cost * (guess[k, i] - before)
             if k + 1 < n:
-                hessian[j, j] += CHANGE_COST
-                hessian[j + m, j] -= CHANGE_COST
-                wish[j] -= CHANGE_COST * (guess[k + 1, i] - guess[k, i])
-            low[j], high[j] = -THRUST - guess[k, i], THRUST - guess[k, i]
+                hessian[j, j] += change_cost
+                hessian[j + m, j] -= change_cost
+                wish[j] -= change_cost * (guess[k + 1, i] - guess[k, i])
+            low[j], high[j] = -most - guess[k, i], most - guess[k, i]
     for j in range(m * n):
         for a in range(j):
             hessian[a, j] = hessian[j, a]
-    change = within(hessian, wish, low, high, NEWTON_STEPS)
+    change = within(hessian, wish, low, high, weights.max_newton_steps)
     out = np.empty((n, m))
     for k in range(n):
         for i in range(m):
-            out[k, i] = min(max(guess[k, i] + change[m * k + i], -THRUST), THRUST)
+            out[k, i] = min(max(guess[k, i] + change[m * k + i], -most), most)
     return out
 
 

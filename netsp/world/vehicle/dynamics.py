@@ -20,7 +20,17 @@ from netsp.base.arrays import Floats
 from netsp.base.compiled.dynamic_array import write_floats
 from netsp.base.compiled.kernel import kernel
 
-MASS, VOLUME, GRAVITY, DENSITY = 13.5, 0.0134, 9.82, 1000.0
+MASS = 13.5
+"""Physical constant: mass of the vehicle, kg."""
+
+VOLUME = 0.0134
+"""Physical constant: volume of the vehicle, m³."""
+
+GRAVITY = 9.82
+"""Physical constant: acceleration of gravity, m/s²."""
+
+WATER_DENSITY = 1000.0
+"""Physical constant: density of the water in which the vehicle was measured, kg/m³."""
 
 INERTIA = np.array([13.5 + 6.36, 13.5 + 7.12, 13.5 + 18.68, 0.37 + 0.222])
 """Mass and added mass: kg, kg, kg, kg m^2."""
@@ -31,8 +41,9 @@ QUADRATIC = np.array([41.1, 217.0, 190.0, 1.5])
 low speed, would let four thrusters push the vehicle to 0.85 m/s. Blue Robotics states 1.5 m/s for
 it, which is what 41.1 kg/m gives."""
 
-THRUST = 40.0
-"""N: most that a T200 gives either way (Blue Robotics: at 16 V 51 N ahead and 40 N astern)."""
+MAX_THRUST = 40.0
+"""Physical constant: largest thrust of a T200 in either direction, N. At 16 V, Blue Robotics states
+51 N ahead and 40 N astern."""
 
 _C, _ARM = math.sqrt(0.5), math.sqrt(0.5) * (0.156 + 0.111)
 ALLOCATION = np.array(
@@ -66,7 +77,7 @@ def derivative(state: Floats, force: Floats, water: Floats, out: Floats) -> None
     m = INERTIA
     out[4] = (m[1] * v * r - (LINEAR[0] + QUADRATIC[0] * abs(u)) * u + force[0]) / m[0]
     out[5] = (-m[0] * u * r - (LINEAR[1] + QUADRATIC[1] * abs(v)) * v + force[1]) / m[1]
-    lift = (DENSITY * VOLUME - MASS) * GRAVITY
+    lift = (WATER_DENSITY * VOLUME - MASS) * GRAVITY
     out[6] = (lift - (LINEAR[2] + QUADRATIC[2] * abs(w)) * w + force[2]) / m[2]
     out[7] = (
         (m[0] - m[1]) * u * v - (LINEAR[3] + QUADRATIC[3] * abs(r)) * r + force[3]

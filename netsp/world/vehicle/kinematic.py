@@ -8,9 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from netsp.base.arrays import Floats
-
-TURN = math.radians(60.0)
-"""Radians per second that a kinematic vehicle turns by at most."""
+from netsp.world.vehicle.vehicle_policy import VehiclePolicy
 
 
 class Vehicle(Protocol):
@@ -86,7 +84,10 @@ class KinematicVehicle:
         m/s.
     """
 
-    def __init__(self, place: Floats, speed: float) -> None:
+    def __init__(
+        self, place: Floats, speed: float, policy: VehiclePolicy = VehiclePolicy()
+    ) -> None:
+        self.policy = policy
         self.position: Floats = np.array(place, dtype=float)
         self.speed = speed
         self.yaw: float = 0.0
@@ -121,7 +122,8 @@ class KinematicVehicle:
             How many points of the path are behind it.
         """
         del water, fresh, pull
-        self.yaw += float(np.clip(turned(yaw - self.yaw), -TURN * seconds, TURN * seconds))
+        most = math.radians(self.policy.max_turn_rate_deg) * seconds
+        self.yaw += float(np.clip(turned(yaw - self.yaw), -most, most))
         points, passed = advance(self.position, path, self.speed * seconds)
         self.position = points[-1]
         return points, passed
