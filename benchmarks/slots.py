@@ -21,10 +21,10 @@ from netsp.base.arrays import Floats
 from netsp.base.clock import Clock
 from netsp.plan.space.mission_policy import StatePolicy
 from netsp.plan.space.mission_solver import solve_mission
-from netsp.plan.space.path_bound import bound_of_all
+from netsp.plan.space.path_bound import bound_all_tours
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import Water
-from netsp.plan.space.space_legs import Ways
+from netsp.plan.space.planning_context import PlanningContext
+from netsp.plan.space.space_legs import RobotPaths
 from netsp.world.mission.mission import Mission
 from netsp.world.scene.scene import Scene
 
@@ -86,13 +86,13 @@ def _leg(a: Floats, b: Floats, y: float, width: float) -> float:
 
 def bound_only(mission: Mission, scene: Scene, seconds: float = 4.0) -> float:
     """Return the bound if all paths found go round the wall."""
-    water = Water.of(mission, scene, scene.field())
-    places = Places.of(mission, water.field)
-    ways = Ways(water, places, StatePolicy().effort(len(places)))
+    context = PlanningContext.for_mission(mission, scene, scene.field())
+    places = Places.for_mission(mission, context.field)
+    ways = RobotPaths(context, places, StatePolicy().effort(len(places)))
     round_ = np.array([mission.start, (-0.5, END + 0.5, 0), (0.5, END + 0.5, 0), (4, 0, 0)])
     for n in range(len(places)):
         ways.tethers[n] = [np.vstack([round_[:-1], places.points[n]])]
-    return bound_of_all(ways, list(range(len(places))), Clock(seconds)) or 0.0
+    return bound_all_tours(ways, list(range(len(places))), Clock(seconds)) or 0.0
 
 
 def main() -> None:
@@ -113,7 +113,7 @@ def main() -> None:
         else:
             found = solve_mission(mission, scene=scene, time_limit=args.time_limit)
             bound = found.tour.bound_of_all or 0.0
-            cells = found.cells
+            cells = found.gaps
             gaps = 0 if cells is None else len(cells.shown) + len(cells.left)
             told = (f"{found.tour.length:.2f}", found.tour.status.value, str(gaps))
         wrong = bound > exists * (1.0 + 1e-6)

@@ -32,6 +32,7 @@ from table import ROOT, head, heading, row
 
 from netsp import Problem, solve
 from netsp.base.clock import Clock
+from netsp.base.geometry import polylines
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.hsignature.rays import signature
 from netsp.plan.random_worlds import reachable_world
@@ -45,11 +46,11 @@ from netsp.plan.space.mission_solver import (
     solve_mission,
 )
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import Water, along, straight
-from netsp.plan.space.prisms import tours_of_plan
-from netsp.plan.space.space_plan import AS_GIVEN, OUT_AND_BACK, PLANE, SHORT_ORDER, water_of
+from netsp.plan.space.planning_context import PlanningContext, is_straight_clear
+from netsp.plan.space.prisms import drive_plane_tours
+from netsp.plan.space.space_plan import AS_GIVEN, OUT_AND_BACK, PLANE, SHORT_ORDER, prepare_context
 from netsp.plan.space.space_signature import SpaceSignature
-from netsp.plan.space.upright import bound_of_upright
+from netsp.plan.space.upright import bound_by_upright_solids
 from netsp.plan.space.visit_order import order_by_going_on
 from netsp.roadmap.explain_unreachable import shortest_tethers
 from netsp.world import Scene
@@ -129,7 +130,7 @@ def words() -> None:
 def group(name: str) -> list[str]:
     """One row of `words`."""
 
-    warm = SpaceSignature.of(Scene(solids=shapes()["ring"]).field(), LOW, HIGH, 0.5, ANCHOR)
+    warm = SpaceSignature.in_box(Scene(solids=shapes()["ring"]).field(), LOW, HIGH, 0.5, ANCHOR)
     assert warm.exact
     if name in shapes():
         field, box, cell, anchor = Scene(solids=shapes()[name]).field(), (LOW, HIGH), 0.2, ANCHOR
@@ -144,7 +145,7 @@ def group(name: str) -> list[str]:
             cell *= (grid.free.size / 5e6) ** (1 / 3)
     before = highest()
     begin = time.perf_counter()
-    made = SpaceSignature.of(field, *box, cell, anchor)
+    made = SpaceSignature.in_box(field, *box, cell, anchor)
     took = time.perf_counter() - begin
     more = 1024 * (highest() - before)
     return [name, f"{made.cells.flags.size:,}", shown(made.group.rank, made.group.relators),
@@ -186,11 +187,11 @@ def loops(count: int) -> None:
 
 def beside_linking(count: int) -> tuple[int, str, int, int, int]:
     field = Scene(solids=shapes()["two rings"]).field()
-    made = SpaceSignature.of(field, LOW, HIGH, 0.25, ANCHOR)
+    made = SpaceSignature.in_box(field, LOW, HIGH, 0.25, ANCHOR)
     seen: dict[tuple, tuple] = {}
     wrong = without = 0
     for points in random_loops(count, field):
-        word, broken = made.word_until(points, closed=True)
+        word, broken = made.try_word(points, closed=True)
         without += broken is not None
         number = linking(points, -2.0), linking(points, 2.0)
         wrong += seen.setdefault(number, made.windings(word)) != made.windings(word)
@@ -201,7 +202,7 @@ def beside_linking(count: int) -> tuple[int, str, int, int, int]:
 def beside_rays(count: int) -> tuple[int, str, int, int, int]:
     solids = [{"post": {"center": p.tolist(), "radius": 0.3}} for p in POSTS]
     field = Scene(solids=solids).field()
-    made = SpaceSignature.of(field, LOW, HIGH, 0.25, ANCHOR)
+    made = SpaceSignature.in_box(field, LOW, HIGH, 0.25, ANCHOR)
     seen: dict[tuple, tuple] = {}
     wrong = without = done = 0
     clear = field.grown(0.05)
@@ -209,7 +210,7 @@ def beside_rays(count: int) -> tuple[int, str, int, int, int]:
         if not clear.line_of_sight(points[0], ANCHOR):
             continue
         moored = np.vstack([ANCHOR, points, points[:1], ANCHOR])
-        word, broken = made.word_until(moored)
+        word, broken = made.try_word(moored)
         without += broken is not None
         rays = signature(moored, POSTS)
         wrong += seen.setdefault(rays, word) != word
@@ -222,11 +223,11 @@ def beside_rays(count: int) -> tuple[int, str, int, int, int]:
 
 def beside_cells(count: int) -> tuple[int, str, int, int, int]:
     field = Scene(solids=cube()).field()
-    one, other = (SpaceSignature.of(field, LOW, HIGH, cell, ANCHOR) for cell in (0.25, 0.19))
+    one, other = (SpaceSignature.in_box(field, LOW, HIGH, cell, ANCHOR) for cell in (0.25, 0.19))
     seen: dict[tuple, tuple] = {}
     wrong = without = 0
     for points in random_loops(count, field, 2):
-        (a, x), (b, y) = (made.word_until(points, closed=True) for made in (one, other))
+        (a, x), (b, y) = (made.try_word(points, closed=True) for made in (one, other))
         without += x is not None or y is not None
         wrong += (a == ()) != (b == ())
         wrong += seen.setdefault(one.windings(a), other.windings(b)) != other.windings(b)
@@ -405,16 +406,16 @@ def prism_tours(worlds: int) -> None:
     for seed, kind in itertools.product(range(worlds), PRISM_KINDS):
         problem, mission, scene = prism_world(kind, seed)
         best = solve(problem, time_limit=60.0)
-        water = water_of(mission, Clock(), scene=scene)
-        places = Places.of(water.mission, water.field)
+        context = prepare_context(mission, Clock(), scene=scene)
+        places = Places.for_mission(context.mission, context.field)
         begin = time.process_time()
         lengths = [
-            tour.length for tour in tours_of_plan(
-                water, scene, places, Clock(60.0), whole_tether=True
+            tour.length for tour in drive_plane_tours(
+                context, scene, places, Clock(60.0), whole_tether=True
             )
         ]  # fmt: skip
         every = list(range(len(places)))
-        bound = bound_of_upright(water.mission, water, every, places, Clock(60.0)) or 0.0
+        bound = bound_by_upright_solids(context.mission, context, every, places, Clock(60.0)) or 0.0
         took, length = time.process_time() - begin, min(lengths, default=np.inf)
         assert best.length is not None
         row(kind, seed, len(scene.solids), len(problem.goals), f"{best.length:.3f}",
@@ -504,45 +505,45 @@ def random_frame(seed: int) -> tuple[Mission, Scene]:
     return mission, scene
 
 
-def shortest_way(water: Water, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def shortest_way(context: PlanningContext, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Straight, or the shortest that a search finds."""
-    if straight(water.field, a, b, water.mission.clearance):
+    if is_straight_clear(context.field, a, b, context.mission.clearance):
         return np.array([a, b])
-    begin, end = water.words.held(a), water.words.held(b)
+    begin, end = context.words.visible_cell(a), context.words.visible_cell(b)
     assert begin is not None
     assert end is not None
-    found = water.search(True, begin, 4, {end: 2.0 * float(np.linalg.norm(a - b))})
-    lines = [water.taut(np.vstack([a, way, b])) for _, way in water.ways(found, end)]
-    return min(lines, key=along)
+    found = context.search_words(True, begin, 4, {end: 2.0 * float(np.linalg.norm(a - b))})
+    lines = [context.pull_taut(np.vstack([a, way, b])) for _, way in context.paths_to(found, end)]
+    return min(lines, key=polylines.length)
 
 
 def without_tether(found: SolvedMission) -> tuple[float, str]:
     """Metres of the shortest tour along the shortest ways that are known, tether or not, and what
     becomes of the tether on it."""
     assert found.plan is not None
-    ways, water = found.plan.ways, found.plan.water
-    points, start = ways.points, water.laid.robot
+    ways, context = found.plan.paths, found.plan.context
+    points, start = ways.points, context.start_tether.robot
     ends = [start, *points]
     paths: dict[tuple[int, int], np.ndarray] = {}
     costs = np.zeros((len(ends), len(ends)))
     for a, b in itertools.permutations(range(len(ends)), 2):
-        known = [way for _, way in ways.known(a - 1, b - 1)] if a and b else []
-        paths[a, b] = known[0] if known else shortest_way(water, ends[a], ends[b])
-        costs[a, b] = along(paths[a, b])
+        known = [way for _, way in ways.between(a - 1, b - 1)] if a and b else []
+        paths[a, b] = known[0] if known else shortest_way(context, ends[a], ends[b])
+        costs[a, b] = polylines.length(paths[a, b])
     costs = np.minimum(costs, costs.T)  # the one way is the other, but for how it was found
     graph = TravelGraph.from_costs(costs, list(range(len(ends))))
     result = solve_graph(graph, "auto", time_limit=20.0)
     assert result.tour is not None
-    tether, longest = water.present, 0.0
+    tether, longest = context.present_tether, 0.0
     for a, b in itertools.pairwise((*result.tour, 0)):
-        tether, most = water.driven(tether, paths[a, b])
+        tether, most = context.drive(tether, paths[a, b])
         longest = max(longest, most)
     path = np.vstack([paths[a, b] for a, b in itertools.pairwise((*result.tour, 0))])
-    word, broken = water.words.word_until(path, closed=True)
+    word, broken = context.words.try_word(path, closed=True)
     hangs = "wound up, by its word" if word or broken is not None else "hangs on a bar"
-    free = abs(tether.length - water.laid.length) < water.mission.delta
+    free = abs(tether.length - context.start_tether.length) < context.mission.delta
     told = "free" if free else f"{hangs}, {tether.length:.1f} m"
-    if longest > water.mission.tether_length:
+    if longest > context.mission.tether_length:
         told += f"; too long ({longest:.1f} m)"
     return float(result.length or 0.0), told
 
@@ -559,7 +560,7 @@ def frames(count: int) -> None:
         took = time.perf_counter() - begin
         run = found.run or simulate(found.mission, scene=scene)
         given = found.given or simulate(mission, scene=scene)
-        words = found.plan.water.words.group if found.plan is not None else None
+        words = found.plan.context.words.group if found.plan is not None else None
         tour, flown = found.tour, run.summary
         row(seed, len(scene.solids), "–" if words is None else shown(words.rank, words.relators),
             f"{tour.length:.1f}", tour.status.value, f"{tour.bound_of_all or 0.0:.1f}",
@@ -572,7 +573,7 @@ def frames(count: int) -> None:
 
 
 def flown_metres(run: Run) -> float:
-    return along(np.array([[r.x, r.y, r.z] for r in run.log]))
+    return polylines.length(np.array([[r.x, r.y, r.z] for r in run.log]))
 
 
 def by_going_on(mission: Mission, scene: Scene) -> str:

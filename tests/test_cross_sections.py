@@ -12,8 +12,8 @@ from netsp.base.clock import Clock
 from netsp.model.problem import Circle
 from netsp.plan.space.cross_sections import Depths, cross_sections
 from netsp.plan.space.places import Places
-from netsp.plan.space.space_plan import water_of
-from netsp.plan.space.upright import bound_of_upright, upright_obstacles
+from netsp.plan.space.space_plan import prepare_context
+from netsp.plan.space.upright import bound_by_upright_solids, upright_obstacles
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 
@@ -95,12 +95,12 @@ def water(*solids, bounds=BOUNDS, **more):
         "scene": "-", "anchor": (-3, 0, 0), "start": (-3, 0, 0), "clearance": 0.1, "cell": 0.5,
         "waypoints": [(3, 0, 0), (0, 4, 0)], "tether_length": 9.0, **more,
     })  # fmt: skip
-    return water_of(mission, Clock(), scene=Scene(bounds=bounds, solids=list(solids)))
+    return prepare_context(mission, Clock(), scene=Scene(bounds=bounds, solids=list(solids)))
 
 
 def bound(made) -> float | None:
-    places = Places.of(made.mission, made.field)
-    return bound_of_upright(made.mission, made, [0, 1], places, Clock())
+    places = Places.for_mission(made.mission, made.field)
+    return bound_by_upright_solids(made.mission, made, [0, 1], places, Clock())
 
 
 def test_the_tether_is_in_the_bound_of_boxes_as_in_that_of_prisms_through_all_depths():

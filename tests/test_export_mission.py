@@ -38,7 +38,7 @@ def file(tmp_path_factory):
         "waypoints": WAYPOINTS, "clearance": 0.2, "tether_length": 9.0,
     }  # fmt: skip
     (folder / "mission.json").write_text(json.dumps(start))
-    planned = plan(Mission.load(folder / "mission.json"), time_limit=None).planned()
+    planned = plan(Mission.load(folder / "mission.json"), time_limit=None).to_mission()
     planned = planned.model_copy(update={"scene": "scene.json"})
     (folder / "planned.json").write_text(planned.model_dump_json())
     return folder / "planned.json"

@@ -124,7 +124,7 @@ def test_another_class_than_the_planned_one_is_told(solved):
 
 
 def taut_along(site, *points):
-    tether = site.water.laid
+    tether = site.water.start_tether
     for a, b in itertools.pairwise(points):
         for share in np.linspace(0.0, 1.0, 12)[1:]:
             there = np.array(a) + share * (np.array(b) - np.array(a))

@@ -13,16 +13,24 @@ import netsp.plan.space.space_plan
 from netsp import Problem, solve
 from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
+from netsp.base.geometry import polylines
 from netsp.judge import Check, Verification
-from netsp.plan.space.board import Board
+from netsp.plan.space.board import StateGraph
 from netsp.plan.space.judge import verify_mission
 from netsp.plan.space.mission_policy import PlanePolicy, StatePolicy
 from netsp.plan.space.mission_solver import seconds_until_home, solve_mission
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import Water, along
-from netsp.plan.space.prisms import floor_plan, tours_of_plan
-from netsp.plan.space.space_plan import AS_GIVEN, OUT_AND_BACK, PLANE, given_plan, plan, plans
-from netsp.plan.space.states import first_states
+from netsp.plan.space.planning_context import PlanningContext
+from netsp.plan.space.prisms import drive_plane_tours, floor_plan
+from netsp.plan.space.space_plan import (
+    AS_GIVEN,
+    OUT_AND_BACK,
+    PLANE,
+    candidate_plans,
+    plan,
+    plan_given_order,
+)
+from netsp.plan.space.states import find_first_states
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from tests.worlds import FEW_CELLS
@@ -52,47 +60,52 @@ BESIDE = [(1.5, 0.2, 0.1), (1.0, 1.9, 0.0), (0.6, -0.4, 1.8)]
 
 
 @pytest.fixture(scope="module")
-def square_water() -> Water:
-    return Water.of(mission_about(BESIDE), SQUARE, SQUARE.field())
+def square_water() -> PlanningContext:
+    return PlanningContext.for_mission(mission_about(BESIDE), SQUARE, SQUARE.field())
 
 
 @pytest.fixture(scope="module")
-def square_board(square_water) -> Board:
-    places = Places.of(square_water.mission, square_water.field)
-    states = first_states(square_water, places, 8.9, StatePolicy().effort(3), Clock())
-    board = Board(square_water, states)
-    board.take(netsp.plan.space.space_plan.Growth(states, None).legs, Clock())
+def square_board(square_water) -> StateGraph:
+    places = Places.for_mission(square_water.mission, square_water.field)
+    states = find_first_states(square_water, places, 8.9, StatePolicy().effort(3), Clock())
+    board = StateGraph(square_water, states)
+    board.update(netsp.plan.space.space_plan.StateGrowth(states, None).legs, Clock())
     return board
 
 
 def test_the_way_along_a_tether_is_of_the_tethers_class(square_board):
     """Bars thinner than the clearance: a taut tether lies where a robot has no room."""
-    water, found = square_board.water, 0
-    for v, state in enumerate(square_board.states.all):
-        way = square_board.way_out(v)
+    context, found = square_board.context, 0
+    for v, state in enumerate(square_board.states.entries):
+        way = square_board.path_out(v)
         if way is not None:
-            assert water.number(way) == state.word
+            assert context.word_number(way) == state.word
             found += 1
     assert found > len(BESIDE)
 
 
 def test_a_stop_has_the_word_of_the_path_to_it_and_not_that_of_its_state(square_board):
-    tour = [of[-1] for of in square_board.states.of.values()]
-    driven = square_board.driven(tour)
-    walked = [square_board.water.present.nodes]
-    for stop in driven.stops:
+    tour = [of[-1] for of in square_board.states.at_place.values()]
+    driven = square_board.drive(tour)
+    walked = [square_board.context.present_tether.nodes]
+    for stop in driven.visits:
         walked.append(stop.path)
-        assert square_board.water.words.word(np.vstack(walked)) == stop.word
+        assert square_board.context.words.word(np.vstack(walked)) == stop.word
 
 
 def test_a_tour_out_along_tethers_and_back_needs_no_legs(square_board):
-    driven = square_board.out_and_back()
+    driven = square_board.drive_out_and_back()
     assert driven is not None
-    assert [stop.waypoint for stop in driven.stops] == [0, 1, 2]
+    assert [stop.waypoint for stop in driven.visits] == [0, 1, 2]
     assert driven.free
     shortest = sum(
-        2.0 * min(along(square_board.way_out(v)) for v in of if square_board.way_out(v) is not None)
-        for of in square_board.states.of.values()
+        2.0
+        * min(
+            polylines.length(square_board.path_out(v))
+            for v in of
+            if square_board.path_out(v) is not None
+        )
+        for of in square_board.states.at_place.values()
     )
     assert driven.length >= shortest - 1e-6
 
@@ -109,7 +122,7 @@ def test_where_all_other_tours_are_refused_the_one_out_and_back_is_given(monkeyp
     monkeypatch.setattr(netsp.plan.space.space_plan, "verify_mission", judge)
     found = plan(mission_about(BESIDE), scene=SQUARE, time_limit=4.0)
     assert found.kind == OUT_AND_BACK
-    assert verify_mission(found.planned(), scene=SQUARE)
+    assert verify_mission(found.to_mission(), scene=SQUARE)
     assert judged[-1] == OUT_AND_BACK
 
 
@@ -143,12 +156,12 @@ def random_bars(seed: int, count: int) -> tuple[Scene, Mission]:
 @settings(max_examples=5, deadline=None)
 def test_no_tour_is_worse_than_the_order_given_and_all_are_verified(seed, count, seconds):
     scene, mission = random_bars(seed, count)
-    first = given_plan(Water.of(mission, scene, scene.field()))
+    first = plan_given_order(PlanningContext.for_mission(mission, scene, scene.field()))
     found = solve_mission(mission, scene=scene, time_limit=seconds)
     verdict = verify_mission(found.mission, scene=scene)
     assert verdict, str(verdict)
     # a tether may catch on bars, and the order given is a tour only where the judge passes it
-    is_tour = first is not None and bool(verify_mission(first.planned(), scene=scene))
+    is_tour = first is not None and bool(verify_mission(first.to_mission(), scene=scene))
     if is_tour and len(first.stops) == len(found.tour.stops):
         assert found.tour.length <= first.length * (1.0 + 1e-6)
     flown = found.run is not None and found.given is not None
@@ -211,29 +224,33 @@ def test_among_upright_prisms_the_tour_of_the_plane_is_found(seed):
     problem, scene, mission = random_posts(seed)
     best = solve(problem)
     assert best.status.value == "optimal"
-    water = Water.of(mission, scene, scene.field())
+    context = PlanningContext.for_mission(mission, scene, scene.field())
     found = next(
-        tours_of_plan(water, scene, Places.of(mission, water.field), Clock(), params=PATIENT)
+        drive_plane_tours(
+            context, scene, Places.for_mission(mission, context.field), Clock(), policy=PATIENT
+        )
     )
-    assert len(found.stops) == 4
+    assert len(found.visits) == 4
     assert found.length == pytest.approx(best.length, rel=5e-3)
 
 
 def test_the_tour_of_the_plane_comes_before_anything_is_sought_and_is_verified():
     _, scene, mission = random_posts(0)
-    first = next(plans(mission, scene=scene, clock=Clock(600.0)))
+    first = next(candidate_plans(mission, scene=scene, clock=Clock(600.0)))
     assert first.kind == PLANE
-    assert verify_mission(first.planned(), scene=scene)
+    assert verify_mission(first.to_mission(), scene=scene)
 
 
 def test_a_tour_of_the_plane_may_begin_beside_the_anchor():
     _, scene, mission = random_posts(1)
     beside = mission.model_copy(update={"start": (-8.0, 0.4, 0.3)})
-    water = Water.of(beside, scene, scene.field())
+    context = PlanningContext.for_mission(beside, scene, scene.field())
     found = next(
-        tours_of_plan(water, scene, Places.of(beside, water.field), Clock(), params=PATIENT)
+        drive_plane_tours(
+            context, scene, Places.for_mission(beside, context.field), Clock(), policy=PATIENT
+        )
     )
-    assert found.stops[0].path[0] == pytest.approx(beside.start)
+    assert found.visits[0].path[0] == pytest.approx(beside.start)
     assert found.home[-1] == pytest.approx(beside.start)
 
 

@@ -14,8 +14,8 @@ from netsp.plan.space.flown import words_of_flight
 from netsp.plan.space.judge import verify_mission
 from netsp.plan.space.mission_repair import RepairPlanner
 from netsp.plan.space.mission_solver import solve_mission
-from netsp.plan.space.path_bound import bound_of_all
-from netsp.plan.space.planning_context import Water, has_room
+from netsp.plan.space.path_bound import bound_all_tours
+from netsp.plan.space.planning_context import PlanningContext, keeps_clearance
 from netsp.plan.space.space_plan import plan
 from netsp.world import Scene
 from netsp.world.mission.equipment import Camera
@@ -32,16 +32,16 @@ def planned(tmp_path_factory):
     """A planned mission, its scene and its field."""
     mission = Mission.load(written(tmp_path_factory.mktemp("posts")))
     scene = mission.load_scene()
-    return plan(mission, scene=scene, time_limit=None).planned(), scene, scene.field()
+    return plan(mission, scene=scene, time_limit=None).to_mission(), scene, scene.field()
 
 
 def in_the_middle(planned, stops: int) -> Mission:
     """What is left of a planned mission once so many stops were made."""
     mission, scene, field = planned
-    water = Water.of(mission, scene, field)
-    tether = water.present
+    context = PlanningContext.for_mission(mission, scene, field)
+    tether = context.present_tether
     for stop in mission.tour.stops[:stops]:
-        tether, _ = water.driven(tether, np.array(stop.path))
+        tether, _ = context.drive(tether, np.array(stop.path))
     line = [tuple(p) for p in tether.nodes.tolist()]
     return mission.model_copy(
         update={
@@ -59,8 +59,8 @@ def test_from_any_stop_of_a_shortest_tour_its_rest_is_found_again(planned, stops
     found = plan(in_the_middle(planned, stops), scene=scene, field=field, time_limit=None)
     assert found.length <= length * (1 + 1e-6) + 0.02
     assert found.free
-    assert found.stops[0].path[0] == pytest.approx(mission.waypoints[stops - 1].position, abs=1e-6)
-    bound = bound_of_all(found.ways, sorted(found.order), None, params=FEW_CELLS.potential)
+    assert found.visits[0].path[0] == pytest.approx(mission.waypoints[stops - 1].position, abs=1e-6)
+    bound = bound_all_tours(found.paths, sorted(found.order), None, potential=FEW_CELLS.potential)
     assert 0.0 < bound <= found.length + 1e-6
 
 
@@ -126,10 +126,10 @@ def test_one_place_of_each_waypoint_is_visited_and_the_best_is_taken(planned):
     found = plan(choice, scene=scene, field=field, time_limit=None)
     assert sorted(found.order) == [0, 1, 2, 3]
     assert found.length < mission.tour.length
-    taken = next(w for w in found.planned().waypoints if w.alternatives)
+    taken = next(w for w in found.to_mission().waypoints if w.alternatives)
     assert (taken.position, taken.heading) == (near.position, near.heading)
     assert taken.alternatives == (Viewpoint(position=far.position, heading=10.0),)
-    assert verify_mission(found.planned(), scene=scene, field=field)
+    assert verify_mission(found.to_mission(), scene=scene, field=field)
 
 
 def test_an_alternative_in_a_solid_is_told(planned):
@@ -413,10 +413,10 @@ def test_no_tour_of_states_leads_where_the_robot_has_no_room(radius, tmp_path):
     mission = small(tmp_path, [[4, 0, 0.1], [3, 2, 0]], bars)
     field = mission.load_scene().field()
     try:
-        stops = plan(mission, time_limit=20.0).stops
+        stops = plan(mission, time_limit=20.0).visits
     except (InputError, LimitReachedError):
         return
-    assert all(has_room(field, stop.path, mission) for stop in stops)
+    assert all(keeps_clearance(field, stop.path, mission) for stop in stops)
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,8 @@ from netsp.command.solve_mission import summary
 from netsp.plan.space.mission_policy import GapPolicy
 from netsp.plan.space.mission_repair import _gaps_named
 from netsp.plan.space.mission_solver import solve_mission
-from netsp.plan.space.passages import GapGrid, resolved, unresolved_gaps
-from netsp.plan.space.space_plan import given_plan, plans, water_of
+from netsp.plan.space.passages import GapGrid, find_hidden_gaps, resolve_gaps
+from netsp.plan.space.space_plan import candidate_plans, plan_given_order, prepare_context
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.planned_tour import PlannedTour
@@ -55,7 +55,7 @@ def mission_of(**more) -> Mission:
 
 def gaps_of(scene: Scene, **more):
     mission = mission_of(**more)
-    return unresolved_gaps(GapGrid.of(scene.field(), grid_box(mission, scene), CLEARANCE))
+    return find_hidden_gaps(GapGrid.in_box(scene.field(), grid_box(mission, scene), CLEARANCE))
 
 
 @settings(max_examples=16, deadline=None)
@@ -69,8 +69,8 @@ def test_a_slot_wide_enough_is_shown_by_the_cells_or_named_with_its_place_and_wi
 ):
     """Walls at x = 0 close two layers of cells, those at x = 0.1 a single one if they are thin."""
     scene = scene_of(y, width, x=x, thick=thick)
-    grid = GapGrid.of(scene.field(), grid_box(mission_of(), scene), CLEARANCE)
-    gaps = unresolved_gaps(grid)
+    grid = GapGrid.in_box(scene.field(), grid_box(mission_of(), scene), CLEARANCE)
+    gaps = find_hidden_gaps(grid)
     rows = grid.low[1] + (np.arange(grid.shape[1]) + 0.5) * grid.cell
     # middles of the cells beside a thin wall at x = 0 are a little off its corners
     beside = max(0.0, 0.5 * grid.cell - 0.5 * thick) if x == 0.0 else 0.0
@@ -107,16 +107,16 @@ def test_a_cell_is_chosen_that_shows_a_slot_the_default_does_not(y):
     scene = scene_of(y, 0.24)
     mission = mission_of()
     assert gaps_of(scene)
-    cells = resolved(mission, scene, scene.field())
+    cells = resolve_gaps(mission, scene, scene.field())
     assert cells.left == ()
     assert len(cells.shown) == 1
     assert cells.mission.cell == cells.cell < 0.2
     # a cell that was asked for is kept, and the gap is named
-    asked = resolved(mission_of(cell=0.2), scene, scene.field())
+    asked = resolve_gaps(mission_of(cell=0.2), scene, scene.field())
     assert asked.mission.cell == 0.2
     assert len(asked.left) == 1
     # and so is it where no cell that may be taken shows it
-    few = resolved(mission, scene, scene.field(), GapPolicy(smallest=0.99))
+    few = resolve_gaps(mission, scene, scene.field(), GapPolicy(smallest=0.99))
     assert few.mission.cell is None
     assert len(few.left) == 1
 
@@ -126,21 +126,21 @@ def test_every_way_to_a_plan_names_the_gaps_that_its_cells_do_not_show():
     scene = scene_of(0.0, 0.24)
     field, asked = scene.field(), mission_of(cell=0.2)
     grid = grid_of(asked, scene, field)
-    first = next(plans(asked, scene=scene, clock=Clock(5.0)))
-    on_grid = given_plan(water_of(asked, Clock(), field=field, grid=grid))
-    for tour in (first.planned().tour, on_grid.planned().tour):
+    first = next(candidate_plans(asked, scene=scene, clock=Clock(5.0)))
+    on_grid = plan_given_order(prepare_context(asked, Clock(), field=field, grid=grid))
+    for tour in (first.to_mission().tour, on_grid.to_mission().tour):
         (gap,) = tour.unresolved_gaps
         assert gap.width == pytest.approx(0.24, abs=0.005)
     assert "0.24 m at (0, 0, " in _gaps_named(on_grid)
     # and a library's plan takes the cell that shows the gap, like a run
-    finer = water_of(mission_of(), Clock(), scene=scene)
+    finer = prepare_context(mission_of(), Clock(), scene=scene)
     assert finer.mission.cell == finer.grid.cell < 0.2
     assert finer.unresolved_gaps == ()
 
 
 def test_a_search_for_gaps_without_time_does_not_say_that_there_are_none(tmp_path, capsys):
     scene, mission = scene_of(0.0, 0.24), mission_of(waypoints=[(-2, 1, 0)])
-    cells = resolved(mission, scene, scene.field(), clock=Clock(0.0))
+    cells = resolve_gaps(mission, scene, scene.field(), clock=Clock(0.0))
     assert cells.left is None
     solved = solve_mission(mission, scene=scene, time_limit=1e-6)
     assert solved.tour.unresolved_gaps is None

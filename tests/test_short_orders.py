@@ -10,7 +10,7 @@ from netsp.plan.space.judge import verify_mission
 from netsp.plan.space.mission_policy import OrderPolicy
 from netsp.plan.space.places import Places
 from netsp.plan.space.short_orders import short_order_tour
-from netsp.plan.space.space_plan import SHORT_ORDER, plans, water_of
+from netsp.plan.space.space_plan import SHORT_ORDER, candidate_plans, prepare_context
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 
@@ -30,31 +30,31 @@ def mission(**more) -> Mission:
 
 
 def best_of(made) -> tuple:
-    return short_order_tour(made, Places.of(made.mission, made.field), Clock())
+    return short_order_tour(made, Places.for_mission(made.mission, made.field), Clock())
 
 
 def test_waypoints_in_a_bad_order_get_a_short_tour_that_the_judge_accepts():
-    found = next(plans(mission(), scene=BAR, clock=Clock(20.0)))
+    found = next(candidate_plans(mission(), scene=BAR, clock=Clock(20.0)))
     assert found.kind == SHORT_ORDER
-    given = drive_given_order(found.water)
+    given = drive_given_order(found.context)
     assert sorted(found.order) == list(range(8))
     assert found.length < 0.6 * given.length
-    assert verify_mission(found.planned(), scene=BAR, water=found.water)
+    assert verify_mission(found.to_mission(), scene=BAR, context=found.context)
 
 
 def test_a_short_order_takes_one_alternative_of_each_waypoint_and_begins_at_the_state():
     near = {"position": (-4.5, 0, -1), "alternatives": [{"position": (3.5, 1.0, -1)}]}
     state = {"position": (3, 2, -1), "tether": [(4.5, 0, 0), (3, 2, -1)]}
-    made = water_of(mission(waypoints=[near, (0, 3, -1)], state=state), Clock(), scene=BAR)
+    made = prepare_context(mission(waypoints=[near, (0, 3, -1)], state=state), Clock(), scene=BAR)
     found = best_of(made)
-    assert sorted(stop.waypoint for stop in found.stops) == [0, 1]
-    assert {stop.waypoint: stop.choice for stop in found.stops} == {0: 1, 1: 0}
-    assert found.stops[0].path[0] == pytest.approx(state["position"])
+    assert sorted(stop.waypoint for stop in found.visits) == [0, 1]
+    assert {stop.waypoint: stop.choice for stop in found.visits} == {0: 1, 1: 0}
+    assert found.visits[0].path[0] == pytest.approx(state["position"])
 
 
 def test_without_time_there_is_no_tour_and_bad_effort_is_refused():
-    made = water_of(mission(), Clock(), scene=BAR)
-    places = Places.of(made.mission, made.field)
+    made = prepare_context(mission(), Clock(), scene=BAR)
+    places = Places.for_mission(made.mission, made.field)
     assert short_order_tour(made, places, Clock(0.0)) is None
     with pytest.raises(InputError, match=r"blocked_ratio: 0\.5; expected 1 or more"):
         OrderPolicy(blocked_ratio=0.5)

@@ -70,7 +70,7 @@ def inputs(tmp_path_factory):
     (folder / "p.json").write_text(problem.to_json())
     (folder / "s.json").write_text(solve(problem).to_json())
     mission = written(folder)
-    planned = plan(Mission.load(mission), time_limit=None).planned()
+    planned = plan(Mission.load(mission), time_limit=None).to_mission()
     planned = planned.model_copy(update={"scene": "scene.json"})
     text = json.dumps(planned.model_dump(mode="json", exclude_none=True))
     (folder / "planned.json").write_text(text)

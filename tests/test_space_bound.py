@@ -12,19 +12,19 @@ from netsp.base.clock import NEVER, Clock
 from netsp.base.errors import InputError
 from netsp.plan.solve_problem import solve
 from netsp.plan.space.mission_policy import PotentialPolicy, StatePolicy
-from netsp.plan.space.path_bound import LegBounds, bound_of_all
+from netsp.plan.space.path_bound import LegBounds, bound_all_tours
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import Water
+from netsp.plan.space.planning_context import PlanningContext
 from netsp.plan.space.potential import (
     Region,
-    edges_of,
-    has_room,
-    marched,
+    corner_edges,
+    fast_march,
+    may_have_room,
     path_bound,
     steepest,
 )  # fmt: skip
-from netsp.plan.space.space_legs import Ways
-from netsp.plan.space.upright import bound_of_upright
+from netsp.plan.space.space_legs import RobotPaths
+from netsp.plan.space.upright import bound_by_upright_solids
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 
@@ -124,7 +124,7 @@ def test_a_cell_is_left_out_only_where_none_of_its_points_has_room(x, y, z, half
     ])  # fmt: skip
     field = scene.field()
     centre, halves = np.array([x, y, z]), np.array([half, half, 0.5 * half])
-    if not has_room(field.arrays, centre, halves, room, 1.0, 3):
+    if not may_have_room(field.arrays, centre, halves, room, 1.0, 3):
         steps = np.linspace(-1.0, 1.0, 7)
         box = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3) * halves
         assert field.distance(box + centre).max() < room
@@ -135,7 +135,7 @@ def test_marching_without_correction_overshoots_and_is_no_bound():
     start = np.zeros((9, 9, 9), dtype=bool)
     start[0, 0, 0] = True
     slow = np.ones((9, 9, 9), dtype=np.float32)
-    u = marched(edges_of(possible), start, 1.0, slow, 100.0, NEVER)
+    u = fast_march(corner_edges(possible), start, 1.0, slow, 100.0, 0.25, NEVER)
     assert u[8, 8, 8] > math.sqrt(3.0) * 8.0
     assert steepest(u, possible, 1.0) > 1.05
 
@@ -152,13 +152,13 @@ def mission_by_a_slot(width: float, tmp_path) -> tuple[Mission, Scene]:
 @pytest.mark.parametrize("width", [0.22, 0.3])
 def test_no_bound_of_all_tours_is_above_a_tour_through_a_slot_that_the_cells_close(width, tmp_path):
     mission, scene = mission_by_a_slot(width, tmp_path)
-    water = Water.of(mission, scene, scene.field())
-    places = Places.of(mission, water.field)
+    context = PlanningContext.for_mission(mission, scene, scene.field())
+    places = Places.for_mission(mission, context.field)
     # what was found goes round the wall, as it does where cells close the slot
-    ways = Ways(water, places, StatePolicy().effort(len(places)))
+    ways = RobotPaths(context, places, StatePolicy().effort(len(places)))
     round_ = np.array([[-2, 0, 0], [-0.3, 3.1, 0], [0.3, 3.1, 0], [2, 0, 0]], dtype=float)
     ways.tethers.update({0: [round_], 1: [round_]})
-    bound = bound_of_all(ways, [0, 1], None, potential=PotentialPolicy(2_000, 16_000))
+    bound = bound_all_tours(ways, [0, 1], None, potential=PotentialPolicy(2_000, 16_000))
     legs = [
         through((-2, 0, 0), (2, y, 0), 0.0, width, 0.4, 0.1) for y in (0.5, -0.5)
     ]  # fmt: skip
@@ -168,14 +168,14 @@ def test_no_bound_of_all_tours_is_above_a_tour_through_a_slot_that_the_cells_clo
 
 def test_a_path_that_was_measured_does_not_raise_the_bound(tmp_path):
     mission, scene = mission_by_a_slot(0.3, tmp_path)
-    water = Water.of(mission, scene, scene.field())
-    places = Places.of(mission, water.field)
-    ways = Ways(water, places, StatePolicy().effort(len(places)))
+    context = PlanningContext.for_mission(mission, scene, scene.field())
+    places = Places.for_mission(mission, context.field)
+    ways = RobotPaths(context, places, StatePolicy().effort(len(places)))
     legs = LegBounds(ways, [0, 1], PotentialPolicy(2_000, 16_000))
     straight = np.linalg.norm(legs.points[0] - legs.points[1])
     assert legs.costs[0, 1] == pytest.approx(straight)
     ways.tethers[0] = [np.array([[-2, 0, 0], [0, 3.5, 0], [2, 0.5, 0]], dtype=float)]
-    while legs.raised(0, 1, Clock()):
+    while legs.raise_bound(0, 1, Clock()):
         pass
     assert legs.costs[0, 1] <= through((-2, 0, 0), (2, 0.5, 0), 0.0, 0.3, 0.4, 0.1)
 
@@ -195,8 +195,8 @@ def test_a_bound_ends_with_its_clock_and_what_is_proven_by_then_is_a_bound():
 def test_the_bound_among_upright_solids_ends_with_the_clock_of_the_run(monkeypatch):
     mission, scene = mission_by_a_slot(0.3, None)
     scene = Scene(bounds=BOUNDS, solids=[{"post": {"center": [0, 0], "radius": 0.5}}])
-    water = Water.of(mission, scene, scene.field())
-    places, clock, heard = Places.of(mission, water.field), Clock(), []
+    context = PlanningContext.for_mission(mission, scene, scene.field())
+    places, clock, heard = Places.for_mission(mission, context.field), Clock(), []
 
     def solve_until_stopped(problem, time_limit):
         clock.end()  # as Ctrl-C and SIGTERM do
@@ -204,7 +204,7 @@ def test_the_bound_among_upright_solids_ends_with_the_clock_of_the_run(monkeypat
         return solve(problem, time_limit=time_limit)
 
     monkeypatch.setattr("netsp.plan.space.upright.solve", solve_until_stopped)
-    bound_of_upright(mission, water, [0, 1], places, clock.part(0.5))
+    bound_by_upright_solids(mission, context, [0, 1], places, clock.part(0.5))
     assert heard == [True]
 
 

@@ -11,18 +11,26 @@ import pytest
 from netsp import Circle, Problem, solve
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError
+from netsp.base.geometry import polylines
 from netsp.command.main import main
 from netsp.hsignature.wordtable import times, times_inverse
-from netsp.plan.space.board import Board
+from netsp.plan.space.board import StateGraph
 from netsp.plan.space.judge import verify_mission
 from netsp.plan.space.mission_policy import PotentialPolicy, StatePolicy
-from netsp.plan.space.path_bound import LegBounds, bound_of_all
+from netsp.plan.space.path_bound import LegBounds, bound_all_tours
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import Water, along, has_room
-from netsp.plan.space.space_legs import Legs, Ways
+from netsp.plan.space.planning_context import PlanningContext, keeps_clearance
+from netsp.plan.space.space_legs import DrivenLegs, RobotPaths
 from netsp.plan.space.space_plan import _best_driven, plan
-from netsp.plan.space.states import first_states
-from netsp.plan.space.triangle_labels import LENGTHS, STEPS, axes_of, lower_end, nth_axis, staircase
+from netsp.plan.space.states import find_first_states
+from netsp.plan.space.triangle_labels import (
+    LENGTHS,
+    STEPS,
+    lower_end,
+    nth_axis,
+    staircase_order,
+    step_axes,
+)
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from netsp.world.scene.scene import scene_of
@@ -69,10 +77,10 @@ def test_among_prisms_it_is_as_short_as_the_proven_optimum(posts, planned):
     assert found.length == pytest.approx(best.length, rel=2e-3)
     assert found.free
     assert sorted(found.order) == [0, 1, 2, 3]
-    assert max(stop.most for stop in found.stops) <= mission.tether_length
+    assert max(stop.longest_tether for stop in found.visits) <= mission.tether_length
     # and the tether is at every goal in the class that it has in the plane
-    path, words = np.array(best.path), found.water.words
-    for stop in found.stops:
+    path, words = np.array(best.path), found.context.words
+    for stop in found.visits:
         near = int(np.argmin(np.linalg.norm(path - problem.goals[stop.waypoint].position, axis=1)))
         assert words.word(path[: near + 1]) == stop.word
 
@@ -84,21 +92,21 @@ def test_a_shorter_tether_makes_another_tour_that_keeps_to_it(posts, tmp_path):
     best = solve(shorter)
     found = plan(mission_of(shorter, tmp_path))
     assert found.length == pytest.approx(best.length, rel=2e-3)
-    assert max(stop.most for stop in found.stops) <= shorter.tether_length + 0.02
+    assert max(stop.longest_tether for stop in found.visits) <= shorter.tether_length + 0.02
 
 
 def test_the_same_seed_gives_the_same_plan(posts, planned):
     one, other = planned, plan(posts[1])
     assert one.order == other.order
     assert one.length == other.length
-    assert [s.word for s in one.stops] == [s.word for s in other.stops]
+    assert [s.word for s in one.visits] == [s.word for s in other.visits]
 
 
 def test_every_stop_has_the_word_of_the_way_to_it(planned):
     found = planned
-    words = found.water.words
+    words = found.context.words
     walked = [np.asarray(found.mission.anchor, dtype=float)[None]]
-    for stop in found.stops:
+    for stop in found.visits:
         walked.append(stop.path)
         assert words.word(np.vstack(walked)) == stop.word
     walked.append(found.home)
@@ -131,10 +139,10 @@ def test_a_search_finds_the_shortest_words_of_each_cell(tmp_path):
     }))  # fmt: skip
     mission = Mission.load(file)
     scene = mission.load_scene()
-    water = Water.of(mission, scene, scene.field())
-    words, most, longest = water.words, 3, 7.0
+    context = PlanningContext.for_mission(mission, scene, scene.field())
+    words, most, longest = context.words, 3, 7.0
     root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
-    found = water.search(False, root, most, longest)
+    found = context.search_words(False, root, most, longest)
     limit = int(100 * 1.35 * longest / 0.4)
     _, ny, nz = words.cells.flags.shape
     kept: dict[tuple[int, int], int] = {(root, 0): 0}
@@ -145,18 +153,18 @@ def test_a_search_finds_the_shortest_words_of_each_cell(tmp_path):
             continue
         i, j, k = np.unravel_index(cell, words.cells.flags.shape)
         for s, step in enumerate(STEPS):
-            order = staircase(words.cells.flags, i, j, k, s)
+            order = staircase_order(words.cells.flags, i, j, k, s)
             there = far + int(LENGTHS[s])
             if order < 0 or there > limit:
                 continue
             at, new, table = cell, word, words.table
-            n, a, b, c = axes_of(s)
+            n, a, b, c = step_axes(s)
             for m in range(n):
                 axis = nth_axis(n, a, b, c, order, m)
                 label = words.labels[3 * lower_end(at, axis, step[axis], ny, nz) + axis]
                 by = times if step[axis] > 0 else times_inverse
                 new, table = by(table, words.rules, new, label)
-                words.keep(table)
+                words.keep_table(table)
                 at += step[axis] * (ny * nz, nz, 1)[axis]
             if there < kept.get((int(at), int(new)), limit + 1):
                 kept[int(at), int(new)] = there
@@ -192,13 +200,13 @@ def about_a_box(**more) -> Mission:
 
 
 def test_a_tour_with_no_clearance_goes_round_a_solid_and_not_through_it():
-    planned = plan(about_a_box(clearance=0.0), scene=BOX, time_limit=20).planned()
+    planned = plan(about_a_box(clearance=0.0), scene=BOX, time_limit=20).to_mission()
     verdict = verify_mission(planned, scene=BOX)
     assert verdict, str(verdict)
 
 
 def test_a_tour_that_leaves_the_scene_is_not_verified_and_one_far_off_is_told_at_once():
-    planned = plan(about_a_box(clearance=0.2), scene=BOX, time_limit=20).planned()
+    planned = plan(about_a_box(clearance=0.2), scene=BOX, time_limit=20).to_mission()
     for beyond in ((-7.0, 0.0, 0.0), (0.0, 0.0, -1e9)):
         home = (planned.tour.home[0], beyond, *planned.tour.home[1:])
         tour = planned.tour.model_copy(update={"home": home}).mended()
@@ -217,7 +225,7 @@ def test_two_stops_cannot_be_the_same_waypoint_of_the_file():
             tether_length=9,
         ).waypoints}
     )  # fmt: skip
-    planned = plan(mission, scene=BOX, time_limit=20).planned()
+    planned = plan(mission, scene=BOX, time_limit=20).to_mission()
     stops = tuple(s.model_copy(update={"given_as": 7}) for s in planned.tour.stops)
     lied = planned.model_copy(update={"tour": planned.tour.model_copy(update={"stops": stops})})
     assert not verify_mission(lied, scene=BOX)
@@ -245,7 +253,7 @@ def test_surprises_that_cannot_be_are_refused_before_the_flight():
 
 
 def test_a_flight_is_not_written_over_its_mission(tmp_path):
-    planned = plan(about_a_box(clearance=0.2), scene=BOX, time_limit=20).planned()
+    planned = plan(about_a_box(clearance=0.2), scene=BOX, time_limit=20).to_mission()
     (tmp_path / "scene.json").write_text(BOX.model_dump_json(exclude_none=True))
     data = {**planned.model_dump(mode="json", exclude_none=True), "scene": "scene.json"}
     file = tmp_path / "mission.json"
@@ -273,11 +281,11 @@ def test_a_bound_on_all_tours_is_found_among_classes_of_which_some_are_not_found
     mission = about_a_box(clearance=0.2)
     found = plan(mission, scene=BOX, time_limit=20)
     for seconds in (0.05, 5.0):
-        bound = bound_of_all(found.ways, sorted(found.order), Clock(seconds))
+        bound = bound_all_tours(found.paths, sorted(found.order), Clock(seconds))
         assert bound is None or bound <= found.length * 1.001
 
 
-def free_bar() -> tuple[Water, Places]:
+def free_bar() -> tuple[PlanningContext, Places]:
     """Water about a bar with free ends, and two waypoints beyond it."""
     bar = {"capsule": {"a": [0, -3, 0], "b": [0, 3, 0], "radius": 0.3}}
     scene = Scene(solids=[bar], bounds=[-6, -6, -6, 6, 6, 6])
@@ -286,7 +294,7 @@ def free_bar() -> tuple[Water, Places]:
         waypoints=[(2, 0, -0.5), (2, 1, -0.5)], tether_length=20.0, clearance=0.2,
     )  # fmt: skip
     field = scene.field()
-    return Water.of(mission, scene, field), Places.of(mission, field)
+    return PlanningContext.for_mission(mission, scene, field), Places.for_mission(mission, field)
 
 
 BESIDE_A_BAR = {
@@ -315,7 +323,7 @@ def test_a_tour_with_detours_is_told_as_one(tmp_path, capsys):
 def test_a_detour_past_the_free_end_of_a_bar_saves_the_way_back_around_it(monkeypatch):
     scene, mission = A_BAR, Mission.model_validate(BESIDE_A_BAR)
     found = plan(mission, scene=scene)
-    assert verify_mission(found.planned(), scene=scene)
+    assert verify_mission(found.to_mission(), scene=scene)
     monkeypatch.setattr("netsp.plan.space.space_plan.Detours.shortened", lambda *_: None)
     taut = plan(mission, scene=scene)
     assert taut.result.status.value == "optimal_of_states"
@@ -323,60 +331,65 @@ def test_a_detour_past_the_free_end_of_a_bar_saves_the_way_back_around_it(monkey
 
 
 def test_a_leg_that_arrives_in_one_direction_only_is_gone_in_that_direction():
-    water, places = free_bar()
-    states = first_states(water, places, 19.8, StatePolicy().effort(2), Clock())
-    a, b = states.of[0][0], states.of[1][0]
+    context, places = free_bar()
+    states = find_first_states(context, places, 19.8, StatePolicy().effort(2), Clock())
+    a, b = states.at_place[0][0], states.at_place[1][0]
     line = places.points[[0, 1]]
     for v, w, path in ((a, b, line), (b, a, line[::-1])):
-        board = Board(water, states)
-        board.take(Legs({(v, w): path}), Clock())
+        board = StateGraph(context, states)
+        board.update(DrivenLegs({(v, w): path}), Clock())
         assert list(board.legs) == [(min(a, b), max(a, b))]
         for tour in ([a, b], [b, a]):
-            driven = board.driven(tour)
+            driven = board.drive(tour)
             assert driven.fault is None
             assert driven.tour == [v, w]
 
 
 def test_a_tour_whose_only_way_is_forbidden_when_the_time_is_up_is_not_driven_again(monkeypatch):
-    water, places = free_bar()
-    states = first_states(water, places, 19.8, StatePolicy().effort(2), Clock())
-    a, b = states.of[0][0], states.of[1][0]
-    own_way, driven = Board._own_way, Board.driven
+    context, places = free_bar()
+    states = find_first_states(context, places, 19.8, StatePolicy().effort(2), Clock())
+    a, b = states.at_place[0][0], states.at_place[1][0]
+    own_way, driven = StateGraph._path_along_tether, StateGraph.drive
     # the robot gets to b by way of a alone, and whatever is driven is at fault on that leg
-    monkeypatch.setattr(Board, "_own_way", lambda self, v: own_way(self, v) if v == a else None)
     monkeypatch.setattr(
-        Board, "driven",
+        StateGraph, "_path_along_tether", lambda self, v: own_way(self, v) if v == a else None
+    )
+    monkeypatch.setattr(
+        StateGraph, "drive",
         lambda self, tour: dataclasses.replace(driven(self, tour), fault=(min(a, b), max(a, b))),
     )  # fmt: skip
-    board = Board(water, states)
+    board = StateGraph(context, states)
     line = places.points[[0, 1]]
-    board.take(Legs({(a, b): line, (b, a): line[::-1]}), Clock())
-    assert board.leads_to([a, b])
+    board.update(DrivenLegs({(a, b): line, (b, a): line[::-1]}), Clock())
+    assert board.can_reach_all([a, b])
     assert _best_driven(board, Clock(0.0), lambda _: None, None, 1.0, {"seed": 0}) is None
-    assert board.leads_to([a])
-    assert not board.leads_to([a, b])
+    assert board.can_reach_all([a])
+    assert not board.can_reach_all([a, b])
 
 
 def test_ways_made_of_tethers_are_ways_of_their_words_and_no_bound_exceeds_them(posts):
     _, mission = posts
     scene = mission.load_scene()
     field = scene.field()
-    water, places = Water.of(mission, scene, field), Places.of(mission, field)
+    context, places = (
+        PlanningContext.for_mission(mission, scene, field),
+        Places.for_mission(mission, field),
+    )
     effort = StatePolicy().effort(len(places))
-    states = first_states(water, places, mission.tether_length, effort, Clock())
-    tethers = {n: [states.all[s].tether.nodes for s in of] for n, of in states.of.items()}
-    ways = Ways(water, places, effort, tethers)
+    states = find_first_states(context, places, mission.tether_length, effort, Clock())
+    tethers = {n: [states.entries[s].tether.nodes for s in of] for n, of in states.at_place.items()}
+    ways = RobotPaths(context, places, effort, tethers)
     made = 0
     for n in range(len(places)):
-        ways.prepare(n, search=False)
+        ways.find_from(n, search=False)
     legs = LegBounds(ways, list(range(len(places))), PotentialPolicy(max_cells=15_000))
     for u, v in itertools.combinations(range(1, len(legs.points)), 2):
-        legs.raised(u, v, Clock())
+        legs.raise_bound(u, v, Clock())
     for n, m in itertools.permutations(range(len(places)), 2):
-        for word, path in ways.known(n, m):
-            assert water.number(path) == word
-            assert has_room(field, path, mission)
+        for word, path in ways.between(n, m):
+            assert context.word_number(path) == word
+            assert keeps_clearance(field, path, mission)
             made += len(path) > 2
-        lengths = [along(path) for _, path in ways.known(n, m)]
+        lengths = [polylines.length(path) for _, path in ways.between(n, m)]
         assert all(length >= legs.costs[n + 1, m + 1] - 1e-6 for length in lengths)
     assert made

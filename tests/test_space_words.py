@@ -31,7 +31,7 @@ def field_of(*solids):
 
 
 def words_of(field, cell=0.25):
-    return SpaceSignature.of(field, LOW, HIGH, cell, ANCHOR)
+    return SpaceSignature.in_box(field, LOW, HIGH, cell, ANCHOR)
 
 
 def knot():
@@ -202,8 +202,8 @@ def test_a_path_through_a_solid_has_no_word_and_is_told_where():
 
 def test_what_cannot_be_is_refused():
     with pytest.raises(InputError, match="anchor: no free cell"):
-        SpaceSignature.of(PRISMS, LOW, HIGH, 0.25, [-2, -1, 0])
+        SpaceSignature.in_box(PRISMS, LOW, HIGH, 0.25, [-2, -1, 0])
     with pytest.raises(InputError, match=r"cell: 0\.01 makes .* GiB; expected"):
-        SpaceSignature.of(PRISMS, LOW, HIGH, 0.01, ANCHOR)
+        SpaceSignature.in_box(PRISMS, LOW, HIGH, 0.01, ANCHOR)
     with pytest.raises(InputError, match="bounds: expected a box"):
-        SpaceSignature.of(PRISMS, HIGH, LOW, 0.25, ANCHOR)
+        SpaceSignature.in_box(PRISMS, HIGH, LOW, 0.25, ANCHOR)

@@ -17,7 +17,7 @@ from netsp.model.solution import Status
 from netsp.plan.space.flown import words_of_flight
 from netsp.plan.space.judge import verify_mission
 from netsp.plan.space.mission_solver import seconds_until_home, solve_mission
-from netsp.plan.space.path_bound import bound_of_all
+from netsp.plan.space.path_bound import bound_all_tours
 from netsp.plan.space.space_plan import plan
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.planned_tour import in_file
@@ -65,7 +65,7 @@ def test_predictive_flies_the_legs_and_looks_for_no_others(solved, monkeypatch):
     monkeypatch.setattr(
         PredictivePlanner, "_shortest_feasible", lambda self, *a: sought.append(a) or seek(self, *a)
     )
-    planned = found.plan.planned()
+    planned = found.plan.to_mission()
     run = simulate(planned)
     assert not sought
     assert run.summary["visited"] == 4
@@ -78,7 +78,7 @@ def test_predictive_flies_the_legs_and_looks_for_no_others(solved, monkeypatch):
 
 
 def test_a_robot_that_is_elsewhere_plans_for_itself(solved):
-    planned = solved[1].plan.planned()
+    planned = solved[1].plan.to_mission()
     other = planned.model_copy(update={"start": (0.0, -2.0, 0.0)})
     run = simulate(other)
     assert run.summary["visited"] == 4
@@ -87,7 +87,7 @@ def test_a_robot_that_is_elsewhere_plans_for_itself(solved):
 
 
 def test_what_is_new_on_the_map_is_not_flown_through(solved, tmp_path):
-    planned = solved[1].plan.planned()
+    planned = solved[1].plan.to_mission()
     leg = np.array(planned.tour.stops[1].path)
     middle = polylines.points_along(leg, 0.5 * polylines.length(leg))[1]
     scene = {**SCENE, "solids": [
@@ -113,7 +113,7 @@ def test_a_solved_mission_is_never_worse_than_the_order_given(solved):
 
 def test_the_bound_is_no_longer_than_any_order_without_a_tether(solved):
     mission, found = solved
-    bound = bound_of_all(found.plan.ways, [0, 1, 2, 3], Clock(), params=FEW_CELLS.potential)
+    bound = bound_all_tours(found.plan.paths, [0, 1, 2, 3], Clock(), potential=FEW_CELLS.potential)
     loose = plan(mission.model_copy(update={"tether_length": 60.0}), time_limit=None)
     assert bound <= loose.length + 1e-6
     assert bound >= 2.0 * max(np.linalg.norm(np.subtract(p, mission.start)) for p in WAYPOINTS)
@@ -151,9 +151,9 @@ def test_a_planned_mission_is_written_and_read_and_flies(tmp_path, capsys):
 def test_the_flight_is_in_the_planned_classes_and_ends_in_none(solved):
     planned = solved[1].mission
     flown = words_of_flight(simulate(planned))
-    assert flown.as_planned == len(flown.stops) == 4
+    assert flown.as_planned == len(flown.visits) == 4
     assert flown.home == ()
-    assert any(word for _, word in flown.stops)
+    assert any(word for _, word in flown.visits)
 
 
 def test_a_flight_in_other_classes_is_told(solved):
@@ -170,7 +170,7 @@ def test_a_flight_in_other_classes_is_told(solved):
 def test_the_judge_accepts_what_was_solved(solved):
     verdict = verify_mission(solved[1].mission)
     assert verdict, str(verdict)
-    assert verify_mission(solved[1].plan.planned(bound=solved[1].tour.bound_of_all))
+    assert verify_mission(solved[1].plan.to_mission(bound=solved[1].tour.bound_of_all))
 
 
 def changed(mission: Mission, **tour) -> Mission:

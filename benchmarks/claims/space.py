@@ -16,7 +16,7 @@ def groups() -> tuple[str, bool]:
 
     found = []
     for name, solids in shapes().items():
-        made = SpaceSignature.of(Scene(solids=solids).field(), LOW, HIGH, 0.2, ANCHOR)
+        made = SpaceSignature.in_box(Scene(solids=solids).field(), LOW, HIGH, 0.2, ANCHOR)
         found.append((name, made.group.rank, len(made.group.relators), made.exact))
     wanted = [
         ("ring", 1, 0, True), ("two rings", 2, 0, True), ("two linked rings", 2, 1, True),
@@ -56,22 +56,24 @@ def uprights() -> tuple[str, bool]:
     from netsp.base.clock import Clock
     from netsp.plan.space.judge import verify_mission
     from netsp.plan.space.places import Places
-    from netsp.plan.space.space_plan import plans
-    from netsp.plan.space.upright import bound_of_upright
+    from netsp.plan.space.space_plan import candidate_plans
+    from netsp.plan.space.upright import bound_by_upright_solids
 
     worst, gap = 0.0, 0.0
     worlds = [posts_world(seed) for seed in (2, 3)]
     worlds += [prism_world(kind, 0) for kind in ("boxes", "close pairs", "depths")]
     for problem, mission, scene in worlds:
-        found = next(plans(mission, scene=scene, clock=Clock(20.0), whole_tether=True))
-        verified = verify_mission(found.planned(), scene=scene, water=found.water)
+        found = next(candidate_plans(mission, scene=scene, clock=Clock(20.0), whole_tether=True))
+        verified = verify_mission(found.to_mission(), scene=scene, context=found.context)
         best = solve(problem, time_limit=20.0)
         assert best.length is not None
         proven = verified and best.status.value == "optimal"
         worst = max(worst, found.length / best.length - 1.0 if proven else float("inf"))
-        places = Places.of(found.mission, found.water.field)
+        places = Places.for_mission(found.mission, found.context.field)
         every = list(range(len(places)))
-        bound = bound_of_upright(found.mission, found.water, every, places, Clock(20.0)) or 0.0
+        bound = (
+            bound_by_upright_solids(found.mission, found.context, every, places, Clock(20.0)) or 0.0
+        )
         gap = max(gap, 1.0 - bound / found.length)
     good = worst <= 5e-3 and 0.0 <= gap <= 0.015
     return f"{100 * worst:.2f} % longer, gap {100 * gap:.2f} %", good
@@ -150,7 +152,7 @@ def mended() -> tuple[str, bool]:
     from netsp.world.simulator.surprises import SceneSurprises
 
     mission, scene = mission_of("ring")
-    planned = plan(mission, scene=scene).planned()
+    planned = plan(mission, scene=scene).to_mission()
     safe = flights = 0
     for stop in planned.tour.stops[::2]:
         leg = np.array(stop.path)

@@ -77,9 +77,9 @@ def _flown(
         if surprises is not None:
             surprises.check_places(mission, scene, field, source or "")
         if check:
-            from netsp.plan.space.judge import checked_mission
+            from netsp.plan.space.judge import check_mission_tour
 
-            clock.bounded("judging the tour", lambda: checked_mission(mission, scene, field))
+            clock.bounded("judging the tour", lambda: check_mission_tour(mission, scene, field))
         if clock.stopped:
             raise KeyboardInterrupt
         if not quiet:
@@ -98,7 +98,7 @@ def _flown(
             if mission.tour is not None and not mission.track:
                 from netsp.plan.space.flown import words_of_flight
 
-                run.summary["words"] = words_of_flight(run, scene=scene, field=field).told()
+                run.summary["words"] = words_of_flight(run, scene=scene, field=field).to_summary()
             if not quiet:
                 print(
                     ("\r\n" if sys.stderr.isatty() else "") + describe_run(run, scene.units),

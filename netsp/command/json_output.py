@@ -75,7 +75,7 @@ def of_mission(mission: Mission, found: SolvedMission, units: str) -> dict[str, 
         "unresolved_gaps": None if tour.unresolved_gaps is None else [
             gap.model_dump(mode="json") for gap in tour.unresolved_gaps
         ],
-        "cell": None if found.cells is None else found.cells.cell,
+        "cell": None if found.gaps is None else found.gaps.cell,
         "order": list(found.order[: len(tour.stops)]), "left_out": list(found.left_out),
         "longest_tether": tour.longest_tether, "tether_length": mission.tether_length,
         "exact_words": tour.exact, "solver": tour.solver, "interrupted": found.interrupted,

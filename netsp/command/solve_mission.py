@@ -220,7 +220,7 @@ def summary(
 
 def _perhaps(found: SolvedMission) -> str:
     """Return words for waypoints that may be left out because of a gap that the grid hides."""
-    gaps, cells = found.tour.unresolved_gaps, found.cells
+    gaps, cells = found.tour.unresolved_gaps, found.gaps
     if not gaps or cells is None:
         return ""
     more = f" or {counted(len(gaps) - 1, 'other')}" if len(gaps) > 1 else ""
@@ -232,10 +232,10 @@ def _perhaps(found: SolvedMission) -> str:
 
 def _gap_lines(found: SolvedMission, units: str) -> list[str]:
     """Return lines about the gaps that a finer cell shows, and those that stay hidden."""
-    if found.cells is None:
+    if found.gaps is None:
         return []
-    cell = f"{found.cells.cell:.3g} {units}"
-    lines = [f"gap      {gap}: shown by cells of {cell}, now in use" for gap in found.cells.shown]
+    cell = f"{found.gaps.cell:.3g} {units}"
+    lines = [f"gap      {gap}: shown by cells of {cell}, now in use" for gap in found.gaps.shown]
     lines += [
         f"gap      {gap}: wide enough for the robot, but cells of {cell} do not show it, and no "
         "tour through it was considered; give the mission a finer `cell`"

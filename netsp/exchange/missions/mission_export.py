@@ -30,7 +30,7 @@ from netsp.exchange.missions.mission_files import (
 )
 from netsp.exchange.missions.waypoints import STRAIGHT, Waypoint, turn
 from netsp.model.problem import Goal, Problem
-from netsp.plan.space.planning_context import Water
+from netsp.plan.space.planning_context import PlanningContext
 from netsp.plan.tour_plan import HOME
 from netsp.world.mission.mission import Mission
 from netsp.world.scene.field import DistanceField
@@ -125,13 +125,13 @@ def export_mission(
         )
     scene = scene or mission.load_scene()
     field = scene.field()
-    water = Water.of(mission, scene, field)
+    context = PlanningContext.for_mission(mission, scene, field)
     line = np.array([p.position for p in points])
     longest = 0.0
     for share in SHARES if acceptance else SHARES[:1]:
         way = pursued(line, share * acceptance) if share else line
         _check_free(field, way, share * acceptance)
-        longest = max(longest, _checked(water, points, way, share == 0.0))
+        longest = max(longest, _checked(context, points, way, share == 0.0))
     sunk = [_sunk(p, surface) for p in points]
     settings = told_apart(sunk, settings)
     write_page(file, kind, FORMATS[kind](_stand_in(mission, surface), sunk, projection, settings))
@@ -212,25 +212,25 @@ def _check_free(field: DistanceField, line: Floats, radius: float) -> None:
         raise InputError(f"mission: the line from ({x:.4g}, {y:.4g}, {z:.4g}) on enters a solid")
 
 
-def _checked(water: Water, points: list[Waypoint], line: Floats, exact: bool) -> float:
+def _checked(context: PlanningContext, points: list[Waypoint], line: Floats, exact: bool) -> float:
     """The longest taut tether along a line, whose word at the end is empty as in the plan; where it
     goes exactly through the waypoints, those at the stops are asked, too."""
-    words, tether = water.words, water.present
-    word, broken = words.word_until(np.vstack([tether.nodes, line, water.laid.nodes[::-1]]))
+    words, tether = context.words, context.present_tether
+    word, broken = words.try_word(np.vstack([tether.nodes, line, context.start_tether.nodes[::-1]]))
     if broken is not None or word != ():
         raise InputError("mission: its waypoints are not of the plan's homotopy class")
     if exact:
         for k, p in enumerate(points):
             if p.goal is None or p.goal == HOME:
                 continue
-            there = np.vstack([tether.nodes, line[: k + 1], water.mission.places[p.goal]])
-            word, broken = words.word_until(there)
+            there = np.vstack([tether.nodes, line[: k + 1], context.mission.places[p.goal]])
+            word, broken = words.try_word(there)
             if broken is not None or word != p.word:
                 raise InputError(
                     f"mission: at waypoint #{p.goal} the lines are not of the planned class"
                 )
-    _, longest = water.driven(tether, line, fine=True)
-    limit = water.mission.tether_length
+    _, longest = context.drive(tether, line, fine=True)
+    limit = context.mission.tether_length
     if longest > limit:
         raise InputError(
             f"tether_length: the lines between waypoints take {longest:.4g} m; expected no more "

@@ -19,7 +19,7 @@ from netsp.online.guard.correct import least_changed
 from netsp.online.guard.silhouettes import silhouette
 from netsp.online.guard.site import LONGER, ROUNDS, Letters, Loop, beside
 from netsp.online.guard.winding import TOUCHING, closing, loops_of
-from netsp.plan.space.planning_context import Water, along
+from netsp.plan.space.planning_context import PlanningContext
 from netsp.plan.space.space_signature import SpaceSignature
 from netsp.world.mission.mission import Mission
 from netsp.world.scene.field import pushed_out
@@ -79,7 +79,7 @@ class CellLetters:
         ]
 
     def _word(self, step: Floats) -> Word | None:
-        number, _ = self.words.number(step)
+        number, _ = self.words.word_number(step)
         return None if number is None else self._letters(number)
 
     def join(self, a: Word, b: Word) -> Word:
@@ -127,11 +127,11 @@ class SpaceSite:
         self.name, self.units = mission.name, scene.units
         self.tether_length = mission.tether_length
         self.field = scene.field()
-        self.water = Water.of(mission, scene, self.field)
+        self.water = PlanningContext.for_mission(mission, scene, self.field)
         self.model = self.water.model
         self.ahead = self.model
         self.anchor = np.asarray(mission.anchor, dtype=float)
-        self._first = self.water.present
+        self._first = self.water.present_tether
         self.start = self._first.robot
         self.identity = hashlib.sha256(
             (mission.model_dump_json() + scene.model_dump_json()).encode()
@@ -151,12 +151,12 @@ class SpaceSite:
         """From one at hand by a way that is not straight; where none is at hand, from the anchor,
         which takes seconds."""
         words = self.water.words
-        end = words.held(place)
+        end = words.visible_cell(place)
         missed = self._missed.get(word)
         if end is None or (missed is not None and math.dist(missed, place) < AGAIN):
             return None
         for other, tether in list(hanging) or [(self.start_word(), self._first)]:
-            begin = words.held(tether.robot)
+            begin = words.visible_cell(tether.robot)
             far = math.dist(tether.robot, place)
             if begin is None or far > ASIDE:
                 continue
@@ -180,7 +180,7 @@ class SpaceSite:
         self, begin: int, end: int, farthest: float, most: int = MOST_WAYS
     ) -> list[tuple[int, Floats]]:
         water = self.water
-        return water.ways(water.search(False, begin, most, {end: farthest}), end)
+        return water.paths_to(water.search_words(False, begin, most, {end: farthest}), end)
 
     def _relaxed(self, line: Floats, word: Word) -> Tether | None:
         tether = self.model.relaxed(line, ROUNDS)
@@ -189,23 +189,23 @@ class SpaceSite:
 
     def word_of(self, nodes: Floats) -> Word | None:
         """Of the cells that it passes."""
-        word, broken = self.water.words.word_until(nodes)
+        word, broken = self.water.words.try_word(nodes)
         return word if broken is None else None
 
     def ways(self, before: Floats, after: Floats, farthest: float) -> list[tuple[Word, float]]:
         """By a search over words; straight where it finds none."""
         words = self.water.words
         a, b = pushed_out(self.field, np.stack([before, after]), SURFACE)
-        begin, end = words.held(a), words.held(b)
+        begin, end = words.visible_cell(a), words.visible_cell(b)
         out: dict[Word, float] = {}
         straight = math.dist(a, b)
         if begin is not None and end is not None:
             most = max(1.5 * straight, farthest) + 2.0 * words.cells.cell
             for number, way in self._ways(begin, end, most):
                 # pulled taut it may pass another side of what cells show as one
-                path = self.water.taut(np.vstack([a, way, b]))
+                path = self.water.pull_taut(np.vstack([a, way, b]))
                 letters = words.letters(number)
-                out[letters] = min(out.get(letters, math.inf), along(path))
+                out[letters] = min(out.get(letters, math.inf), polylines.length(path))
         (direct,) = self.letters.written(a[None], b[None])
         if direct is not None or not out:
             out[direct or ()] = min(out.get(direct or (), math.inf), straight)
@@ -252,7 +252,7 @@ class SpaceSite:
             No such solid or side; no class agrees.
         """
         index = self._index(obstacle)
-        end = self.water.words.held(robot)
+        end = self.water.words.visible_cell(robot)
         agree: dict[Word, Tether] = {}
         if end is not None:
             shape = self.water.words.cells.flags.shape

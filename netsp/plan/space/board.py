@@ -13,18 +13,19 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError
+from netsp.base.geometry import polylines
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
 from netsp.model.solution import Status
 from netsp.plan.solve_problem import solve_graph
-from netsp.plan.space.planning_context import Water, along
-from netsp.plan.space.space_legs import Legs
-from netsp.plan.space.states import States, alike
+from netsp.plan.space.planning_context import PlanningContext
+from netsp.plan.space.space_legs import DrivenLegs
+from netsp.plan.space.states import States, hang_alike
 from netsp.roadmap.from_state import from_state
 
 
 @dataclass(frozen=True)
-class Stop:
+class TourVisit:
     """A waypoint of a plan.
 
     Parameters
@@ -35,31 +36,31 @@ class Stop:
         Which of its alternatives was chosen, from 1 on; 0 for its own position.
     word : tuple of int
         Word of the tether there.
-    tether : float
+    tether_length : float
         Metres of tether there.
     path : ndarray, shape (k, 3)
         How the robot gets there from the stop before, metres.
-    most : float
+    longest_tether : float
         Metres of tether on the way, at most.
     """
 
     waypoint: int
     choice: int
     word: tuple[int, ...]
-    tether: float
+    tether_length: float
     path: Floats
-    most: float
+    longest_tether: float
 
 
 @dataclass(frozen=True)
-class Driven:
+class DrivenTour:
     """What came of driving a tour.
 
     Parameters
     ----------
     tour : list of int
         States, in their order.
-    stops : list of Stop
+    visits : list of TourVisit
         The same with their paths.
     home : ndarray, shape (k, 3)
         From the last stop to the start, metres.
@@ -73,7 +74,7 @@ class Driven:
     """
 
     tour: list[int]
-    stops: list[Stop]
+    visits: list[TourVisit]
     home: Floats
     length: float
     free: bool
@@ -81,12 +82,12 @@ class Driven:
 
 
 @dataclass
-class Board:
+class StateGraph:
     """States and how to get from one to another.
 
     Parameters
     ----------
-    water : Water
+    context : PlanningContext
         Where they are.
     states : States
         Those so far.
@@ -94,7 +95,7 @@ class Board:
         Paths from the state with the lower number to the other, metres.
     """
 
-    water: Water
+    context: PlanningContext
     states: States
     legs: dict[tuple[int, int], Floats] = field(default_factory=dict)
     _out: list[Floats | None] = field(default_factory=list)
@@ -104,12 +105,12 @@ class Board:
     _forbidden: set[tuple[int, int]] = field(default_factory=set)
     _cut: set[tuple[int, int]] = field(default_factory=set)
 
-    def take(self, legs: Legs, clock: Clock) -> bool:
+    def update(self, legs: DrivenLegs, clock: Clock) -> bool:
         """Legs as they are now, and ways from the start to new states.
 
         Parameters
         ----------
-        legs : Legs
+        legs : DrivenLegs
             Those driven so far.
         clock : Clock
             When it is up, states that are left are reached by legs only.
@@ -120,19 +121,19 @@ class Board:
             Whether there was time for all of them.
         """
         whole = True
-        for v in range(len(self._out), len(self.states.all)):
+        for v in range(len(self._out), len(self.states.entries)):
             # one way to each waypoint there must be
             whole = whole and not clock.up
-            first = self.states.of[self.states.all[v].point][0] == v
-            self._out.append(self._own_way(v) if whole or first else None)
-        if self.states.begin is not None and self._out[self.states.begin] is None:
+            first = self.states.at_place[self.states.entries[v].place][0] == v
+            self._out.append(self._path_along_tether(v) if whole or first else None)
+        if self.states.present is not None and self._out[self.states.present] is None:
             # the robot is there, and may go back along its tether whatever the clearance
-            self._out[self.states.begin] = np.vstack(
-                [self.water.laid.nodes[::-1], self.water.present.nodes[1:]]
+            self._out[self.states.present] = np.vstack(
+                [self.context.start_tether.nodes[::-1], self.context.present_tether.nodes[1:]]
             )
         every = dict[tuple[int, int], Floats]()
         self._one_way = {}
-        for v, w, path, both in legs.each():
+        for v, w, path, both in legs.both_directions():
             pair = (min(v, w), max(v, w))
             if pair not in self._forbidden:
                 every[pair] = path if v < w else path[::-1]
@@ -142,18 +143,18 @@ class Board:
         self.legs = {
             (v, w): path
             for (v, w), path in every.items()
-            if along(path) < self._home[v] + self._home[w]
+            if polylines.length(path) < self._home[v] + self._home[w]
             or self._via.get(v) == w
             or self._via.get(w) == v
         }
         return whole
 
-    def _own_way(self, v: int) -> Floats | None:
+    def _path_along_tether(self, v: int) -> Floats | None:
         """Return the path from the start along a state's tether, pulled taut in its class; None if
         the robot has no room on it, because a tether fits through narrower gaps."""
-        tether = self.states.all[v].tether
-        line = np.vstack([self.water.laid.nodes[::-1], tether.nodes[1:]])
-        return self.water.taut_beside(line)
+        tether = self.states.entries[v].tether
+        line = np.vstack([self.context.start_tether.nodes[::-1], tether.nodes[1:]])
+        return self.context.pull_taut_nearby(line)
 
     def _find_ways(self, legs: dict[tuple[int, int], Floats]) -> None:
         """How far it is from the start to each state: along its own tether, or where the robot has
@@ -162,10 +163,10 @@ class Board:
         for (v, w), path in legs.items():
             if (v, w) in self._one_way:
                 continue
-            far = along(path)
+            far = polylines.length(path)
             beside.setdefault(v, []).append((w, far))
             beside.setdefault(w, []).append((v, far))
-        self._home = [np.inf if path is None else along(path) for path in self._out]
+        self._home = [np.inf if path is None else polylines.length(path) for path in self._out]
         self._via = {}
         waiting = [(far, v) for v, far in enumerate(self._home) if np.isfinite(far)]
         heapq.heapify(waiting)
@@ -181,18 +182,18 @@ class Board:
     def _has_clearance(self, v: int) -> bool:
         """Whether others may be reached by way of a state: its waypoint may be nearer to solids
         than the clearance, and others' paths may not."""
-        place = self.states.places.points[self.states.all[v].point]
-        mission = self.water.mission
-        return float(self.water.field.distance(place)) >= mission.clearance - 0.5 * mission.delta
+        place = self.states.places.points[self.states.entries[v].place]
+        mission = self.context.mission
+        return float(self.context.field.distance(place)) >= mission.clearance - 0.5 * mission.delta
 
     @property
-    def reached(self) -> set[int]:
+    def reached_waypoints(self) -> set[int]:
         """Waypoints that the robot gets to, whichever way."""
         places = self.states.places
-        count = len(self.water.mission.waypoints)
+        count = len(self.context.mission.waypoints)
         found = {
-            int(places.waypoint[s.point])
-            for s, far in zip(self.states.all, self._home, strict=False)
+            int(places.waypoint[s.place])
+            for s, far in zip(self.states.entries, self._home, strict=False)
             if np.isfinite(far)
         }
         return {n for n in found if n < count}
@@ -213,15 +214,15 @@ class Board:
             Metres.
         """
         if v < 0:
-            return self._way_out(w)
+            return self._path_out(w)
         if w < 0:
-            return self._way_out(v)[::-1]
+            return self._path_out(v)[::-1]
         direct = self.legs.get((min(v, w), max(v, w)))
         if direct is None:
-            return np.vstack([self._way_out(v)[::-1], self._way_out(w)[1:]])
+            return np.vstack([self._path_out(v)[::-1], self._path_out(w)[1:]])
         return direct if v < w else direct[::-1]
 
-    def way_out(self, v: int) -> Floats | None:
+    def path_out(self, v: int) -> Floats | None:
         """How the robot gets from the start to a state.
 
         Parameters
@@ -234,16 +235,16 @@ class Board:
         ndarray, shape (k, 3), or None
             Metres; None where no way has room.
         """
-        return self._way_out(v) if np.isfinite(self._home[v]) else None
+        return self._path_out(v) if np.isfinite(self._home[v]) else None
 
-    def _way_out(self, v: int) -> Floats:
+    def _path_out(self, v: int) -> Floats:
         """(k, 3) from the start to a state that it gets to."""
-        own = self._out[v] if v >= 0 else self.water.laid.nodes[-1:]
+        own = self._out[v] if v >= 0 else self.context.start_tether.nodes[-1:]
         if own is not None:
             return own
         u = self._via[v]
         leg = self.legs[min(u, v), max(u, v)]
-        return np.vstack([self._way_out(u), (leg if u < v else leg[::-1])[1:]])
+        return np.vstack([self._path_out(u), (leg if u < v else leg[::-1])[1:]])
 
     def forbid(self, pair: tuple[int, int]) -> bool:
         """Take the leg between two states away, or if it was by way of the start, that.
@@ -265,7 +266,7 @@ class Board:
         self._forbidden.add(pair)
         return pair not in self._cut
 
-    def leads_to(self, tour: Sequence[int]) -> bool:
+    def can_reach_all(self, tour: Sequence[int]) -> bool:
         """Return whether the robot gets from the start to every state of a tour.
 
         A leg that is forbidden may have been the only way to a state.
@@ -282,7 +283,7 @@ class Board:
         """States that the robot gets to."""
         return [v for v, far in enumerate(self._home) if np.isfinite(far)]
 
-    def solved(
+    def solve(
         self, clock: Clock, warm: Sequence[int] | None = None, **how: Any
     ) -> tuple[Result, list[int]] | None:
         """The graph as it is now, solved.
@@ -312,12 +313,12 @@ class Board:
         costs[0, 1:] = costs[1:, 0] = home
         for (v, w), path in self.legs.items():
             if v in vertex and w in vertex:
-                costs[vertex[v], vertex[w]] = costs[vertex[w], vertex[v]] = along(path)
+                costs[vertex[v], vertex[w]] = costs[vertex[w], vertex[v]] = polylines.length(path)
         for v, w in self._cut:
             a, b = vertex.get(v, 0), vertex.get(w, 0)
             costs[a, b] = costs[b, a] = np.inf
-        places, begin = self.states.places, self.states.begin
-        waypoint = [int(places.waypoint[self.states.all[v].point]) for v in some]
+        places, begin = self.states.places, self.states.present
+        waypoint = [int(places.waypoint[self.states.entries[v].place]) for v in some]
         cluster = np.r_[0, 1 + np.unique(waypoint, return_inverse=True)[1]]
         try:
             graph = TravelGraph.from_costs(costs, cluster)
@@ -334,30 +335,30 @@ class Board:
             return None
         return result, [some[int(k) - 1] for k in result.tour[len(first) :]]
 
-    def out_and_back(self) -> Driven | None:
+    def drive_out_and_back(self) -> DrivenTour | None:
         """Drive a tour that goes out to each waypoint along a taut tether, and back the same path.
 
         The tour needs no legs between states, so it exists whenever each waypoint can be reached.
 
         Returns
         -------
-        Driven or None
+        DrivenTour or None
             The tour, in the order of the waypoints. None if no waypoint has such a path with the
             tether within its limit and free at the end, or if the mission begins under way and its
             tether does not come free at the start.
         """
         first: dict[int, int] = {}
         # if the time ran out, only the first state of each waypoint has a path out
-        for v, state in enumerate(self.states.all):
+        for v, state in enumerate(self.states.entries):
             if (
                 self._out[v] is None
-                and self.states.places.waypoint[state.point] not in self.reached
+                and self.states.places.waypoint[state.place] not in self.reached_waypoints
             ):
-                self._out[v] = self._own_way(v)
+                self._out[v] = self._path_along_tether(v)
         self._find_ways(self.legs)
         for v in sorted(self._usable, key=lambda v: self._home[v]):
-            waypoint = int(self.states.places.waypoint[self.states.all[v].point])
-            if v == self.states.begin or waypoint in first:
+            waypoint = int(self.states.places.waypoint[self.states.entries[v].place])
+            if v == self.states.present or waypoint in first:
                 continue
             if self._comes_back(v):
                 first[waypoint] = v
@@ -365,19 +366,19 @@ class Board:
             return None
         by_the_start = replace(self, legs={}, _one_way={})
         # a path out through other states follows the legs of this board
-        by_the_start._out = [self.way_out(v) for v in range(len(self._out))]
-        driven = by_the_start._driven([first[n] for n in sorted(first)])
+        by_the_start._out = [self.path_out(v) for v in range(len(self._out))]
+        driven = by_the_start._drive([first[n] for n in sorted(first)])
         return driven if driven.fault is None else None
 
     def _comes_back(self, v: int) -> bool:
         """Return whether the tether keeps its limit out to a state and back, and comes free."""
-        water, way = self.water, self._way_out(v)
-        there, longest = water.driven(water.laid, way, fine=True)
-        back, most = water.driven(there, way[::-1], fine=True)
-        free = alike(back, water.laid, water.mission.delta)
+        context, way = self.context, self._path_out(v)
+        there, longest = context.drive(context.start_tether, way, fine=True)
+        back, most = context.drive(there, way[::-1], fine=True)
+        free = hang_alike(back, context.start_tether, context.mission.delta)
         return free and max(longest, most) <= self.states.limit
 
-    def driven(self, tour: Sequence[int]) -> Driven:
+    def drive(self, tour: Sequence[int]) -> DrivenTour:
         """A tour, driven with the tether it begins with, in the direction that is right for more of
         its legs, and where that fails, in the other.
 
@@ -388,18 +389,18 @@ class Board:
 
         Returns
         -------
-        Driven
+        DrivenTour
             What came of it; where both directions fail, of the first.
         """
-        if self.states.begin is not None:
-            return self._driven(tour)  # it begins elsewhere than it ends
+        if self.states.present is not None:
+            return self._drive(tour)  # it begins elsewhere than it ends
         there, back = list(tour), list(tour)[::-1]
         if self._wrong_way(there) > self._wrong_way(back):
             there, back = back, there
-        first = self._driven(there)
+        first = self._drive(there)
         if first.fault is None:
             return first
-        second = self._driven(back)
+        second = self._drive(back)
         return second if second.fault is None else first
 
     def _wrong_way(self, tour: Sequence[int]) -> int:
@@ -408,46 +409,49 @@ class Board:
             self._one_way.get((min(v, w), max(v, w)), v < w) != (v < w) for v, w in pairwise(tour)
         )
 
-    def _driven(self, tour: Sequence[int]) -> Driven:
+    def _drive(self, tour: Sequence[int]) -> DrivenTour:
         """A tour, driven in the direction given."""
-        states, water, places = self.states, self.water, self.states.places
-        tether, before = water.present, -1 if states.begin is None else states.begin
-        stops: list[Stop] = []
+        states, context, places = self.states, self.context, self.states.places
+        tether, before = context.present_tether, -1 if states.present is None else states.present
+        stops: list[TourVisit] = []
         total, fault, astray = 0.0, None, None
-        delta = water.mission.delta
-        word, at_home = water.number(tether.nodes), water.number(water.laid.nodes)
+        delta = context.mission.delta
+        word, at_home = (
+            context.word_number(tether.nodes),
+            context.word_number(context.start_tether.nodes),
+        )
         for state in [*tour, -1]:
             path = self.path(before, state)
-            tether, longest = water.driven(tether, path, fine=True)
-            total += along(path)
-            meant = water.laid if state < 0 else states.all[state].tether
+            tether, longest = context.drive(tether, path, fine=True)
+            total += polylines.length(path)
+            meant = context.start_tether if state < 0 else states.entries[state].tether
             pair = (min(before, state), max(before, state))
-            writes = water.number(path)
-            word = None if word is None or writes is None else water.words.times(word, writes)
-            as_meant = word == (at_home if state < 0 else states.all[state].word)
+            writes = context.word_number(path)
+            word = None if word is None or writes is None else context.words.multiply(word, writes)
+            as_meant = word == (at_home if state < 0 else states.entries[state].word)
             # first leg after which the tether lies otherwise than in its state, or in another
             # class; no fault if the tether comes free in the end
-            astray = None if as_meant and alike(tether, meant, delta) else astray or pair
+            astray = None if as_meant and hang_alike(tether, meant, delta) else astray or pair
             if fault is None and (longest > states.limit or word is None):
                 fault = astray or pair
             if state >= 0:
-                s = states.all[state]
+                s = states.entries[state]
                 stops.append(
-                    Stop(
-                        int(places.waypoint[s.point]),
-                        int(places.choice[s.point]),
-                        () if word is None else water.words.letters(word),
+                    TourVisit(
+                        int(places.waypoint[s.place]),
+                        int(places.choice[s.place]),
+                        () if word is None else context.words.letters(word),
                         tether.length,
                         path,
                         longest,
                     )
                 )
             before = state
-        free = word == at_home and alike(tether, water.laid, delta)
-        return Driven(list(tour), stops, path, total, free, fault or astray)
+        free = word == at_home and hang_alike(tether, context.start_tether, delta)
+        return DrivenTour(list(tour), stops, path, total, free, fault or astray)
 
 
-def with_status(result: Result, driven: Driven, share: float) -> Result:
+def with_status(result: Result, driven: DrivenTour, share: float) -> Result:
     """A solver's result, of a tour that was driven: by way of the start it may be longer than what
     the solver spoke of, and is then no longer proven.
 
@@ -455,7 +459,7 @@ def with_status(result: Result, driven: Driven, share: float) -> Result:
     ----------
     result : Result
         Of the solver.
-    driven : Driven
+    driven : DrivenTour
         Its tour.
     share : float
         Of the length, and metres, that rounding may take.

@@ -23,16 +23,16 @@ from netsp.plan.space.mission_policy import WordPolicy
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.sampling import Field, distance
 
-FREE = 1
+FREE_CELL = 1
 """Code of a cell whose centre is free, a bit of its flags."""
 
-OPEN = 2
+OPEN_CELL = 2
 """Code of a cell whose 26 neighbours have all edges and squares, a bit of its flags."""
 
-EDGE = 4
+EDGE_BIT = 4
 """Code of an edge along x, the first of three bits: along x, y and z."""
 
-SQUARE = 32
+SQUARE_BIT = 32
 """Code of a square along y and z, the first of three bits: along yz, zx and xy."""
 
 
@@ -49,7 +49,8 @@ class Cells:
     cell : float
         Size of a cell, metres.
     flags : ndarray of uint8, shape (nx, ny, nz)
-        Bits FREE, OPEN, EDGE …, SQUARE …; edges and squares belong to their lowest corner.
+        Bits of `FREE_CELL`, `OPEN_CELL`, `EDGE_BIT` and `SQUARE_BIT`; edges and squares belong to
+        their lowest corner.
     """
 
     field: DistanceField
@@ -58,7 +59,7 @@ class Cells:
     flags: npt.NDArray[np.uint8]
 
     @classmethod
-    def of(
+    def in_box(
         cls,
         field: DistanceField,
         low: npt.ArrayLike,
@@ -102,7 +103,7 @@ class Cells:
                 f"{np.prod(shape) * 7e-8:.2g} GiB; expected {better:.2g} or more"
             )
         nx, ny, nz = (int(n) for n in shape)
-        flags = complex_of(
+        flags = complex_flags(
             field.arrays,
             low,
             cell,
@@ -117,7 +118,7 @@ class Cells:
     @property
     def free_count(self) -> int:
         """Number of free cells."""
-        return int(np.count_nonzero(self.flags & FREE))
+        return int(np.count_nonzero(self.flags & FREE_CELL))
 
     def centre(self, cells: npt.ArrayLike) -> Floats:
         """Centres (..., 3) of cells (..., 3), metres."""
@@ -130,7 +131,7 @@ class Cells:
 
 
 @kernel
-def complex_of(
+def complex_flags(
     field: Field,
     low: Floats,
     cell: float,
@@ -156,7 +157,7 @@ def complex_of(
                 )
                 room[i, j, k] = d
                 if d >= min_room_ratio * cell:
-                    flags[i, j, k] = FREE
+                    flags[i, j, k] = FREE_CELL
     last = np.array([nx, ny, nz]) - 1
     at, to, centre = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64), np.empty(3)
     for i in range(nx):
@@ -167,7 +168,7 @@ def complex_of(
                 if flags[i, j, k] == 0:
                     continue
                 if room[i, j, k] >= 1.75 * cell:
-                    flags[i, j, k] |= OPEN
+                    flags[i, j, k] |= OPEN_CELL
                 wide = room[i, j, k] >= 1.4143 * cell
                 at[0], at[1], at[2] = i, j, k
                 for axis in range(3):
@@ -175,16 +176,16 @@ def complex_of(
                         continue
                     write_ints(to, at, 3)
                     to[axis] += 1
-                    if not flags[to[0], to[1], to[2]] & FREE:
+                    if not flags[to[0], to[1], to[2]] & FREE_CELL:
                         continue
                     if not wide:
                         for c in range(3):
                             centre[c] = low[c] + (0.5 * (at[c] + to[c]) + 0.5) * cell
                         if room[i, j, k] + room[to[0], to[1], to[2]] < 1.0001 * cell and (
-                            not covered(field, centre, cell, axis, -1, max_halvings)
+                            not is_covered(field, centre, cell, axis, -1, max_halvings)
                         ):
                             continue
-                    flags[i, j, k] |= EDGE << axis
+                    flags[i, j, k] |= EDGE_BIT << axis
     for i in range(nx):
         if stop[0] != 0:
             break
@@ -198,29 +199,29 @@ def complex_of(
                     a, b = (axis + 1) % 3, (axis + 2) % 3
                     if at[a] == last[a] or at[b] == last[b]:
                         continue
-                    if not (flags[i, j, k] & (EDGE << a) and flags[i, j, k] & (EDGE << b)):
+                    if not (flags[i, j, k] & (EDGE_BIT << a) and flags[i, j, k] & (EDGE_BIT << b)):
                         continue
                     write_ints(to, at, 3)
                     to[a] += 1
-                    if not flags[to[0], to[1], to[2]] & (EDGE << b):
+                    if not flags[to[0], to[1], to[2]] & (EDGE_BIT << b):
                         continue
                     write_ints(to, at, 3)
                     to[b] += 1
-                    if not flags[to[0], to[1], to[2]] & (EDGE << a):
+                    if not flags[to[0], to[1], to[2]] & (EDGE_BIT << a):
                         continue
                     if not wide:
                         for c in range(3):
                             centre[c] = low[c] + (at[c] + 0.5) * cell
                         centre[a] += 0.5 * cell
                         centre[b] += 0.5 * cell
-                        if not covered(field, centre, cell, a, b, max_halvings):
+                        if not is_covered(field, centre, cell, a, b, max_halvings):
                             continue
-                    flags[i, j, k] |= SQUARE << axis
+                    flags[i, j, k] |= SQUARE_BIT << axis
     return flags
 
 
 @kernel
-def covered(field: Field, centre: Floats, size: float, a: int, b: int, halvings: int) -> bool:
+def is_covered(field: Field, centre: Floats, size: float, a: int, b: int, halvings: int) -> bool:
     """Whether balls without solids cover an edge along axis a (b < 0) or a square along a and b."""
     # (centre, half a side, halvings left) of the parts that are to be covered
     parts, left = np.empty((4 * halvings + 8, 5)), 1

@@ -14,16 +14,17 @@ from itertools import pairwise
 import numpy as np
 
 from netsp.base.arrays import Floats
+from netsp.base.geometry import polylines
 from netsp.plan.space.mission_policy import DetourPolicy
-from netsp.plan.space.planning_context import Water, along, has_room
+from netsp.plan.space.planning_context import PlanningContext, keeps_clearance
 
 
-def ways_beside(water: Water, known: list[Floats], farthest: float) -> list[Floats]:
+def find_bent_paths(context: PlanningContext, known: list[Floats], farthest: float) -> list[Floats]:
     """Locally shortest ways between the same ends as others.
 
     Parameters
     ----------
-    water : Water
+    context : PlanningContext
         Where they are.
     known : list of ndarray of shape (k, 3)
         Taut ways that are known, at least one, shortest first, metres.
@@ -37,26 +38,28 @@ def ways_beside(water: Water, known: list[Floats], farthest: float) -> list[Floa
     """
     begin, end = known[0][0], known[0][-1]
     found: list[Floats] = []
-    delta, policy = water.mission.delta, water.policy.detours
+    delta, policy = context.mission.delta, context.policy.detours
     for bent in _bent(begin, end, farthest, policy):
-        if not _free(water, bent) or any(_seen_from(water, way, bent) for way in known + found):
+        if not _free(context, bent) or any(_seen_from(context, way, bent) for way in known + found):
             continue
-        path = water.taut(bent)
-        if along(path) > farthest or not has_room(water.field, path, water.mission):
+        path = context.pull_taut(bent)
+        if polylines.length(path) > farthest or not keeps_clearance(
+            context.field, path, context.mission
+        ):
             continue
         if all(not _alike(path, other, delta) for other in known + found):
             found.append(path)
-    found.sort(key=along)
+    found.sort(key=polylines.length)
     return found[: policy.max_bent_paths]
 
 
 def _bent(begin: Floats, end: Floats, farthest: float, policy: DetourPolicy) -> Iterator[Floats]:
-    """Ways with one bend or two, out from the straight one."""
+    """RobotPaths with one bend or two, out from the straight one."""
     step = end - begin
     far = float(np.linalg.norm(step))
     if far < 1e-9 or farthest <= far:
         return
-    u, v = across(step)
+    u, v = perpendiculars(step)
     out = 0.5 * math.sqrt(farthest**2 - far**2)
     for share in policy.bend_shares:
         for angle in np.linspace(0.0, 2.0 * math.pi, policy.n_bend_directions, endpoint=False):
@@ -64,7 +67,7 @@ def _bent(begin: Floats, end: Floats, farthest: float, policy: DetourPolicy) -> 
             yield np.array([begin, begin + 0.5 * step + away, end])
 
 
-def across(step: Floats) -> tuple[Floats, Floats]:
+def perpendiculars(step: Floats) -> tuple[Floats, Floats]:
     """Two directions at right angles to one and to each other.
 
     Parameters
@@ -83,19 +86,19 @@ def across(step: Floats) -> tuple[Floats, Floats]:
     return u, np.cross(ahead, u)
 
 
-def _free(water: Water, path: Floats) -> bool:
-    return all(water.field.line_of_sight(a, b) for a, b in pairwise(path))
+def _free(context: PlanningContext, path: Floats) -> bool:
+    return all(context.field.line_of_sight(a, b) for a, b in pairwise(path))
 
 
-def _seen_from(water: Water, way: Floats, bent: Floats) -> bool:
+def _seen_from(context: PlanningContext, way: Floats, bent: Floats) -> bool:
     """Whether one can be pulled into the other, straight across."""
-    shares = np.linspace(0.0, 1.0, water.policy.detours.n_sight_lines + 2)[1:-1]
+    shares = np.linspace(0.0, 1.0, context.policy.detours.n_sight_lines + 2)[1:-1]
     one, other = _at(way, shares), _at(bent, shares)
-    return all(water.field.line_of_sight(a, b) for a, b in zip(one, other, strict=True))
+    return all(context.field.line_of_sight(a, b) for a, b in zip(one, other, strict=True))
 
 
 def _alike(a: Floats, b: Floats, delta: float) -> bool:
-    if abs(along(a) - along(b)) > delta:
+    if abs(polylines.length(a) - polylines.length(b)) > delta:
         return False
     shares = np.array([0.25, 0.5, 0.75])
     return bool(np.linalg.norm(_at(a, shares) - _at(b, shares), axis=1).max() < 2.0 * delta)

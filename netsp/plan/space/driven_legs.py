@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from netsp.base.arrays import Floats
-from netsp.plan.space.board import Driven, Stop
-from netsp.plan.space.planning_context import Water, along, has_room
-from netsp.plan.space.states import alike
+from netsp.base.geometry import polylines
+from netsp.plan.space.board import DrivenTour, TourVisit
+from netsp.plan.space.planning_context import PlanningContext, keeps_clearance
+from netsp.plan.space.states import hang_alike
 
 
 @dataclass(frozen=True)
@@ -32,12 +33,12 @@ class LegTo:
     path: Floats
 
 
-def drive_legs(water: Water, legs: Sequence[LegTo], home: Floats) -> Driven | None:
+def drive_legs(context: PlanningContext, legs: Sequence[LegTo], home: Floats) -> DrivenTour | None:
     """Drive the tether along the legs of a tour.
 
     Parameters
     ----------
-    water : Water
+    context : PlanningContext
         Where they are.
     legs : sequence of LegTo
         In the order of the tour; the first begins where the mission does.
@@ -46,26 +47,32 @@ def drive_legs(water: Water, legs: Sequence[LegTo], home: Floats) -> Driven | No
 
     Returns
     -------
-    Driven or None
+    DrivenTour or None
         The tour with its words and tethers; None where a leg has no room for the robot or no word,
         the tether exceeds its limit, or is not free at the end.
     """
-    tether, word = water.present, water.number(water.present.nodes)
-    limit = max(water.mission.tether_length, tether.length)
-    stops: list[Stop] = []
+    tether, word = context.present_tether, context.word_number(context.present_tether.nodes)
+    limit = max(context.mission.tether_length, tether.length)
+    stops: list[TourVisit] = []
     total = 0.0
     for leg in (*legs, LegTo(-1, 0, home)):
-        writes = water.number(leg.path)
-        if word is None or writes is None or not has_room(water.field, leg.path, water.mission):
+        writes = context.word_number(leg.path)
+        if (
+            word is None
+            or writes is None
+            or not keeps_clearance(context.field, leg.path, context.mission)
+        ):
             return None
-        word = water.words.times(word, writes)
-        tether, longest = water.driven(tether, leg.path, fine=True)
+        word = context.words.multiply(word, writes)
+        tether, longest = context.drive(tether, leg.path, fine=True)
         if longest > limit:
             return None
-        total += along(leg.path)
+        total += polylines.length(leg.path)
         if leg.waypoint >= 0:
-            letters = water.words.letters(word)
-            stops.append(Stop(leg.waypoint, leg.choice, letters, tether.length, leg.path, longest))
-    free = word == water.number(water.laid.nodes)
-    free = free and alike(tether, water.laid, water.mission.delta)
-    return Driven([], stops, np.asarray(home), total, True, None) if free else None
+            letters = context.words.letters(word)
+            stops.append(
+                TourVisit(leg.waypoint, leg.choice, letters, tether.length, leg.path, longest)
+            )
+    free = word == context.word_number(context.start_tether.nodes)
+    free = free and hang_alike(tether, context.start_tether, context.mission.delta)
+    return DrivenTour([], stops, np.asarray(home), total, True, None) if free else None

@@ -9,7 +9,7 @@ import numpy as np
 
 from netsp.base.errors import InputError
 from netsp.hsignature import Word
-from netsp.plan.space.planning_context import Water
+from netsp.plan.space.planning_context import PlanningContext
 from netsp.world.mission.planned_tour import PlannedTour
 from netsp.world.mission.run_log import Run
 from netsp.world.scene.field import DistanceField
@@ -22,7 +22,7 @@ class FlownWords:
 
     Parameters
     ----------
-    stops : tuple of (int, Word or None)
+    visits : tuple of (int, Word or None)
         Waypoint that was visited, and the word of the tether there; None where there is none, as
         when the robot went where the map has a solid.
     home : Word or None
@@ -34,25 +34,25 @@ class FlownWords:
         Of the mission's tour, if it has one, in the same scene.
     """
 
-    stops: tuple[tuple[int, Word | None], ...]
+    visits: tuple[tuple[int, Word | None], ...]
     home: Word | None
     exact: bool
     planned: tuple[Word | None, ...] = ()
 
     @property
-    def complete(self) -> bool:
+    def is_complete(self) -> bool:
         """Whether every word could be told."""
-        return self.home is not None and all(word is not None for _, word in self.stops)
+        return self.home is not None and all(word is not None for _, word in self.visits)
 
     @property
     def as_planned(self) -> int:
         """How many stops were made in the class that the tour has there."""
-        return sum(self._is_as_planned(k, word) for k, word in self.stops)
+        return sum(self._is_as_planned(k, word) for k, word in self.visits)
 
     def _is_as_planned(self, k: int, word: Word | None) -> bool:
         return k < len(self.planned) and word is not None and self.planned[k] == word
 
-    def told(self) -> dict[str, Any]:
+    def to_summary(self) -> dict[str, Any]:
         """For the summary of a run.
 
         Returns
@@ -72,7 +72,7 @@ class FlownWords:
                         else {}
                     ),
                 }
-                for k, word in self.stops
+                for k, word in self.visits
             ],
             "home": None if self.home is None else list(self.home),
             "as_planned": self.as_planned if self.planned else None,
@@ -104,24 +104,24 @@ def words_of_flight(
     Raises
     ------
     InputError
-        A moving anchor; as of `netsp.plan.space.space_signature.SpaceSignature.of`.
+        A moving anchor; as of `netsp.plan.space.space_signature.SpaceSignature.in_box`.
     """
     mission = run.mission
     if mission.track:
         raise InputError("track: of a moving anchor no words are told; expected a mission without")
     scene = scene or mission.load_scene()
-    told = _by(run, Water.of(mission, scene, field or scene.field()))
-    if run.scene is None or told.complete:
-        return told
+    words = _by(run, PlanningContext.for_mission(mission, scene, field or scene.field()))
+    if run.scene is None or words.is_complete:
+        return words
     # where the map was wrong, the way may lead through what it shows
-    by_the_end = _by(run, Water.of(mission, run.scene, run.scene.field()))
-    return by_the_end if by_the_end.complete else told
+    by_the_end = _by(run, PlanningContext.for_mission(mission, run.scene, run.scene.field()))
+    return by_the_end if by_the_end.is_complete else words
 
 
-def _by(run: Run, water: Water) -> FlownWords:
+def _by(run: Run, context: PlanningContext) -> FlownWords:
     """The words of a flight in some scene."""
-    mission, words = run.mission, water.words
-    laid, begin = water.laid.nodes, water.present.nodes
+    mission, words = run.mission, context.words
+    laid, begin = context.start_tether.nodes, context.present_tether.nodes
     places = np.vstack([begin, np.array([[r.x, r.y, r.z] for r in run.log])])
     next_one = np.array([r.waypoint for r in run.log])
     stops = []
@@ -129,18 +129,18 @@ def _by(run: Run, water: Water) -> FlownWords:
         k = int(stop["waypoint"])
         end = len(begin) + int(np.argmax(next_one > k))
         # on to the waypoint itself: words of paths compare only where these end at the same place
-        word, broken = words.word_until(np.vstack([places[: end + 1], mission.places[k]]))
+        word, broken = words.try_word(np.vstack([places[: end + 1], mission.places[k]]))
         stops.append((k, None if broken is not None else word))
-    word, broken = words.word_until(np.vstack([places, laid[::-1]]))
-    planned = () if mission.tour is None else _of_tour(mission.tour, water)
+    word, broken = words.try_word(np.vstack([places, laid[::-1]]))
+    planned = () if mission.tour is None else _of_tour(mission.tour, context)
     return FlownWords(tuple(stops), None if broken is not None else word, words.exact, planned)
 
 
-def _of_tour(tour: PlannedTour, water: Water) -> tuple[Word | None, ...]:
+def _of_tour(tour: PlannedTour, context: PlanningContext) -> tuple[Word | None, ...]:
     """Words at the stops of a tour, whose own letters may be those of another map."""
-    walked, out = water.present.nodes, list[Word | None]()
-    for stop, place in zip(tour.stops, water.mission.places, strict=False):
+    walked, out = context.present_tether.nodes, list[Word | None]()
+    for stop, place in zip(tour.stops, context.mission.places, strict=False):
         walked = np.vstack([walked, np.array(stop.path)])
-        word, broken = water.words.word_until(np.vstack([walked, place]))
+        word, broken = context.words.try_word(np.vstack([walked, place]))
         out.append(None if broken is not None else word)
     return tuple(out)

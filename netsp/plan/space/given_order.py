@@ -12,42 +12,44 @@ import numpy as np
 
 from netsp.base.clock import Clock
 from netsp.base.geometry import polylines
-from netsp.plan.space.board import Driven
+from netsp.plan.space.board import DrivenTour
 from netsp.plan.space.driven_legs import LegTo, drive_legs
-from netsp.plan.space.planning_context import Water
+from netsp.plan.space.planning_context import PlanningContext
 from netsp.world.planner import PlannerOptions
 from netsp.world.planner.planner import DONE
 from netsp.world.planner.predictive import PredictivePlanner
 
 
-def drive_given_order(water: Water) -> Driven | None:
+def drive_given_order(context: PlanningContext) -> DrivenTour | None:
     """Drive a mission in the order of its file, whatever the time.
 
     Parameters
     ----------
-    water : Water
+    context : PlanningContext
         Water of the mission; if the mission has a tour, the legs of that tour are driven.
 
     Returns
     -------
-    Driven or None
+    DrivenTour or None
         The tour; None if the robot does not come home with a free tether, exceeds the limit of the
         tether, or comes too near to solids.
     """
-    mission = water.mission
+    mission = context.mission
     if mission.tour is not None:
         paths = [np.array(stop.path) for stop in mission.tour.stops]
         legs = [LegTo(k, 0, path) for k, path in enumerate(paths)]
-        return drive_legs(water, legs, np.array(mission.tour.home))
-    return drive_order(water, [(k, 0) for k in range(len(mission.waypoints))], Clock())
+        return drive_legs(context, legs, np.array(mission.tour.home))
+    return drive_order(context, [(k, 0) for k in range(len(mission.waypoints))], Clock())
 
 
-def drive_order(water: Water, order: Sequence[tuple[int, int]], clock: Clock) -> Driven | None:
+def drive_order(
+    context: PlanningContext, order: Sequence[tuple[int, int]], clock: Clock
+) -> DrivenTour | None:
     """Drive a mission in some order of its waypoints.
 
     Parameters
     ----------
-    water : Water
+    context : PlanningContext
         Water of the mission.
     order : sequence of (int, int)
         Number of each waypoint, and of its alternative, from 1 on; 0 for the waypoint's position.
@@ -56,20 +58,20 @@ def drive_order(water: Water, order: Sequence[tuple[int, int]], clock: Clock) ->
 
     Returns
     -------
-    Driven or None
+    DrivenTour or None
         The tour; None if the robot does not come home with a free tether, exceeds the limit of the
         tether, or comes too near to solids.
     """
-    mission = water.mission
+    mission = context.mission
     waypoints = tuple(mission.waypoints[n].at(choice) for n, choice in order)
     ordered = mission.model_copy(update={"waypoints": waypoints, "tour": None})
     planner = PredictivePlanner(
-        ordered, water.field, water.model, water.grid, PlannerOptions(prepared=False)
+        ordered, context.field, context.model, context.grid, PlannerOptions(prepared=False)
     )
-    planner.laid = water.laid
-    robot, tether = np.array(mission.begin), water.present
+    planner.laid = context.start_tether
+    robot, tether = np.array(mission.begin), context.present_tether
     walked, legs = [robot], []
-    for _ in range(water.policy.orders.max_paths_per_waypoint * (2 + len(order))):
+    for _ in range(context.policy.orders.max_paths_per_waypoint * (2 + len(order))):
         if clock.up:
             return None
         before = len(planner.reached)
@@ -81,10 +83,10 @@ def drive_order(water: Water, order: Sequence[tuple[int, int]], clock: Clock) ->
         if command.mode == DONE:
             break
         path = np.vstack([robot, command.path])
-        tether = water.model.drive(tether, polylines.dense(path, mission.delta))[0]
+        tether = context.model.drive(tether, polylines.dense(path, mission.delta))[0]
         walked += list(command.path)
         robot = command.path[-1]
         planner.passed(len(command.path))
     if not planner.home:
         return None
-    return drive_legs(water, legs, np.array(walked if len(walked) > 1 else [robot, robot]))
+    return drive_legs(context, legs, np.array(walked if len(walked) > 1 else [robot, robot]))

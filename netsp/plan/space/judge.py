@@ -21,7 +21,7 @@ from netsp.gtsp.travel.result import relative_gap
 from netsp.judge import Check, Verification
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
 from netsp.model.solution import Status
-from netsp.plan.space.planning_context import Water, has_room, least_room
+from netsp.plan.space.planning_context import PlanningContext, keeps_clearance, min_clearance_along
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.mission_limits import check_bounds, check_size
 from netsp.world.mission.planned_tour import PlannedTour
@@ -64,7 +64,7 @@ def verify_mission(
     *,
     scene: Scene | None = None,
     field: DistanceField | None = None,
-    water: Water | None = None,
+    context: PlanningContext | None = None,
     policy: JudgePolicy | None = None,
 ) -> Verification:
     """Judge a planned mission.
@@ -82,7 +82,7 @@ def verify_mission(
         Its scene, when it is at hand.
     field : DistanceField, optional
         The scene's field, when it is at hand.
-    water : Water, optional
+    context : PlanningContext, optional
         Water of the mission, if it is already computed; its words depend on field, box and cell
         only.
 
@@ -101,17 +101,17 @@ def verify_mission(
     if mission.track:
         raise InputError("track: a tour is for a fixed anchor; expected a mission without")
     check_size(mission)
-    if water is None:
+    if context is None:
         scene = scene or mission.load_scene()
         check_bounds(mission, scene)
-        water = Water.of(mission, scene, field or scene.field())
+        context = PlanningContext.for_mission(mission, scene, field or scene.field())
     policy = policy or JudgePolicy()
-    finer = GeodesicTether(water.field, policy.delta_ratio * mission.delta)
-    water = replace(water, mission=mission, model=finer)
-    return Verification(tuple(_Judge(mission, mission.tour, water, policy).run()))
+    finer = GeodesicTether(context.field, policy.delta_ratio * mission.delta)
+    context = replace(context, mission=mission, model=finer)
+    return Verification(tuple(_Judge(mission, mission.tour, context, policy).run()))
 
 
-def checked_mission(mission: Mission, scene: Scene, field: DistanceField) -> None:
+def check_mission_tour(mission: Mission, scene: Scene, field: DistanceField) -> None:
     """Refuse a mission whose tour fails a check, as before it is flown.
 
     Parameters
@@ -145,13 +145,13 @@ def _shown(point: Floats) -> str:
 class _Judge:
     mission: Mission
     tour: PlannedTour
-    water: Water
+    context: PlanningContext
     policy: JudgePolicy
 
     @property
     def field(self) -> DistanceField:
         """Return the scene's field."""
-        return self.water.field
+        return self.context.field
 
     def run(self) -> list[Check]:
         within = self._within()
@@ -179,8 +179,8 @@ class _Judge:
     def _within(self) -> Check:
         """No path leads where the scene ends, nor farther than any tether."""
         line, mission, name = self.tour.line, self.mission, "within the scene and the tether"
-        if self.water.bounds is not None:
-            low, high = np.array(self.water.bounds[:3]), np.array(self.water.bounds[3:])
+        if self.context.bounds is not None:
+            low, high = np.array(self.context.bounds[:3]), np.array(self.context.bounds[3:])
             out = np.flatnonzero(((line < low) | (line > high)).any(axis=1))
             if len(out):
                 return Check(name, False, f"{_shown(line[out[0]])} is out of the scene's bounds")
@@ -220,23 +220,27 @@ class _Judge:
         name = "leaves out only what is out of reach"
         if not left:
             return Check(name, True, "no waypoint")
-        water = self.water
-        tree = ShortestTree(water.grid, np.array(mission.start), mission.places[list(left)])
+        context = self.context
+        tree = ShortestTree(context.grid, np.array(mission.start), mission.places[list(left)])
         limit = self.policy.tether_share * mission.tether_length - mission.delta
         for n, k in enumerate(left):
             path = tree.path(n)
             if path is None:
                 continue
-            line = np.vstack([water.laid.nodes, path[::-1]])
-            tether, longest = water.driven(water.laid, line[len(water.laid.nodes) - 1 :])
+            line = np.vstack([context.start_tether.nodes, path[::-1]])
+            tether, longest = context.drive(
+                context.start_tether, line[len(context.start_tether.nodes) - 1 :]
+            )
             if longest <= limit:
                 return Check(name, False, f"waypoint #{k}, which takes {tether.length:.3f} m")
         return Check(name, True, f"{len(left)} of {len(mission.waypoints)} waypoints")
 
     def _clear(self) -> Check:
         line, mission = self.tour.line, self.mission
-        room = least_room(self.field, line)
-        tight = [k for k, leg in enumerate(self.legs) if not has_room(self.field, leg, mission)]
+        room = min_clearance_along(self.field, line)
+        tight = [
+            k for k, leg in enumerate(self.legs) if not keeps_clearance(self.field, leg, mission)
+        ]
         free = all(self.field.line_of_sight(a, b, depth=1e-3) for a, b in pairwise(line))
         told = f"{room:.3g} m from the nearest, clearance {mission.clearance:g}"
         if room < mission.clearance and not tight:
@@ -253,16 +257,16 @@ class _Judge:
         )
 
     def _words(self) -> list[Check]:
-        mission, words = self.mission, self.water.words
-        walked, wrong = self.water.present.nodes, []
+        mission, words = self.mission, self.context.words
+        walked, wrong = self.context.present_tether.nodes, []
         for k, (stop, leg) in enumerate(zip(self.tour.stops, self.legs, strict=False)):
             walked = np.vstack([walked, leg])
-            word, broken = words.word_until(np.vstack([walked, mission.places[k]]))
+            word, broken = words.try_word(np.vstack([walked, mission.places[k]]))
             if broken is not None or word != stop.signature:
                 found = "no word" if broken is not None else f"the word {list(word)}"
                 wrong.append(f"stop {k} has {found}, stated {list(stop.signature)}")
-        word, broken = words.word_until(
-            np.vstack([walked, self.legs[-1], self.water.laid.nodes[::-1]])
+        word, broken = words.try_word(
+            np.vstack([walked, self.legs[-1], self.context.start_tether.nodes[::-1]])
         )
         if words.exact != self.tour.exact:
             wrong.append(f"words are{'' if words.exact else ' not'} exact, stated otherwise")
@@ -287,10 +291,10 @@ class _Judge:
         ]
 
     def _tethers(self) -> list[Check]:
-        model, laid = self.water.model, self.water.laid
-        tether, longest, where, off = self.water.present, 0.0, 0, []
+        model, laid = self.context.model, self.context.start_tether
+        tether, longest, where, off = self.context.present_tether, 0.0, 0, []
         for k, leg in enumerate(self.legs):
-            tether, most = self.water.driven(tether, leg, fine=True)
+            tether, most = self.context.drive(tether, leg, fine=True)
             if most > longest:
                 longest, where = most, k
             if k < len(self.tour.stops):

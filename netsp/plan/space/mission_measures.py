@@ -125,7 +125,7 @@ def measure_path(
         room = np.prod(high - low + 2.0 * policy.margin_cells * policy.cell)
         cell = max(policy.cell, 1.05 * float(room / policy.words.max_cells) ** (1.0 / 3.0))
     low, high = low - policy.margin_cells * cell, high + policy.margin_cells * cell
-    words = SpaceSignature.of(scene.field(), low, high, cell, line[0], policy=policy.words)
+    words = SpaceSignature.in_box(scene.field(), low, high, cell, line[0], policy=policy.words)
     word = words.word(line, closed=closed)
     length = float(polylines.length(line))
     if closed:

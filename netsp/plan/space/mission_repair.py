@@ -21,7 +21,7 @@ from netsp.base.errors import InputError, LimitReachedError, interrupted
 from netsp.base.field_types import Point3
 from netsp.base.geometry import polylines
 from netsp.plan.space.mission_policy import MissionPolicy
-from netsp.plan.space.planning_context import DIP_RATIO, stride
+from netsp.plan.space.planning_context import DIP_RATIO, drive_step
 from netsp.plan.space.space_plan import SpacePlan, plan
 from netsp.world.mission.mission import Mission, MissionState, MissionWaypoint
 from netsp.world.mission.planned_tour import PlannedStop, PlannedTour, in_file
@@ -66,7 +66,7 @@ class Repair:
 
 def _gaps_named(found: SpacePlan) -> str:
     """Return words for the gaps that the grid of a plan does not show."""
-    gaps = found.water.unresolved_gaps
+    gaps = found.context.unresolved_gaps
     if not gaps:
         return ""
     named = ", ".join(str(gap) for gap in gaps)
@@ -97,7 +97,7 @@ class RepairPlanner(PredictivePlanner):
     """`PredictivePlanner` that plans the rest of a tour as a whole."""
 
     repairs: list[Repair] = field(default_factory=list)
-    policy: MissionPolicy = field(default_factory=MissionPolicy)
+    mission_policy: MissionPolicy = field(default_factory=MissionPolicy)
     _asked_for: bool = False
     _until: float = -np.inf
     _walked: list[Floats] = field(default_factory=list)
@@ -256,7 +256,7 @@ class RepairPlanner(PredictivePlanner):
         """The tether at the end of a leg; None, and why, where the robot cannot go along it."""
         if leg is None or not self.keeps_off(leg):
             return None, f"{name} is blocked"
-        step = stride(self.mission, self.policy.tether_share)
+        step = drive_step(self.mission, self.mission_policy.tether_share)
         there, lengths = self._model.drive(tether, polylines.dense(leg, step))
         most = float(lengths.max(initial=0.0))
         if most > self.limit:
@@ -302,7 +302,7 @@ class RepairPlanner(PredictivePlanner):
             grid=self.grid,
             time_limit=self.options.planning_limit,
             seed=self.options.seed,
-            policy=self.policy,
+            policy=self.mission_policy,
         )
 
     def _inside(self, place: Floats) -> bool:
@@ -319,11 +319,11 @@ class RepairPlanner(PredictivePlanner):
 
     def _take(self, found: SpacePlan) -> None:
         """Go on along a new tour: the waypoints that are left come in its order from now on."""
-        rest = found.planned(seed=self.options.seed)
+        rest = found.to_mission(seed=self.options.seed)
         assert rest.tour is not None
         good = [k for k in self._left if not self._is_lost(k)]
         lost = [k for k in self._left if self._is_lost(k)]
-        left = [*(good[n] for n in found.every_waypoint), *lost]
+        left = [*(good[n] for n in found.all_waypoints), *lost]
         waypoints = (*rest.waypoints, *(self.mission.waypoints[k] for k in lost))
         self._splice(rest.tour, rest.tour.stops, rest.tour.home, waypoints, left)
 

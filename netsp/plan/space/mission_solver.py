@@ -21,15 +21,16 @@ import numpy as np
 
 from netsp.base.clock import Clock, TimeLimit, end_if_abandoned, until_interrupt
 from netsp.base.errors import InputError, LimitReachedError
+from netsp.base.geometry import polylines
 from netsp.gtsp.travel.result import relative_gap
 from netsp.model.bound_scope import LowerBound, Scope
 from netsp.model.solution import Status
 from netsp.plan.solve_problem import SolverLike
 from netsp.plan.space.judge import verify_mission
 from netsp.plan.space.mission_policy import MissionPolicy
-from netsp.plan.space.passages import Resolved
-from netsp.plan.space.path_bound import bound_of_all
-from netsp.plan.space.planning_context import Water, along, has_room
+from netsp.plan.space.passages import GapResolution
+from netsp.plan.space.path_bound import bound_all_tours
+from netsp.plan.space.planning_context import PlanningContext, keeps_clearance
 from netsp.plan.space.space_plan import (
     AS_GIVEN,
     LENGTH_ROUNDING,
@@ -38,12 +39,12 @@ from netsp.plan.space.space_plan import (
     SHORT_ORDER,
     TAUT_LEGS,
     SpacePlan,
+    candidate_plans,
     check_plannable,
-    given_plan,
-    plans,
-    water_of,
+    plan_given_order,
+    prepare_context,
 )
-from netsp.plan.space.upright import bound_of_upright
+from netsp.plan.space.upright import bound_by_upright_solids
 from netsp.plan.space.visit_order import order_by_going_on
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.mission_limits import check_tether
@@ -76,7 +77,7 @@ class SolvedMission:
         The tour of states and legs, whether it was kept or not; None where none was found.
     interrupted : bool
         Whether Ctrl-C ended it.
-    cells : Resolved, optional
+    gaps : Resolved, optional
         Cell size of the plan, and the gaps that its grid shows and does not show.
     """
 
@@ -86,7 +87,7 @@ class SolvedMission:
     given: Run | None
     plan: SpacePlan | None
     interrupted: bool = False
-    cells: Resolved | None = None
+    gaps: GapResolution | None = None
 
     @property
     def tour(self) -> PlannedTour:
@@ -106,7 +107,7 @@ class _Flights:
 
     mission: Mission
     scene: Scene
-    water: Water
+    context: PlanningContext
     clock: Clock
     tell: Callable[[str], None]
     policy: MissionPolicy
@@ -155,7 +156,7 @@ class _Flights:
                 lambda: simulate(
                     mission,
                     scene=self.scene,
-                    field=self.water.field,
+                    field=self.context.field,
                     on_step=watch,
                     options=PlannerOptions(prepared=False, clock=clock),
                 ),
@@ -175,7 +176,7 @@ class _Flights:
         self.tell("judging the tour")
         return self.clock.bounded(
             "judging the tour",
-            lambda: bool(verify_mission(mission, scene=self.scene, water=self.water)),
+            lambda: bool(verify_mission(mission, scene=self.scene, context=self.context)),
         )
 
 
@@ -372,11 +373,13 @@ def solve_mission(
         try:
             with clock.at_least(policy.first_tour_s):
                 scene = scene or clock.bounded("reading the scene", mission.load_scene)
-                water = water_of(mission, clock, scene=scene, field=field, tell=tell, policy=policy)
-                mission, cells = water.mission, water.cells
-                laid = clock.bounded("laying the tether", lambda: water.present)
+                context = prepare_context(
+                    mission, clock, scene=scene, field=field, tell=tell, policy=policy
+                )
+                mission, gaps = context.mission, context.gaps
+                laid = clock.bounded("laying the tether", lambda: context.present_tether)
                 check_tether(mission, laid.length)
-                flights = _Flights(mission, scene, water, clock, tell, policy)
+                flights = _Flights(mission, scene, context, clock, tell, policy)
                 found = _Incumbents(flights)
                 _begin_as_given(found, clock.part(policy.given_share), seed)
         except LimitReachedError:
@@ -397,21 +400,19 @@ def solve_mission(
         found.fly_best()
         _offer_given_flight(found, seed)
         best = _with_bound(found.best, searched.bounds)
-        best = replace(best, mission=with_gaps(best.mission, water))
-        return replace(
-            best, given=found.given, plan=planned, interrupted=clock.stopped, cells=cells
-        )
+        best = replace(best, mission=with_gaps(best.mission, context))
+        return replace(best, given=found.given, plan=planned, interrupted=clock.stopped, gaps=gaps)
 
 
-def with_gaps(mission: Mission, water: Water) -> Mission:
+def with_gaps(mission: Mission, context: PlanningContext) -> Mission:
     """Return a planned mission whose tour names the gaps that its cells do not show.
 
     Parameters
     ----------
     mission : Mission
         Mission with a tour.
-    water : Water
-        Water with the gaps.
+    context : PlanningContext
+        PlanningContext with the gaps.
 
     Returns
     -------
@@ -419,7 +420,7 @@ def with_gaps(mission: Mission, water: Water) -> Mission:
         The mission with `tour.unresolved_gaps`.
     """
     assert mission.tour is not None
-    gaps = {"unresolved_gaps": water.unresolved_gaps}
+    gaps = {"unresolved_gaps": context.unresolved_gaps}
     return mission.model_copy(update={"tour": mission.tour.model_copy(update=gaps)})
 
 
@@ -456,9 +457,11 @@ def _begin_as_given(found: _Incumbents, flying: Clock, seed: int) -> None:
         SolvedMission(mission, order, None, None, None)
     )
     if not taken:
-        water = replace(flights.water, mission=mission.model_copy(update={"tour": None}))
-        driven = flights.clock.bounded("driving the order as given", lambda: given_plan(water))
-        if driven is not None and driven.stops:
+        context = replace(flights.context, mission=mission.model_copy(update={"tour": None}))
+        driven = flights.clock.bounded(
+            "driving the order as given", lambda: plan_given_order(context)
+        )
+        if driven is not None and driven.visits:
             found.take_first(_of_plan(driven, AS_GIVEN, seed))
     given, _ = flights.fly(mission, "the order as given", clock=flying)
     found.take_given(given)
@@ -475,8 +478,8 @@ def _offer_given_flight(found: _Incumbents, seed: int) -> None:
     if seconds_until_home(given) >= worth or found.flights.clock.is_overdue:
         return
     order = tuple(range(len(mission.waypoints)))
-    water = found.flights.water
-    kept = tour_of_flight(mission, order, given, water.field, water, None, seed, AS_GIVEN)
+    context = found.flights.context
+    kept = tour_of_flight(mission, order, given, context.field, context, None, seed, AS_GIVEN)
     if kept is None or not kept.tour.stops:
         return
     if best is None:
@@ -498,10 +501,10 @@ def _search(
     flights, out = found.flights, _Searched()
     if clock.up and found.best is not None:
         return out  # the stages before the first plan would overrun the limit
-    candidates = plans(
+    candidates = candidate_plans(
         flights.mission,
         scene=flights.scene,
-        water=flights.water,
+        context=flights.context,
         solver=solver,
         params=params,
         clock=clock.part(flights.policy.planning_share),
@@ -547,12 +550,12 @@ def _raise_bound(
     before = out.bounds.get(visited)
     if plan.kind in (PLANE, SHORT_ORDER) and before is None:
         flights.tell("bound on all tours by upright solids")
-        places = plan.ways.places
+        places = plan.paths.places
         some = [n for n in range(len(places)) if places.waypoint[n] in visited]
-        bound = bound_of_upright(flights.mission, flights.water, some, places, part)
+        bound = bound_by_upright_solids(flights.mission, flights.context, some, places, part)
     elif plan.kind not in (PLANE, SHORT_ORDER) and not out.has_all_bounds:
         flights.tell("bound on all tours")
-        bound = bound_of_all(plan.ways, sorted(visited), part, seed)
+        bound = bound_all_tours(plan.paths, sorted(visited), part, seed)
         out.has_all_bounds = True
     else:
         return
@@ -561,8 +564,8 @@ def _raise_bound(
 
 
 def _of_plan(planned: SpacePlan, solver: str, seed: int) -> SolvedMission:
-    mission = planned.planned(solver, seed)
-    return SolvedMission(mission, planned.every_waypoint, None, None, planned)
+    mission = planned.to_mission(solver, seed)
+    return SolvedMission(mission, planned.all_waypoints, None, None, planned)
 
 
 def _with_bound(best: SolvedMission, bounds: Mapping[frozenset[int], float]) -> SolvedMission:
@@ -600,14 +603,14 @@ def _offer_going_on(found: _Incumbents, seed: int) -> None:
     if clock.up or mission.state is not None:
         return  # going straight on begins at the start
     flights.tell("order by going straight on")
-    water = flights.water
+    context = flights.context
     try:
         tour = clock.bounded(
             "ordering the waypoints by going straight on",
             lambda: order_by_going_on(
                 mission,
-                water.field,
-                water.grid,
+                context.field,
+                context.grid,
                 clock=clock.part(flights.policy.going_on_share),
                 seed=seed,
                 policy=flights.policy,
@@ -625,7 +628,7 @@ def _offer_going_on(found: _Incumbents, seed: int) -> None:
             continue
         if run is None or clock.is_overdue:
             break
-        kept = tour_of_flight(ordered, order, run, water.field, water, None, seed)
+        kept = tour_of_flight(ordered, order, run, context.field, context, None, seed)
         if kept is not None:
             found.offer(kept, "it as it will be written")
 
@@ -640,7 +643,7 @@ def tour_of_flight(
     order: tuple[int, ...],
     run: Run,
     field: DistanceField,
-    water: Water | None = None,
+    context: PlanningContext | None = None,
     bound: float | None = None,
     seed: int = 0,
     name: str = GOING_ON,
@@ -657,7 +660,7 @@ def tour_of_flight(
         The flight.
     field : DistanceField
         Of the scene.
-    water : Water, optional
+    context : PlanningContext, optional
         Whose words the stops get, when it is at hand.
     bound : float, optional
         Of all tours through the waypoints, metres. A robot that turns back a bit before them goes
@@ -681,13 +684,13 @@ def tour_of_flight(
     parts = _parts(run.log, visited)
     legs = [np.array([[r.x, r.y, r.z] for r in part]) for part in parts]
     path = np.vstack([legs[0][:1], *(leg[1:] for leg in legs)])
-    if not all(has_room(field, leg, mission) for leg in legs):
+    if not all(keeps_clearance(field, leg, mission) for leg in legs):
         return None
-    water = water or Water.of(mission, mission.load_scene(), field)
+    context = context or PlanningContext.for_mission(mission, mission.load_scene(), field)
     planned_stops = []
     for k, stop in enumerate(stops):
-        way = np.vstack([water.present.nodes, *legs[: k + 1]])
-        word, broken = water.words.word_until(way)
+        way = np.vstack([context.present_tether.nodes, *legs[: k + 1]])
+        word, broken = context.words.try_word(way)
         if broken is not None:
             return None
         planned_stops.append(
@@ -699,7 +702,7 @@ def tour_of_flight(
                 given_as=order[visited[k]],
             )
         )
-    length = along(path)
+    length = polylines.length(path)
     if bound is not None:
         ends = np.array([leg[-1] for leg in legs[:-1]]).reshape(-1, 3)
         off = np.linalg.norm(ends - mission.places[visited].reshape(-1, 3), axis=1)
@@ -716,8 +719,8 @@ def tour_of_flight(
         gap_to_all=relative_gap(length, bound),
         states=len(visited),
         legs=len(legs),
-        exact=water.words.exact,
-        unresolved_gaps=water.unresolved_gaps,
+        exact=context.words.exact,
+        unresolved_gaps=context.unresolved_gaps,
     )
     chosen = [*visited, *left]
     there = mission.model_copy(

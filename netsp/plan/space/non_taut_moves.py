@@ -26,12 +26,12 @@ from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.plan.solve_problem import solve_graph
-from netsp.plan.space.board import Board, Driven, Stop
-from netsp.plan.space.detour_variants import across
+from netsp.plan.space.board import DrivenTour, StateGraph, TourVisit
+from netsp.plan.space.detour_variants import perpendiculars
 from netsp.plan.space.mission_policy import DetourPolicy
-from netsp.plan.space.planning_context import along, has_room, straight
-from netsp.plan.space.space_legs import Ways
-from netsp.plan.space.states import alike
+from netsp.plan.space.planning_context import is_straight_clear, keeps_clearance
+from netsp.plan.space.space_legs import RobotPaths
+from netsp.plan.space.states import hang_alike
 from netsp.roadmap.from_state import from_state
 from netsp.world.tether import Tether
 
@@ -72,26 +72,26 @@ class Detours:
     ----------
     board : Board
         States, and the ways from the start to them.
-    ways : Ways
+    paths : RobotPaths
         The robot's ways between waypoints.
     """
 
-    board: Board
-    ways: Ways
+    board: StateGraph
+    paths: RobotPaths
     _legs: dict[tuple[int, int], list[tuple[Floats, int]]] = field(default_factory=dict)
 
     @property
     def _policy(self) -> DetourPolicy:
-        return self.ways.water.policy.detours
+        return self.paths.context.policy.detours
 
     def shortened(
-        self, best: Driven | None, clock: Clock, tell: Callable[[str], None], seed: int = 0
-    ) -> Driven | None:
+        self, best: DrivenTour | None, clock: Clock, tell: Callable[[str], None], seed: int = 0
+    ) -> DrivenTour | None:
         """A tour that is shorter than the best so far.
 
         Parameters
         ----------
-        best : Driven, optional
+        best : DrivenTour, optional
             That tour.
         clock : Clock
             When it is up, no more orders are driven.
@@ -102,21 +102,21 @@ class Detours:
 
         Returns
         -------
-        Driven or None
+        DrivenTour or None
             None where none was found.
         """
         if clock.up and best is not None:
             return None
         states = self.board.states
-        shortest, worth = self._shortest(clock), self.ways.water.policy.bound_worth
-        first = [] if best is None else [[states.all[v].point for v in best.tour]]
+        shortest, worth = self._shortest(clock), self.paths.context.policy.bound_worth
+        first = [] if best is None else [[states.entries[v].place for v in best.tour]]
         free = self._without_tether(shortest, clock.part(self._policy.order_share), seed)
         first += [] if free is None else [free]
         found: list[list[_Line]] = []
         below = np.inf if best is None else (1.0 - worth) * best.length
         for order in first:
             for there in (order, order[::-1]):
-                if clock.up or (there != order and states.begin is not None):
+                if clock.up or (there != order and states.present is not None):
                     continue
                 tell(f"detours along {len(order)} legs")
                 levels = self._driven(there, below, clock)
@@ -148,42 +148,46 @@ class Detours:
         if (n, m) in self._legs:
             return self._legs[n, m]
         if m == HOME or (n != HOME and n > m):
-            number = self.ways.water.number
+            number = self.paths.context.word_number
             back = [(path[::-1], number(path[::-1])) for path, _ in self._of(m, n)]
             self._legs[n, m] = [(path, word) for path, word in back if word is not None]
             return self._legs[n, m]
-        water, mission = self.ways.water, self.ways.water.mission
+        context, mission = self.paths.context, self.paths.context.mission
         begin, end = self._place(n), self._place(m)
         some = self._taut(n, m)
         for path in self._aside(begin, end):
-            if all(straight(water.field, a, b, mission.clearance) for a, b in pairwise(path)):
+            if all(
+                is_straight_clear(context.field, a, b, mission.clearance) for a, b in pairwise(path)
+            ):
                 some.append(path)
-        numbered = [(path, water.number(path)) for path in sorted(some, key=along)]
+        numbered = [
+            (path, context.word_number(path)) for path in sorted(some, key=polylines.length)
+        ]
         self._legs[n, m] = [(path, word) for path, word in numbered if word is not None]
         return self._legs[n, m]
 
     def _taut(self, n: int, m: int) -> list[Floats]:
         """Paths without detours."""
-        water, mission = self.ways.water, self.ways.water.mission
+        context, mission = self.paths.context, self.paths.context.mission
         begin, end = self._place(n), self._place(m)
-        some = [] if n == HOME else [path for _, path in self.ways.known(n, m)]
+        some = [] if n == HOME else [path for _, path in self.paths.between(n, m)]
         if n == HOME:
-            states = self.board.states.of.get(m, ())
-            out = (self.board.way_out(v) for v in states[: self._policy.n_start_paths])
+            states = self.board.states.at_place.get(m, ())
+            out = (self.board.path_out(v) for v in states[: self._policy.n_start_paths])
             some = [path for path in out if path is not None]
-        if not any(len(path) == 2 for path in some) and straight(
-            water.field, begin, end, mission.clearance
+        if not any(len(path) == 2 for path in some) and is_straight_clear(
+            context.field, begin, end, mission.clearance
         ):
             some.append(np.array([begin, end]))
-        return [path for path in some if has_room(water.field, path, mission)]
+        return [path for path in some if keeps_clearance(context.field, path, mission)]
 
     def _aside(self, begin: Floats, end: Floats) -> Iterator[Floats]:
         """Paths with one bend, out to all sides from the middle of the straight one."""
-        effort, step = self.ways.effort, end - begin
+        effort, step = self.paths.effort, end - begin
         far = float(np.linalg.norm(step))
         if far < 1e-9:
             return
-        u, v = across(step)
+        u, v = perpendiculars(step)
         for extra in effort.detours:
             out = 0.5 * far * math.sqrt((1.0 + extra) ** 2 - 1.0)
             for angle in np.linspace(0.0, 2.0 * math.pi, effort.detour_directions, endpoint=False):
@@ -192,27 +196,29 @@ class Detours:
 
     def _place(self, n: int) -> Floats:
         """(3,) where it is, metres."""
-        return self.ways.water.laid.robot if n == HOME else self.ways.points[n]
+        return self.paths.context.start_tether.robot if n == HOME else self.paths.points[n]
 
     def _shortest(self, clock: Clock) -> Floats:
         """(n + 1, n + 1) metres between places, the last of which is the start; infinite where no
         way is known, or there is no time to look whether places far apart see each other."""
-        count = len(self.ways.points)
+        count = len(self.paths.points)
         looking = clock.part(self._policy.order_share)
         out = np.full((count + 1, count + 1), np.inf)
         for m in range(count):
             for n in (HOME, *range(m)):
-                known = self.ways.known(n, m) if n != HOME else []
-                far = along(known[0][1]) if known else np.inf
+                known = self.paths.between(n, m) if n != HOME else []
+                far = polylines.length(known[0][1]) if known else np.inf
                 if not known and not looking.up:
-                    far = min(map(along, self._taut(n, m)), default=np.inf)
+                    far = min(map(polylines.length, self._taut(n, m)), default=np.inf)
                 out[n, m] = out[m, n] = far
         return out
 
     def _without_tether(self, shortest: Floats, clock: Clock, seed: int) -> list[int] | None:
         """Places in the order of the shortest tour without a tether."""
-        places, reached = self.ways.places, self.board.reached
-        some = [n for n in range(len(places)) if n == places.begin or places.waypoint[n] in reached]
+        places, reached = self.paths.places, self.board.reached_waypoints
+        some = [
+            n for n in range(len(places)) if n == places.present or places.waypoint[n] in reached
+        ]
         rows = np.array([HOME, *some])
         cluster = np.r_[0, 1 + np.unique(places.waypoint[some], return_inverse=True)[1]]
         costs = shortest[np.ix_(rows, rows)].copy()
@@ -222,8 +228,8 @@ class Detours:
         except InputError:  # some waypoint is joined to nothing
             return None
         first = 1
-        if places.begin is not None:
-            graph = from_state(graph, 1 + some.index(places.begin))
+        if places.present is not None:
+            graph = from_state(graph, 1 + some.index(places.present))
             first = 2
         result = solve_graph(graph, "auto", time_limit=clock, seed=seed)
         return None if result.tour is None else [int(rows[v]) for v in result.tour[first:]]
@@ -231,7 +237,7 @@ class Detours:
     def _moves(self, order: Sequence[int], shortest: Floats, below: float) -> Iterator[list[int]]:
         """Orders that a piece moved, or turned round, makes of one, shortest first without a
         tether."""
-        begin = HOME if self.ways.places.begin is None else self.ways.places.begin
+        begin = HOME if self.paths.places.present is None else self.paths.places.present
         found: set[tuple[float, tuple[int, ...]]] = set()
         for there in _moved(list(order), self._policy.piece_lengths):
             ends = np.array([begin, *there, HOME])
@@ -252,17 +258,17 @@ class Detours:
         """What is kept after each leg of an order, the tour itself at the end; None where none was
         found that is shorter than so many metres. Of an order that begins like one that was driven,
         what was kept by there is taken."""
-        water, states, places = self.ways.water, self.board.states, self.ways.places
-        begin = HOME if places.begin is None else places.begin
+        context, states, places = self.paths.context, self.board.states, self.paths.places
+        begin = HOME if places.present is None else places.present
         ends = [begin, *order, HOME]
         legs = [self._of(n, m) for n, m in pairwise(ends)]
         if not all(legs):
             return None
-        rest = np.cumsum([0.0, *(along(leg[0][0]) for leg in legs[::-1])])[::-1]
-        word = water.number(water.present.nodes)
+        rest = np.cumsum([0.0, *(polylines.length(leg[0][0]) for leg in legs[::-1])])[::-1]
+        word = context.word_number(context.present_tether.nodes)
         if word is None or rest[0] >= below:
             return None
-        levels = [[_Line(0.0, water.present, water.present, word)]]
+        levels = [[_Line(0.0, context.present_tether, context.present_tether, word)]]
         shared = 0
         while known and shared < len(order) and order[shared] == like[shared]:
             shared += 1
@@ -270,18 +276,18 @@ class Detours:
         for k in range(shared, len(legs)):
             last = k + 1 == len(legs)
             ahead = sorted(
-                (line.length + along(path), i, j)
+                (line.length + polylines.length(path), i, j)
                 for i, line in enumerate(levels[k])
                 for j, (path, _) in enumerate(legs[k])
-                if line.length + along(path) + rest[k + 1] < below
+                if line.length + polylines.length(path) + rest[k + 1] < below
             )
             kept: list[_Line] = []
             for far, i, j in ahead:
-                if clock.up or len(kept) >= (1 if last else self.ways.effort.detour_tethers):
+                if clock.up or len(kept) >= (1 if last else self.paths.effort.detour_tethers):
                     break
                 line, (path, writes) = levels[k][i], legs[k][j]
-                word = water.words.times(line.word, writes)
-                tether, most = water.driven(line.tether, path)
+                word = context.words.multiply(line.word, writes)
+                tether, most = context.drive(line.tether, path)
                 if most > states.limit or any(self._same(other, tether, word) for other in kept):
                     continue
                 if last and not self._is_free(tether, word):
@@ -329,33 +335,33 @@ class Detours:
     ) -> tuple[Tether | None, bool]:
         """A tether, driven in steps along a path to within reach of its end, and whether it slipped
         off something; None in its place where it is not like another at the end."""
-        water = self.ways.water
+        context = self.paths.context
         way = np.vstack([before.robot[None], path[1:]])
-        short = _cut(way, water.mission.reach)
-        step *= max(1.0, along(path) / self._policy.long_leg)
-        there, lengths = water.model.drive(before, polylines.dense(short, step))
-        end, most = water.driven(there, np.vstack([short[-1:], path[-1:]]))
+        short = _cut(way, context.mission.reach)
+        step *= max(1.0, polylines.length(path) / self._policy.long_leg)
+        there, lengths = context.model.drive(before, polylines.dense(short, step))
+        end, most = context.drive(there, np.vstack([short[-1:], path[-1:]]))
         longest = max(most, float(lengths.max(initial=0.0)))
-        delta = water.mission.delta
-        if longest > self.board.states.limit or not alike(end, after, delta):
+        delta = context.mission.delta
+        if longest > self.board.states.limit or not hang_alike(end, after, delta):
             return None, False
         drops = -np.diff(lengths, prepend=before.length)
         return there, bool((drops > step + delta).any())
 
     def _same(self, line: _Line, tether: Tether, word: int) -> bool:
-        delta = self.ways.water.mission.delta
-        return line.word == word and alike(line.tether, tether, 0.25 * delta)
+        delta = self.paths.context.mission.delta
+        return line.word == word and hang_alike(line.tether, tether, 0.25 * delta)
 
     def _is_free(self, tether: Tether, word: int) -> bool:
-        water = self.ways.water
-        same = not water.words.exact or word == water.number(water.laid.nodes)
-        return same and alike(tether, water.laid, water.mission.delta)
+        context = self.paths.context
+        same = not context.words.exact or word == context.word_number(context.start_tether.nodes)
+        return same and hang_alike(tether, context.start_tether, context.mission.delta)
 
-    def _as_driven(self, line: _Line) -> Driven:
+    def _as_driven(self, line: _Line) -> DrivenTour:
         *legs, home = line.legs
-        places, letters = self.ways.places, self.ways.water.words.letters
+        places, letters = self.paths.places, self.paths.context.words.letters
         stops = [
-            Stop(
+            TourVisit(
                 int(places.waypoint[leg.place]),
                 int(places.choice[leg.place]),
                 letters(leg.word),
@@ -365,12 +371,12 @@ class Detours:
             )
             for leg in legs
         ]
-        return Driven([], stops, _path(home), line.length, True, None)
+        return DrivenTour([], stops, _path(home), line.length, True, None)
 
 
 def _cut(path: Floats, short: float) -> Floats:
     """A path, less its last metres, or half of it where it is no longer than twice that."""
-    length = along(path)
+    length = polylines.length(path)
     keep = max(length - short, 0.5 * length)
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     last = int(np.searchsorted(lengths, keep, side="left"))

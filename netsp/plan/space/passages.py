@@ -73,7 +73,7 @@ class GapGrid:
     min_room_ratio: float = WordPolicy.min_room_ratio
 
     @classmethod
-    def of(
+    def in_box(
         cls,
         field: DistanceField,
         box: tuple[Floats, Floats, float],
@@ -101,7 +101,7 @@ class GapGrid:
         return cls(field, low, low + cell * counts, cell, clearance, min_room_ratio)
 
     @classmethod
-    def of_grid(
+    def from_grid(
         cls, grid: Grid, clearance: float, min_room_ratio: float = WordPolicy.min_room_ratio
     ) -> GapGrid:
         """Return the cells of a grid for paths.
@@ -128,7 +128,7 @@ class GapGrid:
         return nx, ny, nz
 
     @property
-    def least(self) -> float:
+    def min_room(self) -> float:
         """Least distance of the middle of a free cell from solids, metres."""
         return max(self.clearance, self.min_room_ratio * self.cell)
 
@@ -149,9 +149,9 @@ class GapGrid:
         """
         axes = [self.low[k] + (first[k] + np.arange(shape[k]) + 0.5) * self.cell for k in range(3)]
         points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        return np.asarray(self.field.distance(points) >= self.least)
+        return np.asarray(self.field.distance(points) >= self.min_room)
 
-    def joins(self, gap: Gap, around: int) -> bool:
+    def connects(self, gap: Gap, around: int) -> bool:
         """Say whether free cells join the two sides of a gap near it.
 
         Parameters
@@ -188,7 +188,7 @@ def _near(parts: Ints, at: Ints) -> set[int]:
     return set(np.unique(parts[box]).tolist()) - {0}
 
 
-def unresolved_gaps(
+def find_hidden_gaps(
     grid: GapGrid, policy: GapPolicy | None = None, clock: Clock | None = None
 ) -> list[Gap]:
     """Return the gaps that have room for the robot but no free cells through them.
@@ -443,7 +443,7 @@ def _widest(grid: GapGrid, place: Floats, through: Floats) -> Floats:
     return place
 
 
-def resolving_cell(
+def find_resolving_cell(
     grid: GapGrid,
     gaps: list[Gap],
     box_of: Callable[[float], tuple[Floats, Floats, float]],
@@ -457,7 +457,7 @@ def resolving_cell(
     grid : GapGrid
         Grid that shows none of the gaps.
     gaps : list of Gap
-        Gaps from `unresolved_gaps`.
+        Gaps from `find_hidden_gaps`.
     box_of : callable
         Takes a cell size; returns the corners of the box of such a grid and the cell size, metres.
     policy : GapPolicy, optional
@@ -481,18 +481,18 @@ def resolving_cell(
     while shown < len(gaps) and cell * policy.step >= policy.smallest * grid.cell:
         clock.check(SEARCHING)
         cell *= policy.step
-        finer = GapGrid.of(grid.field, box_of(cell), grid.clearance, grid.min_room_ratio)
+        finer = GapGrid.in_box(grid.field, box_of(cell), grid.clearance, grid.min_room_ratio)
         if float(np.prod(finer.shape)) > limit:
             break
         around = int(np.ceil(policy.around * grid.cell / cell))
-        count = sum(finer.joins(gap, around) for gap in gaps)
+        count = sum(finer.connects(gap, around) for gap in gaps)
         if count > shown:
             best, shown = cell, count
     return best
 
 
 @dataclass(frozen=True)
-class Resolved:
+class GapResolution:
     """Mission with the cell size that shows the gaps of its scene, as far as possible.
 
     Parameters
@@ -514,7 +514,7 @@ class Resolved:
 
     @property
     def in_file(self) -> tuple[UnresolvedGap, ...] | None:
-        """Return the gaps that stay hidden, as in a tour's `unresolved_gaps`."""
+        """Return the gaps that stay hidden, as in a tour's `find_hidden_gaps`."""
         if self.left is None:
             return None
         return tuple(
@@ -524,13 +524,13 @@ class Resolved:
         )
 
 
-def resolved_on(
+def find_gaps_on(
     mission: Mission,
     grid: Grid,
     policy: GapPolicy | None = None,
     clock: Clock | None = None,
     min_room_ratio: float = WordPolicy.min_room_ratio,
-) -> Resolved:
+) -> GapResolution:
     """Find the gaps that a given grid does not show. Its cell size is kept.
 
     Parameters
@@ -553,24 +553,24 @@ def resolved_on(
     """
     policy, clock = policy or GapPolicy(), clock or Clock()
     try:
-        gaps = unresolved_gaps(
-            GapGrid.of_grid(grid, mission.clearance, min_room_ratio),
+        gaps = find_hidden_gaps(
+            GapGrid.from_grid(grid, mission.clearance, min_room_ratio),
             policy,
             clock.part(policy.time_share),
         )
     except LimitReachedError:
-        return Resolved(mission, grid.cell, (), None)
-    return Resolved(mission, grid.cell, (), tuple(gaps))
+        return GapResolution(mission, grid.cell, (), None)
+    return GapResolution(mission, grid.cell, (), tuple(gaps))
 
 
-def resolved(
+def resolve_gaps(
     mission: Mission,
     scene: Scene,
     field: DistanceField,
     policy: GapPolicy | None = None,
     clock: Clock | None = None,
     min_room_ratio: float = WordPolicy.min_room_ratio,
-) -> Resolved:
+) -> GapResolution:
     """Return a mission whose cells show the gaps of its scene, as far as possible.
 
     A cell size that the mission states is kept, and its gaps are only reported. The same holds for
@@ -603,21 +603,21 @@ def resolved(
         return grid_box(mission.model_copy(update={"cell": cell}), scene)
 
     box = grid_box(mission, scene)
-    grid = GapGrid.of(field, box, mission.clearance, min_room_ratio)
+    grid = GapGrid.in_box(field, box, mission.clearance, min_room_ratio)
     try:
-        gaps = unresolved_gaps(grid, policy, searching)
+        gaps = find_hidden_gaps(grid, policy, searching)
     except LimitReachedError:
-        return Resolved(mission, box[2], (), None)
+        return GapResolution(mission, box[2], (), None)
     if not gaps or mission.cell is not None or mission.tour is not None:
-        return Resolved(mission, box[2], (), tuple(gaps))
+        return GapResolution(mission, box[2], (), tuple(gaps))
     try:
-        cell = resolving_cell(grid, gaps, box_of, policy, searching)
+        cell = find_resolving_cell(grid, gaps, box_of, policy, searching)
         if cell is None:
-            return Resolved(mission, box[2], (), tuple(gaps))
-        finer = GapGrid.of(field, box_of(cell), mission.clearance, min_room_ratio)
-        left = unresolved_gaps(finer, policy, searching)
+            return GapResolution(mission, box[2], (), tuple(gaps))
+        finer = GapGrid.in_box(field, box_of(cell), mission.clearance, min_room_ratio)
+        left = find_hidden_gaps(finer, policy, searching)
     except LimitReachedError:
-        return Resolved(mission, box[2], (), tuple(gaps))
+        return GapResolution(mission, box[2], (), tuple(gaps))
     far = 2.0 * grid.cell
     shown = [g for g in gaps if all(np.linalg.norm(g.place - k.place) > far for k in left)]
-    return Resolved(mission.model_copy(update={"cell": cell}), cell, tuple(shown), tuple(left))
+    return GapResolution(mission.model_copy(update={"cell": cell}), cell, tuple(shown), tuple(left))

@@ -21,18 +21,23 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock
+from netsp.base.geometry import polylines
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.mission_policy import BoundPolicy, PotentialPolicy
-from netsp.plan.space.planning_context import CLEARANCE_TOLERANCE, DEPTH_TOLERANCE, along, straight
-from netsp.plan.space.potential import Region, cells_of, path_bound
-from netsp.plan.space.space_legs import Ways
-from netsp.plan.space.upright import bound_of_upright
+from netsp.plan.space.planning_context import (
+    CLEARANCE_TOLERANCE,
+    DEPTH_TOLERANCE,
+    is_straight_clear,
+)
+from netsp.plan.space.potential import Region, cells_at_level, path_bound
+from netsp.plan.space.space_legs import RobotPaths
+from netsp.plan.space.upright import bound_by_upright_solids
 from netsp.roadmap.from_state import from_state
 
 
-def bound_of_all(
-    ways: Ways,
+def bound_all_tours(
+    robot_paths: RobotPaths,
     reached: list[int],
     clock: Clock | None,
     seed: int = 0,
@@ -47,7 +52,7 @@ def bound_of_all(
 
     Parameters
     ----------
-    ways : Ways
+    robot_paths : RobotPaths
         Known paths between waypoints; their lengths only say how far to look.
     reached : list of int
         Numbers of the waypoints that the tours visit.
@@ -56,26 +61,30 @@ def bound_of_all(
     seed : int
         Random seed of the solver.
     policy : BoundPolicy, optional
-        Time and accuracy; by default those of `ways.water.policy`.
+        Time and accuracy; by default those of `robot_paths.context.policy`.
     potential : PotentialPolicy, optional
-        Effort for each leg; by default that of `ways.water.policy`.
+        Effort for each leg; by default that of `robot_paths.context.policy`.
 
     Returns
     -------
     float or None
         Lower bound, metres; None if there was no time for one, or no waypoint besides the start.
     """
-    clock, defaults = clock or Clock(), ways.water.policy
+    clock, defaults = clock or Clock(), robot_paths.context.policy
     policy, potential = policy or defaults.bound, potential or defaults.potential
-    places, visited = ways.places, set(reached)
-    some = [n for n in range(len(places)) if n == places.begin or places.waypoint[n] in visited]
+    places, visited = robot_paths.places, set(reached)
+    some = [n for n in range(len(places)) if n == places.present or places.waypoint[n] in visited]
     if not some:
         return None
-    upright = bound_of_upright(
-        ways.water.mission, ways.water, some, places, clock.part(policy.upright_share)
+    upright = bound_by_upright_solids(
+        robot_paths.context.mission,
+        robot_paths.context,
+        some,
+        places,
+        clock.part(policy.upright_share),
     )
-    legs = LegBounds(ways, some, potential, policy)
-    of_robot = _of_robot(legs, clock, seed)
+    legs = LegBounds(robot_paths, some, potential, policy)
+    of_robot = _bound_without_tether(legs, clock, seed)
     return max(of_robot or 0.0, upright or 0.0) or None
 
 
@@ -85,10 +94,10 @@ class LegBounds:
 
     Parameters
     ----------
-    ways : Ways
+    paths : RobotPaths
         Known paths between waypoints.
     some : list of int
-        Numbers of the places, as in `ways.places`.
+        Numbers of the places, as in `robot_paths.places`.
     potential : PotentialPolicy
         Effort for each leg.
     policy : BoundPolicy
@@ -104,7 +113,7 @@ class LegBounds:
         True where more effort cannot raise the bound.
     """
 
-    ways: Ways
+    paths: RobotPaths
     some: list[int]
     potential: PotentialPolicy
     policy: BoundPolicy = field(default_factory=BoundPolicy)
@@ -116,15 +125,15 @@ class LegBounds:
     _room: Floats = field(init=False)
 
     def __post_init__(self) -> None:
-        water = self.ways.water
-        self.points = np.vstack([water.mission.start, self.ways.places.points[self.some]])
+        context = self.paths.context
+        self.points = np.vstack([context.mission.start, self.paths.places.points[self.some]])
         self.costs = np.linalg.norm(self.points[:, None] - self.points[None], axis=2)
         self.final = np.eye(len(self.points), dtype=np.bool_)
         self._level = np.zeros(self.costs.shape, dtype=np.int64)
         self._looked = self.final.copy()
-        self._room = water.field.distance(self.points)
+        self._room = context.field.distance(self.points)
 
-    def raised(self, u: int, v: int, clock: Clock) -> bool:
+    def raise_bound(self, u: int, v: int, clock: Clock) -> bool:
         """Raise the bound of a leg on a finer grid.
 
         Parameters
@@ -144,22 +153,22 @@ class LegBounds:
         if self.final[u, v]:
             return False
         a, b, before = self.points[u], self.points[v], self.costs[u, v]
-        water = self.ways.water
+        context = self.paths.context
         if not self._looked[u, v]:
             self._looked[u, v] = self._looked[v, u] = True
-            if straight(water.field, a, b, water.mission.clearance):
+            if is_straight_clear(context.field, a, b, context.mission.clearance):
                 self.final[u, v] = self.final[v, u] = True
                 return False
         known = self._known(u, v)
         farthest = self.policy.max_detour_ratio * float(np.linalg.norm(b - a))
         longest = known if math.isfinite(known) else farthest
         level = int(self._level[u, v]) + 1
-        cells = cells_of(level, self.potential)
+        cells = cells_at_level(level, self.potential)
         if self.policy.cell_s * cells > clock.left:
             self.final[u, v] = self.final[v, u] = True
             return False
         length = path_bound(
-            water.field, a, b, self._region(u, v), longest, cells, self.potential, clock
+            context.field, a, b, self._region(u, v), longest, cells, self.potential, clock
         )
         self.costs[u, v] = self.costs[v, u] = max(before, length)
         self._level[u, v] = self._level[v, u] = level
@@ -169,37 +178,43 @@ class LegBounds:
 
     def _region(self, u: int, v: int) -> Region:
         """Return the region of all legs that the judge accepts
-        (`netsp.plan.space.planning_context.has_room`)."""
-        mission, water = self.ways.water.mission, self.ways.water
+        (`netsp.plan.space.planning_context.keeps_clearance`)."""
+        mission, context = self.paths.context.mission, self.paths.context
         room = min(mission.clearance, float(self._room[u]), float(self._room[v]))
         # between two samples of a path the distance from solids may be half a step less
         room = max(room - 0.5 * mission.delta - 2.0 * CLEARANCE_TOLERANCE, -2.0 * DEPTH_TOLERANCE)
         bounds = np.array([[-np.inf] * 3, [np.inf] * 3])
-        if water.bounds is not None:
-            bounds = np.array(water.bounds).reshape(2, 3)
+        if context.bounds is not None:
+            bounds = np.array(context.bounds).reshape(2, 3)
         anchor = np.asarray(mission.anchor, dtype=float)
         return Region(room, bounds, anchor, mission.tether_length * (1.0 + 1e-6))
 
     def _known(self, u: int, v: int) -> float:
         """Return the length of the shortest path found so far; infinite where there is none."""
-        ways = self.ways
+        robot_paths = self.paths
         if u == 0 or v == 0:
-            n, laid = self.some[max(u, v) - 1], along(ways.water.laid.nodes)
-            return min((laid + along(t) for t in ways.tethers.get(n, ())), default=math.inf)
-        known = ways.known(self.some[u - 1], self.some[v - 1])
-        return min((along(path) for _, path in known), default=math.inf)
+            n, laid = (
+                self.some[max(u, v) - 1],
+                polylines.length(robot_paths.context.start_tether.nodes),
+            )
+            return min(
+                (laid + polylines.length(t) for t in robot_paths.tethers.get(n, ())),
+                default=math.inf,
+            )
+        known = robot_paths.between(self.some[u - 1], self.some[v - 1])
+        return min((polylines.length(path) for _, path in known), default=math.inf)
 
 
-def _of_robot(legs: LegBounds, clock: Clock, seed: int) -> float | None:
+def _bound_without_tether(legs: LegBounds, clock: Clock, seed: int) -> float | None:
     """Return the bound that the least lengths of legs prove.
 
     Solve for the shortest tour by these lengths, raise the bounds of its legs, and solve again,
     until no bound of a leg can be raised or the time is up.
     """
-    places, best = legs.ways.places, 0.0
+    places, best = legs.paths.places, 0.0
     point = np.array(legs.some)
     cluster: Ints = np.r_[0, 1 + np.unique(places.waypoint[point], return_inverse=True)[1]]
-    begin = None if places.begin is None else 1 + int(np.flatnonzero(point == places.begin)[0])
+    begin = None if places.present is None else 1 + int(np.flatnonzero(point == places.present)[0])
     while True:
         graph = TravelGraph.from_costs(legs.costs, cluster)
         if begin is not None:
@@ -215,6 +230,6 @@ def _of_robot(legs: LegBounds, clock: Clock, seed: int) -> float | None:
             for u, v in tour:
                 if clock.up:
                     return best or None
-                grown = legs.raised(u, v, clock) or grown
+                grown = legs.raise_bound(u, v, clock) or grown
         if not grown:
             return best or None

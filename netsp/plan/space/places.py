@@ -25,17 +25,17 @@ class Places:
         Which waypoint each is a place of; of the state, the number of waypoints.
     choice : ndarray of int, shape (n,)
         Which of its waypoint's alternatives it is, from 1 on; 0 for the waypoint's own position.
-    begin : int or None
+    present : int or None
         Number of the point of the mission's state; None where the robot is at the start.
     """
 
     points: Floats
     waypoint: Ints
     choice: Ints
-    begin: int | None
+    present: int | None
 
     @classmethod
-    def of(cls, mission: Mission, field: DistanceField) -> Places:
+    def for_mission(cls, mission: Mission, field: DistanceField) -> Places:
         """The places of a mission.
 
         Parameters
@@ -61,15 +61,15 @@ class Places:
                 points.append(position)
                 waypoint.append(k)
                 choice.append(c)
-        begin = None
+        present = None
         if mission.state is not None:
-            begin = len(points)
+            present = len(points)
             points.append(mission.state.position)
             waypoint.append(len(mission.waypoints))
             choice.append(0)
-        out = cls(np.array(points), np.array(waypoint), np.array(choice), begin)
+        out = cls(np.array(points), np.array(waypoint), np.array(choice), present)
         room = field.distance(out.points)
-        tight = np.flatnonzero((room < DIP_RATIO * mission.delta) & out.to_visit)
+        tight = np.flatnonzero((room < DIP_RATIO * mission.delta) & out.is_waypoint)
         if len(tight):
             n = tight[0]
             choice = out.choice[n]
@@ -86,13 +86,13 @@ class Places:
         return len(self.points)
 
     @property
-    def apart(self) -> Floats:
+    def distances(self) -> Floats:
         """(n, n) straight distances, metres; infinite between places of one waypoint."""
-        apart = np.linalg.norm(self.points[:, None] - self.points[None], axis=2)
-        apart[self.waypoint[:, None] == self.waypoint[None]] = np.inf
-        return np.asarray(apart)
+        distances = np.linalg.norm(self.points[:, None] - self.points[None], axis=2)
+        distances[self.waypoint[:, None] == self.waypoint[None]] = np.inf
+        return np.asarray(distances)
 
     @property
-    def to_visit(self) -> Bools:
+    def is_waypoint(self) -> Bools:
         """(n,) all but the state."""
-        return np.asarray(np.arange(len(self)) != (-1 if self.begin is None else self.begin))
+        return np.asarray(np.arange(len(self)) != (-1 if self.present is None else self.present))

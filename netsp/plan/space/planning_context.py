@@ -13,11 +13,11 @@ import numpy as np
 from netsp.base.arrays import Bools, Floats
 from netsp.base.clock import NEVER, Flag, end_if_abandoned
 from netsp.base.geometry import polylines
-from netsp.plan.space.cells import FREE, OPEN
+from netsp.plan.space.cells import FREE_CELL, OPEN_CELL
 from netsp.plan.space.mission_policy import MissionPolicy
-from netsp.plan.space.passages import Resolved
+from netsp.plan.space.passages import GapResolution
 from netsp.plan.space.space_signature import SpaceSignature
-from netsp.plan.space.word_search import NO_WORD, Found, shortest_words, way_back
+from netsp.plan.space.word_search import NO_WORD, WordSearch, path_to_slot, shortest_words
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.planned_tour import UnresolvedGap
 from netsp.world.paths.standoff import beside
@@ -42,7 +42,7 @@ an eighth of delta (docs/tether.md)."""
 
 
 @dataclass(frozen=True)
-class Water:
+class PlanningContext:
     """What planning asks of a scene.
 
     Parameters
@@ -60,7 +60,7 @@ class Water:
     bounds : tuple of float, optional
         Bounds (xmin, ymin, zmin, xmax, ymax, zmax) of the scene, metres; None if it has none or is
         not known.
-    cells : Resolved, optional
+    gaps : Resolved, optional
         Cell size, and the gaps that the grid does not show; None if they were not searched for.
     policy : MissionPolicy
         Effort and limits of planning.
@@ -72,17 +72,17 @@ class Water:
     words: SpaceSignature
     model: GeodesicTether
     bounds: tuple[float, ...] | None = None
-    cells: Resolved | None = None
+    gaps: GapResolution | None = None
     policy: MissionPolicy = dataclasses.field(default_factory=MissionPolicy)
 
     @classmethod
-    def of(
+    def for_mission(
         cls,
         mission: Mission,
         scene: Scene,
         field: DistanceField,
         policy: MissionPolicy | None = None,
-    ) -> Water:
+    ) -> PlanningContext:
         """The water of a mission.
 
         Parameters
@@ -98,25 +98,25 @@ class Water:
 
         Returns
         -------
-        Water
+        PlanningContext
             The same.
 
         Raises
         ------
         InputError
-            As of `netsp.plan.space.space_signature.SpaceSignature.of`.
+            As of `netsp.plan.space.space_signature.SpaceSignature.in_box`.
         """
-        return cls.within(mission, field, grid_of(mission, scene, field), scene.bounds, policy)
+        return cls.on_grid(mission, field, grid_of(mission, scene, field), scene.bounds, policy)
 
     @classmethod
-    def within(
+    def on_grid(
         cls,
         mission: Mission,
         field: DistanceField,
         grid: Grid,
         bounds: tuple[float, ...] | None = None,
         policy: MissionPolicy | None = None,
-    ) -> Water:
+    ) -> PlanningContext:
         """The same where a grid is at hand.
 
         Parameters
@@ -134,17 +134,17 @@ class Water:
 
         Returns
         -------
-        Water
+        PlanningContext
             The same.
 
         Raises
         ------
         InputError
-            As of `netsp.plan.space.space_signature.SpaceSignature.of`.
+            As of `netsp.plan.space.space_signature.SpaceSignature.in_box`.
         """
         policy = policy or MissionPolicy()
         high = grid.low + grid.cell * np.array(grid.free.shape)
-        words = SpaceSignature.of(
+        words = SpaceSignature.in_box(
             field,
             grid.low,
             high,
@@ -159,20 +159,20 @@ class Water:
     @property
     def unresolved_gaps(self) -> tuple[UnresolvedGap, ...] | None:
         """Return the gaps that the grid does not show, as in a tour; None if not searched for."""
-        return None if self.cells is None else self.cells.in_file
+        return None if self.gaps is None else self.gaps.in_file
 
     @cached_property
-    def laid(self) -> Tether:
+    def start_tether(self) -> Tether:
         """The tether with the robot at the start."""
         return first_tether(self.mission, self.field, self.model, self.grid)
 
     @cached_property
-    def present(self) -> Tether:
+    def present_tether(self) -> Tether:
         """The tether when the mission begins."""
         return present_tether(self.mission, self.field, self.model, self.grid)
 
     @cached_property
-    def room(self) -> Bools:
+    def robot_cells(self) -> Bools:
         """(nx, ny, nz) cells that keep the robot's clearance."""
         c = self.words.cells
         nx, ny, nz = c.flags.shape
@@ -181,30 +181,30 @@ class Water:
         )
 
     @cached_property
-    def everywhere(self) -> Bools:
+    def tether_cells(self) -> Bools:
         """(nx, ny, nz) all cells: the tether's water."""
         return np.ones(self.words.cells.flags.shape, dtype=np.bool_)
 
     @cached_property
-    def open(self) -> tuple[Bools, Bools]:
+    def open_cells(self) -> tuple[Bools, Bools]:
         """(nx, ny, nz) cells about which all are free and of one class, for the tether and for the
         robot."""
         flags = self.words.cells.flags
-        free = (flags & FREE) != 0
+        free = (flags & FREE_CELL) != 0
         both = []
-        for mask in (free, free & self.room):
+        for mask in (free, free & self.robot_cells):
             inner = states_of(mask)[1:-1, 1:-1, 1:-1] == ALL_FREE
-            both.append(inner & ((flags & OPEN) != 0))
+            both.append(inner & ((flags & OPEN_CELL) != 0))
         return both[0], both[1]
 
-    def search(
+    def search_words(
         self,
         robot: bool,
         cell: int,
         most: int,
         within: float | Mapping[int, float],
         stop: Flag = NEVER,
-    ) -> Found:
+    ) -> WordSearch:
         """The soonest words of cells, from one of them on.
 
         Parameters
@@ -244,11 +244,11 @@ class Water:
             apart = 100.0 * np.abs(targets - root)
             reach = np.ceil(0.005 * (limits[:, None] + apart).max(0)).astype(np.int64) + 1
             first, last = np.maximum(root - reach, 0), np.minimum(root + reach, shape - 1)
-        room = self.room if robot else self.everywhere
+        room = self.robot_cells if robot else self.tether_cells
         found, table = shortest_words(
             cells.flags,
             room,
-            self.open[robot],
+            self.open_cells[robot],
             words.labels,
             words.table,
             words.rules,
@@ -260,10 +260,10 @@ class Water:
             limits,
             stop,
         )
-        words.keep(table)
-        return Found(*found)
+        words.keep_table(table)
+        return WordSearch(*found)
 
-    def ways(self, found: Found, cell: int) -> list[tuple[int, Floats]]:
+    def paths_to(self, found: WordSearch, cell: int) -> list[tuple[int, Floats]]:
         """Words and paths that a search has found to a cell.
 
         Parameters
@@ -285,12 +285,12 @@ class Water:
             return []
         words, far = found.word[place], found.far[place]
         return [
-            (int(words[s]), c.centre(way_back(found, at, int(s))))
+            (int(words[s]), c.centre(path_to_slot(found, at, int(s))))
             for s in np.argsort(far, kind="stable")
             if words[s] != NO_WORD
         ]
 
-    def taut(self, path: Floats) -> Floats:
+    def pull_taut(self, path: Floats) -> Floats:
         """A path of the robot pulled taut in its class, at its clearance.
 
         Parameters
@@ -307,10 +307,10 @@ class Water:
         line = taut(self.field, path, mission.clearance, mission.delta)
         if mission.clearance >= 0.5 * mission.delta:
             return line
-        room = min(mission.clearance, room_at_ends(self.field, path))
-        return lifted(self.field, line, room, self.policy.max_lifts)
+        room = min(mission.clearance, end_clearance(self.field, path))
+        return lift_corners(self.field, line, room, self.policy.max_lifts)
 
-    def taut_beside(self, line: Floats) -> Floats | None:
+    def pull_taut_nearby(self, line: Floats) -> Floats | None:
         """Pull a tether's line taut as a path of the robot, in the line's class.
 
         A tether rests on surfaces, so its line is nearer to them than the clearance, and has no
@@ -328,27 +328,27 @@ class Water:
         ndarray, shape (m, 3), or None
             The path, metres; None if no path with room was found in the line's class.
         """
-        word = self.number(line)
+        word = self.word_number(line)
         if word is None:
             return None
-        path = self.taut(line)
-        if self.number(path) == word and has_room(self.field, path, self.mission):
+        path = self.pull_taut(line)
+        if self.word_number(path) == word and keeps_clearance(self.field, path, self.mission):
             return path
         step = min(self.grid.cell, 0.5 * THINNEST * self.mission.delta)
         clear = beside(self.field, polylines.points_along(line, step), self.mission.clearance)
-        if self.number(clear) != word:
+        if self.word_number(clear) != word:
             return None
-        for path in (self.taut(clear), clear):
-            if self.number(path) == word and has_room(self.field, path, self.mission):
+        for path in (self.pull_taut(clear), clear):
+            if self.word_number(path) == word and keeps_clearance(self.field, path, self.mission):
                 return path
         return None
 
-    def driven(self, tether: Tether, path: Floats, *, fine: bool = False) -> tuple[Tether, float]:
+    def drive(self, tether: Tether, path: Floats, *, fine: bool = False) -> tuple[Tether, float]:
         """A tether, once the robot has gone a path.
 
         About solids in space its length is not convex along a straight leg, as it is in the plane
         (docs/theory.md, fact 2): it may be longer there than at both ends. So it is asked for in
-        steps (`stride`).
+        steps (`drive_step`).
 
         Parameters
         ----------
@@ -367,11 +367,11 @@ class Water:
             Metres of it on the way, as far as the steps tell: between two of them it is longer by
             half a step at most, because it gets longer by no more than the robot goes.
         """
-        step = self.mission.delta if fine else stride(self.mission, self.policy.tether_share)
+        step = self.mission.delta if fine else drive_step(self.mission, self.policy.tether_share)
         after, lengths = self.model.drive(tether, polylines.dense(path, step))
         return after, float(lengths.max(initial=tether.length))
 
-    def number(self, path: Floats) -> int | None:
+    def word_number(self, path: Floats) -> int | None:
         """Number of a path's word; None where it has none.
 
         Parameters
@@ -384,26 +384,10 @@ class Water:
         int or None
             Its number in the table.
         """
-        return self.words.number(path)[0]
+        return self.words.word_number(path)[0]
 
 
-def along(path: Floats) -> float:
-    """Length of a path, metres.
-
-    Parameters
-    ----------
-    path : ndarray, shape (k, 3)
-        Metres.
-
-    Returns
-    -------
-    float
-        Metres.
-    """
-    return float(polylines.length(path))
-
-
-def has_room(field: DistanceField, path: Floats, mission: Mission) -> bool:
+def keeps_clearance(field: DistanceField, path: Floats, mission: Mission) -> bool:
     """Whether a path keeps the clearance, or what its ends have of it; corners that were pulled
     taut dip below it by half of delta at most.
 
@@ -421,12 +405,12 @@ def has_room(field: DistanceField, path: Floats, mission: Mission) -> bool:
     bool
         Whether it does.
     """
-    return least_room(field, path) >= max(
-        min(mission.clearance, room_at_ends(field, path)) - 0.5 * mission.delta, -DEPTH_TOLERANCE
+    return min_clearance_along(field, path) >= max(
+        min(mission.clearance, end_clearance(field, path)) - 0.5 * mission.delta, -DEPTH_TOLERANCE
     )
 
 
-def room_at_ends(field: DistanceField, path: Floats) -> float:
+def end_clearance(field: DistanceField, path: Floats) -> float:
     """How near the ends of a path are to solids.
 
     Parameters
@@ -444,7 +428,7 @@ def room_at_ends(field: DistanceField, path: Floats) -> float:
     return float(field.distance(path[[0, -1]]).min())
 
 
-def lifted(field: DistanceField, path: Floats, room: float, max_lifts: int) -> Floats:
+def lift_corners(field: DistanceField, path: Floats, room: float, max_lifts: int) -> Floats:
     """A taut path whose corners dip below a clearance, led around the outside of them.
 
     Parameters
@@ -480,7 +464,7 @@ def lifted(field: DistanceField, path: Floats, room: float, max_lifts: int) -> F
     return path
 
 
-def least_room(field: DistanceField, path: Floats) -> float:
+def min_clearance_along(field: DistanceField, path: Floats) -> float:
     """How near a path comes to solids.
 
     Parameters
@@ -495,11 +479,11 @@ def least_room(field: DistanceField, path: Floats) -> float:
     float
         Metres, right to a hundredth of one, or to a millionth of the path's length.
     """
-    step = max(2.0 * CLEARANCE_TOLERANCE, along(path) / 1e6)
+    step = max(2.0 * CLEARANCE_TOLERANCE, polylines.length(path) / 1e6)
     return float(field.distance(np.vstack([path[:1], polylines.dense(path, step)])).min())
 
 
-def stride(mission: Mission, tether_share: float) -> float:
+def drive_step(mission: Mission, tether_share: float) -> float:
     """Metres after which the tether's length is asked for on a leg: so many that it can be longer
     in between by no more than what is spared of the tether.
 
@@ -518,7 +502,7 @@ def stride(mission: Mission, tether_share: float) -> float:
     return max(mission.delta, 2.0 * (1.0 - tether_share) * mission.tether_length)
 
 
-def straight(field: DistanceField, a: Floats, b: Floats, clearance: float) -> bool:
+def is_straight_clear(field: DistanceField, a: Floats, b: Floats, clearance: float) -> bool:
     """Whether a straight path keeps the clearance, or what its ends have of it.
 
     Parameters

@@ -127,7 +127,9 @@ def path_bound(
         return straight
     return max(
         straight,
-        clock.interruptible(lambda: _through(possible, low, cell, a, b, longest, policy, flag)),
+        clock.interruptible(
+            lambda: _bound_of_potential(possible, low, cell, a, b, longest, policy, flag)
+        ),
     )
 
 
@@ -177,7 +179,7 @@ def _box_of_ellipsoid(a: Floats, b: Floats, longest: float) -> tuple[Floats, Flo
     return 0.5 * (a + b) - half, 0.5 * (a + b) + half
 
 
-def _through(
+def _bound_of_potential(
     possible: Bools,
     low: Floats,
     cell: float,
@@ -202,9 +204,9 @@ def _through(
     far = distances_of_corners(possible.shape, low, cell, a)
     begin = (1.0 / (1.0 + 0.5 * cell / np.maximum(far, max(ball_a, cell)))).astype(np.float32)
     most = longest - ball_a
-    edges = edges_of(possible)
+    edges = corner_edges(possible)
     slow, slow_cells = begin.copy(), np.ones(possible.shape, dtype=np.float32)
-    u = marched(edges, start, cell, slow, most, policy.bucket_cells, stop)
+    u = fast_march(edges, start, cell, slow, most, policy.bucket_cells, stop)
     before_b = _corners((from_b <= ball_b) & possible)
     best = 0.0
     for k in range(2 * policy.rounds):
@@ -213,12 +215,12 @@ def _through(
                 if stop[0]:
                     return best
                 sweep(u, edges, cell, slow, turn)
-            slope = slowed(u, possible, cell, slow_cells, begin, slow)
+            slope = slow_steep_cells(u, possible, cell, slow_cells, begin, slow)
         else:
             for turn in range(8):
                 if stop[0]:
                     return best
-                lower(u, possible, cell, turn, SLOPE_TOLERANCE)
+                lower_values(u, possible, cell, turn, SLOPE_TOLERANCE)
             slope = steepest(u, possible, cell)
         # after each round, u divided by its steepest slope is a potential
         slope = max(1.0, slope)
@@ -303,7 +305,7 @@ def _hypot3(parts: list[Floats]) -> Floats:
 
 
 @kernel
-def has_room(
+def may_have_room(
     field: Field, centre: Floats, halves: Floats, room: float, steep: float, halvings: int
 ) -> bool:
     """Return whether some point of a box may be as far from solids as `room`; false only if it is
@@ -393,12 +395,12 @@ def possibly_free(
                     continue
                 if math.sqrt(from_anchor) > reach + diagonal:
                     continue
-                out[i, j, k] = has_room(field, centre, halves, room, steep, halvings)
+                out[i, j, k] = may_have_room(field, centre, halves, room, steep, halvings)
     return out
 
 
 @kernel
-def edges_of(possible: Bools) -> npt.NDArray[np.uint8]:
+def corner_edges(possible: Bools) -> npt.NDArray[np.uint8]:
     """Return three bits for each corner: whether its edge in positive direction along x, y, z
     belongs to a cell that is possibly free."""
     nx, ny, nz = possible.shape
@@ -416,7 +418,9 @@ def edges_of(possible: Bools) -> npt.NDArray[np.uint8]:
 
 
 @kernel
-def arrival(u: Floats, edges: npt.NDArray[np.uint8], p: int, q: int, r: int, step: float) -> float:
+def upwind_value(
+    u: Floats, edges: npt.NDArray[np.uint8], p: int, q: int, r: int, step: float
+) -> float:
     """Return the value of a corner from its neighbours' values, upwind (Godunov's scheme)."""
     x, y, z = math.inf, math.inf, math.inf
     here = edges[p, q, r]
@@ -449,7 +453,7 @@ def arrival(u: Floats, edges: npt.NDArray[np.uint8], p: int, q: int, r: int, ste
 
 
 @kernel
-def marched(
+def fast_march(
     edges: npt.NDArray[np.uint8],
     start: Bools,
     cell: float,
@@ -496,7 +500,7 @@ def marched(
             joined = edges[i, j, k] if sign > 0 else edges[p, q, r]
             if not joined & (1 << axis):
                 continue
-            value = arrival(u, edges, p, q, r, cell * slow[p, q, r])
+            value = upwind_value(u, edges, p, q, r, cell * slow[p, q, r])
             if value < u[p, q, r]:
                 u[p, q, r] = value
                 bucket = max(now, int(value / width))
@@ -525,12 +529,12 @@ def sweep(u: Floats, edges: npt.NDArray[np.uint8], cell: float, slow: Singles, t
             for c in range(nz):
                 k = c if turn & 4 == 0 else nz - 1 - c
                 if u[i, j, k] > 0.0:
-                    value = arrival(u, edges, i, j, k, cell * slow[i, j, k])
+                    value = upwind_value(u, edges, i, j, k, cell * slow[i, j, k])
                     u[i, j, k] = min(u[i, j, k], value)
 
 
 @kernel
-def slope_of(u: Floats, i: int, j: int, k: int, cell: float) -> float:
+def steepest_slope(u: Floats, i: int, j: int, k: int, cell: float) -> float:
     """Return the steepest slope of the trilinear function of a cell. The square of its gradient is
     convex along each axis, so it is largest in a corner, where three edges give the gradient."""
     most = 0.0
@@ -555,12 +559,12 @@ def steepest(u: Floats, possible: Bools, cell: float) -> float:
         for j in range(ny):
             for k in range(nz):
                 if possible[i, j, k]:
-                    most = max(most, slope_of(u, i, j, k, cell))
+                    most = max(most, steepest_slope(u, i, j, k, cell))
     return most
 
 
 @kernel
-def slowed(
+def slow_steep_cells(
     u: Floats, possible: Bools, cell: float, slow_cells: Singles, begin: Singles, slow: Singles
 ) -> float:
     """Slow the corners of cells with too steep a slope, and return the steepest slope."""
@@ -571,7 +575,7 @@ def slowed(
             for k in range(nz):
                 if not possible[i, j, k]:
                     continue
-                slope = slope_of(u, i, j, k, cell)
+                slope = steepest_slope(u, i, j, k, cell)
                 most = max(most, slope)
                 if slope > 1.0:
                     # slow a little more than needed, because exact steps would take many rounds
@@ -585,7 +589,7 @@ def slowed(
 
 
 @kernel
-def lower(u: Floats, possible: Bools, cell: float, turn: int, tolerance: float) -> None:
+def lower_values(u: Floats, possible: Bools, cell: float, turn: int, tolerance: float) -> None:
     """Lower values in one sweep over all cells, in one of eight orders, so that no corner of a cell
     has too steep a slope."""
     nx, ny, nz = possible.shape
@@ -635,7 +639,7 @@ def lower_corner(u: Floats, i: int, j: int, k: int, n: int, limit: float, tolera
             u[x, y, z] = here + share * (u[x, y, z] - here)
 
 
-def cells_of(level: int, policy: PotentialPolicy) -> int:
+def cells_at_level(level: int, policy: PotentialPolicy) -> int:
     """Return the number of cells of the grid of a level.
 
     Parameters

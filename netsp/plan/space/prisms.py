@@ -23,11 +23,11 @@ from netsp.hsignature.rays import signature
 from netsp.model.problem import Circle, Goal, Polygon, Problem
 from netsp.model.solution import Status
 from netsp.plan.solve_problem import solve_graph
-from netsp.plan.space.board import Driven
+from netsp.plan.space.board import DrivenTour
 from netsp.plan.space.driven_legs import LegTo, drive_legs
 from netsp.plan.space.mission_policy import PlanePolicy
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import Water
+from netsp.plan.space.planning_context import PlanningContext
 from netsp.roadmap.explain_unreachable import shortest_tethers
 from netsp.roadmap.from_state import from_state
 from netsp.roadmap.taut import TautRoadmap
@@ -213,20 +213,20 @@ def wall_corners(point: Floats, normal: Floats, anchor: Floats, far: float) -> t
     return tuple((float(x), float(y)) for x, y in corners)
 
 
-def tours_of_plan(
-    water: Water,
+def drive_plane_tours(
+    context: PlanningContext,
     scene: Scene,
     places: Places,
     clock: Clock,
     seed: int = 0,
     policy: PlanePolicy | None = None,
     whole_tether: bool = False,
-) -> Iterator[Driven]:
+) -> Iterator[DrivenTour]:
     """Drive the shortest tours of the plane in a scene of upright prisms.
 
     Parameters
     ----------
-    water : Water
+    context : PlanningContext
         Water of the mission.
     scene : Scene
         Scene of the mission.
@@ -243,16 +243,16 @@ def tours_of_plan(
 
     Yields
     ------
-    Driven
+    DrivenTour
         First, if `whole_tether`, the shortest tour for the whole tether; then the shortest tour for
         the share of the tether that plans may use. Nothing in other scenes. A tour is skipped if
         the tether in space exceeds its limit.
     """
-    plan, policy = floor_plan(scene, water.mission), policy or water.policy.plane
+    plan, policy = floor_plan(scene, context.mission), policy or context.policy.plane
     if plan is None:
         return
-    usable = water.policy.tether_share
-    plane = _PlaneTour(water, scene, places, plan, policy)
+    usable = context.policy.tether_share
+    plane = _PlaneTour(context, scene, places, plan, policy)
     for share in (1.0, usable) if whole_tether else (usable,):
         if clock.up:
             return
@@ -262,11 +262,11 @@ def tours_of_plan(
             continue
         if found is not None:
             legs, home, is_optimal = found
-            driven = drive_legs(water, legs, home)
+            driven = drive_legs(context, legs, home)
             if driven is not None:
                 yield driven
-                longest = max(stop.most for stop in driven.stops)
-                if is_optimal and longest <= usable * water.mission.tether_length:
+                longest = max(stop.longest_tether for stop in driven.visits)
+                if is_optimal and longest <= usable * context.mission.tether_length:
                     return
 
 
@@ -274,7 +274,7 @@ def tours_of_plan(
 class _PlaneTour:
     """Mission among upright prisms, as a problem of the plane."""
 
-    water: Water
+    context: PlanningContext
     scene: Scene
     places: Places
     plan: FloorPlan
@@ -285,14 +285,14 @@ class _PlaneTour:
     ) -> tuple[list[LegTo], Floats, bool] | None:
         """Return the legs of the shortest tour for a share of the tether, the path home, and True
         if the solver proved that it is the shortest of the plane."""
-        water, places = self.water, self.places
-        mission = water.mission
+        context, places = self.context, self.places
+        mission = context.mission
         start = len(places)  # number of the goal at the start, used if the start is not the anchor
         points = np.vstack([places.points, mission.start])
         away = math.dist(mission.start, mission.anchor) > UPRIGHT_TOLERANCE
         goals = np.arange(len(points) if away else start)
         goals = goals[self._in_reach(points, goals, share)]
-        needed = {places.begin} if places.begin is not None else set()
+        needed = {places.present} if places.present is not None else set()
         needed |= {start} if away else set()
         if not needed <= set(goals.tolist()) or not set(goals.tolist()) - needed:
             return None
@@ -303,11 +303,15 @@ class _PlaneTour:
         )
         graph = roadmap.to_travel_graph()
         place = np.r_[-1, goals][graph.cluster]
-        home = self._vertex(roadmap, graph, place == start, water.laid.nodes) if away else 0
+        home = (
+            self._vertex(roadmap, graph, place == start, context.start_tether.nodes) if away else 0
+        )
         begin = None
-        if places.begin is not None:
-            begin = self._vertex(roadmap, graph, place == places.begin, water.present.nodes)
-        if home is None or (places.begin is not None and begin is None):
+        if places.present is not None:
+            begin = self._vertex(
+                roadmap, graph, place == places.present, context.present_tether.nodes
+            )
+        if home is None or (places.present is not None and begin is None):
             return None
         found = _solved(graph, place, self.places, home, begin, clock, seed)
         if found is None:
@@ -324,10 +328,10 @@ class _PlaneTour:
     def _problem(self, goals: Floats, share: float) -> Problem:
         """Return the problem of the plane through some goals."""
         mission, (obstacles, growth) = (
-            self.water.mission,
+            self.context.mission,
             self.plan.obstacles(self.policy.corner_segments),
         )
-        room = float(self.water.field.distance(np.vstack([goals, mission.anchor])).min())
+        room = float(self.context.field.distance(np.vstack([goals, mission.anchor])).min())
         bounds = self.scene.bounds
         return Problem(
             base=mission.anchor,
@@ -341,7 +345,7 @@ class _PlaneTour:
     def _in_reach(self, points: Floats, goals: Ints, share: float) -> Ints:
         """Return the indices of the goals that the tether reaches in some class."""
         needed = shortest_tethers(self._problem(points[goals], share))
-        return np.flatnonzero(needed <= share * self.water.mission.tether_length)
+        return np.flatnonzero(needed <= share * self.context.mission.tether_length)
 
     def _vertex(
         self, roadmap: TautRoadmap, graph: TravelGraph, here: Floats, line: Floats
@@ -372,7 +376,7 @@ def _solved(
     others = [
         v
         for v in range(1, len(graph))
-        if 0 <= place[v] < count and (place[v] != places.begin or v == begin)
+        if 0 <= place[v] < count and (place[v] != places.present or v == begin)
     ]
     rows = np.array([home, *others])
     waypoint = places.waypoint[place[others]]

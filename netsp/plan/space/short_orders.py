@@ -13,24 +13,29 @@ import numpy as np
 
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock
+from netsp.base.geometry import polylines
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.plan.solve_problem import solve_graph
-from netsp.plan.space.board import Driven
+from netsp.plan.space.board import DrivenTour
 from netsp.plan.space.given_order import drive_order
 from netsp.plan.space.mission_policy import OrderPolicy
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import Water, along, straight
+from netsp.plan.space.planning_context import PlanningContext, is_straight_clear
 from netsp.roadmap.from_state import from_state
 
 
 def short_order_tour(
-    water: Water, places: Places, clock: Clock, seed: int = 0, policy: OrderPolicy | None = None
-) -> Driven | None:
+    context: PlanningContext,
+    places: Places,
+    clock: Clock,
+    seed: int = 0,
+    policy: OrderPolicy | None = None,
+) -> DrivenTour | None:
     """Drive tours in short orders, and return the best.
 
     Parameters
     ----------
-    water : Water
+    context : PlanningContext
         Water of the mission.
     places : Places
         Places of the waypoints.
@@ -43,13 +48,13 @@ def short_order_tour(
 
     Returns
     -------
-    Driven or None
+    DrivenTour or None
         The tour with the most stops, and of these the shortest; None if no order can be driven.
     """
-    policy = policy or water.policy.orders
+    policy = policy or context.policy.orders
     clock = clock.part(policy.time_share)
-    estimates = _estimates(water, places, clock, policy)
-    best: Driven | None = None
+    estimates = _estimates(context, places, clock, policy)
+    best: DrivenTour | None = None
     seen: set[tuple[int, ...]] = set()
     for _ in range(policy.max_rounds):
         order = _shortest_order(estimates, places, Clock(policy.max_solve_s, within=clock), seed)
@@ -57,10 +62,12 @@ def short_order_tour(
             return best
         seen |= {tuple(order), tuple(order[::-1])}
         # a mission under way has one direction: from the robot to the start
-        for there in (order, order[::-1])[: 1 if places.begin is not None else 2]:
+        for there in (order, order[::-1])[: 1 if places.present is not None else 2]:
             if clock.up:
                 return best
-            driven = drive_order(water, [(int(n), int(c)) for n, c in _stops(places, there)], clock)
+            driven = drive_order(
+                context, [(int(n), int(c)) for n, c in _stops(places, there)], clock
+            )
             if driven is None:
                 continue
             _update_estimates(estimates, places, there, driven)
@@ -69,9 +76,9 @@ def short_order_tour(
     return best
 
 
-def _rank(driven: Driven) -> tuple[int, float]:
+def _rank(driven: DrivenTour) -> tuple[int, float]:
     """Return the sort key of a tour: more stops first, then the shorter tour."""
-    return -len(driven.stops), driven.length
+    return -len(driven.visits), driven.length
 
 
 def _stops(places: Places, order: list[int]) -> Ints:
@@ -79,9 +86,11 @@ def _stops(places: Places, order: list[int]) -> Ints:
     return np.column_stack([places.waypoint[order], places.choice[order]])
 
 
-def _estimates(water: Water, places: Places, clock: Clock, policy: OrderPolicy) -> Floats:
+def _estimates(
+    context: PlanningContext, places: Places, clock: Clock, policy: OrderPolicy
+) -> Floats:
     """Return the estimated lengths (n + 1, n + 1) of legs; row 0 is the start, then places."""
-    points = np.vstack([water.mission.start, places.points])
+    points = np.vstack([context.mission.start, places.points])
     lengths = np.linalg.norm(points[:, None] - points[None], axis=2)
     if len(points) > policy.max_sighted + 1:
         return np.asarray(lengths)
@@ -89,7 +98,9 @@ def _estimates(water: Water, places: Places, clock: Clock, policy: OrderPolicy) 
         if clock.up:
             break
         for v in range(u):
-            if not straight(water.field, points[u], points[v], water.mission.clearance):
+            if not is_straight_clear(
+                context.field, points[u], points[v], context.mission.clearance
+            ):
                 lengths[u, v] = lengths[v, u] = policy.blocked_ratio * lengths[u, v]
     return np.asarray(lengths)
 
@@ -98,18 +109,20 @@ def _shortest_order(estimates: Floats, places: Places, clock: Clock, seed: int) 
     """Return the places of the shortest tour by estimates; None if the time is up."""
     cluster = np.r_[0, 1 + places.waypoint]
     graph, first = TravelGraph.from_costs(estimates, cluster), 1
-    if places.begin is not None:
-        graph, first = from_state(graph, 1 + places.begin), 2
+    if places.present is not None:
+        graph, first = from_state(graph, 1 + places.present), 2
     result = solve_graph(graph, "auto", time_limit=clock, seed=seed)
     return None if result.tour is None else [v - 1 for v in result.tour[first:]]
 
 
-def _update_estimates(estimates: Floats, places: Places, order: list[int], driven: Driven) -> None:
+def _update_estimates(
+    estimates: Floats, places: Places, order: list[int], driven: DrivenTour
+) -> None:
     """Replace the estimates of legs by the lengths that they were driven with."""
     place_of = {places.waypoint[n]: 1 + n for n in order}
-    here = 0 if places.begin is None else 1 + places.begin
-    for stop in driven.stops:
+    here = 0 if places.present is None else 1 + places.present
+    for stop in driven.visits:
         there = place_of[stop.waypoint]
-        estimates[here, there] = estimates[there, here] = along(stop.path)
+        estimates[here, there] = estimates[there, here] = polylines.length(stop.path)
         here = there
-    estimates[here, 0] = estimates[0, here] = along(driven.home)
+    estimates[here, 0] = estimates[0, here] = polylines.length(driven.home)

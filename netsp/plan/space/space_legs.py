@@ -11,20 +11,21 @@ import numpy as np
 
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock
-from netsp.plan.space.detour_variants import ways_beside
+from netsp.base.geometry import polylines
+from netsp.plan.space.detour_variants import find_bent_paths
 from netsp.plan.space.mission_policy import StateEffort
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import Water, along, has_room, straight
+from netsp.plan.space.planning_context import PlanningContext, is_straight_clear, keeps_clearance
 from netsp.plan.space.states import State, States
 
 
 @dataclass
-class Ways:
+class RobotPaths:
     """The robot's ways between waypoints that are near one another, by the words they write.
 
     Parameters
     ----------
-    water : Water
+    context : PlanningContext
         Where they are.
     places : Places
         The waypoints, and where else the robot may be.
@@ -35,21 +36,21 @@ class Ways:
         search, metres.
     """
 
-    water: Water
+    context: PlanningContext
     places: Places
     effort: StateEffort
     tethers: dict[int, list[Floats]] = field(default_factory=dict)
     _known: dict[tuple[int, int], list[tuple[int, Floats]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        apart = self.places.apart
+        apart = self.places.distances
         per = len(apart) / np.count_nonzero(self.places.choice == 0)
-        count = min(math.ceil(self.water.policy.states.n_neighbours * per), len(apart) - 1)
+        count = min(math.ceil(self.context.policy.states.n_neighbours * per), len(apart) - 1)
         nearest = np.argsort(apart, axis=1, kind="stable")[:, :count]
         both = np.zeros(apart.shape, dtype=bool)
         both[np.arange(len(apart))[:, None], nearest] = True
         both = (both | both.T) & np.isfinite(apart)
-        self.near: list[Ints] = [np.flatnonzero(row) for row in both]
+        self.neighbours: list[Ints] = [np.flatnonzero(row) for row in both]
         self._apart = apart
 
     @property
@@ -57,7 +58,7 @@ class Ways:
         """(n, 3) the places, metres."""
         return self.places.points
 
-    def prepare(self, n: int, *, search: bool = True, pulling: Clock | None = None) -> None:
+    def find_from(self, n: int, *, search: bool = True, pulling: Clock | None = None) -> None:
         """Seek the ways from a waypoint to those near it that have a greater number.
 
         Parameters
@@ -69,68 +70,72 @@ class Ways:
         pulling : Clock, optional
             When it is up, there are no more of those along tethers, either.
         """
-        to = [int(m) for m in self.near[n] if m > n and (n, int(m)) not in self._known]
+        to = [int(m) for m in self.neighbours[n] if m > n and (n, int(m)) not in self._known]
         if not to:
             return
-        water, words = self.water, self.water.words
-        here = words.held(self.points[n])
+        context, words = self.context, self.context.words
+        here = words.visible_cell(self.points[n])
         found = None
         if here is not None and search:
-            ends = {m: words.held(self.points[m]) for m in to}
+            ends = {m: words.visible_cell(self.points[m]) for m in to}
             limits = {
                 c: self.effort.max_path_ratio * float(self._apart[n, m])
                 for m, c in ends.items()
                 if c is not None
             }
-            found = water.search(True, here, self.effort.paths, limits) if limits else None
+            found = context.search_words(True, here, self.effort.paths, limits) if limits else None
         for m in to:
-            ways = []
-            if straight(water.field, self.points[n], self.points[m], water.mission.clearance):
+            paths = []
+            if is_straight_clear(
+                context.field, self.points[n], self.points[m], context.mission.clearance
+            ):
                 line = self.points[[n, m]]
-                word = water.number(line)
+                word = context.word_number(line)
                 if word is not None:
-                    ways.append((word, line))
+                    paths.append((word, line))
             there = ends[m] if found is not None else None
             if found is not None and there is not None:
-                for _, cells in water.ways(found, there):
-                    path = water.taut(np.vstack([self.points[n], cells, self.points[m]]))
-                    word = water.number(path)
-                    if word is not None and all(word != w for w, _ in ways):
-                        ways.append((word, path))
+                for _, cells in context.paths_to(found, there):
+                    path = context.pull_taut(np.vstack([self.points[n], cells, self.points[m]]))
+                    word = context.word_number(path)
+                    if word is not None and all(word != w for w, _ in paths):
+                        paths.append((word, path))
             if found is None and not (pulling is not None and pulling.up):
-                self._add_along_tethers(n, m, ways)
-            ways.sort(key=lambda way: along(way[1]))
-            if found is not None and ways:
+                self._add_along_tethers(n, m, paths)
+            paths.sort(key=lambda way: polylines.length(way[1]))
+            if found is not None and paths:
                 farther = self.effort.max_path_ratio * float(self._apart[n, m])
-                for path in ways_beside(water, [way for _, way in ways], farther):
-                    word = water.number(path)
+                for path in find_bent_paths(context, [way for _, way in paths], farther):
+                    word = context.word_number(path)
                     if word is not None:
-                        ways.append((word, path))
-                ways.sort(key=lambda way: along(way[1]))
+                        paths.append((word, path))
+                paths.sort(key=lambda way: polylines.length(way[1]))
             back = []
-            for _, path in ways:
-                word = water.number(path[::-1])
+            for _, path in paths:
+                word = context.word_number(path[::-1])
                 if word is not None:
                     back.append((word, path[::-1]))
-            self._known[n, m], self._known[m, n] = ways, back
+            self._known[n, m], self._known[m, n] = paths, back
 
-    def _add_along_tethers(self, n: int, m: int, ways: list[tuple[int, Floats]]) -> None:
+    def _add_along_tethers(self, n: int, m: int, paths: list[tuple[int, Floats]]) -> None:
         """The shortest ways back along a tether of one place and out along one of another, pulled
         taut, each of a class of its own."""
         found: dict[int, Floats] = {}
         for back in self.tethers.get(n, ()):
             for out in self.tethers.get(m, ()):
-                path = self.water.taut(np.vstack([back[::-1], out[1:]]))
-                word = self.water.number(path)
-                if word is None or not has_room(self.water.field, path, self.water.mission):
+                path = self.context.pull_taut(np.vstack([back[::-1], out[1:]]))
+                word = self.context.word_number(path)
+                if word is None or not keeps_clearance(
+                    self.context.field, path, self.context.mission
+                ):
                     continue
-                if word not in found or along(path) < along(found[word]):
+                if word not in found or polylines.length(path) < polylines.length(found[word]):
                     found[word] = path
-        for word, path in sorted(found.items(), key=lambda way: along(way[1])):
-            if len(ways) < self.effort.paths and all(word != w for w, _ in ways):
-                ways.append((word, path))
+        for word, path in sorted(found.items(), key=lambda way: polylines.length(way[1])):
+            if len(paths) < self.effort.paths and all(word != w for w, _ in paths):
+                paths.append((word, path))
 
-    def prepare_all(self, clock: Clock, tell: Callable[[str], None]) -> None:
+    def find_all(self, clock: Clock, tell: Callable[[str], None]) -> None:
         """Seek all ways between waypoints that are near.
 
         Parameters
@@ -141,15 +146,15 @@ class Ways:
         tell : callable
             Called with a line of text now and then.
         """
-        times = self.water.policy.times
+        times = self.context.policy.times
         searching, pulling = clock.part(times.path_search_share), None
         for n in range(len(self.points)):
             tell(f"ways of the robot from waypoint {n + 1} of {len(self.points)}")
             if searching.up and pulling is None:
                 pulling = clock.part(times.tether_path_share)
-            self.prepare(n, search=pulling is None, pulling=pulling)
+            self.find_from(n, search=pulling is None, pulling=pulling)
 
-    def known(self, n: int, m: int) -> list[tuple[int, Floats]]:
+    def between(self, n: int, m: int) -> list[tuple[int, Floats]]:
         """Ways from one waypoint to another that were found so far, shortest first.
 
         Parameters
@@ -168,7 +173,7 @@ class Ways:
 
 
 @dataclass
-class Legs:
+class DrivenLegs:
     """Legs between states: each was driven with the tether of the state that it begins at.
 
     Attributes
@@ -179,7 +184,7 @@ class Legs:
 
     arrives: dict[tuple[int, int], Floats] = field(default_factory=dict)
 
-    def each(self) -> Iterator[tuple[int, int, Floats, bool]]:
+    def both_directions(self) -> Iterator[tuple[int, int, Floats, bool]]:
         """Legs that arrive in one direction at least.
 
         A tether may hang otherwise when the robot comes back: from there it then arrives in a state
@@ -196,11 +201,11 @@ class Legs:
             if back is None:
                 yield v, w, path, False
             elif v < w:
-                yield v, w, min(path, back[::-1], key=along), True
+                yield v, w, min(path, back[::-1], key=polylines.length), True
 
 
 @dataclass
-class Growth:
+class StateGrowth:
     """Legs and the states that they lead to: each state's own tether is driven along all ways to
     waypoints near, and what it arrives in is a state, too. The shortest legs come first, so that
     states are made in chains of neighbours, and what there is when the time is up joins them.
@@ -209,20 +214,20 @@ class Growth:
     ----------
     states : States
         Those so far; more are added.
-    ways : Ways
+    paths : RobotPaths
         The robot's ways.
     """
 
     states: States
-    ways: Ways
-    legs: Legs = field(default_factory=Legs)
+    paths: RobotPaths
+    legs: DrivenLegs = field(default_factory=DrivenLegs)
     _waiting: list[tuple[float, int, int, int, int]] = field(default_factory=list)
     _no_room: list[tuple[float, int, int, int, int]] = field(default_factory=list)
     _known: int = 0
     _count: int = 0
     _shortest: dict[tuple[int, int], float] = field(default_factory=dict)
 
-    def go_on(self, most: int, clock: Clock, tell: Callable[[str], None]) -> bool:
+    def grow(self, most: int, clock: Clock, tell: Callable[[str], None]) -> bool:
         """Drive legs until there are none left to drive, or the time is up.
 
         Parameters
@@ -239,27 +244,29 @@ class Growth:
         bool
             Whether there are none left for so many states.
         """
-        self.states.most = most
+        self.states.max_per_place = most
         for leg in self._no_room:
             heapq.heappush(self._waiting, leg)
         self._no_room.clear()
         while self._drive_on():
-            tell(f"legs, {len(self.legs.arrives)} driven between {len(self.states.all)} states")
+            tell(f"legs, {len(self.legs.arrives)} driven between {len(self.states.entries)} states")
             if clock.up:
                 return False
         return True
 
     def _look_at_new(self) -> None:
         """Take the ways from new states on among those that wait."""
-        for v in range(self._known, len(self.states.all)):
-            state = self.states.all[v]
-            key = state.point, state.word
+        for v in range(self._known, len(self.states.entries)):
+            state = self.states.entries[v]
+            key = state.place, state.word
             self._shortest[key] = min(state.tether.length, self._shortest.get(key, np.inf))
-            for m in self.ways.near[state.point]:
-                for k, (_, path) in enumerate(self.ways.known(state.point, int(m))):
+            for m in self.paths.neighbours[state.place]:
+                for k, (_, path) in enumerate(self.paths.between(state.place, int(m))):
                     self._count += 1
-                    heapq.heappush(self._waiting, (along(path), self._count, v, int(m), k))
-        self._known = len(self.states.all)
+                    heapq.heappush(
+                        self._waiting, (polylines.length(path), self._count, v, int(m), k)
+                    )
+        self._known = len(self.states.entries)
 
     def _drive_on(self) -> bool:
         """Drive the next leg; whether there was one."""
@@ -269,15 +276,15 @@ class Growth:
         leg = heapq.heappop(self._waiting)
         _, _, v, m, k = leg
         states, legs = self.states, self.legs
-        state = states.all[v]
-        word, path = self.ways.known(state.point, m)[k]
-        writes = states.water.words.times(state.word, word)
-        if not states.may_take(m, writes):
+        state = states.entries[v]
+        word, path = self.paths.between(state.place, m)[k]
+        writes = states.context.words.multiply(state.word, word)
+        if not states.can_hold(m, writes):
             self._no_room.append(leg)
             return True
         if not self._may_fit(state, m, writes, path):
             return True
-        there, longest = states.water.driven(state.tether, path)
+        there, longest = states.context.drive(state.tether, path)
         if longest > states.limit:
             return True
         w = states.find(m, writes, there)
@@ -287,7 +294,7 @@ class Growth:
             self._no_room.append(leg)
         else:
             old = legs.arrives.get((v, w))
-            if old is None or along(path) < along(old):
+            if old is None or polylines.length(path) < polylines.length(old):
                 legs.arrives[v, w] = path
         return True
 
@@ -297,8 +304,8 @@ class Growth:
         key = m, writes
         if self._shortest.get(key, np.inf) > self.states.limit:
             line = np.vstack([state.tether.nodes, path[1:]])
-            rounds = self.states.water.policy.states.max_pull_rounds
-            length = self.states.water.model.relaxed(line, rounds).length
+            rounds = self.states.context.policy.states.max_pull_rounds
+            length = self.states.context.model.relaxed(line, rounds).length
             self._shortest[key] = min(length, self._shortest.get(key, np.inf))
             return bool(length <= self.states.limit)
         return True

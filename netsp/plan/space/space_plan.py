@@ -25,6 +25,7 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.clock import Clock, TimeLimit, until_interrupt
+from netsp.base.deprecated import deprecated_method
 from netsp.base.errors import InputError, LimitReachedError, counted
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result, relative_gap
@@ -32,19 +33,19 @@ from netsp.model.bound_scope import LowerBound, Scope
 from netsp.model.solution import Status
 from netsp.plan.solve_problem import SolverLike, solve_graph
 from netsp.plan.solver_table import SOLVERS
-from netsp.plan.space.board import Board, Driven, Stop, with_status
+from netsp.plan.space.board import DrivenTour, StateGraph, TourVisit, with_status
 from netsp.plan.space.given_order import drive_given_order
 from netsp.plan.space.judge import verify_mission
 from netsp.plan.space.mission_policy import MissionPolicy
 from netsp.plan.space.non_taut_moves import Detours
-from netsp.plan.space.passages import resolved, resolved_on
+from netsp.plan.space.passages import find_gaps_on, resolve_gaps
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import Water
-from netsp.plan.space.prisms import tours_of_plan
+from netsp.plan.space.planning_context import PlanningContext
+from netsp.plan.space.prisms import drive_plane_tours
 from netsp.plan.space.short_orders import short_order_tour
-from netsp.plan.space.space_legs import Growth, Ways
-from netsp.plan.space.states import first_states, states_with_room
-from netsp.plan.space.trees import states_of_trees
+from netsp.plan.space.space_legs import RobotPaths, StateGrowth
+from netsp.plan.space.states import add_states_with_room, find_first_states
+from netsp.plan.space.trees import add_states_of_trees
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.mission_limits import check_bounds, check_size, check_tether
 from netsp.world.mission.planned_tour import PlannedStop, PlannedTour, in_file
@@ -83,7 +84,7 @@ class SpacePlan:
     ----------
     mission : Mission
         What was planned.
-    stops : tuple of Stop
+    visits : tuple of TourVisit
         In the order of the tour.
     home : ndarray, shape (k, 3)
         From the last stop back to the start, metres.
@@ -99,9 +100,9 @@ class SpacePlan:
         Waypoints that no tether within the limit was found to.
     free : bool
         Whether the tether was as at the start when the whole tour was driven.
-    water : Water
+    context : PlanningContext
         With the words.
-    ways : Ways
+    paths : RobotPaths
         Of the robot between waypoints.
     kind : str
         How the tour was found: `TAUT_LEGS`, `DETOURS`, `PLANE`, `SHORT_ORDER`, `OUT_AND_BACK` or
@@ -109,7 +110,7 @@ class SpacePlan:
     """
 
     mission: Mission
-    stops: tuple[Stop, ...]
+    visits: tuple[TourVisit, ...]
     home: Floats
     length: float
     result: Result
@@ -117,20 +118,26 @@ class SpacePlan:
     legs: int
     unreached: tuple[int, ...]
     free: bool
-    water: Water
-    ways: Ways
+    context: PlanningContext
+    paths: RobotPaths
     kind: str = TAUT_LEGS
 
     @property
     def order(self) -> tuple[int, ...]:
         """The waypoints' numbers in the order of the tour."""
-        return tuple(stop.waypoint for stop in self.stops)
+        return tuple(stop.waypoint for stop in self.visits)
 
     @property
-    def every_waypoint(self) -> tuple[int, ...]:
+    def all_waypoints(self) -> tuple[int, ...]:
         """The same, and then those that no tether reaches."""
         rest = set(range(len(self.mission.waypoints))) - set(self.order)
         return (*self.order, *sorted(rest))
+
+    planned = deprecated_method("planned", "to_mission")
+    every_waypoint = deprecated_method("every_waypoint", "all_waypoints")
+    stops = deprecated_method("stops", "visits")
+    water = deprecated_method("water", "context")
+    ways = deprecated_method("ways", "paths")
 
     def replaces(self, other: SpacePlan) -> bool:
         """Return whether this plan is better than another that has passed the judge.
@@ -146,11 +153,11 @@ class SpacePlan:
             True if it visits more waypoints, or as many and is shorter. A tour along states and
             legs may be longer than a tour of the plane by `bound_worth` of the policy.
         """
-        if len(self.stops) != len(other.stops):
-            return len(self.stops) > len(other.stops)
+        if len(self.visits) != len(other.visits):
+            return len(self.visits) > len(other.visits)
         known = self.kind == TAUT_LEGS and other.kind == PLANE
         return self.length < other.length * (
-            1.0 + (self.water.policy.bound_worth if known else 0.0)
+            1.0 + (self.context.policy.bound_worth if known else 0.0)
         )
 
     def _status(self, bound: float | None) -> Status:
@@ -161,7 +168,9 @@ class SpacePlan:
         proven = LowerBound(bound, Scope.ALL_TOURS).proves(self.length)
         return Status.OPTIMAL if proven else self.result.status
 
-    def planned(self, solver: str = "auto", seed: int = 0, bound: float | None = None) -> Mission:
+    def to_mission(
+        self, solver: str = "auto", seed: int = 0, bound: float | None = None
+    ) -> Mission:
         """The mission with its waypoints in the order of the tour, and the tour; waypoints that no
         tether reaches come last.
 
@@ -188,11 +197,11 @@ class SpacePlan:
                 PlannedStop(
                     path=in_file(stop.path),
                     signature=stop.word,
-                    tether_length=stop.tether,
-                    longest_tether=stop.most,
+                    tether_length=stop.tether_length,
+                    longest_tether=stop.longest_tether,
                     given_as=stop.waypoint,
                 )
-                for stop in self.stops
+                for stop in self.visits
             ),
             home=in_file(self.home),
             status=self._status(bound),
@@ -205,13 +214,13 @@ class SpacePlan:
             gap_to_all=relative_gap(self.length, bound),
             states=self.states,
             legs=self.legs,
-            exact=self.water.words.exact,
-            unresolved_gaps=self.water.unresolved_gaps,
+            exact=self.context.words.exact,
+            unresolved_gaps=self.context.unresolved_gaps,
         )
         all_of = self.mission.waypoints
         waypoints = (
-            *(all_of[stop.waypoint].at(stop.choice) for stop in self.stops),
-            *(all_of[n] for n in self.every_waypoint[len(self.stops) :]),
+            *(all_of[stop.waypoint].at(stop.choice) for stop in self.visits),
+            *(all_of[n] for n in self.all_waypoints[len(self.visits) :]),
         )
         return self.mission.model_copy(update={"waypoints": waypoints, "tour": tour})
 
@@ -275,7 +284,7 @@ def plan(
     """
     kept: SpacePlan | None = None
     with until_interrupt(time_limit) as clock:
-        for found in plans(
+        for found in candidate_plans(
             mission,
             scene=scene,
             field=field,
@@ -289,7 +298,7 @@ def plan(
             policy=policy,
         ):
             if kept is None or found.replaces(kept):
-                verdict = verify_mission(found.planned(), scene=scene, water=found.water)
+                verdict = verify_mission(found.to_mission(), scene=scene, context=found.context)
                 kept = found if verdict else kept
             if kept is not None and found.kind == TAUT_LEGS:
                 break
@@ -300,13 +309,13 @@ def plan(
         return kept
 
 
-def plans(
+def candidate_plans(
     mission: Mission,
     *,
     scene: Scene | None = None,
     field: DistanceField | None = None,
     grid: Grid | None = None,
-    water: Water | None = None,
+    context: PlanningContext | None = None,
     solver: SolverLike = "auto",
     params: Mapping[str, Any] | None = None,
     clock: Clock,
@@ -328,7 +337,7 @@ def plans(
         Distance field of the scene; computed if needed.
     grid : Grid, optional
         Grid for paths; made if needed.
-    water : Water, optional
+    context : PlanningContext, optional
         Water of the mission with its words; if given, `field` and `grid` are not used.
     solver : str or callable
         Solver, as in `netsp.plan.solve_problem.solve_graph`.
@@ -345,7 +354,7 @@ def plans(
     on_progress : callable, optional
         Called with a line of text at each stage.
     policy : MissionPolicy, optional
-        Effort, time and limits; not used if `water` is given, which has its own.
+        Effort, time and limits; not used if `context` is given, which has its own.
 
     Yields
     ------
@@ -362,10 +371,10 @@ def plans(
     """
     check_plannable(mission, solver, params, seed)
     how = {"solver": solver, "seed": seed, "params": params, "iteration_limit": iteration_limit}
-    if water is None:
+    if context is None:
         if field is None or grid is None:
             scene = scene or mission.load_scene()
-        water = water_of(
+        context = prepare_context(
             mission,
             clock,
             scene=scene,
@@ -374,10 +383,10 @@ def plans(
             tell=on_progress,
             policy=policy,
         )
-    yield from _planned(water, scene, clock, on_progress or _silent, how, whole_tether)
+    yield from _planned(context, scene, clock, on_progress or _silent, how, whole_tether)
 
 
-def water_of(
+def prepare_context(
     mission: Mission,
     clock: Clock,
     *,
@@ -386,7 +395,7 @@ def water_of(
     grid: Grid | None = None,
     tell: Callable[[str], None] | None = None,
     policy: MissionPolicy | None = None,
-) -> Water:
+) -> PlanningContext:
     """Make the water of a mission for a plan: check the mission, find the gaps that its grid does
     not show, refine the grid where that shows them, and find the words of the scene.
 
@@ -410,7 +419,7 @@ def water_of(
 
     Returns
     -------
-    Water
+    PlanningContext
         The water, with `cells`. Its mission has the cell size of the grid.
 
     Raises
@@ -432,33 +441,33 @@ def water_of(
     if grid is None:
         assert scene is not None
         find_gaps = partial(
-            resolved, mission, scene, field, policy.gaps, clock, policy.words.min_room_ratio
+            resolve_gaps, mission, scene, field, policy.gaps, clock, policy.words.min_room_ratio
         )
     else:
         find_gaps = partial(
-            resolved_on, mission, grid, policy.gaps, clock, policy.words.min_room_ratio
+            find_gaps_on, mission, grid, policy.gaps, clock, policy.words.min_room_ratio
         )
-    cells = clock.bounded("searching for gaps that the cells do not show", find_gaps)
-    mission = cells.mission
-    Places.of(mission, field)  # refuse bad waypoints before the long search for words
+    gaps = clock.bounded("searching for gaps that the cells do not show", find_gaps)
+    mission = gaps.mission
+    Places.for_mission(mission, field)  # refuse bad waypoints before the long search for words
     if grid is None:
         assert scene is not None
         grid = clock.bounded("measuring the cells", partial(grid_of, mission, scene, field))
     tell("words of the scene")
     bounds = None if scene is None else scene.bounds
-    water = clock.bounded(
+    context = clock.bounded(
         "finding the words of the scene",
-        partial(Water.within, mission, field, grid, bounds, policy),
+        partial(PlanningContext.on_grid, mission, field, grid, bounds, policy),
     )
-    return replace(water, cells=cells)
+    return replace(context, gaps=gaps)
 
 
-def given_plan(water: Water) -> SpacePlan | None:
+def plan_given_order(context: PlanningContext) -> SpacePlan | None:
     """Drive a mission in the order of its file: the first incumbent.
 
     Parameters
     ----------
-    water : Water
+    context : PlanningContext
         Water of the mission.
 
     Returns
@@ -466,29 +475,29 @@ def given_plan(water: Water) -> SpacePlan | None:
     SpacePlan or None
         The plan, without known paths between waypoints; None if that order cannot be driven.
     """
-    driven = drive_given_order(water)
+    driven = drive_given_order(context)
     if driven is None:
         return None
-    return _plan_of(water, Places.of(water.mission, water.field), driven, AS_GIVEN)
+    return _plan_of(context, Places.for_mission(context.mission, context.field), driven, AS_GIVEN)
 
 
-def _plan_of(water: Water, places: Places, driven: Driven, kind: str) -> SpacePlan:
+def _plan_of(context: PlanningContext, places: Places, driven: DrivenTour, kind: str) -> SpacePlan:
     """Return a tour that was found without states and legs as a plan, without known paths between
     waypoints."""
-    visited = {stop.waypoint for stop in driven.stops}
-    unreached = tuple(n for n in range(len(water.mission.waypoints)) if n not in visited)
+    visited = {stop.waypoint for stop in driven.visits}
+    unreached = tuple(n for n in range(len(context.mission.waypoints)) if n not in visited)
     return SpacePlan(
-        water.mission,
-        tuple(driven.stops),
+        context.mission,
+        tuple(driven.visits),
         driven.home,
         driven.length,
         Result(None, driven.length, None, Status.FEASIBLE),
-        len(driven.stops),
-        len(driven.stops) + 1,
+        len(driven.visits),
+        len(driven.visits) + 1,
         unreached,
         driven.free,
-        water,
-        Ways(water, places, water.policy.states.effort(len(places))),
+        context,
+        RobotPaths(context, places, context.policy.states.effort(len(places))),
         kind,
     )
 
@@ -524,25 +533,26 @@ def _silent(_: str) -> None:
 
 
 def _planned(
-    water: Water,
+    context: PlanningContext,
     scene: Scene | None,
     clock: Clock,
     tell: Callable[[str], None],
     how: dict[str, Any],
     whole_tether: bool,
 ) -> Iterator[SpacePlan]:
-    mission, field = water.mission, water.field
-    policy, times = water.policy, water.policy.times
-    places = Places.of(mission, field)
+    mission, field = context.mission, context.field
+    policy, times = context.policy, context.policy.times
+    places = Places.for_mission(mission, field)
     # a robot that is farther out than the share may still come back
     limit = max(
-        policy.tether_share * mission.tether_length, water.present.length * (1.0 + LENGTH_ROUNDING)
+        policy.tether_share * mission.tether_length,
+        context.present_tether.length * (1.0 + LENGTH_ROUNDING),
     )
-    check_tether(mission, water.present.length)
+    check_tether(mission, context.present_tether.length)
     in_plane = False
     if scene is not None:
-        for driven in tours_of_plan(
-            water,
+        for driven in drive_plane_tours(
+            context,
             scene,
             places,
             clock.part(policy.plane.time_share),
@@ -551,69 +561,71 @@ def _planned(
             whole_tether,
         ):
             in_plane = True
-            yield _plan_of(water, places, driven, PLANE)
+            yield _plan_of(context, places, driven, PLANE)
     if not in_plane:
         tell("short orders")
-        driven_short = short_order_tour(water, places, clock, how["seed"])
-        if driven_short is not None and driven_short.stops:
-            yield _plan_of(water, places, driven_short, SHORT_ORDER)
+        driven_short = short_order_tour(context, places, clock, how["seed"])
+        if driven_short is not None and driven_short.visits:
+            yield _plan_of(context, places, driven_short, SHORT_ORDER)
     tell("shortest tethers to each waypoint")
-    effort = water.policy.states.effort(len(places))
-    states = first_states(water, places, limit, effort, clock.part(times.first_states_share))
+    effort = context.policy.states.effort(len(places))
+    states = find_first_states(context, places, limit, effort, clock.part(times.first_states_share))
     if not states.reached - {len(mission.waypoints)}:
         nearest = float(np.linalg.norm(mission.places - np.array(mission.anchor), axis=1).min())
         if nearest <= limit:
             raise InputError(
                 f"waypoints: no way in the water leads a tether of {limit:.4g} m to any of them, "
                 f"though the nearest is {nearest:.4g} m from the anchor as the crow flies: walls, "
-                f"or gaps narrower than a cell ({water.words.cells.cell:.3g} m)"
+                f"or gaps narrower than a cell ({context.words.cells.cell:.3g} m)"
             )
         raise InputError(
             f"waypoints: no tether within the limit reaches any of them: {limit:.4g} m "
             f"({100 * policy.tether_share:g} % of tether_length), and the nearest is {nearest:.4g} "
             "m from the anchor as the crow flies"
         )
-    hanging = {n: [states.all[s].tether.nodes for s in of] for n, of in states.of.items()}
-    ways = Ways(water, places, effort, hanging)
-    board, growth = Board(water, states), Growth(states, ways)
+    hanging = {n: [states.entries[s].tether.nodes for s in of] for n, of in states.at_place.items()}
+    robot_paths = RobotPaths(context, places, effort, hanging)
+    board, growth = StateGraph(context, states), StateGrowth(states, robot_paths)
 
-    def planned(result: Result, driven: Driven, kind: str) -> SpacePlan:
-        visited = {stop.waypoint for stop in driven.stops}
+    def planned(result: Result, driven: DrivenTour, kind: str) -> SpacePlan:
+        visited = {stop.waypoint for stop in driven.visits}
         unreached = tuple(n for n in range(len(mission.waypoints)) if n not in visited)
         return SpacePlan(
             mission,
-            tuple(driven.stops),
+            tuple(driven.visits),
             driven.home,
             driven.length,
             result,
-            len(states.all),
+            len(states.entries),
             len(board.legs),
             unreached,
             driven.free,
-            water,
-            ways,
+            context,
+            robot_paths,
             kind,
         )
 
-    ways.prepare_all(clock, tell)
+    robot_paths.find_all(clock, tell)
     tell("trees of legs")
-    states_of_trees(states, ways, clock.part(times.tree_share))
-    board.take(growth.legs, clock.part(times.home_path_share))
-    if lacking := set(range(len(mission.waypoints))) - board.reached:
+    add_states_of_trees(states, robot_paths, clock.part(times.tree_share))
+    board.update(growth.legs, clock.part(times.home_path_share))
+    if lacking := set(range(len(mission.waypoints))) - board.reached_waypoints:
         tell("ways with room for the robot")
-        states_with_room(states, lacking, effort.words, clock.part(times.first_states_share))
-        board.take(growth.legs, clock.part(times.home_path_share))
-    growth.go_on(0, clock.part(times.tree_share), tell)
+        add_states_with_room(states, lacking, effort.words, clock.part(times.first_states_share))
+        board.update(growth.legs, clock.part(times.home_path_share))
+    growth.grow(0, clock.part(times.tree_share), tell)
     taut = clock.part(times.taut_share)
-    best: tuple[Result, Driven] | None = None
+    best: tuple[Result, DrivenTour] | None = None
     complete = False
     for most in effort.states:
         begin = taut.elapsed
         enough = board.legs or times.growth_share * taut.left >= times.min_growth_s
         growing = taut.part(times.growth_share) if enough else Clock(times.min_growth_s)
-        grown = growth.go_on(most, growing, tell)
+        grown = growth.grow(most, growing, tell)
         tell("ways by the anchor")
-        complete = (board.take(growth.legs, taut.part(times.home_path_share)) and grown) or complete
+        complete = (
+            board.update(growth.legs, taut.part(times.home_path_share)) and grown
+        ) or complete
         last = most == effort.states[-1]
         share = times.solve_share if last else times.early_solve_share
         best = _better(best, _best_driven(board, taut, tell, best, share, how))
@@ -621,15 +633,15 @@ def _planned(
             if not last and not (best is not None and best[0].status is Status.OPTIMAL):
                 best = _better(best, _best_driven(board, taut, tell, best, times.solve_share, how))
             break
-    if not board.reached:
+    if not board.reached_waypoints:
         raise InputError(
             f"waypoints: the robot gets to none of them with its clearance of {mission.clearance:g}"
         )
     # where words tell all, detours lead to the tethers that straight legs lead to
     proven = best is not None and best[0].status is Status.OPTIMAL and complete
     shorter = None
-    if states.hang_on_free_ends or not proven:
-        shorter = Detours(board, ways).shortened(best and best[1], clock, tell, how["seed"])
+    if states.has_free_ends or not proven:
+        shorter = Detours(board, robot_paths).shortened(best and best[1], clock, tell, how["seed"])
 
     along_taut = None
     if best is not None:
@@ -645,7 +657,7 @@ def _planned(
     if along_taut is not None:
         yield along_taut
     tell("out along the tether and back")
-    fallback = board.out_and_back()
+    fallback = board.drive_out_and_back()
     if fallback is not None:
         yield planned(Result(None, fallback.length, None, Status.FEASIBLE), fallback, OUT_AND_BACK)
 
@@ -668,8 +680,8 @@ def _try_out(solver: SolverLike, params: Mapping[str, Any] | None, seed: int) ->
 
 
 def _better(
-    best: tuple[Result, Driven] | None, found: tuple[Result, Driven] | None
-) -> tuple[Result, Driven] | None:
+    best: tuple[Result, DrivenTour] | None, found: tuple[Result, DrivenTour] | None
+) -> tuple[Result, DrivenTour] | None:
     """The shorter of two tours; of equals the second, more was known when it was found."""
     if best is None or (found is not None and found[1].length <= best[1].length):
         return found
@@ -677,32 +689,32 @@ def _better(
 
 
 def _best_driven(
-    board: Board,
+    board: StateGraph,
     clock: Clock,
     tell: Callable[[str], None],
-    best: tuple[Result, Driven] | None,
+    best: tuple[Result, DrivenTour] | None,
     share: float,
     how: dict[str, Any],
-) -> tuple[Result, Driven] | None:
+) -> tuple[Result, DrivenTour] | None:
     """The best tour that was driven without fault. As long as there is time, the graph is solved
     again without the legs that were at fault; then the tour goes by way of the start there."""
-    times = board.water.policy.times
+    times = board.context.policy.times
     again, found = 0, None
     warm = None if best is None else best[1].tour
     while again < times.max_solves or clock.up:
         if found is None:
             tell("order" if again == 0 else f"order, {counted(again, 'leg')} at fault forbidden")
             solving = Clock(times.min_solve_s) if clock.up else clock.part(share)
-            found = board.solved(solving, warm, **how)
+            found = board.solve(solving, warm, **how)
             if found is None:
                 return None
         result, tour = found
         tell("driving the tour")
-        driven = board.driven(tour)
+        driven = board.drive(tour)
         if driven.fault is None:
             return with_status(result, driven, LENGTH_ROUNDING), driven
         joined = board.forbid(driven.fault)
-        if clock.up and not (joined and board.leads_to(tour)):
+        if clock.up and not (joined and board.can_reach_all(tour)):
             return None  # no time is left, and this tour can no longer be driven
         warm = None  # it may go along that leg
         again += 1

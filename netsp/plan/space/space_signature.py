@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import abandoned, end_if_abandoned
+from netsp.base.deprecated import deprecated_method
 from netsp.base.errors import InputError
 from netsp.hsignature.groups import Group, eliminated
 from netsp.hsignature.words import Word, invert
@@ -33,11 +34,12 @@ from netsp.plan.space.triangle_labels import (
     FAR,
     UNKNOWN,
     Labels,
-    distances,
-    labelled,
-    relations,
+    cell_distances,
+    label_edges,
+    square_relations,
 )
-from netsp.plan.space.walk import LabelledComplex, path_word, visible_cell
+from netsp.plan.space.walk import LabelledComplex, path_word
+from netsp.plan.space.walk import visible_cell as find_visible_cell
 from netsp.world.scene.field import DistanceField
 
 
@@ -74,7 +76,7 @@ class SpaceSignature:
     _tables: list[Table] = field(repr=False)
 
     @classmethod
-    def of(
+    def in_box(
         cls,
         scene: DistanceField,
         low: npt.ArrayLike,
@@ -120,17 +122,17 @@ class SpaceSignature:
         >>> from netsp.world import Scene
         >>> ring = {"center": [0, 0, 0], "axis": [0, 0, 1], "major_radius": 2, "minor_radius": 0.1}
         >>> field = Scene(solids=[{"torus": ring}]).field()
-        >>> water = SpaceSignature.of(field, [-4] * 3, [4] * 3, 0.25, [3, 0, 3])
+        >>> water = SpaceSignature.in_box(field, [-4] * 3, [4] * 3, 0.25, [3, 0, 3])
         >>> through = water.word([[0, 0, 3], [0, 0, -3]])
         >>> beside = water.word([[0, 0, -3], [3.5, 0, -3], [3.5, 0, 3], [0, 0, 3]])
         >>> water.group.rank, len(water.product(through, beside))
         (1, 1)
         """
-        cells = Cells.of(scene, low, high, cell, policy)
-        return cls.of_cells(cells, root, tolerance=tolerance, policy=policy)
+        cells = Cells.in_box(scene, low, high, cell, policy)
+        return cls.from_cells(cells, root, tolerance=tolerance, policy=policy)
 
     @classmethod
-    def of_cells(
+    def from_cells(
         cls,
         cells: Cells,
         root: npt.ArrayLike,
@@ -163,7 +165,7 @@ class SpaceSignature:
         point = np.asarray(root, dtype=float)
         no_labels = np.empty(0, dtype=np.int32)
         everywhere = np.ones(cells.flags.shape, dtype=np.uint8)
-        at = visible_cell(_labelled(cells, no_labels, everywhere, tolerance, policy), point)
+        at = find_visible_cell(_labelled(cells, no_labels, everywhere, tolerance, policy), point)
         if at < 0:
             raise InputError(
                 f"anchor: no free cell of {cells.cell:g} m is in sight of {shown(point)}; "
@@ -171,9 +173,9 @@ class SpaceSignature:
             )
         begin = np.array(np.unravel_index(at, cells.flags.shape), dtype=np.int64)
         stop = abandoned()
-        far, order = distances(cells.flags, begin, stop)
+        far, order = cell_distances(cells.flags, begin, stop)
         none = packed([])
-        labels, table, generators = labelled(
+        labels, table, generators = label_edges(
             cells.flags, far, order, empty_table(), none, policy.max_generators, stop
         )
         end_if_abandoned()
@@ -182,7 +184,7 @@ class SpaceSignature:
                 f"cell: {cells.cell:g} m finds more than {policy.max_generators} holes in the "
                 "scene; expected a larger cell"
             )
-        words, table = relations(cells.flags, labels, order, table, none, stop)
+        words, table = square_relations(cells.flags, labels, order, table, none, stop)
         end_if_abandoned()
         meaning, rank, relators = eliminated(
             generators, [word_of(table, int(number)) for number in words]
@@ -190,6 +192,15 @@ class SpaceSignature:
         group = Group.of(rank, relators)
         labels, table = _renumbered(labels, table, meaning, packed(group.rules))
         return cls(cells, begin, group, labels, far, generators, tolerance, policy, [table])
+
+    of = deprecated_method("of", "in_box")
+    of_cells = deprecated_method("of_cells", "from_cells")
+    held = deprecated_method("held", "visible_cell")
+    word_until = deprecated_method("word_until", "try_word")
+    number = deprecated_method("number", "word_number")
+    times = deprecated_method("times", "multiply")
+    keep = deprecated_method("keep", "keep_table")
+    known = deprecated_method("known", "reached_cells")
 
     @property
     def exact(self) -> bool:
@@ -204,14 +215,14 @@ class SpaceSignature:
     @cached_property
     def _complex(self) -> LabelledComplex:
         """Return the labelled complex for kernels."""
-        return _labelled(self.cells, self.labels, self.known, self.tolerance, self.policy)
+        return _labelled(self.cells, self.labels, self.reached_cells, self.tolerance, self.policy)
 
     @property
     def table(self) -> Table:
         """The words met so far."""
         return self._tables[0]
 
-    def keep(self, table: Table) -> None:
+    def keep_table(self, table: Table) -> None:
         """Take over a table that has grown.
 
         Parameters
@@ -222,11 +233,11 @@ class SpaceSignature:
         self._tables[0] = table
 
     @cached_property
-    def known(self) -> npt.NDArray[np.uint8]:
+    def reached_cells(self) -> npt.NDArray[np.uint8]:
         """(nx, ny, nz) which cells a path from the root leads to."""
         return np.asarray((self.far < FAR).reshape(self.cells.flags.shape), dtype=np.uint8)
 
-    def held(self, point: npt.ArrayLike) -> int | None:
+    def visible_cell(self, point: npt.ArrayLike) -> int | None:
         """The number of the cell that a point holds on to.
 
         Parameters
@@ -239,7 +250,7 @@ class SpaceSignature:
         int or None
             None where no cell is in sight.
         """
-        at = visible_cell(self._complex, np.asarray(point, dtype=float))
+        at = find_visible_cell(self._complex, np.asarray(point, dtype=float))
         return None if at < 0 else int(at)
 
     def word(self, path: npt.ArrayLike, *, closed: bool = False) -> Word:
@@ -264,7 +275,7 @@ class SpaceSignature:
             The path runs through a solid, out of the box, or through a gap that the cells do not
             show; says where.
         """
-        word, broken = self.word_until(path, closed=closed)
+        word, broken = self.try_word(path, closed=closed)
         if broken is not None:
             raise InputError(
                 f"path: no word at {shown(broken)}: a solid, the bounds, or a gap narrower than "
@@ -272,9 +283,7 @@ class SpaceSignature:
             )
         return word
 
-    def word_until(
-        self, path: npt.ArrayLike, *, closed: bool = False
-    ) -> tuple[Word, Floats | None]:
+    def try_word(self, path: npt.ArrayLike, *, closed: bool = False) -> tuple[Word, Floats | None]:
         """The same without an error.
 
         Parameters
@@ -294,12 +303,12 @@ class SpaceSignature:
         line = np.asarray(path, dtype=float).reshape(-1, 3)
         if closed:
             line = np.vstack([line, line[:1]])
-        number, where = self.number(line)
+        number, where = self.word_number(line)
         if number is None:
             return (), where
         return word_of(self.table, number), None
 
-    def number(self, line: Floats) -> tuple[int | None, Floats]:
+    def word_number(self, line: Floats) -> tuple[int | None, Floats]:
         """The number of a path's word in the table.
 
         Parameters
@@ -317,7 +326,7 @@ class SpaceSignature:
         number, table, where = path_word(
             self._complex, self.table, self.rules, np.ascontiguousarray(line)
         )
-        self.keep(table)
+        self.keep_table(table)
         return (None if number < 0 else int(number)), where
 
     def product(self, *words: Word) -> Word:
@@ -350,7 +359,7 @@ class SpaceSignature:
         """
         return word_of(self.table, number)
 
-    def times(self, a: int, b: int) -> int:
+    def multiply(self, a: int, b: int) -> int:
         """`product` of words by their numbers in the table.
 
         Parameters
@@ -366,7 +375,7 @@ class SpaceSignature:
             Of both.
         """
         number, table = times(self.table, self.rules, a, b)
-        self.keep(table)
+        self.keep_table(table)
         return int(number)
 
     def inverse(self, word: Word) -> Word:

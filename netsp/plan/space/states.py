@@ -17,9 +17,9 @@ from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
 from netsp.plan.space.mission_policy import StateEffort
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import Water
+from netsp.plan.space.planning_context import PlanningContext
 from netsp.plan.space.space_signature import shown
-from netsp.plan.space.word_search import Found
+from netsp.plan.space.word_search import WordSearch
 from netsp.world.tether import Tether
 
 
@@ -29,7 +29,7 @@ class State:
 
     Parameters
     ----------
-    point : int
+    place : int
         The waypoint.
     word : int
         Number of the tether's word in the water's table.
@@ -37,7 +37,7 @@ class State:
         As it hangs.
     """
 
-    point: int
+    place: int
     word: int
     tether: Tether
 
@@ -48,22 +48,22 @@ class States:
 
     Parameters
     ----------
-    water : Water
+    context : PlanningContext
         Where they are.
     places : Places
         The points; that of the mission's state has the one tether that hangs there now.
     limit : float
         Longest tether, metres.
-    most : int
+    max_per_place : int
         States of a waypoint.
     """
 
-    water: Water
+    context: PlanningContext
     places: Places
     limit: float
-    most: int
-    all: list[State] = field(default_factory=list)
-    of: dict[int, list[int]] = field(default_factory=dict)
+    max_per_place: int
+    entries: list[State] = field(default_factory=list)
+    at_place: dict[int, list[int]] = field(default_factory=dict)
 
     def find(self, point: int, word: int, tether: Tether) -> int | None:
         """The number of the state that a tether is in.
@@ -82,13 +82,13 @@ class States:
         int or None
             None where it is in none so far.
         """
-        delta = self.water.mission.delta
-        for s in self.of.get(point, ()):
-            if self.all[s].word == word and alike(self.all[s].tether, tether, delta):
+        delta = self.context.mission.delta
+        for s in self.at_place.get(point, ()):
+            if self.entries[s].word == word and hang_alike(self.entries[s].tether, tether, delta):
                 return s
         return None
 
-    def may_take(self, point: int, word: int) -> bool:
+    def can_hold(self, point: int, word: int) -> bool:
         """Whether a tether of a word may be in some state of a waypoint, or make a new one.
 
         Parameters
@@ -103,9 +103,9 @@ class States:
         bool
             Whether it may.
         """
-        here = self.of.get(point, [])
-        room = len(here) < self.most and point != self.places.begin
-        return room or any(self.all[s].word == word for s in here)
+        here = self.at_place.get(point, [])
+        room = len(here) < self.max_per_place and point != self.places.present
+        return room or any(self.entries[s].word == word for s in here)
 
     def add(self, point: int, word: int, tether: Tether) -> int | None:
         """A new state, if there is room for one more and the tether is no longer than its limit.
@@ -124,35 +124,35 @@ class States:
         int or None
             Its number, None if there is none.
         """
-        here = self.of.setdefault(point, [])
+        here = self.at_place.setdefault(point, [])
         if (
-            len(here) >= self.most
+            len(here) >= self.max_per_place
             or tether.length > self.limit
-            or (point == self.places.begin and here)
+            or (point == self.places.present and here)
         ):
             return None
-        here.append(len(self.all))
-        self.all.append(State(point, word, tether))
+        here.append(len(self.entries))
+        self.entries.append(State(point, word, tether))
         return here[-1]
 
     @property
-    def begin(self) -> int | None:
+    def present(self) -> int | None:
         """Number of the state that the mission begins in; None at the start."""
-        return None if self.places.begin is None else self.of[self.places.begin][0]
+        return None if self.places.present is None else self.at_place[self.places.present][0]
 
     @property
-    def hang_on_free_ends(self) -> bool:
+    def has_free_ends(self) -> bool:
         """Whether tethers of one word hang in several ways at some waypoint."""
-        of_words = {(s.point, s.word) for s in self.all}
-        return len(of_words) < len(self.all)
+        of_words = {(s.place, s.word) for s in self.entries}
+        return len(of_words) < len(self.entries)
 
     @property
     def reached(self) -> set[int]:
         """The waypoints that have states; that of the mission's state counts as one more."""
-        return {int(self.places.waypoint[n]) for n in self.of}
+        return {int(self.places.waypoint[n]) for n in self.at_place}
 
 
-def alike(a: Tether, b: Tether, delta: float) -> bool:
+def hang_alike(a: Tether, b: Tether, delta: float) -> bool:
     """Whether two tethers of one word between the same ends hang alike.
 
     Parameters
@@ -180,14 +180,14 @@ def alike(a: Tether, b: Tether, delta: float) -> bool:
     return bool(np.linalg.norm(one - other, axis=1).max() < 2.0 * delta)
 
 
-def first_states(
-    water: Water, places: Places, limit: float, effort: StateEffort, clock: Clock
+def find_first_states(
+    context: PlanningContext, places: Places, limit: float, effort: StateEffort, clock: Clock
 ) -> States:
     """States of the shortest words of each waypoint, and the one that the mission begins in.
 
     Parameters
     ----------
-    water : Water
+    context : PlanningContext
         Where they are.
     places : Places
         The points.
@@ -208,26 +208,28 @@ def first_states(
     InputError
         The tether of the mission's state has no word: says where.
     """
-    states = States(water, places, limit, effort.states[0])
-    words = water.words
-    if places.begin is not None:
-        number, where = words.number(water.present.nodes)
+    states = States(context, places, limit, effort.states[0])
+    words = context.words
+    if places.present is not None:
+        number, where = words.word_number(context.present_tether.nodes)
         if number is None:
             raise InputError(
                 f"state.tether: no word at {shown(where)}: a gap narrower than the cell of "
                 f"{words.cells.cell:g} m; expected a smaller cell"
             )
-        states.add(places.begin, number, water.present)
-    anchor = np.asarray(water.mission.anchor, dtype=float)[None]
+        states.add(places.present, number, context.present_tether)
+    anchor = np.asarray(context.mission.anchor, dtype=float)[None]
     root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
     flag = clock.flag
-    found = clock.interruptible(lambda: water.search(False, root, effort.words, limit, flag))
+    found = clock.interruptible(
+        lambda: context.search_words(False, root, effort.words, limit, flag)
+    )
     for n in range(len(places)):
         _take(states, n, found, anchor, 1 if clock.up else effort.words)
     return states
 
 
-def states_with_room(states: States, lacking: set[int], words: int, clock: Clock) -> None:
+def add_states_with_room(states: States, lacking: set[int], words: int, clock: Clock) -> None:
     """More states, along the robot's own shortest ways from the start: where it does not fit
     through the gaps that the shortest tethers go through.
 
@@ -242,28 +244,28 @@ def states_with_room(states: States, lacking: set[int], words: int, clock: Clock
     clock : Clock
         When it is up, there is only the soonest of each.
     """
-    water = states.water
-    start = water.words.held(water.laid.robot)
+    context = states.context
+    start = context.words.visible_cell(context.start_tether.robot)
     if start is None:
         return
-    flag, limit = clock.flag, water.policy.states.max_robot_ratio * states.limit
-    found = clock.interruptible(lambda: water.search(True, start, words, limit, flag))
+    flag, limit = clock.flag, context.policy.states.max_robot_ratio * states.limit
+    found = clock.interruptible(lambda: context.search_words(True, start, words, limit, flag))
     for n in np.flatnonzero(np.isin(states.places.waypoint, list(lacking))):
-        _take(states, int(n), found, water.laid.nodes, 1 if clock.up else words)
+        _take(states, int(n), found, context.start_tether.nodes, 1 if clock.up else words)
 
 
-def _take(states: States, n: int, found: Found, begin: Floats, most: int) -> None:
+def _take(states: States, n: int, found: WordSearch, begin: Floats, most: int) -> None:
     """States of a place by the shortest ways found to it, which go on from a line."""
-    water, words, point = states.water, states.water.words, states.places.points[n]
-    cell = words.held(point)
-    if cell is None or n == states.places.begin:
+    context, words, point = states.context, states.context.words, states.places.points[n]
+    cell = words.visible_cell(point)
+    if cell is None or n == states.places.present:
         return
-    for _, way in water.ways(found, cell)[:most]:
-        tether = water.model.relaxed(
-            np.vstack([begin, way, point]), water.policy.states.max_pull_rounds
+    for _, way in context.paths_to(found, cell)[:most]:
+        tether = context.model.relaxed(
+            np.vstack([begin, way, point]), context.policy.states.max_pull_rounds
         )
         if tether.length > states.limit:
             continue
-        hangs = water.number(tether.nodes)
+        hangs = context.word_number(tether.nodes)
         if hangs is not None and states.find(n, hangs, tether) is None:
             states.add(n, hangs, tether)

@@ -12,12 +12,12 @@ from __future__ import annotations
 import heapq
 
 from netsp.base.clock import Clock
-from netsp.plan.space.planning_context import along
-from netsp.plan.space.space_legs import Ways
+from netsp.base.geometry import polylines
+from netsp.plan.space.space_legs import RobotPaths
 from netsp.plan.space.states import States
 
 
-def states_of_trees(states: States, ways: Ways, clock: Clock) -> None:
+def add_states_of_trees(states: States, robot_paths: RobotPaths, clock: Clock) -> None:
     """Drive the tether along trees; where it arrives in a state that was not there, there is one
     more.
 
@@ -25,26 +25,32 @@ def states_of_trees(states: States, ways: Ways, clock: Clock) -> None:
     ----------
     states : States
         The first ones; more are added, whatever the most of a waypoint.
-    ways : Ways
+    paths : RobotPaths
         The robot's ways between waypoints.
     clock : Clock
         When it is up, trees are left as they are.
     """
-    most, trade_offs = states.most, states.water.policy.states.tree_trade_offs
-    states.most += len(trade_offs)
-    roots = [min(of, key=lambda s: states.all[s].tether.length) for of in states.of.values() if of]
+    most, trade_offs = states.max_per_place, states.context.policy.states.tree_trade_offs
+    states.max_per_place += len(trade_offs)
+    roots = [
+        min(of, key=lambda s: states.entries[s].tether.length)
+        for of in states.at_place.values()
+        if of
+    ]
     for trade in trade_offs:
-        _grow(states, ways, clock, roots, trade)
-    states.most = most
+        _grow(states, robot_paths, clock, roots, trade)
+    states.max_per_place = most
 
 
-def _grow(states: States, ways: Ways, clock: Clock, roots: list[int], trade: float) -> None:
-    water = states.water
+def _grow(
+    states: States, robot_paths: RobotPaths, clock: Clock, roots: list[int], trade: float
+) -> None:
+    context = states.context
     # (key, tie, how far from the start, state, waypoint, way); a way of -1 is straight to a root
     waiting: list[tuple[float, int, float, int, int, int]] = []
     for s in roots:
-        far = states.all[s].tether.length
-        waiting.append((far * (1.0 + trade), len(waiting), far, s, states.all[s].point, -1))
+        far = states.entries[s].tether.length
+        waiting.append((far * (1.0 + trade), len(waiting), far, s, states.entries[s].place, -1))
     heapq.heapify(waiting)
     tie, settled = len(waiting), set()
     while waiting and not clock.up:
@@ -53,22 +59,22 @@ def _grow(states: States, ways: Ways, clock: Clock, roots: list[int], trade: flo
             continue
         arrived: int | None = s
         if k >= 0:
-            word, path = ways.known(states.all[s].point, point)[k]
-            tether, longest = water.driven(states.all[s].tether, path)
+            word, path = robot_paths.between(states.entries[s].place, point)[k]
+            tether, longest = context.drive(states.entries[s].tether, path)
             if longest > states.limit:
                 continue
-            word = water.words.times(states.all[s].word, word)
+            word = context.words.multiply(states.entries[s].word, word)
             arrived = states.find(point, word, tether)
             if arrived is None:
                 arrived = states.add(point, word, tether)
         if arrived is None:
             continue
         settled.add(point)
-        for m in ways.near[point]:
+        for m in robot_paths.neighbours[point]:
             if int(m) in settled:
                 continue
-            for j, (_, path) in enumerate(ways.known(point, int(m))):
-                leg = along(path)
+            for j, (_, path) in enumerate(robot_paths.between(point, int(m))):
+                leg = polylines.length(path)
                 tie += 1
                 key = leg + trade * (far + leg)
                 heapq.heappush(waiting, (key, tie, far + leg, arrived, int(m), j))

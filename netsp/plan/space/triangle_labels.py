@@ -19,7 +19,7 @@ from netsp.base.clock import Flag
 from netsp.base.compiled.dynamic_array import more_int_rows, write_ints
 from netsp.base.compiled.kernel import kernel
 from netsp.hsignature.wordtable import Rules, Table, times, times_inverse, times_letter
-from netsp.plan.space.cells import EDGE, FREE, OPEN, SQUARE
+from netsp.plan.space.cells import EDGE_BIT, FREE_CELL, OPEN_CELL, SQUARE_BIT
 
 Flags = npt.NDArray[np.uint8]
 Labels = npt.NDArray[np.int32]
@@ -45,11 +45,11 @@ def edge_flag(flags: Flags, i: int, j: int, k: int, axis: int, sign: int) -> boo
         i, j, k = i - (axis == 0), j - (axis == 1), k - (axis == 2)
         if i < 0 or j < 0 or k < 0:
             return False
-    return bool(flags[i, j, k] & (EDGE << axis))
+    return bool(flags[i, j, k] & (EDGE_BIT << axis))
 
 
 @kernel
-def axes_of(step: int) -> tuple[int, int, int, int]:
+def step_axes(step: int) -> tuple[int, int, int, int]:
     """How many axes a step goes along, and which."""
     n, axes = 0, np.zeros(3, dtype=np.int64)
     for axis in range(3):
@@ -60,11 +60,11 @@ def axes_of(step: int) -> tuple[int, int, int, int]:
 
 
 @kernel
-def staircase(flags: Flags, i: int, j: int, k: int, step: int) -> int:
+def staircase_order(flags: Flags, i: int, j: int, k: int, step: int) -> int:
     """The order of axes, 0 … 5, in which a step can be taken along edges that count; -1 for none.
 
     Order o takes the axes of the step from the o // 2-th on, upwards or (o odd) downwards."""
-    n, a, b, c = axes_of(step)
+    n, a, b, c = step_axes(step)
     for order in range(1 if n == 1 else 2 if n == 2 else 6):
         p, q, r = i, j, k
         free = True
@@ -92,7 +92,7 @@ def nth_axis(n: int, a: int, b: int, c: int, order: int, m: int) -> int:
 
 
 @kernel
-def distances(
+def cell_distances(
     flags: Flags, root: Ints, stop: Flag
 ) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
     """Return how far all cells are from the root over 26 steps, and the cells in the order of that.
@@ -135,7 +135,7 @@ def distances(
         order[count] = cell
         count += 1
         i, j, k = cell // (ny * nz), cell // nz % ny, cell % nz
-        open_ = flags[i, j, k] & OPEN != 0
+        open_ = flags[i, j, k] & OPEN_CELL != 0
         for s in range(26):
             p, q, r = i + STEPS[s, 0], j + STEPS[s, 1], k + STEPS[s, 2]
             if p < 0 or q < 0 or r < 0 or p >= nx or q >= ny or r >= nz:
@@ -144,7 +144,9 @@ def distances(
             there = now + LENGTHS[s]
             if there >= far[beside]:
                 continue
-            if not flags[p, q, r] & FREE or not (open_ or staircase(flags, i, j, k, s) >= 0):
+            if not flags[p, q, r] & FREE_CELL or not (
+                open_ or staircase_order(flags, i, j, k, s) >= 0
+            ):
                 continue
             far[beside] = there
             if spare >= 0:
@@ -161,7 +163,7 @@ def distances(
 
 
 @kernel
-def labelled(
+def label_edges(
     flags: Flags,
     far: npt.NDArray[np.int32],
     order: npt.NDArray[np.int32],
@@ -200,7 +202,7 @@ def labelled(
                 least, best = far[other], 3 * lower + axis
         labels[best] = 0
         if left == len(to_do):
-            to_do = longer_ints(to_do)
+            to_do = doubled(to_do)
         to_do[left] = best
         left += 1
     for cell in order:
@@ -212,11 +214,11 @@ def labelled(
                 left -= 1
                 edge = to_do[left]
                 for n in range(4):
-                    found, word, table = through(flags, labels, table, rules, edge, n)
+                    found, word, table = close_square(flags, labels, table, rules, edge, n)
                     if found >= 0:
                         labels[found] = word
                         if left + 1 >= len(to_do):
-                            to_do = longer_ints(to_do)
+                            to_do = doubled(to_do)
                         to_do[left] = found
                         left += 1
             if side == 6:
@@ -255,7 +257,7 @@ def upper_end(cell: int, axis: int, ny: int, nz: int) -> int:
 
 
 @kernel
-def longer_ints(a: Ints) -> Ints:
+def doubled(a: Ints) -> Ints:
     """The same with room for twice as many."""
     b = np.empty(2 * len(a), dtype=np.int64)
     write_ints(b, a, len(a))
@@ -263,7 +265,7 @@ def longer_ints(a: Ints) -> Ints:
 
 
 @kernel
-def square_beside(flags: Flags, edge: int, n: int) -> tuple[int, int, int, int, int]:
+def square_of_edge(flags: Flags, edge: int, n: int) -> tuple[int, int, int, int, int]:
     """The n-th of four squares beside an edge: (whether it counts, its four edges).
 
     Edges in the order in which a walk along a, then b meets them: a below, b on the right, a above,
@@ -277,7 +279,7 @@ def square_beside(flags: Flags, edge: int, n: int) -> tuple[int, int, int, int, 
         i, j, k = i - (other == 0), j - (other == 1), k - (other == 2)
         if i < 0 or j < 0 or k < 0:
             return 0, 0, 0, 0, 0
-    if not flags[i, j, k] & (SQUARE << normal):
+    if not flags[i, j, k] & (SQUARE_BIT << normal):
         return 0, 0, 0, 0, 0
     at = (i * ny + j) * nz + k
     a, b = (normal + 1) % 3, (normal + 2) % 3
@@ -291,12 +293,12 @@ def square_beside(flags: Flags, edge: int, n: int) -> tuple[int, int, int, int, 
 
 
 @kernel
-def through(
+def close_square(
     flags: Flags, labels: Labels, table: Table, rules: Rules, edge: int, n: int
 ) -> tuple[int, int, Table]:
     """(edge, word, table) of the one unknown edge of the n-th square beside a known edge; -1 where
     there is no such."""
-    counts, low, right, top, left = square_beside(flags, edge, n)
+    counts, low, right, top, left = square_of_edge(flags, edge, n)
     if counts == 0:
         return -1, 0, table
     unknown = (
@@ -329,7 +331,7 @@ def through(
 
 
 @kernel
-def relations(
+def square_relations(
     flags: Flags,
     labels: Labels,
     order: npt.NDArray[np.int32],
@@ -347,7 +349,7 @@ def relations(
             break
         i, j, k = cell // (ny * nz), cell // nz % ny, cell % nz
         for normal in range(3):
-            if not flags[i, j, k] & (SQUARE << normal):
+            if not flags[i, j, k] & (SQUARE_BIT << normal):
                 continue
             a, b = (normal + 1) % 3, (normal + 2) % 3
             low, right = labels[3 * cell + a], labels[3 * upper_end(cell, a, ny, nz) + b]
@@ -367,7 +369,7 @@ def relations(
             if not seen[word]:
                 seen[word] = True
                 if count == len(out):
-                    out = longer_ints(out)
+                    out = doubled(out)
                 out[count] = word
                 count += 1
     return out[:count].copy(), table

@@ -19,13 +19,13 @@ from netsp.model.problem import Circle, Polygon, Problem
 from netsp.plan.solve_problem import solve
 from netsp.plan.space.cross_sections import Depths, cross_sections, level_range
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import DEPTH_TOLERANCE, DIP_RATIO, Water
+from netsp.plan.space.planning_context import DEPTH_TOLERANCE, DIP_RATIO, PlanningContext
 from netsp.plan.space.potential import BOUND_ROUNDING
 from netsp.world.mission.mission import Mission
 
 
-def bound_of_upright(
-    mission: Mission, water: Water, some: list[int], places: Places, clock: Clock
+def bound_by_upright_solids(
+    mission: Mission, context: PlanningContext, some: list[int], places: Places, clock: Clock
 ) -> float | None:
     """Return a bound on all tours from the scene's upright solids.
 
@@ -33,7 +33,7 @@ def bound_of_upright(
     ----------
     mission : Mission
         Mission with the tether.
-    water : Water
+    context : PlanningContext
         Scene, and tether at the start.
     some : list of int
         Numbers of the places that tours visit.
@@ -48,18 +48,18 @@ def bound_of_upright(
         Lower bound, metres; None if there are no upright solids, the mission begins under way, a
         waypoint has alternatives, or there was no time.
     """
-    if places.begin is not None or len(set(places.waypoint[some].tolist())) < len(some):
+    if places.present is not None or len(set(places.waypoint[some].tolist())) < len(some):
         return None
     # the judge lets a path dip into solids a little, and a tether between its nodes a little more:
     # among obstacles shrunk by the larger depth both are free, and the taut tether is no longer
     # than its model
     dip = max(2.0 * DEPTH_TOLERANCE, DIP_RATIO * mission.delta)
-    obstacles = upright_obstacles(water, dip)
+    obstacles = upright_obstacles(context, dip)
     if not obstacles or clock.up:
         return None
     # the problem begins at the start: a tether there is at most the tether from the anchor and the
     # tether laid from the anchor to the start
-    laid = float(polylines.length(water.laid.nodes))
+    laid = float(polylines.length(context.start_tether.nodes))
     max_length = mission.tether_length * (1.0 + 1e-6) + laid
     try:
         problem = Problem(
@@ -76,7 +76,7 @@ def bound_of_upright(
     return bound.length * (1.0 - BOUND_ROUNDING)
 
 
-def upright_obstacles(water: Water, dip: float) -> list[Circle | Polygon]:
+def upright_obstacles(context: PlanningContext, dip: float) -> list[Circle | Polygon]:
     """Return obstacles of the plane that lie within a scene's upright solids.
 
     A solid must stand through all heights in which tethers lie or words tell classes apart. If all
@@ -85,7 +85,7 @@ def upright_obstacles(water: Water, dip: float) -> list[Circle | Polygon]:
 
     Parameters
     ----------
-    water : Water
+    context : PlanningContext
         The scene.
     dip : float
         Depth to which paths and tethers may enter solids, metres.
@@ -95,13 +95,17 @@ def upright_obstacles(water: Water, dip: float) -> list[Circle | Polygon]:
     list of Circle or Polygon
         One for each upright solid that is thicker than twice `dip`.
     """
-    field, grid = water.field, water.grid
-    anchor = np.asarray(water.mission.anchor, dtype=float)
-    reach = water.mission.tether_length * (1.0 + 1e-6) + dip
+    field, grid = context.field, context.grid
+    anchor = np.asarray(context.mission.anchor, dtype=float)
+    reach = context.mission.tether_length * (1.0 + 1e-6) + dip
     floor, ceiling = level_range(field, dip)
     heights = [float(grid.low[2]), float(grid.low[2]) + grid.cell * grid.free.shape[2]]
-    if water.bounds is not None:
-        heights += [water.bounds[2], water.bounds[5], *water.laid.nodes[:, 2].tolist()]
+    if context.bounds is not None:
+        heights += [
+            context.bounds[2],
+            context.bounds[5],
+            *context.start_tether.nodes[:, 2].tolist(),
+        ]
         in_bounds = Depths(max(floor, min(heights)), min(ceiling, max(heights)), anchor, reach)
         obstacles, all_upright = cross_sections(field, in_bounds, dip)
         if all_upright:

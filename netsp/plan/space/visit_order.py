@@ -22,8 +22,8 @@ from netsp.gtsp.search import Instance, best_classes
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.mission_policy import MissionPolicy
-from netsp.plan.space.planning_context import straight, stride
-from netsp.plan.space.states import alike
+from netsp.plan.space.planning_context import drive_step, is_straight_clear
+from netsp.plan.space.states import hang_alike
 from netsp.world.mission.mission import Mission
 from netsp.world.paths.tree import Grid, ShortestTree, taut
 from netsp.world.scene.field import DistanceField
@@ -40,7 +40,7 @@ class _Classes:
     def find(self, n: int, tether: Tether, delta: float) -> int | None:
         """The vertex of a waypoint with the same tether."""
         for v, (m, other) in enumerate(zip(self.point, self.tether, strict=True)):
-            if m == n and alike(tether, other, delta):
+            if m == n and hang_alike(tether, other, delta):
                 return v
         return None
 
@@ -164,11 +164,11 @@ def waypoint_graph(
         clock.check("driving straight legs")
         n = found.point[v]
         for m in near[n]:
-            if not straight(field, points[n], points[m], mission.clearance):
+            if not is_straight_clear(field, points[n], points[m], mission.clearance):
                 continue
             path = np.array([points[n], points[m]])
             there, lengths = model.drive(
-                found.tether[v], polylines.dense(path, stride(mission, policy.tether_share))
+                found.tether[v], polylines.dense(path, drive_step(mission, policy.tether_share))
             )
             if lengths.max() > limit:
                 continue

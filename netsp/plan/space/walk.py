@@ -16,7 +16,7 @@ from netsp.base.arrays import Floats, Ints
 from netsp.base.compiled.dynamic_array import order_of
 from netsp.base.compiled.kernel import kernel
 from netsp.hsignature.wordtable import Rules, Table, times, times_inverse
-from netsp.plan.space.cells import FREE
+from netsp.plan.space.cells import FREE_CELL
 from netsp.plan.space.triangle_labels import UNKNOWN, Flags, Labels, edge_flag, lower_end
 from netsp.world.scene.sampling import Field, distance
 
@@ -132,7 +132,7 @@ def visible_cell(complex_: LabelledComplex, p: Floats) -> int:
     for i in range(max(at[0] - reach, 0), min(at[0] + reach + 1, nx)):
         for j in range(max(at[1] - reach, 0), min(at[1] + reach + 1, ny)):
             for k in range(max(at[2] - reach, 0), min(at[2] + reach + 1, nz)):
-                if flags[i, j, k] & FREE and complex_.known[i, j, k]:
+                if flags[i, j, k] & FREE_CELL and complex_.known[i, j, k]:
                     c = cell_centre(complex_, i, j, k)
                     far[count] = (p[0] - c[0]) ** 2 + (p[1] - c[1]) ** 2 + (p[2] - c[2]) ** 2
                     cells[count] = (i * ny + j) * nz + k

@@ -17,7 +17,7 @@ from netsp.base.arrays import Bools, Ints
 from netsp.base.compiled.dynamic_array import more_int_rows
 from netsp.base.compiled.kernel import kernel
 from netsp.hsignature.wordtable import Rules, Table, times, times_inverse
-from netsp.plan.space.cells import FREE
+from netsp.plan.space.cells import FREE_CELL
 from netsp.plan.space.triangle_labels import (
     BUCKETS,
     LENGTHS,
@@ -25,10 +25,10 @@ from netsp.plan.space.triangle_labels import (
     UNKNOWN,
     Flags,
     Labels,
-    axes_of,
     lower_end,
     nth_axis,
-    staircase,
+    staircase_order,
+    step_axes,
 )
 from netsp.world.paths.tree import ONWARD
 
@@ -36,7 +36,7 @@ NO_WORD = -1
 """Sentinel word of an empty slot."""
 
 
-class Found(NamedTuple):
+class WordSearch(NamedTuple):
     """What a search has found, slot by slot of the cells of its box.
 
     Attributes
@@ -75,7 +75,7 @@ def shortest_words(
     targets: Ints,
     limits: Ints,
     stop: Ints,
-) -> tuple[Found, Table]:
+) -> tuple[WordSearch, Table]:
     """Return the `most` soonest words of the cells of a box that are on the way to some targets.
 
     About an open cell everything is free and of one class, so only those steps are taken that lead
@@ -160,14 +160,14 @@ def shortest_words(
             if p < 0 or q < 0 or r < 0 or p >= sx or q >= sy or r >= sz:
                 continue
             u, v, w = p + first[0], q + first[1], r + first[2]
-            if not flags[u, v, w] & FREE or not room[u, v, w]:
+            if not flags[u, v, w] & FREE_CELL or not room[u, v, w]:
                 continue
             if far[p, q, r, most - 1] <= there and done[p, q, r, most - 1]:
                 continue
-            order = 0 if open_here else staircase(flags, x, y, z, s)
+            order = 0 if open_here else staircase_order(flags, x, y, z, s)
             if order < 0:
                 continue
-            new, table = word_after(labels, table, rules, here, x, y, z, ny, nz, s, order)
+            new, table = word_after_step(labels, table, rules, here, x, y, z, ny, nz, s, order)
             if new < 0:
                 continue
             # the slot of this word, else an empty one, else the farthest that is not done
@@ -199,11 +199,11 @@ def shortest_words(
                 for m in range(most):
                     if not done[a, b, c, m]:
                         word[a, b, c, m] = NO_WORD
-    return Found(first, word, far, step, slot), table
+    return WordSearch(first, word, far, step, slot), table
 
 
 @kernel
-def word_after(
+def word_after_step(
     labels: Labels,
     table: Table,
     rules: Rules,
@@ -216,8 +216,9 @@ def word_after(
     step: int,
     order: int,
 ) -> tuple[int, Table]:
-    """A word after one step, along edges in an order of `staircase`; -1 where one is unknown."""
-    n, a, b, c = axes_of(step)
+    """Return the word after one step along edges in an order of
+    `staircase_order`; -1 if the     word of an edge is not known."""
+    n, a, b, c = step_axes(step)
     cell = (i * ny + j) * nz + k
     for m in range(n):
         axis = nth_axis(n, a, b, c, order, m)
@@ -235,7 +236,7 @@ def word_after(
 
 
 @kernel
-def way_back(found: Found, cell: Ints, slot: int) -> Ints:
+def path_to_slot(found: WordSearch, cell: Ints, slot: int) -> Ints:
     """Cells (m, 3) from where a search began to one of its slots."""
     out, count = np.empty((64, 3), dtype=np.int64), 0
     i, j, k = cell[0] - found.first[0], cell[1] - found.first[1], cell[2] - found.first[2]
