@@ -21,11 +21,15 @@ from peak import highest
 from table import head, heading, row
 
 from netsp.world import Scene
-from netsp.world.scene import lattice, voxels
+from netsp.world.scene import voxels
 from netsp.world.scene.field import DistanceField
+from netsp.world.scene.scene_policy import GridPolicy
 from netsp.world.tether import TETHERS
 
 VOXEL = 0.05
+
+SPARSE = GridPolicy(max_dense_points=0)
+"""Policy of grids that always hold only the points near surfaces."""
 
 
 def jetties(rows: int) -> trimesh.Trimesh:
@@ -88,10 +92,10 @@ def beside() -> None:
     t = np.linspace(0.0, 1.0, 1500)[:, None]
     path = np.hstack([14.0 * np.cos(14.0 * t), 14.0 * np.sin(9.0 * t), 8.0 * np.sin(23.0 * t)])
     fields = []
-    for most in (voxels.MOST_DENSE, 0):
-        kept, voxels.MOST_DENSE = voxels.MOST_DENSE, most
-        grid = voxels.of_triangles(mesh.vertices, mesh.faces, voxel=0.1, memory_limit=8.0)
-        voxels.MOST_DENSE = kept
+    for policy in (GridPolicy(), SPARSE):
+        grid = voxels.grid_of_triangles(
+            mesh.vertices, mesh.faces, voxel=0.1, memory_limit=8.0, policy=policy
+        )
         fields.append(DistanceField.build([], [], np.empty((0, 4)), [], grid, 0.0))
     models = [TETHERS["geodesic"](f, delta=0.2) for f in fields]
     medians: list[list[float]] = [[], []]
@@ -119,13 +123,11 @@ def main() -> None:
     args = parser.parse_args()
     heading("Large sites")
     # compiled on something small
-    kept, voxels.MOST_DENSE = voxels.MOST_DENSE, 0
     small = trimesh.creation.icosphere(subdivisions=1)
-    voxels.of_triangles(small.vertices, small.faces, voxel=0.1)
-    voxels.MOST_DENSE = kept
+    voxels.grid_of_triangles(small.vertices, small.faces, voxel=0.1, policy=SPARSE)
     before = highest()
     site()
-    print(f"Python and libraries alone: {before:.2f} GiB; slabs of {lattice.SLAB:,} blocks.\n")
+    print(f"Python and libraries alone: {before:.2f} GiB; slabs of {SPARSE.slab_size:,} blocks.\n")
     if not args.site:
         beside()
 

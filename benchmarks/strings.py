@@ -31,7 +31,7 @@ from netsp.base.geometry import polylines
 from netsp.world import GeodesicTether
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.scene.sampling import Field, sample
-from netsp.world.scene.voxels import of_triangles
+from netsp.world.scene.voxels import grid_of_triangles
 from netsp.world.tether import Tether
 
 DELTA, VOXEL, THINNEST = 0.1, 0.05, 0.25
@@ -133,7 +133,7 @@ def string_length(field: DistanceField, nodes: np.ndarray) -> float:
 def field_of(seed: int, voxel: float) -> DistanceField:
     """A mesh in voxels of so many metres."""
     mesh = boxes(seed)
-    voxels = of_triangles(mesh.vertices, mesh.faces, voxel=voxel)
+    voxels = grid_of_triangles(mesh.vertices, mesh.faces, voxel=voxel)
     return DistanceField.build([], [], np.empty((0, 4)), [], voxels, 0.0)
 
 

@@ -25,7 +25,7 @@ from netsp.plan.random_worlds import random_world
 from netsp.roadmap.paths import TautPaths
 from netsp.world import GeodesicTether, ReactTether, Scene
 from netsp.world.scene.field import DistanceField
-from netsp.world.scene.voxels import of_cloud_file
+from netsp.world.scene.voxels import grid_of_cloud_file
 
 SCENES = ROOT / "scenes"
 
@@ -322,7 +322,7 @@ def main() -> None:
         head("voxel", "grid", "build s", "notes", name="tether-cloud")
         for voxel in (0.1, 0.05):
             begin = time.perf_counter()
-            grid = of_cloud_file(args.cloud, scale=args.scale, voxel=voxel)
+            grid = grid_of_cloud_file(args.cloud, scale=args.scale, voxel=voxel)
             row(voxel, "x".join(map(str, grid.counts)), f"{time.perf_counter() - begin:.2f}",
                 "; ".join(grid.notes))  # fmt: skip
         print()

@@ -10,7 +10,7 @@ from netsp.command.main import main
 from netsp.world import GeodesicTether, Scene
 from netsp.world.scene.floor import floor_mesh
 from netsp.world.scene.readers import read_cloud
-from netsp.world.scene.voxels import of_mesh
+from netsp.world.scene.voxels import grid_of_mesh_file
 
 rasterio = pytest.importorskip("rasterio", reason="rasterio (extra geo) is not installed")
 
@@ -163,7 +163,7 @@ def test_meshes_are_read_from_glb(tmp_path):
         transform=trimesh.transformations.translation_matrix((4, 0, 0)),
     )
     parts.export(tmp_path / "parts.glb")
-    grid = of_mesh(tmp_path / "parts.glb", voxel=0.1)
+    grid = grid_of_mesh_file(tmp_path / "parts.glb", voxel=0.1)
     field = Scene(mesh={"file": str(tmp_path / "parts.glb"), "voxel": 0.1}).field()
     assert grid.size == 0.1
     at = np.array([(0, 0, 2), (4, 0, 1.5), (4, 0, 0), (0, 0, 0)], dtype=float)

@@ -7,9 +7,10 @@ import pytest
 import trimesh
 
 from netsp import InputError
-from netsp.world.scene import lattice, voxels
+from netsp.world.scene import voxels
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.grid import SIDE
+from netsp.world.scene.scene_policy import GridPolicy
 from netsp.world.scene.sites import site_distance, triangle_sites
 from netsp.world.tether import TETHERS
 
@@ -44,17 +45,23 @@ def torn(seed):
     return mesh
 
 
-@pytest.fixture
-def sparse(monkeypatch):
-    """Whatever is built meanwhile is sparse, in slabs of a few blocks."""
+SPARSE = GridPolicy(max_dense_points=0, slab_blocks=150 * GridPolicy().workers)
+"""Policy of sparse grids that are built in slabs of a few blocks."""
 
-    def only(build):
-        with monkeypatch.context() as patch:
-            patch.setattr(voxels, "MOST_DENSE", 0)
-            patch.setattr(lattice, "SLAB", 150)
-            return build()
 
-    return only
+def sparse(build):
+    """Return what `build` makes with a sparse grid."""
+    return build(SPARSE)
+
+
+def on_mesh(mesh, **options):
+    """Return a function that builds the grid of a mesh with a policy."""
+    options.setdefault("voxel", VOXEL)
+
+    def build(policy=None):
+        return voxels.grid_of_triangles(mesh.vertices, mesh.faces, policy=policy, **options)
+
+    return build
 
 
 def around(mesh, count, seed=0):
@@ -67,10 +74,8 @@ def around(mesh, count, seed=0):
     [boxes(1), boxes(2), torn(3), hollow()],
     ids=["boxes", "more boxes", "torn", "hollow"],
 )
-def test_near_surfaces_a_sparse_grid_says_what_a_full_one_says(mesh, sparse):
-    def build():
-        return voxels.of_triangles(mesh.vertices, mesh.faces, voxel=VOXEL)
-
+def test_near_surfaces_a_sparse_grid_says_what_a_full_one_says(mesh):
+    build = on_mesh(mesh)
     full, part = build(), sparse(build)
     assert full.table is None
     assert part.table is not None
@@ -84,12 +89,12 @@ def test_near_surfaces_a_sparse_grid_says_what_a_full_one_says(mesh, sparse):
     assert ((a < 0.0) == (b < 0.0)).all()
 
 
-def test_a_sparse_grid_of_a_cloud_has_the_surface_of_a_full_one(sparse):
+def test_a_sparse_grid_of_a_cloud_has_the_surface_of_a_full_one():
     mesh = boxes(4)
     points = trimesh.sample.sample_surface(mesh, 15_000, seed=1)[0]
 
-    def build():
-        return voxels.of_cloud(points, voxel=VOXEL)
+    def build(policy=None):
+        return voxels.grid_of_cloud(points, voxel=VOXEL, policy=policy)
 
     p = around(mesh, 100_000)
     full, part = field(build()), field(sparse(build))
@@ -99,21 +104,21 @@ def test_a_sparse_grid_of_a_cloud_has_the_surface_of_a_full_one(sparse):
     assert np.abs(a - b)[near].mean() < 1e-3 * VOXEL
 
 
-def test_a_sparse_sheet_of_points_is_as_thick_as_a_full_one(sparse):
+def test_a_sparse_sheet_of_points_is_as_thick_as_a_full_one():
     u, v = np.meshgrid(np.linspace(-1, 1, 60), np.linspace(-1, 1, 60))
     points = np.column_stack([u.ravel(), v.ravel(), 0 * u.ravel()])
-    grid = sparse(lambda: voxels.of_cloud(points, voxel=0.05))
+    grid = sparse(lambda policy: voxels.grid_of_cloud(points, voxel=0.05, policy=policy))
     assert any("sheet" in n for n in grid.notes)
     assert field(grid).distance([[0, 0, 0.3], [0, 0, -0.3]]) == pytest.approx(0.2, abs=0.01)
 
 
-def test_far_from_surfaces_a_sparse_grid_is_never_above_the_distance(sparse):
+def test_far_from_surfaces_a_sparse_grid_is_never_above_the_distance():
     # a small ball and a needle curve the distance as much as anything can
     ball = trimesh.creation.icosphere(subdivisions=1, radius=0.15)
     needle = trimesh.creation.box([0.1, 0.1, 6.0])
     needle.apply_translation([3.0, 0.0, 0.0])
     mesh = trimesh.util.concatenate([ball, needle])
-    grid = sparse(lambda: voxels.of_triangles(mesh.vertices, mesh.faces, voxel=VOXEL))
+    grid = sparse(on_mesh(mesh))
     sites = triangle_sites(np.asarray(mesh.triangles))
     p = around(mesh, 4000)
     true = np.array([min(site_distance(sites, s, *q) for s in range(len(sites))) for q in p])
@@ -127,9 +132,9 @@ def test_far_from_surfaces_a_sparse_grid_is_never_above_the_distance(sparse):
     assert np.median((true - said)[outside & inner]) < 0.1 * SIDE * VOXEL
 
 
-def test_a_sparse_grid_does_not_jump_anywhere(sparse):
+def test_a_sparse_grid_does_not_jump_anywhere():
     mesh = boxes(5)
-    grid = sparse(lambda: voxels.of_triangles(mesh.vertices, mesh.faces, voxel=VOXEL))
+    grid = sparse(on_mesh(mesh))
     p = around(mesh, 60_000)
     for axis in range(3):
         # onto faces of cells, from both sides
@@ -145,12 +150,10 @@ def test_a_sparse_grid_does_not_jump_anywhere(sparse):
         assert jump.max() < 1e-5
 
 
-def test_a_tether_is_as_long_in_a_sparse_grid_as_in_a_full_one(sparse):
+def test_a_tether_is_as_long_in_a_sparse_grid_as_in_a_full_one():
     mesh = boxes(6, 7)
 
-    def build():
-        return voxels.of_triangles(mesh.vertices, mesh.faces, voxel=0.05)
-
+    build = on_mesh(mesh, voxel=0.05)
     t = np.linspace(0.0, 1.0, 200)[:, None]
     ring = np.hstack([6.5 * np.cos(9.0 * t), 6.5 * np.sin(9.0 * t), 3.0 * np.sin(7.0 * t)])
     models = [TETHERS["geodesic"](field(g), delta=0.15) for g in (build(), sparse(build))]
@@ -168,19 +171,27 @@ def test_a_tether_is_as_long_in_a_sparse_grid_as_in_a_full_one(sparse):
     assert np.mean(apart < 0.01) >= 0.9
 
 
-def test_a_thin_plate_is_told_in_a_sparse_grid_too(sparse):
+def test_a_thin_plate_is_told_in_a_sparse_grid_too():
     plate, block = trimesh.creation.box([4.0, 4.0, 0.2]), trimesh.creation.box([2.0, 2.0, 2.0])
     block.apply_translation([6.0, 0.0, 0.0])
     for mesh, thin in ((plate, True), (block, False)):
-        grid = sparse(lambda mesh=mesh: voxels.of_triangles(mesh.vertices, mesh.faces, voxel=0.05))
+        grid = sparse(
+            lambda policy, mesh=mesh: voxels.grid_of_triangles(
+                mesh.vertices, mesh.faces, voxel=0.05, policy=policy
+            )
+        )
         assert bool(field(grid).thinner_than(0.5)) == thin
 
 
-def test_blocks_are_only_where_they_are_wanted(sparse):
+def test_blocks_are_only_where_they_are_wanted():
     mesh = trimesh.creation.box([4.0, 4.0, 4.0])
     region = np.array([[-9.0, -9.0, 0.0], [9.0, 9.0, 9.0]])
     grids = [
-        sparse(lambda r=r: voxels.of_triangles(mesh.vertices, mesh.faces, voxel=VOXEL, region=r))
+        sparse(
+            lambda policy, r=r: voxels.grid_of_triangles(
+                mesh.vertices, mesh.faces, voxel=VOXEL, region=r, policy=policy
+            )
+        )
         for r in (None, region)
     ]
     everywhere, above = (field(g) for g in grids)
@@ -195,9 +206,15 @@ def test_blocks_are_only_where_they_are_wanted(sparse):
     assert ((a < 0.0) == (b < 0.0)).all()
 
 
-def test_a_sparse_field_is_kept_in_a_file(sparse, tmp_path):
+def test_a_sparse_field_is_kept_in_a_file(tmp_path):
     mesh = boxes(7)
-    one = field(sparse(lambda: voxels.of_triangles(mesh.vertices, mesh.faces, voxel=VOXEL)))
+    one = field(
+        sparse(
+            lambda policy: voxels.grid_of_triangles(
+                mesh.vertices, mesh.faces, voxel=VOXEL, policy=policy
+            )
+        )
+    )
     one.save(tmp_path / "field.npz")
     other = DistanceField.load(tmp_path / "field.npz")
     p = around(mesh, 1000)
@@ -205,26 +222,21 @@ def test_a_sparse_field_is_kept_in_a_file(sparse, tmp_path):
     assert other.voxel == one.voxel
 
 
-def test_more_memory_than_allowed_is_refused_with_voxels_that_fit(sparse):
+def test_more_memory_than_allowed_is_refused_with_voxels_that_fit():
     ball = trimesh.creation.icosphere(subdivisions=2)
 
-    def build(voxel):
-        return voxels.of_triangles(ball.vertices, ball.faces, voxel=voxel, memory_limit=0.05)
-
     with pytest.raises(InputError, match="GiB") as error:
-        sparse(lambda: build(0.004))
+        sparse(on_mesh(ball, voxel=0.004, memory_limit=0.05))
     better = float(str(error.value).split("voxels of ")[-1].split(" or")[0])
     assert 0.004 < better < 0.05
-    assert sparse(lambda: build(better)).table is not None
+    assert sparse(on_mesh(ball, voxel=better, memory_limit=0.05)).table is not None
 
 
 @pytest.mark.parametrize("kind", ["full", "sparse"])
-def test_the_voxels_of_a_field_make_the_same_field_again(kind, sparse):
+def test_the_voxels_of_a_field_make_the_same_field_again(kind):
     mesh = boxes(5)
 
-    def build():
-        return voxels.of_triangles(mesh.vertices, mesh.faces, voxel=VOXEL)
-
+    build = on_mesh(mesh)
     grid = sparse(build) if kind == "sparse" else build()
     one = field(grid)
     again = one.voxels

@@ -12,7 +12,12 @@ from netsp.command.main import main
 from netsp.world import DistanceField, Scene
 from netsp.world.scene.packing import CELLS
 from netsp.world.scene.surfaces import surface_of
-from netsp.world.scene.voxels import of_cloud, of_cloud_file, of_mesh, of_triangles
+from netsp.world.scene.voxels import (
+    grid_of_cloud,
+    grid_of_cloud_file,
+    grid_of_mesh_file,
+    grid_of_triangles,
+)
 
 trimesh = pytest.importorskip("trimesh")
 
@@ -99,7 +104,9 @@ def test_a_field_reads_back_as_it_was_written(kind, tmp_path):
     field = field_of(*[{k: v} for k, v in SHAPES.items()])
     if kind == "voxels":
         ball = trimesh.creation.icosphere(subdivisions=2)
-        field = DistanceField.build([], [], [], [], of_triangles(ball.vertices, ball.faces), 0.0)
+        field = DistanceField.build(
+            [], [], [], [], grid_of_triangles(ball.vertices, ball.faces), 0.0
+        )
     field.save(tmp_path / "field.npz")
     again = DistanceField.load(tmp_path / "field.npz")
     p = np.random.default_rng(2).uniform(-1.2, 1.2, (100, 3))
@@ -119,7 +126,7 @@ def voxel_field(grid):
 def test_voxels_of_a_closed_mesh_are_true_to_a_fraction_of_a_voxel():
     """Near a round surface, where linear interpolation errs by h^2 / (8 r) at most."""
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.8)
-    field = voxel_field(of_triangles(ball.vertices, ball.faces, voxel=0.05))
+    field = voxel_field(grid_of_triangles(ball.vertices, ball.faces, voxel=0.05))
     rng = np.random.default_rng(3)
     p = rng.normal(size=(4000, 3))
     p *= (rng.uniform(0.7, 0.9, 4000) / np.linalg.norm(p, axis=1))[:, None]
@@ -130,7 +137,7 @@ def test_voxels_of_a_closed_mesh_are_true_to_a_fraction_of_a_voxel():
 
 def test_far_from_the_grid_distances_are_lower_bounds_that_grow():
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.8)
-    field = voxel_field(of_triangles(ball.vertices, ball.faces, voxel=0.05))
+    field = voxel_field(grid_of_triangles(ball.vertices, ball.faces, voxel=0.05))
     p = np.outer(np.linspace(1.5, 9, 20), [0.6, 0.64, 0.48])
     d = field.distance(p)
     assert (d <= np.linalg.norm(p, axis=1) - 0.8 + 0.01).all()
@@ -141,14 +148,14 @@ def test_overlapping_parts_unite_and_cavities_are_solid():
     a = trimesh.creation.box((1, 1, 1))
     b = trimesh.creation.box((1, 1, 1)).apply_translation((0.6, 0, 0))
     both = trimesh.util.concatenate([a, b])
-    grid = of_triangles(both.vertices, both.faces, voxel=0.04)
+    grid = grid_of_triangles(both.vertices, both.faces, voxel=0.04)
     assert any("overlap" in n for n in grid.notes)
     assert voxel_field(grid).distance([0.3, 0.0, 0.0]) < -0.15
     shell = trimesh.creation.icosphere(subdivisions=3, radius=1.0)
     inner = trimesh.creation.icosphere(subdivisions=3, radius=0.8)
     inner.invert()
     hollow = trimesh.util.concatenate([shell, inner])
-    grid = of_triangles(hollow.vertices, hollow.faces, voxel=0.05)
+    grid = grid_of_triangles(hollow.vertices, hollow.faces, voxel=0.05)
     assert any("cavities" in n for n in grid.notes)
     assert voxel_field(grid).distance([0.0, 0.0, 0.0]) < 0
 
@@ -158,7 +165,7 @@ def test_parts_turned_against_each_other_do_not_cancel():
     other = box.copy().apply_translation((1, 0, 0))
     other.invert()
     both = trimesh.util.concatenate([box, other])
-    grid = of_triangles(both.vertices, both.faces, voxel=0.04)
+    grid = grid_of_triangles(both.vertices, both.faces, voxel=0.04)
     assert any("inside out" in n for n in grid.notes)
     assert voxel_field(grid).distance([0.5, 0.0, 0.0]) < -0.4
 
@@ -175,19 +182,19 @@ def test_parts_turned_against_each_other_do_not_cancel():
 )
 def test_meshes_of_no_use_are_refused(vertices, faces, more, message):
     with pytest.raises(InputError, match=message):
-        of_triangles(vertices, faces, **more)
+        grid_of_triangles(vertices, faces, **more)
 
 
 def test_voxels_too_large_for_a_mesh_are_refused():
     box = trimesh.creation.box((1, 1, 1))
     with pytest.raises(InputError, match="smaller voxels"):
-        of_triangles(box.vertices, box.faces, voxel=50.0)
+        grid_of_triangles(box.vertices, box.faces, voxel=50.0)
 
 
 def test_an_open_mesh_is_a_shell_and_says_so():
     sheet = trimesh.creation.box((1, 1, 1))
     faces = sheet.faces[np.abs(sheet.face_normals[:, 2] - 1.0) > 1e-9]  # no lid
-    grid = of_triangles(sheet.vertices, faces, voxel=0.04)
+    grid = grid_of_triangles(sheet.vertices, faces, voxel=0.04)
     assert any("open" in n for n in grid.notes)
     field = voxel_field(grid)
     assert field.distance([0, 0, 0.2]) > 0.2  # water flows in from above
@@ -198,7 +205,7 @@ def test_an_open_mesh_is_a_shell_and_says_so():
 def test_a_cloud_on_a_surface_is_solid_within_and_passes_through_its_points():
     ball = trimesh.creation.icosphere(subdivisions=4, radius=1.0)
     cloud, _ = trimesh.sample.sample_surface(ball, 12000, seed=1)
-    field = voxel_field(of_cloud(cloud, voxel=0.05))
+    field = voxel_field(grid_of_cloud(cloud, voxel=0.05))
     assert np.abs(field.distance(cloud)).mean() < 0.01
     p = np.random.default_rng(4).normal(size=(1000, 3))
     p *= (np.linspace(0.85, 1.25, 1000) / np.linalg.norm(p, axis=1))[:, None]
@@ -208,7 +215,7 @@ def test_a_cloud_on_a_surface_is_solid_within_and_passes_through_its_points():
 
 def test_a_sheet_of_points_is_solid_two_voxels_to_either_side():
     u, v = np.meshgrid(np.linspace(-1, 1, 60), np.linspace(-1, 1, 60))
-    grid = of_cloud(np.column_stack([u.ravel(), v.ravel(), 0 * u.ravel()]), voxel=0.05)
+    grid = grid_of_cloud(np.column_stack([u.ravel(), v.ravel(), 0 * u.ravel()]), voxel=0.05)
     assert any("sheet" in n for n in grid.notes)
     field = voxel_field(grid)
     assert not field.line_of_sight([0, 0, 1], [0, 0, -1])
@@ -220,9 +227,9 @@ def test_clouds_and_meshes_are_read_from_files(tmp_path):
     ball.export(tmp_path / "ball.stl")
     np.savez(tmp_path / "cloud.npz", points=ball.vertices)
     np.savetxt(tmp_path / "cloud.csv", ball.vertices, delimiter=",", header="x,y,z", comments="")
-    expected = of_cloud(ball.vertices, voxel=0.1).values
+    expected = grid_of_cloud(ball.vertices, voxel=0.1).values
     for name in ("cloud.npz", "cloud.csv"):
-        found = of_cloud_file(tmp_path / name, voxel=0.1).values
+        found = grid_of_cloud_file(tmp_path / name, voxel=0.1).values
         assert np.allclose(found, expected, atol=1e-4)
     scene = {"schema_version": 1, "mesh": {"file": "ball.stl", "scale": 2.0, "voxel": 0.1}}
     (tmp_path / "scene.json").write_text(json.dumps(scene))
@@ -240,19 +247,19 @@ def test_clouds_and_meshes_are_read_from_files(tmp_path):
 )
 def test_clouds_of_no_use_are_refused(points, message):
     with pytest.raises(InputError, match=message):
-        of_cloud(points)
+        grid_of_cloud(points)
 
 
 def test_a_grid_that_is_too_large_is_refused_with_one_that_is_not():
     ball = trimesh.creation.icosphere(subdivisions=2)
     with pytest.raises(InputError, match="GiB") as error:
-        of_triangles(ball.vertices, ball.faces, voxel=0.0005)
+        grid_of_triangles(ball.vertices, ball.faces, voxel=0.0005)
     better = float(str(error.value).split("voxels of ")[-1].split(" or")[0])
     assert 0.0005 < better < 0.005
     with pytest.raises(InputError, match=r"got none"):
-        of_triangles(np.zeros((0, 3)), np.zeros((0, 3), dtype=int))
+        grid_of_triangles(np.zeros((0, 3)), np.zeros((0, 3), dtype=int))
     with pytest.raises(InputError, match="no such file"):
-        of_mesh("missing.stl")
+        grid_of_mesh_file("missing.stl")
 
 
 @pytest.mark.parametrize(
@@ -280,7 +287,7 @@ def test_thin_parts_are_named():
     assert "wire" in field.thinner_than(0.1)[0]
     assert field.thinner_than(0.03) == ()
     plate = trimesh.creation.box((1, 1, 0.2))
-    field = voxel_field(of_triangles(plate.vertices, plate.faces, voxel=0.02))
+    field = voxel_field(grid_of_triangles(plate.vertices, plate.faces, voxel=0.02))
     assert field.thinner_than(0.1) == ()
     assert "thinner" in field.thinner_than(0.4)[0]
 

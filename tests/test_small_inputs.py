@@ -22,7 +22,7 @@ from netsp.online.guard.plane import PlaneSite
 from netsp.online.guard.state_file import MAX_LETTERS, GuardState
 from netsp.plan.sizing.tether_margins import margins
 from netsp.world.mission.mission import Mission
-from netsp.world.tether.taut_tether import Tether, strand_of
+from netsp.world.tether.taut_tether import Tether, new_strand
 
 LONG_NUMBER = "1" * 5001
 
@@ -159,11 +159,11 @@ def test_a_travel_graph_in_networkx_has_the_lengths_of_its_legs(posts):
 
 def test_tethers_are_equal_if_all_of_them_is():
     nodes = [[0, 0, 0], [1, 1, 1], [2, 0, 0]]
-    one, same = Tether(strand_of(nodes), 3.0), Tether(strand_of(nodes), 3.0)
+    one, same = Tether(new_strand(nodes), 3.0), Tether(new_strand(nodes), 3.0)
     assert one == same
     assert one != dataclasses.replace(same, length=4.0)
-    assert one != Tether(strand_of(nodes[:2]), 3.0)
-    assert one != Tether(strand_of([[0, 0, 0], [1, 1, 1], [2, 0, 1]]), 3.0)
+    assert one != Tether(new_strand(nodes[:2]), 3.0)
+    assert one != Tether(new_strand([[0, 0, 0], [1, 1, 1], [2, 0, 1]]), 3.0)
     assert one != "a tether"
 
 

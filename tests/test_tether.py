@@ -16,7 +16,7 @@ from netsp.plan.random_worlds import random_world
 from netsp.roadmap.paths import TautPaths
 from netsp.world import GeodesicTether, ReactTether, Scene
 from netsp.world.scene.field import DistanceField
-from netsp.world.scene.voxels import of_triangles
+from netsp.world.scene.voxels import grid_of_triangles
 
 
 def model(*solids, delta=0.05, kind=GeodesicTether, **more):
@@ -132,7 +132,7 @@ def test_over_the_edges_of_a_box(dy):
 def test_voxels_of_a_mesh_give_nearly_the_length_of_the_solid():
     trimesh = pytest.importorskip("trimesh")
     mesh = trimesh.creation.cylinder(radius=0.5, height=6, sections=128)
-    field = DistanceField.build([], [], [], [], of_triangles(mesh.vertices, mesh.faces, voxel=0.05), 0)  # fmt: skip # noqa: E501
+    field = DistanceField.build([], [], [], [], grid_of_triangles(mesh.vertices, mesh.faces, voxel=0.05), 0)  # fmt: skip # noqa: E501
     tethers = GeodesicTether(field, 0.1)
     angle = np.linspace(0.0, 4 * np.pi, 400)
     path = np.column_stack([2 * np.cos(angle), 2 * np.sin(angle), 0.1 * angle])
@@ -169,7 +169,7 @@ def test_poles_of_a_mesh_are_never_passed_either(seed):
         part.apply_translation([*pole, 0.0])
         parts.append(part)
     mesh = trimesh.util.concatenate(parts)
-    voxels = of_triangles(mesh.vertices, mesh.faces, voxel=0.05)
+    voxels = grid_of_triangles(mesh.vertices, mesh.faces, voxel=0.05)
     field = DistanceField.build([], [], np.empty((0, 4)), [], voxels, 0.0)
     tethers, start = GeodesicTether(field, 0.1), np.array([-0.5, -0.5, 0.0])
     walk = random_drive(rng, field, start, 60, 1.0, [-1, -1, -1.2], [6, 6, 1.2])
@@ -383,7 +383,7 @@ def tilted_boxes(seed):
 def test_a_tether_does_not_hang_on_the_tips_of_corners(seed):
     """After three still updates it is no longer than one of half the delta, laid where it lies."""
     mesh = tilted_boxes(seed)
-    grid = of_triangles(mesh.vertices, mesh.faces, voxel=0.05)
+    grid = grid_of_triangles(mesh.vertices, mesh.faces, voxel=0.05)
     field = DistanceField.build([], [], np.empty((0, 4)), [], grid, 0.0)
     tethers, finer = GeodesicTether(field, 0.1), GeodesicTether(field, 0.05)
     rng = np.random.default_rng([seed, 1])

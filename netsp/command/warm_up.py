@@ -281,8 +281,12 @@ def steps() -> Iterator[Step]:
         points[:, 1] = np.where(points[:, 1] < 0.25, 0.0, 0.5)
         for scarce in (False, True):
             for grid in (
-                voxels.of_triangles(bar, faces, voxel=0.1, memory_limit=0.01 if scarce else 1.0),
-                voxels.of_cloud(points @ turn, voxel=0.1, memory_limit=0.018 if scarce else 1.0),
+                voxels.grid_of_triangles(
+                    bar, faces, voxel=0.1, memory_limit=0.01 if scarce else 1.0
+                ),
+                voxels.grid_of_cloud(
+                    points @ turn, voxel=0.1, memory_limit=0.018 if scarce else 1.0
+                ),
             ):
                 assert (grid.table is not None) == scarce
                 DistanceField.build([], [], np.empty((0, 4)), [], grid, 0.0).distance(bar)

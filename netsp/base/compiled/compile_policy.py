@@ -53,6 +53,9 @@ class CompilePolicy:
     min_numpy_items : int
         Minimum number of values, such as points times solids, for which an interpreted kernel uses
         NumPy instead of a loop. Results are the same; at the default, so is the time.
+    numpy_chunk_items : int
+        Number of points that the vectorised forms of scene kernels compute at a time: few enough
+        that their arrays fit in the processor's cache. Results are the same.
     check_interval_s : float
         Wall-clock seconds between two checks of the interpreted calls that run. A shorter interval
         ends calls more punctually and takes more CPU.
@@ -77,6 +80,7 @@ class CompilePolicy:
     max_wait_ratio: float = 10.0
     max_copied_bytes: int = 64 * 2**20
     min_numpy_items: int = 16
+    numpy_chunk_items: int = 32_768
     check_interval_s: float = 0.005
     max_idle_checks: int = 20
     lock_interval_s: float = 0.02

@@ -28,7 +28,7 @@ from netsp.world.scene.scene import Scene
 from netsp.world.simulator.laid_tether import first_tether, present_tether
 from netsp.world.simulator.mission_run import grid_of
 from netsp.world.tether import GeodesicTether, Tether
-from netsp.world.tether.resolution import THINNEST
+from netsp.world.tether.tether_policy import THINNEST
 
 CLEARANCE_TOLERANCE = 0.01
 """Tolerance of clearances that are sampled along a path, metres: largest overstatement."""

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Flag, abandoned, end_if_abandoned
+from netsp.base.compiled.compile_policy import current_policy
 from netsp.base.compiled.dynamic_array import more_int_rows
 from netsp.base.compiled.interpretation import interprets
 from netsp.base.compiled.kernel import kernel
@@ -22,7 +23,7 @@ from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
 from netsp.world.paths.path_policy import PathPolicy
 from netsp.world.scene.field import DistanceField
-from netsp.world.scene.point_batches import CHUNK, distances
+from netsp.world.scene.point_batches import distances
 from netsp.world.scene.sampling import Field, distance, lowest_along, lowest_along_each
 from netsp.world.tether.geodesic import GeodesicTether
 
@@ -246,7 +247,7 @@ def _free_cells_in_numpy(
     """Vectorise `free_cells` over blocks of layers of cells."""
     out = np.zeros(shape, dtype=np.bool_)
     x, y, z = (low[axis] + (np.arange(shape[axis]) + 0.5) * cell for axis in range(3))
-    layers = max(1, CHUNK // max(1, shape[1] * shape[2]))
+    layers = max(1, current_policy().numpy_chunk_items // max(1, shape[1] * shape[2]))
     for i in range(0, shape[0], layers):
         if stop[0] != 0:
             break

@@ -25,7 +25,7 @@ from netsp.world.planner.planner_policy import PlannerPolicy
 from netsp.world.scene.field import DistanceField
 from netsp.world.tether import GeodesicTether, ReactTether, Tether
 from netsp.world.tether.load import Load, payout, payout_along
-from netsp.world.tether.resolution import THINNEST
+from netsp.world.tether.tether_policy import THINNEST
 
 Tethers = GeodesicTether | ReactTether
 

@@ -27,17 +27,32 @@ Blocks = npt.NDArray[np.int32]
 Table = npt.NDArray[np.int32]
 States = npt.NDArray[np.uint8]
 Place = tuple[Floats, float, int]
-"""Origin of the grid, size of a voxel, and number of the first block of a slab."""
+"""Origin of the grid, size of a voxel, and index of the first block of a slab."""
 
-WATER, REACHED, SPREAD = 1, 2, 3
-"""States of a point or cell in a flood; 0 is solid."""
+Cell = tuple[int, int, int, int]
+"""Indices of a cell along the axes, and index of its block, negative for none."""
+
+WATER = 1
+"""Code of water in a flood; 0 is solid."""
+
+REACHED = 2
+"""Code of water that the flood has reached."""
+
+SPREAD = 3
+"""Code of reached water whose neighbours in its block are reached, too."""
 
 
 @kernel
 def nearest_in_blocks(
-    sites: Floats, which: Ints, place: Place, blocks: Blocks, table: Table,
-    distances: Singles, owner: Owners, stop: Flag,
-) -> None:  # fmt: skip
+    sites: Floats,
+    which: Ints,
+    place: Place,
+    blocks: Blocks,
+    table: Table,
+    distances: Singles,
+    owner: Owners,
+    stop: Flag,
+) -> None:
     """Measure some of the sites from the points around them, as far as these lie in blocks of a
     slab; distances and owner are (n, 512). Ends early once `stop` is set."""
     origin, size, begin = place
@@ -84,9 +99,13 @@ def nearest_in_blocks(
 
 @kernel
 def nearest_to_corners(
-    sites: Floats, place: Place, blocks: Blocks, corners: Owners,
-    distances: Singles, owner: Owners,
-) -> None:  # fmt: skip
+    sites: Floats,
+    place: Place,
+    blocks: Blocks,
+    corners: Owners,
+    distances: Singles,
+    owner: Owners,
+) -> None:
     """Measure at the eight outermost points of each block the sites nearest to the cell's corners,
     (nx + 1, ny + 1, nz + 1): so every block has something to hand on."""
     origin, size, _ = place
@@ -107,9 +126,18 @@ def nearest_to_corners(
 
 @kernel
 def sweep_blocks(
-    sites: Floats, place: Place, blocks: Blocks, table: Table, order: Ints,
-    distances: Singles, owner: Owners, turn: int, changed: Ints, asked: Ints, stop: Flag,
-) -> None:  # fmt: skip
+    sites: Floats,
+    place: Place,
+    blocks: Blocks,
+    table: Table,
+    order: Ints,
+    distances: Singles,
+    owner: Owners,
+    turn: int,
+    changed: Ints,
+    asked: Ints,
+    stop: Flag,
+) -> None:
     """Pass through a slab's points in one of the eight diagonal directions, blocks in an order in
     which the three neighbours that a point asks were passed before it.
 
@@ -131,14 +159,16 @@ def sweep_blocks(
         before_k = table[bi, bj, bk - dk] - begin if 0 <= bk - dk < nz else -1
         if before_i >= len(blocks):
             before_i = -1
-        news = False
-        for before, way in (
-            (before_i, (di + 1) // 2), (before_j, 2 + (dj + 1) // 2), (before_k, 4 + (dk + 1) // 2),
-        ):  # fmt: skip
-            news = news or asked[b, way] < changed[b]
-            news = news or (before >= 0 and asked[b, way] < changed[before])
-            asked[b, way] = turn + 1
-        if not news:
+        has_news = False
+        for before, side in (
+            (before_i, (di + 1) // 2),
+            (before_j, 2 + (dj + 1) // 2),
+            (before_k, 4 + (dk + 1) // 2),
+        ):
+            has_news = has_news or asked[b, side] < changed[b]
+            has_news = has_news or (before >= 0 and asked[b, side] < changed[before])
+            asked[b, side] = turn + 1
+        if not has_news:
             continue
         for p in range(SIDE):
             i = p if di > 0 else SIDE - 1 - p
@@ -274,12 +304,13 @@ def flood(states: States, cells: States, table: Table) -> None:
             for p in range(SIDE):
                 for q in range(SIDE):
                     for r in range(SIDE):
-                        at_border = (
-                            (i == 0 and p == 0) or (i == nx - 1 and p == SIDE - 1)
-                            or (j == 0 and q == 0) or (j == ny - 1 and q == SIDE - 1)
-                            or (k == 0 and r == 0) or (k == nz - 1 and r == SIDE - 1)
-                        )  # fmt: skip
-                        if at_border and states[b, p, q, r] == WATER:
+                        is_first = (i == 0 and p == 0) or (j == 0 and q == 0) or (k == 0 and r == 0)
+                        is_last = (
+                            (i == nx - 1 and p == SIDE - 1)
+                            or (j == ny - 1 and q == SIDE - 1)
+                            or (k == nz - 1 and r == SIDE - 1)
+                        )
+                        if (is_first or is_last) and states[b, p, q, r] == WATER:
                             states[b, p, q, r] = REACHED
         queue[length], waiting[cell] = cell, 1
         length += 1
@@ -335,12 +366,11 @@ def _spread(points: States, stack: Ints) -> None:
 
 @kernel
 def _over_face(
-    states: States, cells: States, here: tuple[int, int, int, int],
-    there: tuple[int, int, int, int], axis: int, side: int,
-) -> bool:  # fmt: skip
+    states: States, cells: States, source: Cell, target: Cell, axis: int, side: int
+) -> bool:
     """Reach over the face between two cells; whether anything new was."""
-    i, j, k, b = here
-    u, v, w, c = there
+    i, j, k, b = source
+    u, v, w, c = target
     if b < 0 and cells[i, j, k] < REACHED:
         return False
     if c < 0 and cells[u, v, w] != WATER:
@@ -348,15 +378,17 @@ def _over_face(
     if b < 0 and c < 0:
         cells[u, v, w] = REACHED
         return True
-    new = False
+    is_new = False
     mine, other = (SIDE - 1, 0) if side > 0 else (0, SIDE - 1)
     for p in range(SIDE):
         for q in range(SIDE):
             if b >= 0:
-                state = (
-                    states[b, mine, p, q] if axis == 0
-                    else states[b, p, mine, q] if axis == 1 else states[b, p, q, mine]
-                )  # fmt: skip
+                if axis == 0:
+                    state = states[b, mine, p, q]
+                elif axis == 1:
+                    state = states[b, p, mine, q]
+                else:
+                    state = states[b, p, q, mine]
                 if state < REACHED:
                     continue
             if c < 0:
@@ -370,8 +402,8 @@ def _over_face(
                 x, y, z = p, q, other
             if states[c, x, y, z] == WATER:
                 states[c, x, y, z] = REACHED
-                new = True
-    return new
+                is_new = True
+    return is_new
 
 
 @kernel

@@ -33,10 +33,8 @@ def nearest_sites(
                 return
             for j in range(low[1], high[1] + 1):
                 for k in range(low[2], high[2] + 1):
-                    d = site_distance(
-                        sites, s,
-                        origin[0] + size * i, origin[1] + size * j, origin[2] + size * k,
-                    )  # fmt: skip
+                    x, y, z = origin[0] + size * i, origin[1] + size * j, origin[2] + size * k
+                    d = site_distance(sites, s, x, y, z)
                     if d < distances[i, j, k]:
                         distances[i, j, k] = d
                         owner[i, j, k] = s

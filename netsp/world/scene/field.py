@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import zipfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from dataclasses import field as dataclass_field
 from functools import cached_property
 from pathlib import Path
 
@@ -18,20 +19,10 @@ from netsp.base.errors import InputError
 from netsp.world.scene import packing
 from netsp.world.scene.grid import VoxelGrid
 from netsp.world.scene.sampling import Field, lowest_along, sample_many
-
-ASK_ALL = 6
-"""So many solids or fewer are all asked at every point."""
-
-CELLS = 40
-"""Cells along the longest side of the coarse grid that tells which solids may be nearest."""
-
-CHUNK = 1_000_000
-"""Points measured between two looks at whether the work is abandoned: about half a second."""
+from netsp.world.scene.scene_policy import FieldPolicy
 
 FILE_VERSION = 4
-
-MOST_LOOKS = 2_000
-"""Solid voxels in blocks whose surroundings tell how much of a scene is thin."""
+"""Format of the files that `DistanceField.save` writes."""
 
 
 def finite_point(value: npt.ArrayLike, name: str) -> tuple[float, float, float]:
@@ -69,6 +60,7 @@ class DistanceField:
     notes: tuple[str, ...] = ()
     thickness: tuple[tuple[str, float], ...] = ()
     seams: tuple[int, ...] = ()
+    policy: FieldPolicy = dataclass_field(default_factory=FieldPolicy)
 
     @classmethod
     def build(
@@ -81,6 +73,7 @@ class DistanceField:
         offset: float,
         thickness: Sequence[tuple[str, float]] = (),
         seams: Sequence[int] = (),
+        policy: FieldPolicy | None = None,
     ) -> DistanceField:
         """A field from encoded solids, their bounding boxes and voxels.
 
@@ -108,13 +101,15 @@ class DistanceField:
         DistanceField
             The field.
         """
+        policy = policy or FieldPolicy()
         data = packing.of_solids(kinds, rows, outline)
-        if len(kinds) > ASK_ALL and boxes:
+        if len(kinds) > policy.max_solids_without_lookup and boxes:
             low = np.min([b[0] for b in boxes], axis=0)
             high = np.max([b[1] for b in boxes], axis=0)
             room = 0.25 * float((high - low).max()) + 1e-9
             low, high = low - room, high + room
-            data = packing.with_lookup(data, low, high, float((high - low).max()) / CELLS)
+            size = float((high - low).max()) / policy.lookup_cells
+            data = packing.with_lookup(data, low, high, size)
         voxels = np.empty(0, dtype=np.float32)
         if grid is not None:
             data, voxels = packing.with_voxels(data, grid), grid.values
@@ -124,6 +119,7 @@ class DistanceField:
             grid.notes if grid is not None else (),
             tuple(thickness),
             tuple(seams),
+            policy,
         )
 
     def distance(self, points: npt.ArrayLike) -> Floats:
@@ -144,9 +140,10 @@ class DistanceField:
         """
         p = self._points(points)
         rows, out = p.reshape(-1, 3), np.empty(p.shape[:-1])
-        for first in range(0, len(rows), CHUNK):
+        chunk = self.policy.chunk_points
+        for first in range(0, len(rows), chunk):
             end_if_abandoned()
-            part = slice(first, first + CHUNK)
+            part = slice(first, first + chunk)
             out.reshape(-1)[part] = sample_many(self.arrays, rows[part])[:, 0]
         return out
 
@@ -285,13 +282,15 @@ class DistanceField:
                 return float(solid.any())
             far = distance_transform_edt(~deep) * size
             return float((far[solid] > reach).mean())
-        some = packing.block_points(data, self.arrays.grid, self.arrays.offset, MOST_LOOKS)
-        if not len(some):
+        samples = packing.block_points(
+            data, self.arrays.grid, self.arrays.offset, self.policy.max_thin_samples
+        )
+        if not len(samples):
             return 0.0
         steps = np.linspace(-reach, reach, 9)
         ball = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
         ball = ball[np.linalg.norm(ball, axis=1) <= reach]
-        deepest = np.array([self.distance(p + ball).min() for p in some])
+        deepest = np.array([self.distance(p + ball).min() for p in samples])
         return float((deepest > -depth).mean())
 
     @cached_property
@@ -312,7 +311,7 @@ class DistanceField:
             The grown field.
         """
         arrays = self.arrays._replace(offset=float(self.arrays.offset) + by)
-        return DistanceField(arrays, self.voxel, self.notes, self.thickness, self.seams)
+        return replace(self, arrays=arrays)
 
     @property
     def voxels(self) -> VoxelGrid | None:

@@ -24,14 +24,8 @@ from netsp.base.axes import (
 from netsp.base.errors import InputError, counted
 from netsp.base.files import read_bytes
 from netsp.world.scene.point_clouds import read_text_cloud
+from netsp.world.scene.scene_policy import FloorPolicy
 from netsp.world.scene.tally import Tally
-
-MOST_POINTS = 4_000_000
-"""Of a grid; it becomes twice as many triangles."""
-
-SHARE = 0.05
-"""Thickness of the floor below its deepest point, as a share of its longer side."""
-
 
 TABLES = (".xyz", ".csv", ".txt", ".pts", ".dat")
 """Extensions of grids that are tables of text, with a row for each cell."""
@@ -40,22 +34,35 @@ UPWARD_FORMATS = ("BAG",)
 """Formats of GDAL whose heights count upwards although their vertical systems name a depth (Open
 Navigation Surface, format specification 1.6: elevations are positive above the datum)."""
 
+MAX_ROW_SLOPE = 1e-9
+"""Tolerance for the slope of a grid's rows against the east, from rounding of the geotransform."""
+
+MAX_STEP_SHIFT = 0.02
+"""Tolerance for the distance of a table's coordinates from a grid, from rounding, as a share of a
+step."""
+
 _ESRI_WORDS = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter")
 
 
 def floor_mesh(
-    path: str | Path, *, scale: float = 1.0, origin: tuple[float, float] = (0.0, 0.0),
+    path: str | Path,
+    *,
+    scale: float = 1.0,
+    origin: tuple[float, float] = (0.0, 0.0),
     depths: bool | None = None,
-) -> tuple[Floats, npt.NDArray[np.int64]]:  # fmt: skip
+) -> tuple[Floats, npt.NDArray[np.int64]]:
     """The floor as a closed mesh, as of `load_floor` without its notes."""
     vertices, faces, _ = load_floor(path, scale=scale, origin=origin, depths=depths)
     return vertices, faces
 
 
 def load_floor(
-    path: str | Path, *, scale: float = 1.0, origin: tuple[float, float] = (0.0, 0.0),
+    path: str | Path,
+    *,
+    scale: float = 1.0,
+    origin: tuple[float, float] = (0.0, 0.0),
     depths: bool | None = None,
-) -> tuple[Floats, npt.NDArray[np.int64], tuple[str, ...]]:  # fmt: skip
+) -> tuple[Floats, npt.NDArray[np.int64], tuple[str, ...]]:
     """Read a sea floor as a closed mesh: heights at the middles of the grid's cells joined by
     triangles, walls, and a flat bottom.
 
@@ -116,9 +123,13 @@ class FloorReading:
 
 
 def read_floor(
-    path: str | Path, *, scale: float = 1.0, origin: tuple[float, float] = (0.0, 0.0),
+    path: str | Path,
+    *,
+    scale: float = 1.0,
+    origin: tuple[float, float] = (0.0, 0.0),
     depths: bool | None = None,
-) -> FloorReading:  # fmt: skip
+    policy: FloorPolicy | None = None,
+) -> FloorReading:
     """Read a sea floor as `load_floor` does, with the numbers of its cells.
 
     Parameters
@@ -137,8 +148,9 @@ def read_floor(
     InputError
         As `load_floor` raises it.
     """
+    policy = policy or FloorPolicy()
     is_table = Path(path).suffix.lower() in TABLES or _is_plain_table(path)
-    grid = _grid_of_table(path) if is_table else _read(path)
+    grid = _grid_of_table(path, policy) if is_table else _read(path, policy)
     if scale != 1.0 and (grid.metres != 1.0 or grid.height_metres not in (None, 1.0)):
         raise InputError(
             f"{path}: scale: the grid states its unit and is read in metres; expected no scale, "
@@ -169,7 +181,7 @@ def read_floor(
         x, z = x[::-1], z[:, ::-1]
     if y[0] > y[-1]:
         y, z = y[::-1], z[::-1]
-    bottom = float(z.min()) - SHARE * max(np.ptp(x), np.ptp(y))
+    bottom = float(z.min()) - policy.base_share * max(np.ptp(x), np.ptp(y))
     gx, gy = np.meshgrid(x, y)
     top = np.column_stack([gx.ravel(), gy.ravel(), z.ravel()])
     below = top.copy()
@@ -180,9 +192,8 @@ def read_floor(
     up = np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
     rim = np.concatenate([at[0, :-1], at[:-1, -1], at[-1, :0:-1], at[:0:-1, 0]])
     after, n = np.roll(rim, -1), rows * columns
-    walls = np.vstack([
-        np.column_stack([rim, rim + n, after + n]), np.column_stack([rim, after + n, after]),
-    ])  # fmt: skip
+    first = np.column_stack([rim, rim + n, after + n])
+    walls = np.vstack([first, np.column_stack([rim, after + n, after])])
     vertices = np.vstack([top, below])
     faces = np.vstack([up, up[:, ::-1] + n, walls]).astype(np.int64)
     left_out = (("without a height", grid.gaps),) if grid.gaps else ()
@@ -218,7 +229,7 @@ class _Band:
     meaning: Column | None
 
 
-def _read(path: str | Path) -> _Grid:
+def _read(path: str | Path, policy: FloorPolicy) -> _Grid:
     rasterio = _rasterio()
     if not Path(path).is_file():
         raise InputError(f"{path}: cannot be read: no such file")
@@ -226,10 +237,10 @@ def _read(path: str | Path) -> _Grid:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of files without a place on the map, refused below
             with _opened(rasterio, path) as grid:
-                if grid.width * grid.height > MOST_POINTS:
+                if grid.width * grid.height > policy.max_cells:
                     raise InputError(
                         f"{path}: {grid.width} x {grid.height} cells; expected at most "
-                        f"{MOST_POINTS:,} in all"
+                        f"{policy.max_cells:,} in all"
                     )
                 system = grid.crs.to_wkt() if grid.crs is not None else None
                 t = grid.transform
@@ -259,7 +270,7 @@ def _read(path: str | Path) -> _Grid:
             f"{path}: the grid has no place on the map; add a geotransform "
             "(gdal_translate -a_ullr west north east south)"
         )
-    if max(abs(t.b), abs(t.d)) > MAX_TURN * max(abs(t.a), abs(t.e)):
+    if max(abs(t.b), abs(t.d)) > MAX_ROW_SLOPE * max(abs(t.a), abs(t.e)):
         raise InputError(f"{path}: the grid is turned; expected rows that run east")
     rows, columns = z.shape
     if rows < 2 or columns < 2:
@@ -284,12 +295,8 @@ def _read(path: str | Path) -> _Grid:
     down = down or positive.strip().lower() == "down"
     called_depth = band.meaning is not None and band.meaning.factor < 0.0
     x, y = t.c + t.a * (np.arange(columns) + 0.5), t.f + t.e * (np.arange(rows) + 0.5)
-    return _Grid(
-        x, y, z, metres, heights, down, called_depth and not positive, tuple(notes), gaps
-    )  # fmt: skip
-
-
-MAX_TURN = 1e-9  # share of a cell by which rows may lean, from rounding of the geotransform
+    called_depth = called_depth and not positive
+    return _Grid(x, y, z, metres, heights, down, called_depth, tuple(notes), gaps)
 
 
 @contextmanager
@@ -386,16 +393,16 @@ def _is_plain_table(path: str | Path) -> bool:
     return bool(words) and words[0].decode("latin-1") not in (*_ESRI_WORDS, "dx", "dy", "cellsize")
 
 
-def _grid_of_table(path: str | Path) -> _Grid:
+def _grid_of_table(path: str | Path, policy: FloorPolicy) -> _Grid:
     """Read a table with a row for each cell, in any order; cells without a row are gaps."""
     if not Path(path).is_file():
         raise InputError(f"{path}: cannot be read: no such file")
     cloud = read_text_cloud(path)
-    x, columns = _steps(cloud.points[:, 0], path)
-    y, rows = _steps(cloud.points[:, 1], path)
-    if len(x) * len(y) > MOST_POINTS:
+    x, columns = _steps(cloud.points[:, 0], path, policy.max_cells)
+    y, rows = _steps(cloud.points[:, 1], path, policy.max_cells)
+    if len(x) * len(y) > policy.max_cells:
         raise InputError(
-            f"{path}: {len(x)} x {len(y)} cells; expected at most {MOST_POINTS:,} in all"
+            f"{path}: {len(x)} x {len(y)} cells; expected at most {policy.max_cells:,} in all"
         )
     places = rows * len(x) + columns
     if len(np.unique(places)) != len(places):
@@ -407,10 +414,9 @@ def _grid_of_table(path: str | Path) -> _Grid:
     return _Grid(x, y, filled, notes=tuple(notes), gaps=gaps)
 
 
-MAX_SHIFT = 0.02  # share of a step by which coordinates of a table may lie off it, from rounding
-
-
-def _steps(values: Floats, path: str | Path) -> tuple[Floats, npt.NDArray[np.int64]]:
+def _steps(
+    values: Floats, path: str | Path, max_cells: int
+) -> tuple[Floats, npt.NDArray[np.int64]]:
     """Return the equally spaced coordinates along an axis, and the index of each value."""
     known, places = np.unique(values, return_inverse=True)
     if len(known) < 2:
@@ -418,8 +424,8 @@ def _steps(values: Floats, path: str | Path) -> tuple[Floats, npt.NDArray[np.int
     apart = np.diff(known)
     numbers = np.concatenate([[0.0], np.cumsum(np.round(apart / apart.min()))])
     step = (known[-1] - known[0]) / numbers[-1]
-    if numbers[-1] >= MOST_POINTS or (
-        np.abs(known - known[0] - step * numbers).max() > MAX_SHIFT * step
+    if numbers[-1] >= max_cells or (
+        np.abs(known - known[0] - step * numbers).max() > MAX_STEP_SHIFT * step
     ):
         raise InputError(
             f"{path}: its points lie on no grid of equal steps; give a regular grid, or use the "

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from netsp.base.arrays import Floats, Singles
 
 SIDE = 8
-"""Voxels along a side of a block."""
+"""Format of a block: number of voxels along its sides."""
 
 
 @dataclass(frozen=True)

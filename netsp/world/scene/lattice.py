@@ -7,7 +7,6 @@ Both kinds of lattice number their points in one row, so that what is computed p
 from __future__ import annotations
 
 import itertools
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -22,18 +21,9 @@ from netsp.world.scene import blocks as compiled
 from netsp.world.scene.blocks import REACHED, WATER
 from netsp.world.scene.closest import Owners, nearest_sites, sweep, windings
 from netsp.world.scene.grid import SIDE, VoxelGrid
+from netsp.world.scene.scene_policy import GridPolicy
 
 OnStage = Callable[[str, float], None] | None
-
-OUTSIDE, INSIDE = 1.25, 0.9
-"""Sides of a cell: cells with a corner nearer to a surface are blocks. Inside solids: no surface
-passes through a cell whose corners are all deeper than half of its diagonal, sqrt(3) / 2."""
-
-WORKERS = min(4, os.cpu_count() or 1)
-"""More would hold more slabs at a time, and the memory is for one site, not for one core."""
-
-SLAB, HALO = 80_000 // WORKERS, 2
-"""Blocks whose distances each computes at a time, and cells to either side that take part."""
 
 
 @dataclass
@@ -112,12 +102,20 @@ class Sparse:
     near : ndarray of bool, shape (nx, ny, nz)
         Which cells are blocks.
     known : (ndarray, ndarray, ndarray)
-        Some sites, the distances of the corners to them, and which is nearest to each.
+        Sites, the distances of the corners to them, and which is nearest to each.
+    policy : GridPolicy
+        Reach of the blocks, and sizes of the slabs.
     """
 
     def __init__(
-        self, origin: Floats, size: float, near: Bools, known: tuple[Floats, Singles, Owners]
+        self,
+        origin: Floats,
+        size: float,
+        near: Bools,
+        known: tuple[Floats, Singles, Owners],
+        policy: GridPolicy,
     ) -> None:
+        self.policy = policy
         self.origin, self.size, self.known = origin, size, known
         self.counts = (near.shape[0] + 1, near.shape[1] + 1, near.shape[2] + 1)
         self.first = int(np.prod(self.counts))
@@ -154,7 +152,7 @@ class Sparse:
                 self._parts(owner)[1][rows] = s[inner]
             return len(d[inner])
 
-        done, pool = 0, ThreadPoolExecutor(WORKERS)
+        done, pool = 0, ThreadPoolExecutor(self.policy.workers)
         try:
             for count in pool.map(fill, self._slabs()):
                 end_if_abandoned()
@@ -168,17 +166,22 @@ class Sparse:
     def _slabs(self) -> list[tuple[int, int]]:
         """Ranges of cells along x with not too many blocks each."""
         many = np.cumsum(np.bincount(self.blocks[:, 0], minlength=len(self.table)))
-        slab = many // SLAB
+        slab = many // self.policy.slab_size
         cuts: list[Any] = [0, *(np.flatnonzero(np.diff(slab)) + 1), len(slab)]
         return [(int(a), int(b)) for a, b in itertools.pairwise(cuts) if a < b]
 
     def _slab(
-        self, slab: tuple[int, int], sites: Floats, reach: tuple[Floats, Floats],
-        corners: Owners, stop: Flag,
-    ) -> tuple[Singles, Owners, slice]:  # fmt: skip
+        self,
+        slab: tuple[int, int],
+        sites: Floats,
+        reach: tuple[Floats, Floats],
+        corners: Owners,
+        stop: Flag,
+    ) -> tuple[Singles, Owners, slice]:
         """Distances and owners of the blocks of a slab and around it, and which are its own."""
         low, high = slab
-        cuts = np.array([low - HALO, low, high, high + HALO])
+        halo = self.policy.halo_cells
+        cuts = np.array([low - halo, low, high, high + halo])
         begin, first, last, end = np.searchsorted(self.blocks[:, 0], cuts).tolist()
         blocks = self.blocks[begin:end]
         distances = np.full((len(blocks), SIDE**3), np.float32(np.inf))
@@ -186,7 +189,7 @@ class Sparse:
         if not len(blocks):
             return distances, owner, slice(0, 0)
         side = SIDE * self.size
-        ends = self.origin[0] + side * np.array([low - HALO - 1, high + HALO + 1])
+        ends = self.origin[0] + side * np.array([low - halo - 1, high + halo + 1])
         which = np.flatnonzero((reach[1] >= ends[0]) & (reach[0] <= ends[1]))
         place = (self.origin, self.size, begin)
         compiled.nearest_to_corners(sites, place, blocks, corners, distances, owner)
@@ -237,15 +240,22 @@ class Sparse:
     def grid(self, values: Singles, solid: Floats, notes: tuple[str, ...]) -> VoxelGrid:
         """As of `Dense`."""
         side = SIDE * self.size
-        compiled.understate(values, side, OUTSIDE)
+        compiled.understate(values, side, self.policy.block_reach)
         compiled.meet_corners(*self._parts(values), self.blocks, self.table)
         return VoxelGrid(values, self.counts, self.origin, side, solid, notes, self.table)
 
 
 def sparse_near(
-    origin: Floats, size: float, cells: tuple[int, int, int], sites: Floats,
-    shell: float, triangles: Floats | None, region: Floats | None,
-) -> Sparse:  # fmt: skip
+    origin: Floats,
+    size: float,
+    cells: tuple[int, int, int],
+    sites: Floats,
+    policy: GridPolicy,
+    *,
+    shell: float,
+    triangles: Floats | None,
+    region: Floats | None,
+) -> Sparse:
     """The lattice with blocks wherever a surface is near.
 
     Parameters
@@ -273,10 +283,10 @@ def sparse_near(
     corners = (cells[0] + 1, cells[1] + 1, cells[2] + 1)
     side = SIDE * size
     distances, owner = _closest(sites, origin, side, corners, None)
-    near = distances <= shell + OUTSIDE * side
+    near = distances <= shell + policy.block_reach * side
     if triangles is not None:
         inside = windings(triangles, origin, side, corners) != 0
-        near &= ~inside | (distances <= INSIDE * side)
+        near &= ~inside | (distances <= policy.inside_block_reach * side)
     cell = np.zeros(cells, dtype=bool)
     for p in range(2):
         for q in range(2):
@@ -287,7 +297,7 @@ def sparse_near(
             at = origin[axis] + side * np.arange(cells[axis])
             wanted = (at + side >= region[0][axis]) & (at <= region[1][axis])
             cell &= wanted.reshape([-1 if a == axis else 1 for a in range(3)])
-    return Sparse(origin, size, cell, (sites, distances, owner))
+    return Sparse(origin, size, cell, (sites, distances, owner), policy)
 
 
 Lattice = Dense | Sparse
@@ -311,9 +321,8 @@ def tell(on_progress: OnStage, stage: str, fraction: float) -> None:
 
 
 def _closest(
-    sites: Floats, origin: Floats, size: float, counts: tuple[int, ...],
-    on_progress: OnStage,
-) -> tuple[Singles, Owners]:  # fmt: skip
+    sites: Floats, origin: Floats, size: float, counts: tuple[int, ...], on_progress: OnStage
+) -> tuple[Singles, Owners]:
     """Distances of all points of a grid to the nearest site, and which it is."""
     tell(on_progress, "distances", 0.0)
     distances = np.full(counts, np.float32(np.inf))

@@ -22,8 +22,11 @@ _HARMLESS = re.compile(
 )
 """Extensions of glTF that move no vertex."""
 
-_SURFACES = {4, 5}  # modes of glTF's primitives that are read: triangles, and strips of them
+_SURFACES = {4, 5}
+"""Codes of glTF for primitives that are read: triangles and strips of triangles."""
+
 _FAN = 6
+"""Code of glTF for a fan of triangles."""
 
 
 def gltf_parts(path: str | Path) -> tuple[int, list[tuple[str, int]]]:
@@ -208,15 +211,18 @@ def plain_obj(path: str | Path) -> PlainObj:
     corners = [len(f.split(b"#")[0].split()) for f in faces]
     short = sum(count < 3 for count in corners)
     left_out = [
-        ("of points or lines, not of faces", lines), ("of free-form curves or surfaces", curves),
+        ("of points or lines, not of faces", lines),
+        ("of free-form curves or surfaces", curves),
         ("of fewer than three corners", short),
-    ]  # fmt: skip
+    ]
     if re.search(rb"^[ \t]*f[ \t].*-\d", data, re.MULTILINE):
         data = b"\n".join(_with_positive_indices(data))
     return PlainObj(
-        data, len(faces) - short, sum(max(count - 2, 0) for count in corners),
-        [(reason, count) for reason, count in left_out if count],
-    )  # fmt: skip
+        data,
+        faces=len(faces) - short,
+        triangles=sum(max(count - 2, 0) for count in corners),
+        left_out=[(reason, count) for reason, count in left_out if count],
+    )
 
 
 def _with_positive_indices(data: bytes) -> list[bytes]:

@@ -22,16 +22,37 @@ from netsp.base.compiled.kernel import kernel
 from netsp.world.scene.grid import SIDE, VoxelGrid
 from netsp.world.scene.solids import PRISM, solid_distance
 
-COUNT, CELLS, VOXELS, NEAR, PLACE, SHAPE, BLOCKS, FINE = 0, 1, 2, 3, 10, 20, 23, 24
-"""Places in the header: number of solids; where the look-up begins (0: there is none, all solids
-are asked); 1 where there are voxels; of the look-up the origin (3), size of a cell and counts (3);
-of the voxels the origin (3), size and bounding box of all that is solid (6), counts (3), where the
-table of blocks begins (0: there is none), size of a voxel in a block.
+COUNT = 0
+"""Index of the number of solids."""
 
-The table has for each cell between grid points 0, or where its block begins among the voxels."""
+CELLS = 1
+"""Index of the place at which the look-up begins; 0 without a look-up, where all solids are
+measured."""
 
-ROWS, ROW = 25, 17
-"""Where the rows begin, and the length of each: kind and 16 numbers."""
+VOXELS = 2
+"""Index of 1 for a field with voxels, else 0."""
+
+NEAR = 3
+"""Index of the look-up's origin (3), size of a cell and counts (3)."""
+
+PLACE = 10
+"""Index of the voxels' origin (3) and size, and of the bounding box (6) of the solid."""
+
+SHAPE = 20
+"""Index of the counts (3) of the voxels."""
+
+BLOCKS = 23
+"""Index of the place at which the table of blocks begins; 0 without blocks. For each cell between
+grid points, the table holds the place of its block among the voxels, or 0."""
+
+FINE = 24
+"""Index of the size of a voxel in a block."""
+
+ROWS = 25
+"""Index of the first row."""
+
+ROW = 17
+"""Format of a row: its length, of the kind and 16 numbers."""
 
 
 def of_solids(kinds: list[int], rows: list[list[float]], outline: npt.ArrayLike) -> Floats:

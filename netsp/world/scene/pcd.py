@@ -15,16 +15,11 @@ from netsp.base.validated import shown
 from netsp.world.scene.point_clouds import PointCloud, cloud_of_fields, coordinate_fields
 
 _TYPES = {("F", 4): "<f4", ("F", 8): "<f8"} | {
-    (kind, size): f"<{letter}{size}" for kind, letter in (("I", "i"), ("U", "u"))
-    for size in (1, 2, 4, 8)
-}  # fmt: skip
+    (kind, size): f"<{kind.lower()}{size}" for kind in ("I", "U") for size in (1, 2, 4, 8)
+}
 
 PADDING = "_"
 """Name of fields that hold nothing. Packed data do not contain them."""
-
-HEAD_BYTES = 100_000  # largest header; the line DATA must end within these bytes
-
-MAX_UNPACKED = 4 * MOST_BYTES  # bytes of packed data when they are unpacked
 
 
 @dataclass(frozen=True)
@@ -44,7 +39,9 @@ class _Head:
     view: tuple[float, ...]
 
 
-def read_pcd(path: str | Path) -> PointCloud:
+def read_pcd(
+    path: str | Path, *, max_head_bytes: int = 100_000, max_unpacked_bytes: int = 4 * MOST_BYTES
+) -> PointCloud:
     """Read a cloud of the Point Cloud Library.
 
     Parameters
@@ -53,6 +50,10 @@ def read_pcd(path: str | Path) -> PointCloud:
         PCD 0.5 to 0.7 with fields x, y and z (or depth) in any order. Points that are not finite
         mark beams without an echo; they are left out. VIEWPOINT says where the sensor stood, and
         points keep their coordinates, as the library reads them.
+    max_head_bytes : int
+        Maximum size of the header.
+    max_unpacked_bytes : int
+        Maximum size of packed data when they are unpacked.
 
     Raises
     ------
@@ -60,7 +61,7 @@ def read_pcd(path: str | Path) -> PointCloud:
         The header is damaged, a field is missing, or data are missing or damaged.
     """
     data = read_bytes(path)
-    head = _head(data, path)
+    head = _head(data, path, max_head_bytes)
     single = [k for k, count in enumerate(head.counts) if count == 1]
     names = [head.names[k] for k in single]
     if head.form == "ascii":
@@ -68,7 +69,7 @@ def read_pcd(path: str | Path) -> PointCloud:
     elif head.form == "binary":
         values = _from_records(data, head, single, path)
     elif head.form == "binary_compressed":
-        values = _from_columns(data[head.at :], head, single, path)
+        values = _from_columns(data[head.at :], head, single, path, max_unpacked_bytes)
     else:
         raise InputError(
             f"{path}: DATA: expected ascii, binary or binary_compressed, got {shown(head.form)}"
@@ -84,12 +85,12 @@ def read_pcd(path: str | Path) -> PointCloud:
     return replace(cloud, notes=(*cloud.notes, note))
 
 
-def _head(data: bytes, path: str | Path) -> _Head:
+def _head(data: bytes, path: str | Path, max_head_bytes: int) -> _Head:
     lines: dict[str, list[str]] = {}
     at = 0
     while "DATA" not in lines:
         end = data.find(b"\n", at)
-        if end < 0 or end > HEAD_BYTES:
+        if end < 0 or end > max_head_bytes:
             raise InputError(f"{path}: expected a PCD file with a line DATA")
         words = data[at:end].decode("ascii", "replace").split("#")[0].split()
         if words:
@@ -145,10 +146,8 @@ def _from_text(data: bytes, head: _Head, single: list[int], path: str | Path) ->
 
 
 def _from_records(data: bytes, head: _Head, single: list[int], path: str | Path) -> Floats:
-    kind = np.dtype([
-        (f"{k}", known, (count,))
-        for k, (known, count) in enumerate(zip(head.types, head.counts, strict=True))
-    ])  # fmt: skip
+    fields = enumerate(zip(head.types, head.counts, strict=True))
+    kind = np.dtype([(f"{k}", known, (count,)) for k, (known, count) in fields])
     if len(data) - head.at < head.points * kind.itemsize:
         raise InputError(f"{path}: cut short; expected {counted(head.points, 'point')}")
     records = np.frombuffer(data, kind, head.points, head.at)
@@ -158,7 +157,9 @@ def _from_records(data: bytes, head: _Head, single: list[int], path: str | Path)
     return values
 
 
-def _from_columns(data: bytes, head: _Head, single: list[int], path: str | Path) -> Floats:
+def _from_columns(
+    data: bytes, head: _Head, single: list[int], path: str | Path, max_unpacked_bytes: int
+) -> Floats:
     if len(data) < 8:
         raise InputError(f"{path}: cut short; expected the sizes of packed data")
     packed, unpacked = struct.unpack_from("<II", data)
@@ -175,8 +176,8 @@ def _from_columns(data: bytes, head: _Head, single: list[int], path: str | Path)
             f"{path}: expected {head.points * sum(stored)} bytes of unpacked data for "
             f"{counted(head.points, 'point')}, the file states {unpacked}"
         )
-    if unpacked > MAX_UNPACKED:
-        raise InputError(f"{path}: unpacks to more than {MAX_UNPACKED / 2**20:g} MiB")
+    if unpacked > max_unpacked_bytes:
+        raise InputError(f"{path}: unpacks to more than {max_unpacked_bytes / 2**20:g} MiB")
     try:
         plain = unpack_lzf(data[8 : 8 + packed], unpacked)
     except ValueError as error:
@@ -230,16 +231,16 @@ def unpack_lzf(packed: bytes, size: int) -> bytes:
             if length == 7:
                 length += packed[at]
                 at += 1
-            back = ((control & 31) << 8) + packed[at] + 1
+            distance = ((control & 31) << 8) + packed[at] + 1
             at += 1
             length += 2
-            start = len(out) - back
+            start = len(out) - distance
             if start < 0:
                 raise ValueError("a reference leads to before the beginning")
-            if back >= length:
+            if distance >= length:
                 out += out[start : start + length]
             else:  # the copy overlaps what it writes: the bytes repeat
-                out += (bytes(out[start:]) * (length // back + 1))[:length]
+                out += (bytes(out[start:]) * (length // distance + 1))[:length]
         if len(out) > size:
             break
     if len(out) != size:

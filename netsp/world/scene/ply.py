@@ -27,8 +27,6 @@ _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _CORNERS = ("vertex_indices", "vertex_index")
 """Names of the property of a face that lists its corners."""
 
-HEAD_BYTES = 100_000  # largest header
-
 
 @dataclass(frozen=True)
 class PlyFile:
@@ -57,9 +55,7 @@ class PlyFile:
         Faces of more than three corners are cut from their first corner.
         """
         whole = [f for f in self.faces if len(f) >= 3]
-        fans = [
-            np.column_stack([np.full(len(f) - 2, f[0]), f[1:-1], f[2:]]) for f in whole
-        ]  # fmt: skip
+        fans = [np.column_stack([np.full(len(f) - 2, f[0]), f[1:-1], f[2:]]) for f in whole]
         out = np.vstack(fans) if fans else np.empty((0, 3), dtype=np.int64)
         return out.astype(np.int64), len(self.faces) - len(whole)
 
@@ -74,13 +70,15 @@ class _Element:
     properties: list[tuple[str, str, str]]
 
 
-def read_ply(path: str | Path) -> PlyFile:
+def read_ply(path: str | Path, *, max_head_bytes: int = 100_000) -> PlyFile:
     """Read a polygon file as text or binary.
 
     Parameters
     ----------
     path : str or Path
         PLY 1.0 with vertices.
+    max_head_bytes : int
+        Maximum size of the header.
 
     Raises
     ------
@@ -88,7 +86,7 @@ def read_ply(path: str | Path) -> PlyFile:
         The header is damaged, data are missing, or a face refers to a missing vertex.
     """
     data = read_bytes(path)
-    elements, order, at = _head(data, path)
+    elements, order, at = _head(data, path, max_head_bytes)
     reader = _Text(data[at:], path) if not order else _Binary(data, order, at, path)
     names: tuple[str, ...] = ()
     values = np.empty((0, 0))
@@ -113,9 +111,9 @@ def read_ply(path: str | Path) -> PlyFile:
     return PlyFile(names, values, faces, others)
 
 
-def _head(data: bytes, path: str | Path) -> tuple[list[_Element], str, int]:
+def _head(data: bytes, path: str | Path, max_head_bytes: int) -> tuple[list[_Element], str, int]:
     """Return the elements, the order of bytes (empty for text), and the place of the data."""
-    mark = data.find(b"end_header", 0, HEAD_BYTES)
+    mark = data.find(b"end_header", 0, max_head_bytes)
     end = data.find(b"\n", mark)
     if not data.startswith(b"ply") or mark < 0 or end < 0:
         raise InputError(f"{path}: expected a PLY file with a line end_header")
@@ -240,10 +238,8 @@ class _Binary:
         if len(self.data) - at < element.count * kind.itemsize:
             return None
         records = np.frombuffer(self.data, kind, element.count, at)
-        same = all(
-            (records[f"n{k}"] == many).all()
-            for k, (many, p) in enumerate(zip(out, element.properties, strict=True)) if p[2]
-        )  # fmt: skip
+        numbered = enumerate(zip(out, element.properties, strict=True))
+        same = all((records[f"n{k}"] == many).all() for k, (many, p) in numbered if p[2])
         return out if same else None
 
     def _kind(self, element: _Element, lengths: list[int]) -> np.dtype[np.void]:
@@ -266,6 +262,7 @@ class _Binary:
         values = np.column_stack(columns) if columns else np.empty((element.count, 0))
         lists = {
             p[0]: list(records[f"v{k}"].astype(np.int64))
-            for k, p in enumerate(element.properties) if p[2]
-        }  # fmt: skip
+            for k, p in enumerate(element.properties)
+            if p[2]
+        }
         return values.astype(float), lists

@@ -31,8 +31,6 @@ Row = list[Any]
 """Numbers of one solid, or arrays with the numbers of one solid for each point
 (`netsp.world.scene.packing`)."""
 
-CHUNK = 32_768  # points of a block, few enough that its arrays fit in the processor's cache
-
 
 def is_short(data: Floats, count: int) -> bool:
     """Return whether a loop over points is faster than NumPy.
@@ -60,8 +58,9 @@ def distances(data: Floats, offset: float, x: Floats, y: Floats, z: Floats) -> F
         Coordinates of the points.
     """
     out = np.empty(len(x))
-    for first in range(0, len(x), CHUNK):
-        part = slice(first, first + CHUNK)
+    chunk = current_policy().numpy_chunk_items
+    for first in range(0, len(x), chunk):
+        part = slice(first, first + chunk)
         out[part] = _nearest(data, (x[part], y[part], z[part]))[0] - offset
     return out
 
@@ -79,8 +78,9 @@ def samples(data: Floats, offset: float, points: Floats) -> Floats:
         The points.
     """
     out = np.empty((len(points), 5))
-    for first in range(0, len(points), CHUNK):
-        part = slice(first, first + CHUNK)
+    chunk = current_policy().numpy_chunk_items
+    for first in range(0, len(points), chunk):
+        part = slice(first, first + chunk)
         x, y, z = (np.ascontiguousarray(points[part, axis]) for axis in range(3))
         p = (x, y, z)
         own = np.empty((len(x), 5))
@@ -137,7 +137,8 @@ def _candidates_in_numpy(data: Floats) -> tuple[Ints, Ints]:
     rows = range(ROWS, ROWS + ROW * int(data[COUNT]), ROW)
     reach = math.sqrt(3.0) * size * (1.0 + 1e-9)
     listed, items = [np.zeros(1, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-    for first in range(0, len(x), step := max(1, 16 * CHUNK // max(1, len(rows)))):
+    step = max(1, 16 * current_policy().numpy_chunk_items // max(1, len(rows)))
+    for first in range(0, len(x), step):
         p = _at((x, y, z), np.arange(first, min(first + step, len(x))))
         found = np.array(
             [_solids(data, int(data[at]), at, p, has_gradient=False)[0] for at in rows]
@@ -265,9 +266,7 @@ def _capsule(row: Row, p: Vectors, has_gradient: bool) -> Samples:
     vx, vy, vz = p[0] - px, p[1] - py, p[2] - pz
     aa = ax * ax + ay * ay + az * az
     t, is_long = _share((vx * ax + vy * ay + vz * az) / aa), aa > 0.0
-    vx, vy, vz = (
-        np.where(is_long, v - t * a, v) for v, a in ((vx, ax), (vy, ay), (vz, az))
-    )  # fmt: skip
+    vx, vy, vz = (np.where(is_long, v - t * a, v) for v, a in ((vx, ax), (vy, ay), (vz, az)))
     if has_gradient:
         return _round(vx, vy, vz, radius)
     d = np.sqrt(vx * vx + vy * vy + vz * vz) - radius
@@ -289,14 +288,10 @@ def _cylinder(row: Row, p: Vectors, has_gradient: bool) -> Samples:
     if not has_gradient:
         return d, d, d, d
     is_steep = abs(ux) < 0.6
-    nx, ny, nz = (
-        np.where(is_steep, a, b) for a, b in ((0.0, -uz), (uz, 0.0), (-uy, ux))
-    )  # fmt: skip
+    nx, ny, nz = (np.where(is_steep, a, b) for a, b in ((0.0, -uz), (uz, 0.0), (-uy, ux)))
     norm = np.sqrt(nx * nx + ny * ny + nz * nz)
     off = rho > 0.0
-    qx, qy, qz = (
-        np.where(off, q / rho, n / norm) for q, n in ((qx, nx), (qy, ny), (qz, nz))
-    )  # fmt: skip
+    qx, qy, qz = (np.where(off, q / rho, n / norm) for q, n in ((qx, nx), (qy, ny), (qz, nz)))
     sign = np.where(beyond, 1.0, -1.0)
     a = np.where(corner, side / d, np.where(side > end, 1.0, 0.0))
     b = np.where(corner, sign * end / d, np.where(side > end, 0.0, sign))
@@ -385,7 +380,10 @@ def _prism(data: Floats, at: int, p: Vectors) -> Samples:
 
 
 _BY_KIND: dict[int, tuple[int, Callable[[Row, Vectors, bool], Samples]]] = {
-    CAPSULE: (7, _capsule), CYLINDER: (8, _cylinder), BOX: (15, _box), TORUS: (12, _torus),
+    CAPSULE: (7, _capsule),
+    CYLINDER: (8, _cylinder),
+    BOX: (15, _box),
+    TORUS: (12, _torus),
     POST: (3, _post),
-}  # fmt: skip
+}
 """Number of values in the row of a solid, and the function that measures it, by kind of solid."""

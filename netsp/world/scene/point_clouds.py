@@ -259,9 +259,10 @@ def _without_gaps(table: Table, used: Sequence[Quantity]) -> tuple[Table, int]:
     """Return the table without rows whose coordinates are all empty or nan, and their number."""
     first = table.columns[used[0]][0]
     blank = {
-        k for k, cells in enumerate(table.rows)
+        k
+        for k, cells in enumerate(table.rows)
         if first >= len(cells) or cells[first].strip().lower() in ("", "nan")
-    }  # fmt: skip
+    }
     blank = {k for k in blank if all(table.text(k, q).lower() in ("", "nan") for q in used)}
     if not blank:
         return table, 0
@@ -332,7 +333,7 @@ def read_las(path: str | Path) -> PointCloud:
         notes.append(
             f"coordinate system unknown: {'read as metres, ' if unit is None else ''}z upwards"
         )
-    if not heights.is_stated and 1024 <= keys.get(_VERTICAL, 0) < 32767:
+    if not heights.is_stated and 1024 <= keys.get(_VERTICAL, 0) < _USER_DEFINED:
         heights = height_axis(f"EPSG:{keys[_VERTICAL]}")
     unit = 1.0 if unit is None else unit
     metres = _unit_of_key(keys, _HEIGHT_UNIT, path)
@@ -348,20 +349,32 @@ def read_las(path: str | Path) -> PointCloud:
     )
 
 
-_WKT, _KEYS = 2112, 34735  # records of LAS with a coordinate system (LAS 1.4 R15, section 3)
-_MODEL, _MAP_UNIT, _VERTICAL, _HEIGHT_UNIT = (
-    1024,
-    3076,
-    4096,
-    4099,
-)  # keys of GeoTIFF 1.1, section 7
-USER_DEFINED = 32767  # value of a GeoTIFF key whose meaning stands in other keys
+_WKT = 2112
+"""Code of the LAS record with a coordinate system as text (LAS 1.4 R15, section 3)."""
+
+_KEYS = 34735
+"""Code of the LAS record with GeoTIFF keys (LAS 1.4 R15, section 3)."""
+
+_MODEL = 1024
+"""Code of the GeoTIFF key for the kind of coordinates (GeoTIFF 1.1, section 7, as the next)."""
+
+_MAP_UNIT = 3076
+"""Code of the GeoTIFF key for the unit of the map."""
+
+_VERTICAL = 4096
+"""Code of the GeoTIFF key for the vertical system."""
+
+_HEIGHT_UNIT = 4099
+"""Code of the GeoTIFF key for the unit of heights."""
+
+_USER_DEFINED = 32767
+"""Code of GeoTIFF for a value whose meaning is given by other keys."""
 
 
 def _unit_of_key(keys: dict[int, int], key: int, path: str | Path) -> float | None:
     """Return the metres in the unit that a GeoTIFF key states; None where it states none."""
     code = keys.get(key, 0)
-    if code in (0, USER_DEFINED):
+    if code in (0, _USER_DEFINED):
         return None
     metres = metres_per_unit_code(code)
     if metres is None:

@@ -114,9 +114,12 @@ class Placement:
     rotate: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def apply(
-        self, points: Floats, up: Up = "z", metres: tuple[float, float, float] = (1.0, 1.0, 1.0),
+        self,
+        points: Floats,
+        up: Up = "z",
+        metres: tuple[float, float, float] = (1.0, 1.0, 1.0),
         source: str = "file",
-    ) -> Floats:  # fmt: skip
+    ) -> Floats:
         """Return points of a file in the scene.
 
         Parameters

@@ -23,6 +23,7 @@ from netsp.model.problem import Circle, Problem
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.grid import VoxelGrid
 from netsp.world.scene.readers import Placement, read_cloud_file, read_mesh_file
+from netsp.world.scene.scene_policy import FloorPolicy, ScenePolicy
 from netsp.world.scene.seams import seam_boxes
 from netsp.world.scene.shapes import (
     Box,
@@ -307,6 +308,7 @@ class Scene(FileModel):
         voxel: float | None = None,
         memory_limit: float = 4.0,
         on_progress: Callable[[str, float], None] | None = None,
+        policy: ScenePolicy | None = None,
     ) -> DistanceField:
         """The distance field of the scene.
 
@@ -334,10 +336,17 @@ class Scene(FileModel):
             raise InputError(
                 f"{self.name}: the scene is empty; expected solids, mesh, cloud or floor"
             )
-        grid = self.voxels(voxel=voxel, memory_limit=memory_limit, on_progress=on_progress)
-        return self.field_with(solids, grid)
+        grid = self.voxels(
+            voxel=voxel, memory_limit=memory_limit, on_progress=on_progress, policy=policy
+        )
+        return self.field_with(solids, grid, policy)
 
-    def field_with(self, solids: tuple[Solid, ...], grid: VoxelGrid | None) -> DistanceField:
+    def field_with(
+        self,
+        solids: tuple[Solid, ...],
+        grid: VoxelGrid | None,
+        policy: ScenePolicy | None = None,
+    ) -> DistanceField:
         """The field of other solids about the same voxels.
 
         Parameters
@@ -354,11 +363,19 @@ class Scene(FileModel):
         """
         kind, rows, outline = encode(solids)
         boxes = [b for s in solids if (b := s.shape.box()) is not None]
-        seams = seam_boxes([s.shape for s in solids])
+        policy = policy or ScenePolicy()
+        seams = seam_boxes([s.shape for s in solids], policy.seams)
         return DistanceField.build(
-            kind + [BOX] * len(seams), rows + [row for _, row in seams], outline, boxes, grid,
-            self.tether_radius, _thickness(solids), [owner for owner, _ in seams],
-        )  # fmt: skip
+            kind + [BOX] * len(seams),
+            rows + [row for _, row in seams],
+            outline,
+            boxes,
+            grid,
+            self.tether_radius,
+            thickness=_thickness(solids),
+            seams=[owner for owner, _ in seams],
+            policy=policy.distances,
+        )
 
     def voxels(
         self,
@@ -366,6 +383,7 @@ class Scene(FileModel):
         voxel: float | None = None,
         memory_limit: float = 4.0,
         on_progress: Callable[[str, float], None] | None = None,
+        policy: ScenePolicy | None = None,
     ) -> VoxelGrid | None:
         """Distances to what no solid describes.
 
@@ -392,21 +410,25 @@ class Scene(FileModel):
             return None
         from netsp.world.scene import voxels
 
-        parts, points, said = self._files()
+        policy = policy or ScenePolicy()
+        parts, points, notes = self._files(policy.floor)
         options: dict[str, Any] = {
-            "voxel": voxel or self._voxel(), "memory_limit": memory_limit,
-            "on_progress": on_progress, "source": self._source(),
-        }  # fmt: skip
+            "voxel": voxel or self._voxel(),
+            "memory_limit": memory_limit,
+            "on_progress": on_progress,
+            "source": self._source(),
+            "policy": policy.grid,
+        }
         if points is not None:
             grid = (
-                voxels.of_meshes_and_cloud(list(parts.values()), points, **options)
+                voxels.grid_of_meshes_and_cloud(list(parts.values()), points, **options)
                 if parts
-                else voxels.of_cloud(points, **options)
+                else voxels.grid_of_cloud(points, **options)
             )
         else:
             region = self._water(parts) if "floor" in parts else None
-            grid = voxels.of_meshes(list(parts.values()), region=region, **options)
-        return replace(grid, notes=(*said, *grid.notes))
+            grid = voxels.grid_of_meshes(list(parts.values()), region=region, **options)
+        return replace(grid, notes=(*notes, *grid.notes))
 
     def _water(self, parts: Mapping[str, Any]) -> Floats:
         """Return the box above a sea floor; below it, and beyond its walls, there is nothing to
@@ -415,10 +437,8 @@ class Scene(FileModel):
         top = vertices[: len(vertices) // 2]
         water = np.array([top.min(0), [*top.max(0)[:2], np.inf]])
         if "mesh" in parts:
-            water = np.array([
-                np.minimum(water[0], parts["mesh"][0].min(0)),
-                np.maximum(water[1], parts["mesh"][0].max(0)),
-            ])  # fmt: skip
+            low, high = parts["mesh"][0].min(0), parts["mesh"][0].max(0)
+            water = np.array([np.minimum(water[0], low), np.maximum(water[1], high)])
         return water
 
     def _voxel(self) -> float | None:
@@ -431,30 +451,33 @@ class Scene(FileModel):
         return files[0] if len(files) == 1 and self.floor is None else self.name
 
     def _files(
-        self,
+        self, policy: FloorPolicy | None = None
     ) -> tuple[dict[str, tuple[Floats, npt.NDArray[np.int64]]], Floats | None, list[str]]:
         """Read mesh, floor and cloud: triangles by name, points, and notes of what was left out."""
         parts: dict[str, tuple[Floats, npt.NDArray[np.int64]]] = {}
         points: Floats | None = None
-        said: list[str] = []
+        notes: list[str] = []
         if self.mesh is not None:
             mesh = read_mesh_file(self.mesh.file, self.mesh.placement)
             parts["mesh"] = mesh.vertices, mesh.faces
-            said += _said(self.mesh.file, mesh.notes, mesh.tally)
+            notes += _file_notes(self.mesh.file, mesh.notes, mesh.tally)
         if self.floor is not None:
             from netsp.world.scene.floor import read_floor
 
             floor = read_floor(
-                self.floor.file, scale=self.floor.scale, origin=self.floor.origin,
+                self.floor.file,
+                scale=self.floor.scale,
+                origin=self.floor.origin,
                 depths=self.floor.depths,
-            )  # fmt: skip
+                policy=policy,
+            )
             parts["floor"] = floor.vertices, floor.faces
-            said += _said(self.floor.file, floor.notes, floor.tally)
+            notes += _file_notes(self.floor.file, floor.notes, floor.tally)
         if self.cloud is not None:
             cloud = read_cloud_file(self.cloud.file, self.cloud.placement)
             points = cloud.points
-            said += _said(self.cloud.file, cloud.notes, cloud.tally)
-        return parts, points, said
+            notes += _file_notes(self.cloud.file, cloud.notes, cloud.tally)
+        return parts, points, notes
 
     def reading_notes(self) -> list[str]:
         """Return what was left out, turned or converted when the scene's files were read.
@@ -488,7 +511,7 @@ class Scene(FileModel):
         return list(without._files()[0].items())
 
 
-def _said(file: str, notes: Sequence[str], tally: Tally) -> list[str]:
+def _file_notes(file: str, notes: Sequence[str], tally: Tally) -> list[str]:
     """Return the notes on a file, and how many of its parts are used where not all are."""
     return [f"{file}: {note}" for note in (*notes, tally.note) if note]
 

@@ -20,37 +20,11 @@ from shapely.geometry.polygon import orient
 
 from netsp.base.arrays import Floats
 from netsp.base.clock import end_if_abandoned
+from netsp.world.scene.scene_policy import SeamPolicy
 from netsp.world.scene.shapes import Box, Cylinder, HalfSpace, Prism, Shape
 
-GAP, OVERLAP = 1e-3, 0.1
-"""Metres between two faces that count as touching, and how far one solid may be in the other until
-what they share is deep enough without."""
-
-PARALLEL = 1e-3
-"""Radians between two faces that count as parallel."""
-
-THICK = 0.5
-"""Metres that a box goes into either solid at most."""
-
-LEAST = 1e-3
-"""Metres: a seam that is narrower than that is left as it is."""
-
-LOWEST, GROWTH = 0.17, 1.7
-"""Metres of the lowest box that stands on a side of a seam with few of them, and how much each is
-higher than the one before: a point that is r from its nearest side and from all others has a box
-of any height between r and 2 r on it. So everything 0.15 m from the rim is as deep as edges dip."""
-
-FEW = 10
-"""Sides of a seam that are few."""
-
-STRIP, FEWEST, MOST = 0.15, 18, 120
-"""Metres of the parts that a seam with many sides is cut into, and how many there are."""
-
-AROUND = 32
-"""Corners that stand for a circle; they lie on it, so that nothing sticks out."""
-
-FAR = 1e4
-"""Metres to where a face without end is taken."""
+Rectangle = tuple[tuple[float, float, float, float], Floats]
+"""Ends (x0, y0, x1, y1) of a rectangle in a frame of its own, and the first axis of the frame."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +49,9 @@ class Face:
     inset: bool = False
 
 
-def seam_boxes(shapes: Sequence[Shape]) -> list[tuple[int, list[float]]]:
+def seam_boxes(
+    shapes: Sequence[Shape], policy: SeamPolicy | None = None
+) -> list[tuple[int, list[float]]]:
     """Boxes that fill the seams between solids.
 
     Parameters
@@ -88,33 +64,35 @@ def seam_boxes(shapes: Sequence[Shape]) -> list[tuple[int, list[float]]]:
     list of (int, list of float)
         Number of one of the two solids, and the row of a box for `netsp.world.scene.solids`.
     """
+    policy = policy or SeamPolicy()
     flat = [k for k, s in enumerate(shapes) if isinstance(s, Box | Cylinder | Prism | HalfSpace)]
-    ends = np.array([_ends(shapes[k]) for k in flat]).reshape(-1, 2, 3)
+    ends = np.array([_ends(shapes[k], policy) for k in flat]).reshape(-1, 2, 3)
     rows = []
     for n, a in enumerate(flat[:-1]):
         end_if_abandoned()
         others = ends[n + 1 :]
-        near = (others[:, 0] <= ends[n, 1] + GAP) & (others[:, 1] >= ends[n, 0] - GAP)
+        gap = policy.max_gap
+        near = (others[:, 0] <= ends[n, 1] + gap) & (others[:, 1] >= ends[n, 0] - gap)
         for m in np.flatnonzero(near.all(1)):
             b = flat[n + 1 + int(m)]
             at = 0.5 * (np.maximum(ends[n, 0], others[m, 0]) + np.minimum(ends[n, 1], others[m, 1]))
-            for one in _faces(shapes[a], at):
-                for other in _faces(shapes[b], at):
-                    rows += [(a, row) for row in _between(one, other)]
+            for first in _faces(shapes[a], at, policy):
+                for second in _faces(shapes[b], at, policy):
+                    rows += [(a, row) for row in _between(first, second, policy)]
     return rows
 
 
-def _ends(shape: Shape) -> Floats:
+def _ends(shape: Shape, policy: SeamPolicy) -> Floats:
     """(2, 3) bounding box; `FAR` where there is no end."""
-    found = shape.box()
+    found, far = shape.box(), policy.endless_size
     if found is None:
-        return np.array([[-FAR] * 3, [FAR] * 3])
+        return np.array([[-far] * 3, [far] * 3])
     if isinstance(shape, Prism):
-        found[:, 2] = -FAR, FAR
+        found[:, 2] = -far, far
     return found
 
 
-def _faces(shape: Shape, at: Floats) -> Iterator[Face]:
+def _faces(shape: Shape, at: Floats, policy: SeamPolicy) -> Iterator[Face]:
     """The flat faces of a solid; of those without end the part about a point."""
     if isinstance(shape, Box):
         axes, half = shape.axes(), 0.5 * np.array(shape.size)
@@ -128,7 +106,7 @@ def _faces(shape: Shape, at: Floats) -> Iterator[Face]:
         a, b = np.array(shape.a), np.array(shape.b)
         axis = (b - a) / shape.length
         u, v = _across(axis)
-        angle = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)[:, None]
+        angle = np.linspace(0.0, 2.0 * np.pi, policy.circle_corners, endpoint=False)[:, None]
         ring = shape.radius * (np.cos(angle) * u + np.sin(angle) * v)
         yield Face(a + ring, -axis, shape.length)
         yield Face(b + ring, axis, shape.length)
@@ -136,13 +114,14 @@ def _faces(shape: Shape, at: Floats) -> Iterator[Face]:
         normal = np.array(shape.normal) / np.linalg.norm(shape.normal)
         u, v = _across(normal)
         middle = at - ((at - np.array(shape.point)) @ normal) * normal
-        yield Face(middle + FAR * np.array([u + v, u - v, -u - v, v - u]), normal, np.inf)
+        square = np.array([u + v, u - v, -u - v, v - u])
+        yield Face(middle + policy.endless_size * square, normal, np.inf)
     elif isinstance(shape, Prism):
         polygon = Polygon(shape.polygon)
         ring = np.array(polygon.exterior.coords)
         if not polygon.exterior.is_ccw:
             ring = ring[::-1]
-        up = np.array([0.0, 0.0, FAR])
+        up = np.array([0.0, 0.0, policy.endless_size])
         for p, q in pairwise(ring):
             along = (q - p) / np.linalg.norm(q - p)
             normal = np.array([along[1], -along[0], 0.0])
@@ -157,30 +136,32 @@ def _across(axis: Floats) -> tuple[Floats, Floats]:
     return u, np.cross(axis, u)
 
 
-def _between(one: Face, other: Face) -> Iterator[list[float]]:
+def _between(first: Face, second: Face, policy: SeamPolicy) -> Iterator[list[float]]:
     """Rows of the boxes between two faces that touch or nearly so."""
-    if one.normal @ other.normal > -np.cos(PARALLEL):
+    if first.normal @ second.normal > -np.cos(policy.max_angle):
         return
-    gap = float((other.corners.mean(0) - one.corners[0]) @ one.normal)
-    if not -OVERLAP <= gap <= GAP:
+    gap = float((second.corners.mean(0) - first.corners[0]) @ first.normal)
+    if not -policy.max_overlap <= gap <= policy.max_gap:
         return
     # each goes that much into both solids, measured from half way between the faces
-    thick = min(one.depth, other.depth, THICK) - 0.5 * abs(gap)
-    normal, origin = one.normal, one.corners[0]
-    u = max(np.roll(one.corners, -1, axis=0) - one.corners, key=np.linalg.norm)
+    thick = min(first.depth, second.depth, policy.max_depth) - 0.5 * abs(gap)
+    normal, origin = first.normal, first.corners[0]
+    u = max(np.roll(first.corners, -1, axis=0) - first.corners, key=np.linalg.norm)
     u = u / np.linalg.norm(u)
     v = np.cross(normal, u)
     frame = np.column_stack([u, v])
-    shared = Polygon((one.corners - origin) @ frame).intersection(
-        Polygon((other.corners - origin) @ frame)
+    shared = Polygon((first.corners - origin) @ frame).intersection(
+        Polygon((second.corners - origin) @ frame)
     )
-    if one.inset or other.inset:
+    if first.inset or second.inset:
         thick = 0.5 * min(thick, _width(shared))
         shared = shared.buffer(-thick, join_style="mitre")
-    if not isinstance(shared, Polygon) or shared.is_empty or min(thick, _width(shared)) < LEAST:
+    if not isinstance(shared, Polygon) or shared.is_empty:
+        return
+    if min(thick, _width(shared)) < policy.min_width:
         return
     level = origin + 0.5 * gap * normal
-    for (x0, y0, x1, y1), turned in _rectangles(shared):
+    for (x0, y0, x1, y1), turned in _rectangles(shared, policy):
         along = turned[0] * u + turned[1] * v
         middle = np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1)])
         across = np.cross(normal, along)
@@ -197,7 +178,7 @@ def _width(shared: Polygon) -> float:
     return float(np.linalg.norm(np.diff(corners, axis=0), axis=1).min())
 
 
-def _rectangles(shared: Polygon) -> Iterator[tuple[tuple[float, float, float, float], Floats]]:
+def _rectangles(shared: Polygon, policy: SeamPolicy) -> Iterator[Rectangle]:
     """Rectangles inside a convex polygon that cover it but for slivers, in a frame of their own:
     the ends of each, and the first axis of the frame."""
     around = shared.minimum_rotated_rectangle
@@ -210,12 +191,14 @@ def _rectangles(shared: Polygon) -> Iterator[tuple[tuple[float, float, float, fl
         local = corners @ frame
         yield (*local.min(0), *local.max(0)), first
         return
-    shared = shapely.remove_repeated_points(shared, LEAST)
-    sides = len(shared.exterior.coords) - 1
-    yield from _on_sides(shared) if sides <= FEW else _in_strips(shared, first)
+    shared = shapely.remove_repeated_points(shared, policy.min_width)
+    if len(shared.exterior.coords) - 1 <= policy.max_few_sides:
+        yield from _on_sides(shared, policy)
+    else:
+        yield from _in_strips(shared, first, policy)
 
 
-def _on_sides(shared: Polygon) -> Iterator[tuple[tuple[float, float, float, float], Floats]]:
+def _on_sides(shared: Polygon, policy: SeamPolicy) -> Iterator[Rectangle]:
     """Rectangles of growing heights on each side of a convex polygon."""
     corners = np.array(orient(shared).exterior.coords)
     for p, q in pairwise(corners):
@@ -224,26 +207,25 @@ def _on_sides(shared: Polygon) -> Iterator[tuple[tuple[float, float, float, floa
         turned = Polygon(corners @ np.column_stack([along, [-along[1], along[0]]]))
         x, y = along @ p, -along[1] * p[0] + along[0] * p[1]
         left, _, right, top = turned.bounds
-        height, top = LOWEST, top - y
-        while height < GROWTH * top:
-            upper = min(height, top - LEAST)
+        height, top = policy.min_height, top - y
+        while height < policy.height_growth * top:
+            upper = min(height, top - policy.min_width)
             across = LineString([(left - 1.0, y + upper), (right + 1.0, y + upper)])
             x0, _, x1, _ = turned.intersection(across).bounds
             x0, x1 = max(x, x0), min(x + length, x1)
-            if x1 - x0 > LEAST:
+            if x1 - x0 > policy.min_width:
                 yield (x0, y, x1, y + upper), along
-            height *= GROWTH
+            height *= policy.height_growth
 
 
-def _in_strips(
-    shared: Polygon, first: Floats
-) -> Iterator[tuple[tuple[float, float, float, float], Floats]]:
+def _in_strips(shared: Polygon, first: Floats, policy: SeamPolicy) -> Iterator[Rectangle]:
     """Rectangles between cuts across a convex polygon, in a frame with the given first axis."""
     turned = Polygon(
         np.array(shared.exterior.coords) @ np.column_stack([first, [-first[1], first[0]]])
     )
     x0, y0, x1, y1 = turned.bounds
-    strips = int(np.clip(np.ceil((x1 - x0) / STRIP), FEWEST, MOST))
+    wanted = np.ceil((x1 - x0) / policy.strip_width)
+    strips = int(np.clip(wanted, policy.min_strips, policy.max_strips))
     cuts = np.linspace(x0, x1, strips + 1)[1:-1]
     # the lower side is convex and the upper concave: between two cuts they are narrowest at these
     sides = [turned.intersection(box(x, y0 - 1.0, x, y1 + 1.0)).bounds for x in cuts]
@@ -253,5 +235,5 @@ def _in_strips(
     for i, j in sorted(nested | in_a_row):
         low = max(sides[i][1], sides[j][1])
         high = min(sides[i][3], sides[j][3])
-        if high - low > LEAST:
+        if high - low > policy.min_width:
             yield (cuts[i], low, cuts[j], high), first

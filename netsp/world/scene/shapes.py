@@ -174,10 +174,15 @@ class Torus(Model):
     def row(self) -> SolidRow:
         """Its kind, and the numbers that the kernels read of it (`netsp.world.scene.solids`)."""
         axis, start, _ = self.frame()
+        angle = math.radians(self.angle)
         return kinds.TORUS, [
-            *self.center, *axis, *start, self.major_radius, self.minor_radius,
-            math.radians(self.angle),
-        ]  # fmt: skip
+            *self.center,
+            *axis,
+            *start,
+            self.major_radius,
+            self.minor_radius,
+            angle,
+        ]
 
     def thickness(self) -> float:
         """Of its thinnest part (m); inf if nothing of it is thin."""

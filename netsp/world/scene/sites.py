@@ -16,8 +16,11 @@ import numpy.typing as npt
 from netsp.base.arrays import Floats
 from netsp.base.compiled.kernel import kernel
 
-POINT, TRIANGLE = 4, 20
-"""Numbers of a site."""
+POINT = 4
+"""Format of the row of a point: its length."""
+
+TRIANGLE = 20
+"""Format of the row of a triangle: its length."""
 
 
 def point_sites(points: Floats, radii: npt.ArrayLike = 0.0) -> Floats:

@@ -199,9 +199,7 @@ def _torus(data: Floats, r: int, x: float, y: float, z: float) -> tuple[float, f
         # beyond the ends: the nearer one
         angle = most if angle - most < TWO_PI - angle else 0.0
     c, s = bend * math.cos(angle), bend * math.sin(angle)
-    return _round(
-        vx - c * sx - s * tx, vy - c * sy - s * ty, vz - c * sz - s * tz, radius
-    )  # fmt: skip
+    return _round(vx - c * sx - s * tx, vy - c * sy - s * ty, vz - c * sz - s * tz, radius)
 
 
 @kernel

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
+from netsp.base.number_ranges import check_positive
 from netsp.world.scene.scene import Scene
 from netsp.world.scene.shapes import (
     Box,
@@ -23,32 +26,48 @@ from netsp.world.scene.shapes import (
 Faces = npt.NDArray[np.int64]
 Triangles = tuple[Floats, Faces]
 
-AROUND = 32
-"""Sides of what is round."""
 
-MOST_POINTS = 20_000
-"""Points of a cloud that are drawn."""
+@dataclass(frozen=True)
+class SurfacePolicy:
+    """Policy of the surfaces that pictures show. All numbers are positive.
+
+    Attributes
+    ----------
+    circle_sides
+        Number of sides of the polygon that stands for a circle.
+    max_cloud_points
+        Maximum number of points of a cloud that are drawn.
+    """
+
+    circle_sides: int = 32
+    max_cloud_points: int = 20_000
+
+    def __post_init__(self) -> None:
+        check_positive(self)
 
 
-def surface_of(shape: Shape, low: Floats, high: Floats) -> Triangles:
+def surface_of(
+    shape: Shape, low: Floats, high: Floats, policy: SurfacePolicy | None = None
+) -> Triangles:
     """Vertices (n, 3) and faces (m, 3) of a shape; what has no end is cut off at the corners `low`
     and `high` (3,) of the picture."""
+    sides = (policy or SurfacePolicy()).circle_sides
     if isinstance(shape, Sphere):
-        return _tube(np.array([shape.center, shape.center]), shape.radius, round_ends=True)
+        return _tube(np.array([shape.center, shape.center]), shape.radius, sides, round_ends=True)
     if isinstance(shape, Capsule):
-        return _tube(np.array([shape.a, shape.b]), shape.radius, round_ends=True)
+        return _tube(np.array([shape.a, shape.b]), shape.radius, sides, round_ends=True)
     if isinstance(shape, Cylinder):
-        return _tube(np.array([shape.a, shape.b]), shape.radius)
+        return _tube(np.array([shape.a, shape.b]), shape.radius, sides)
     if isinstance(shape, Torus):
         closed = shape.angle == 360.0
-        return _tube(shape.centreline(), shape.minor_radius, round_ends=not closed)
+        return _tube(shape.centreline(), shape.minor_radius, sides, round_ends=not closed)
     if isinstance(shape, Box):
         corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
         vertices = np.array(shape.center) + 0.5 * corners * shape.size @ shape.axes()
         return vertices, _BOX
     if isinstance(shape, Post):
         x, y = shape.center
-        return _tube(np.array([[x, y, low[2]], [x, y, high[2]]]), shape.radius)
+        return _tube(np.array([[x, y, low[2]], [x, y, high[2]]]), shape.radius, sides)
     if isinstance(shape, Prism):
         return _walls(shape, float(low[2]), float(high[2]))
     return _plane(shape, low, high)
@@ -60,7 +79,7 @@ _BOX = np.array(
 )  # fmt: skip
 
 
-def _tube(line: Floats, radius: float, round_ends: bool = False) -> Triangles:
+def _tube(line: Floats, radius: float, sides: int, round_ends: bool = False) -> Triangles:
     """A tube about a line of points, with flat or round ends."""
     ahead = np.diff(line, axis=0, append=2 * line[-1:] - line[-2:-1])
     if not np.any(ahead):
@@ -76,7 +95,7 @@ def _tube(line: Floats, radius: float, round_ends: bool = False) -> Triangles:
         centres = [c for c, _ in first] + centres + [c for c, _ in reversed(last)]
         radii = [r for _, r in first] + radii + [r for _, r in reversed(last)]
         axes = [tangents[0]] * 4 + axes + [tangents[-1]] * 4
-    turn = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
+    turn = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
     across = np.eye(3)[np.abs(axes[0]).argmin()]
     rings = []
     for centre, r, axis in zip(centres, radii, axes, strict=True):
@@ -85,8 +104,8 @@ def _tube(line: Floats, radius: float, round_ends: bool = False) -> Triangles:
         other = np.cross(axis, across)
         rings.append(centre + r * (np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * other))
     vertices = np.vstack([*rings, centres[0], centres[-1]])
-    k = np.arange(AROUND)
-    nxt = (k + 1) % AROUND
+    k = np.arange(sides)
+    nxt = (k + 1) % sides
     faces = [
         np.vstack(
             [
@@ -94,12 +113,12 @@ def _tube(line: Floats, radius: float, round_ends: bool = False) -> Triangles:
                 np.column_stack([a + nxt, b + nxt, b + k]),
             ]
         )
-        for a, b in ((AROUND * i, AROUND * (i + 1)) for i in range(len(rings) - 1))
+        for a, b in ((sides * i, sides * (i + 1)) for i in range(len(rings) - 1))
     ]
-    top = AROUND * (len(rings) - 1)
-    ends = AROUND * len(rings)
-    faces.append(np.column_stack([nxt, k, np.full(AROUND, ends)]))
-    faces.append(np.column_stack([top + k, top + nxt, np.full(AROUND, ends + 1)]))
+    top = sides * (len(rings) - 1)
+    ends = sides * len(rings)
+    faces.append(np.column_stack([nxt, k, np.full(sides, ends)]))
+    faces.append(np.column_stack([top + k, top + nxt, np.full(sides, ends + 1)]))
     return vertices, np.vstack(faces)
 
 
@@ -131,11 +150,10 @@ def _plane(shape: HalfSpace, low: Floats, high: Floats) -> Triangles:
     middle = 0.5 * (low + high)
     middle = middle - ((middle - shape.point) @ normal) * normal
     reach = 0.5 * float(np.linalg.norm(high - low))
-    vertices = np.array([middle + reach * (a * u + b * v) for a, b in _SQUARE])
+    vertices = np.array(
+        [middle + reach * (a * u + b * v) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    )
     return vertices, np.array([[0, 1, 2], [0, 2, 3]])
-
-
-_SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 
 
 def extent(scene: Scene, *points: Floats) -> tuple[Floats, Floats]:
@@ -169,10 +187,11 @@ def extent(scene: Scene, *points: Floats) -> tuple[Floats, Floats]:
     return low - room, high + room
 
 
-def drawn_points(scene: Scene) -> Floats:
+def drawn_points(scene: Scene, policy: SurfacePolicy | None = None) -> Floats:
     """Some of the points of the scene's cloud."""
     from netsp.world.scene.readers import load_cloud
 
     assert scene.cloud is not None
+    most = (policy or SurfacePolicy()).max_cloud_points
     points = load_cloud(scene.cloud.file, scene.cloud.placement)[0]
-    return np.asarray(points[:: -(-len(points) // MOST_POINTS)])
+    return np.asarray(points[:: -(-len(points) // most)])

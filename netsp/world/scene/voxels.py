@@ -22,40 +22,18 @@ from netsp.base.errors import InputError
 from netsp.world.scene.grid import SIDE, VoxelGrid
 from netsp.world.scene.lattice import Dense, Lattice, OnStage, sparse_near, tell
 from netsp.world.scene.readers import Placement, load_cloud, load_mesh
+from netsp.world.scene.scene_policy import GridPolicy
 from netsp.world.scene.sites import point_sites, triangle_sites
 
-DEFAULT_VOXELS = 200
-"""Voxels along the longest side when no size is given."""
 
-BYTES_PER_VOXEL = 28
-"""At the peak of building."""
-
-MOST_DENSE = 40_000_000
-"""Grid points, above which only those near surfaces are held."""
-
-MESH_BLOCK, CLOUD_BLOCK = 2700, 30_000
-"""Bytes per block of a sparse grid at the peak of building, with the points of a cloud and the tree
-that finds their neighbours (measured with 13 and 54 points to a block)."""
-
-BYTES_PER_CELL, PAD = 48, 4
-"""Of a cell without grid points, and cells between the solid and the border of a sparse grid."""
-
-SHEET = 2.0
-"""Voxels to either side of what has no thickness of its own. With one, interpolation between the
-grid's points rounds both sides into one: tethers of different resolutions then parted by up to
-85 % along a tour about FC-Planner's pipes, and a planner's forecast was off by 1 %."""
-
-MARGIN = 8
-"""Voxels between the solid and the border of the grid."""
-
-
-def of_mesh(
+def grid_of_mesh_file(
     path: str | Path,
     *,
     scale: float = 1.0,
     voxel: float | None = None,
     memory_limit: float = 4.0,
     on_progress: OnStage = None,
+    policy: GridPolicy | None = None,
 ) -> VoxelGrid:
     """The distance grid of a mesh file in any format that trimesh reads (STL, OBJ, PLY, GLB, …).
 
@@ -67,14 +45,19 @@ def of_mesh(
     """
     vertices, faces, notes = load_mesh(path, Placement(scale))
     end_if_abandoned()
-    grid = of_triangles(
-        vertices, faces, voxel=voxel, memory_limit=memory_limit,
-        on_progress=on_progress, source=str(path),
-    )  # fmt: skip
+    grid = grid_of_triangles(
+        vertices,
+        faces,
+        voxel=voxel,
+        memory_limit=memory_limit,
+        on_progress=on_progress,
+        source=str(path),
+        policy=policy,
+    )
     return replace(grid, notes=(*notes, *grid.notes))
 
 
-def of_meshes(
+def grid_of_meshes(
     parts: list[tuple[Floats, npt.NDArray[np.int64]]],
     *,
     voxel: float | None = None,
@@ -82,18 +65,23 @@ def of_meshes(
     on_progress: OnStage = None,
     region: Floats | None = None,
     source: str = "mesh",
+    policy: GridPolicy | None = None,
 ) -> VoxelGrid:
     """The distance grid of several meshes together: vertices (n, 3) and faces (m, 3) of each."""
     first = np.cumsum([0, *(len(v) for v, _ in parts)])
-    return of_triangles(
+    return grid_of_triangles(
         np.vstack([v for v, _ in parts]),
         np.vstack([f + n for (_, f), n in zip(parts, first, strict=False)]),
-        voxel=voxel, memory_limit=memory_limit, on_progress=on_progress, source=source,
+        voxel=voxel,
+        memory_limit=memory_limit,
+        on_progress=on_progress,
         region=region,
-    )  # fmt: skip
+        source=source,
+        policy=policy,
+    )
 
 
-def of_triangles(
+def grid_of_triangles(
     vertices: npt.ArrayLike,
     faces: npt.ArrayLike,
     *,
@@ -102,6 +90,7 @@ def of_triangles(
     on_progress: OnStage = None,
     region: Floats | None = None,
     source: str = "mesh",
+    policy: GridPolicy | None = None,
 ) -> VoxelGrid:
     """The distance grid of triangles: vertices (n, 3), faces (m, 3)."""
     v, f = np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.int64)
@@ -117,13 +106,13 @@ def of_triangles(
         raise InputError(f"{source}: a vertex is not finite")
     mesh = _Triangles.of(v, f)
     low, high = mesh.triangles.min((0, 1)), mesh.triangles.max((0, 1))
-    lattice = _lattice(
-        low, high, voxel, memory_limit, source, mesh.sites,
-        shell=SHEET if mesh.open_edges else 0.0,
-        triangles=None if mesh.open_edges else mesh.triangles, region=region,
-    )  # fmt: skip
-    values, notes = mesh.values(lattice, on_progress, source)
-    grow = SHEET * lattice.size if mesh.open_edges else 0.0
+    policy = policy or GridPolicy()
+    half = policy.sheet_voxels if mesh.open_edges else 0.0
+    place = _Place(low, high, _size(low, high, voxel, source, policy), memory_limit, source)
+    triangles = None if mesh.open_edges else mesh.triangles
+    lattice = _lattice(place, mesh.sites, policy, shell=half, triangles=triangles, region=region)
+    values, notes = mesh.values(lattice, on_progress, source, policy.sheet_voxels)
+    grow = half * lattice.size
     tell(on_progress, "distances", 1.0)
     return lattice.grid(values, np.array([low - grow, high + grow]), tuple(notes))
 
@@ -149,13 +138,13 @@ class _Triangles:
         return cls(triangles, triangle_sites(triangles), open_edges, uneven, turned)
 
     def values(
-        self, lattice: Lattice, on_progress: OnStage, source: str
+        self, lattice: Lattice, on_progress: OnStage, source: str, sheet_voxels: float
     ) -> tuple[Singles, list[str]]:
         """Return the signed distances at the points of a lattice, and what was assumed."""
         size, notes = lattice.size, []
         values = lattice.closest(self.sites, on_progress, whose=False)[0]
         if self.open_edges:
-            shell = SHEET * size
+            shell = sheet_voxels * size
             notes.append(
                 f"the mesh is open ({self.open_edges} edges have one triangle only): taken as a "
                 f"shell, {2 * shell:.3g} thick; spaces that water cannot reach count as solid"
@@ -183,31 +172,37 @@ class _Triangles:
         return values, notes
 
 
-def of_cloud_file(
+def grid_of_cloud_file(
     path: str | Path,
     *,
     scale: float = 1.0,
     voxel: float | None = None,
     memory_limit: float = 4.0,
     on_progress: OnStage = None,
+    policy: GridPolicy | None = None,
 ) -> VoxelGrid:
     """The distance grid of a cloud file in any format of `netsp.world.scene.readers.load_cloud`.
-    InputError as for `of_mesh`."""
+    InputError as for `grid_of_mesh_file`."""
     points, notes = load_cloud(path, Placement(scale))
-    grid = of_cloud(
-        points, voxel=voxel, memory_limit=memory_limit, on_progress=on_progress,
+    grid = grid_of_cloud(
+        points,
+        voxel=voxel,
+        memory_limit=memory_limit,
+        on_progress=on_progress,
         source=str(path),
-    )  # fmt: skip
+        policy=policy,
+    )
     return replace(grid, notes=(*notes, *grid.notes))
 
 
-def of_cloud(
+def grid_of_cloud(
     points: npt.ArrayLike,
     *,
     voxel: float | None = None,
     memory_limit: float = 4.0,
     on_progress: OnStage = None,
     source: str = "cloud",
+    policy: GridPolicy | None = None,
 ) -> VoxelGrid:
     """The distance grid of a cloud (n, 3) that lies on the surface of something solid.
 
@@ -218,15 +213,17 @@ def of_cloud(
     """
     p = _points(points, source)
     low, high = p.min(0), p.max(0)
-    ball = _ball(p, _size(low, high, voxel, source))
+    policy = policy or GridPolicy()
+    size = _size(low, high, voxel, source, policy)
+    ball = _ball(p, size)
     sites = point_sites(p)
-    lattice = _lattice(
-        low, high, voxel, memory_limit, source, sites, shell=0.0, extra=_spacing(p),
-        block=CLOUD_BLOCK,
-    )  # fmt: skip
-    out, notes, grow = _cloud_values(lattice, p, sites, ball, on_progress, source)
+    place = _Place(low, high, size, memory_limit, source)
+    lattice = _lattice(place, sites, policy, extra=_spacing(p), has_cloud=True)
+    values, notes, grow = _cloud_values(
+        lattice, p, sites, ball, on_progress, source, policy.sheet_voxels
+    )
     tell(on_progress, "distances", 1.0)
-    return lattice.grid(out, np.array([low - grow, high + grow]), tuple(notes))
+    return lattice.grid(values, np.array([low - grow, high + grow]), tuple(notes))
 
 
 def _points(points: npt.ArrayLike, source: str) -> Floats:
@@ -249,7 +246,13 @@ def _ball(p: Floats, size: float) -> float:
 
 
 def _cloud_values(
-    lattice: Lattice, p: Floats, sites: Floats, ball: float, on_progress: OnStage, source: str
+    lattice: Lattice,
+    p: Floats,
+    sites: Floats,
+    ball: float,
+    on_progress: OnStage,
+    source: str,
+    sheet_voxels: float,
 ) -> tuple[Singles, list[str], float]:
     """Return the signed distances at the points of a lattice, what was assumed, and by how much
     the solid is larger than the box of the points."""
@@ -272,7 +275,7 @@ def _cloud_values(
     loose = lattice.least_around(out, p, 2) > -size
     grow = 0.0
     if loose.any():
-        half = SHEET * size
+        half = sheet_voxels * size
         out = np.where(loose[owner], np.minimum(out, distances - np.float32(half)), out)
         grow = half
         if loose.mean() > 0.01:
@@ -283,7 +286,7 @@ def _cloud_values(
     return out, notes, grow
 
 
-def of_meshes_and_cloud(
+def grid_of_meshes_and_cloud(
     parts: list[tuple[Floats, npt.NDArray[np.int64]]],
     points: npt.ArrayLike,
     *,
@@ -291,6 +294,7 @@ def of_meshes_and_cloud(
     memory_limit: float = 4.0,
     on_progress: OnStage = None,
     source: str = "scene",
+    policy: GridPolicy | None = None,
 ) -> VoxelGrid:
     """Return the distance grid of meshes and a cloud of points together.
 
@@ -315,7 +319,7 @@ def of_meshes_and_cloud(
     Raises
     ------
     InputError
-        As for `of_triangles` and `of_cloud`.
+        As for `grid_of_triangles` and `grid_of_cloud`.
     """
     p = _points(points, source)
     first = np.cumsum([0, *(len(v) for v, _ in parts)])
@@ -324,67 +328,102 @@ def of_meshes_and_cloud(
     mesh = _Triangles.of(v, f)
     low = np.minimum(mesh.triangles.min((0, 1)), p.min(0))
     high = np.maximum(mesh.triangles.max((0, 1)), p.max(0))
-    size = _size(low, high, voxel, source)
+    policy = policy or GridPolicy()
+    half = policy.sheet_voxels if mesh.open_edges else 0.0
+    size = _size(low, high, voxel, source, policy)
     extra = _spacing(p)
     flat = triangle_sites(np.repeat(p[:, None], 3, axis=1))  # points, where blocks are placed
     lattice = _lattice(
-        low, high, size, memory_limit, source, np.vstack([mesh.sites, flat]),
-        shell=SHEET if mesh.open_edges else 0.0, extra=extra, block=CLOUD_BLOCK,
-    )  # fmt: skip
-    values, notes = mesh.values(lattice, on_progress, source)
-    cloud, more, grow = _cloud_values(lattice, p, point_sites(p), _ball(p, size), None, source)
+        _Place(low, high, size, memory_limit, source),
+        np.vstack([mesh.sites, flat]),
+        policy,
+        shell=half,
+        extra=extra,
+        has_cloud=True,
+    )
+    values, notes = mesh.values(lattice, on_progress, source, policy.sheet_voxels)
+    cloud, cloud_notes, grow = _cloud_values(
+        lattice, p, point_sites(p), _ball(p, size), None, source, policy.sheet_voxels
+    )
     if mesh.open_edges:
-        grow = max(grow, SHEET * lattice.size)
+        grow = max(grow, half * lattice.size)
     tell(on_progress, "distances", 1.0)
     box = np.array([low - grow, high + grow])
-    return lattice.grid(np.minimum(values, cloud), box, (*notes, *more))
+    return lattice.grid(np.minimum(values, cloud), box, (*notes, *cloud_notes))
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Box (corners `low` and `high`) of a grid, edge of its voxels, memory in GiB, and the name of
+    its source for messages."""
+
+    low: Floats
+    high: Floats
+    size: float
+    memory_limit: float
+    source: str
 
 
 def _lattice(
-    low: Floats, high: Floats, voxel: float | None, memory_limit: float, source: str,
-    sites: Floats, *, shell: float, extra: float = 0.0, block: int = MESH_BLOCK,
-    triangles: Floats | None = None, region: Floats | None = None,
-) -> Lattice:  # fmt: skip
+    place: _Place,
+    sites: Floats,
+    policy: GridPolicy,
+    *,
+    shell: float = 0.0,
+    extra: float = 0.0,
+    has_cloud: bool = False,
+    triangles: Floats | None = None,
+    region: Floats | None = None,
+) -> Lattice:
     """The points at which the grid is built; `shell` in voxels, `extra` room in metres,
     `block` the bytes of one at the peak.
 
     InputError when there would be too many.
     """
-    size = _size(low, high, voxel, source)
-    pad = MARGIN * size + 2.0 * extra
+    low, high, size = place.low, place.high, place.size
+    memory = place.memory_limit * 2**30
+    pad = policy.border_voxels * size + 2.0 * extra
     counts = np.ceil((high - low + 2.0 * pad) / size) + 1
     # off by an odd fraction of a voxel: no row of the grid runs along an edge of the mesh
     off = size * np.array([0.0123457, 0.0271828, 0.0314159])
-    if np.prod(counts) <= MOST_DENSE and np.prod(counts) * BYTES_PER_VOXEL <= memory_limit * 2**30:
+    points = np.prod(counts)
+    if points <= policy.max_dense_points and points * policy.bytes_per_voxel <= memory:
         return Dense(low - pad + off, size, (int(counts[0]), int(counts[1]), int(counts[2])))
     side = SIDE * size
-    pad = PAD * side + 2.0 * extra
+    pad = policy.border_cells * side + 2.0 * extra
     cells = np.ceil((high - low + 2.0 * pad) / side)
-    need = float(np.prod(cells + 1)) * BYTES_PER_CELL
-    if need <= memory_limit * 2**30:
+    need = float(np.prod(cells + 1)) * policy.bytes_per_cell
+    if need <= memory:
         lattice = sparse_near(
-            low - pad + off, size, (int(cells[0]), int(cells[1]), int(cells[2])), sites,
-            shell * size + extra, triangles, region,
-        )  # fmt: skip
+            low - pad + off,
+            size,
+            (int(cells[0]), int(cells[1]), int(cells[2])),
+            sites,
+            policy,
+            shell=shell * size + extra,
+            triangles=triangles,
+            region=region,
+        )
+        block = policy.bytes_per_cloud_block if has_cloud else policy.bytes_per_mesh_block
         need += len(lattice.blocks) * block
-        if need <= memory_limit * 2**30:
+        if need <= memory:
             return lattice
     # blocks lie along surfaces, cells fill the box
-    better = size * math.sqrt(need / (memory_limit * 2**30)) * 1.05
+    better = size * math.sqrt(need / memory) * 1.05
     raise InputError(
-        f"{source}: voxels of {size:.3g} need {need / 2**30:.3g} GiB, more than "
-        f"{memory_limit:g}; expected voxels of {better:.2g} or more"
+        f"{place.source}: voxels of {size:.3g} need {need / 2**30:.3g} GiB, more than "
+        f"{place.memory_limit:g}; expected voxels of {better:.2g} or more"
     )
 
 
-def _size(low: Floats, high: Floats, voxel: float | None, source: str) -> float:
+def _size(low: Floats, high: Floats, voxel: float | None, source: str, policy: GridPolicy) -> float:
     """Edge of a voxel, metres."""
     if voxel is not None and not 0.0 < voxel < math.inf:
         raise InputError(f"{source}: voxel: expected a positive length, got {voxel!r}")
     side = float((high - low).max())
     if side <= 0.0:
         raise InputError(f"{source}: all points are the same")
-    return voxel if voxel is not None else side / DEFAULT_VOXELS
+    return voxel if voxel is not None else side / policy.default_voxels
 
 
 def _edges(faces: npt.NDArray[np.int64], vertices: Floats) -> tuple[int, int]:

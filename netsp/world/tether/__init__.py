@@ -16,99 +16,79 @@ from netsp.world.tether.taut_tether import Contact, Tether
 
 
 class TetherModel(Protocol):
-    """How a tether behaves: what a planner believes. States are immutable."""
+    """Model of a tether that planners use. States are immutable."""
 
     name: str
 
     def start(self, anchor: npt.ArrayLike, robot: npt.ArrayLike) -> Tether:
-        """The tether along the line of sight.
+        """Return the tether along the line of sight.
 
         Parameters
         ----------
         anchor : array_like, shape (3,)
-            Where it is fixed, metres.
+            Position of the anchor, metres.
         robot : array_like, shape (3,)
-            Where it ends, metres.
-
-        Returns
-        -------
-        Tether
-            The tether.
+            Position of the robot, metres.
         """
 
     def update(self, tether: Tether, robot: npt.ArrayLike) -> Tether:
-        """The tether after the robot has gone straight to a place.
+        """Return the tether after the robot has gone straight to a place.
 
         Parameters
         ----------
         tether : Tether
-            Before; it must not be changed.
+            Tether before the motion; it must not be changed.
         robot : array_like, shape (3,)
             New position of the robot, metres.
-
-        Returns
-        -------
-        Tether
-            After.
         """
 
     def drive(self, tether: Tether, path: npt.ArrayLike) -> tuple[Tether, Floats]:
-        """The tether after the robot has passed some points.
+        """Return the tether after the robot has passed some points, and its lengths on the way.
 
         Parameters
         ----------
         tether : Tether
-            Before; it must not be changed.
+            Tether before the motion; it must not be changed.
         path : array_like, shape (k, 3)
-            The points, metres.
+            Points, metres.
 
         Returns
         -------
         tether : Tether
-            At the last point.
+            Tether at the last point.
         lengths : ndarray, shape (k,)
             Length at each point, metres.
         """
 
     def lay(self, path: npt.ArrayLike) -> Tether:
-        """The tether after a robot has travelled a path from its anchor on.
+        """Return the tether after a robot has travelled a path from its anchor on.
 
         Parameters
         ----------
         path : array_like, shape (k, 3)
-            From the anchor to the robot, metres.
-
-        Returns
-        -------
-        Tether
-            The tether.
+            Path from the anchor to the robot, metres.
         """
 
 
 TETHERS: Registry[Callable[[DistanceField, float], Any]] = Registry(
     "tether", "netsp.tethers", {"geodesic": GeodesicTether, "react": ReactTether}, later
 )
-"""Name → what makes a tether model of a distance field and a resolution (m)."""
+"""Factories of tether models by name; each takes a distance field and a resolution in metres."""
 
 
 def make_tether(
     model: str | Callable[[DistanceField, float], Any], field: DistanceField, delta: float
 ) -> Any:
-    """A tether model by name, or made by a callable.
+    """Return a tether model by name, or the one that a callable makes.
 
     Parameters
     ----------
     model : str or callable
-        One of `TETHERS`, or `f(field, delta) -> TetherModel`.
+        One of `TETHERS`, or ``f(field, delta) -> TetherModel``.
     field : DistanceField
-        The scene.
+        Distance field of the scene.
     delta : float
         Resolution, metres.
-
-    Returns
-    -------
-    TetherModel
-        The model.
 
     Raises
     ------

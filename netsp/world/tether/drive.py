@@ -1,4 +1,4 @@
-"""Take the end of a strand along a path, and say how long it is on the way."""
+"""Motions of a strand's ends along paths, with its lengths on the way."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.compiled.kernel import kernel
 from netsp.world.scene.sampling import Field, distance
-from netsp.world.tether.measure import cut_off
-from netsp.world.tether.pull import PullSettings, pull_end
+from netsp.world.tether.measure import corner_excess
+from netsp.world.tether.pull import pull_end
 from netsp.world.tether.strand import strand_length
+from netsp.world.tether.tether_policy import PullSettings
 
 
 @kernel
@@ -22,13 +23,24 @@ def follow(
     z: float,
     settings: PullSettings,
 ) -> tuple[Floats, float, float, float]:
-    """`pull_end` on a copy, with what its callers ask next. Returns (strand, residual, length,
-    depth): depth is how deep the target lies inside a solid; then nothing is done."""
+    """Move one end of a copy of the strand to (x, y, z), as `pull_end` does.
+
+    Returns
+    -------
+    strand : ndarray
+        The new strand; the old one where the target is too deep.
+    residual : float
+        Motion in the last round, metres.
+    length : float
+        Length, metres.
+    depth : float
+        Depth of the target inside a solid, metres. Above delta / 4, nothing is moved.
+    """
     depth = -distance(field, x, y, z)
     if depth > 0.25 * settings.delta:
         return strand, 0.0, 0.0, depth
     strand, count, residual = pull_end(field, strand.copy(), len(strand), last, x, y, z, settings)
-    length = strand_length(strand, count) + cut_off(field, strand, count, settings)
+    length = strand_length(strand, count) + corner_excess(field, strand, count, settings)
     return strand[:count].copy(), residual, length, depth
 
 
@@ -41,9 +53,11 @@ def drive(
     settings: PullSettings,
     floor: float,
 ) -> tuple[Floats, int, float, Floats]:
-    """Take the robot along a path (k, 3). Returns (strand, count, residual, lengths after each
-    point). What corners cut off is added at the last point, and where the length is at least
-    `floor`."""
+    """Move the robot along a path (k, 3).
+
+    Lengths from `floor` on, and the last one, are corrected for the corners of voxels. Returns
+    strand, count and residual as `pull_end` does, and the length at each point (k,).
+    """
     lengths, residual = np.empty(len(path)), 0.0
     for k in range(len(path)):
         strand, count, residual = pull_end(
@@ -51,5 +65,5 @@ def drive(
         )
         lengths[k] = strand_length(strand, count)
         if lengths[k] >= floor or k == len(path) - 1:
-            lengths[k] += cut_off(field, strand, count, settings)
+            lengths[k] += corner_excess(field, strand, count, settings)
     return strand, count, residual, lengths

@@ -1,16 +1,17 @@
 """`geodesic`: a tether that is the locally shortest curve of its homotopy class.
 
-Our own model. What it promises, and why, is told in `netsp.world.tether.pull` and docs/tether.md:
-it passes through nothing thicker than 1.8 delta, and its length is that of the curve and not of
-its chords. Where the shortest curve of a class is unique (among vertical prisms always), it depends
-on the robot's position and the class alone, so driving back undoes driving. Elsewhere a class may
-have several locally shortest curves (a tether that could slip off the end of a pipe): the tether
-keeps to the one it was driven to as long as there is one.
+The tether passes through nothing thicker than 1.8 delta, and its length is that of the curve, not
+of its chords; `netsp.world.tether.pull` and docs/tether.md explain why. Where the shortest curve of
+a class is unique, as among vertical prisms, it depends only on the robot's position and the class,
+so driving back undoes driving. Elsewhere a class may have several locally shortest curves, such as
+a tether that could slip off the end of a pipe. Then the tether keeps to the one that it was driven
+to for as long as that one exists.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 from functools import cached_property
 from itertools import pairwise
 
@@ -23,37 +24,43 @@ from netsp.base.errors import InputError
 from netsp.world.scene.field import DistanceField, finite_point
 from netsp.world.tether.drive import drive, follow
 from netsp.world.tether.load import Load, drive_under
-from netsp.world.tether.measure import cut_off
-from netsp.world.tether.pull import MORE_ROUNDS, PullSettings, pull
-from netsp.world.tether.resolution import THINNEST
+from netsp.world.tether.measure import corner_excess
+from netsp.world.tether.pull import pull
 from netsp.world.tether.strand import strand_length
-from netsp.world.tether.taut_tether import Tether, strand_of
-from netsp.world.tether.tips import MOST_NUDGE
+from netsp.world.tether.taut_tether import Tether, new_strand
+from netsp.world.tether.tether_policy import (
+    THINNEST,
+    PullSettings,
+    TetherPolicy,
+    pull_settings,
+)
 
 
 @dataclass(frozen=True)
 class GeodesicTether:
-    """A taut tether over the solids of a scene: shortest in its homotopy class.
+    """Model of a taut tether that is the shortest curve of its homotopy class.
 
-    These are the parameters of the model; `start` gives a tether, `update` moves it on with every
-    new position of the robot.
+    An object holds the parameters of the model. `start` returns a tether, `update` the tether after
+    a motion of the robot.
 
     Parameters
     ----------
     field : DistanceField
-        The scene.
+        Distance field of the scene.
     delta : float
-        Resolution, metres. Edges over a surface dip into it by at most delta / 8 (their length is
-        corrected for it), and solids thinner than 1.8 delta may be lost. A delta finer than the
-        voxels of a scene is taken as their size (or as fine as its other solids need), for voxels
-        know nothing of a surface's shape below that: the tether would cling to their corners.
+        Resolution, metres. Edges dip into surfaces by at most delta / 8, for which lengths are
+        corrected, and the tether may pass through solids thinner than 1.8 delta. A delta finer than
+        the voxels of the scene is replaced by their size, or by what its other solids need: below a
+        voxel, the shape of a surface is unknown, and the tether would cling to the corners.
     precision : float, optional
-        Metres; the rounds end when no node has farther to go, or the tether would get shorter by
-        less than 0.4 of it. By default delta / 200.
+        Distance, metres: rounds end when no node has farther to go, or when the tether would become
+        shorter by less than 0.4 of it. Default: delta / 200.
     rounds : int
-        At most so many in one update, and one more for every delta / 5 that the robot moved. Where
-        the tether slips over an edge it may take a few updates to come to rest; until then its
-        length is not the least, and `Tether.residual` above `precision`.
+        Maximum number of rounds in one update, besides one for every delta / 5 that the robot
+        moved. A tether that slips over an edge may need several updates to come to rest. Until then
+        its length is not the least, and `Tether.residual` is above `precision`.
+    policy : TetherPolicy
+        Other numbers of the model.
 
     Examples
     --------
@@ -70,6 +77,7 @@ class GeodesicTether:
     delta: float = 0.1
     precision: float | None = None
     rounds: int = 3
+    policy: TetherPolicy = dataclass_field(default_factory=TetherPolicy)
 
     name = "geodesic"
 
@@ -88,27 +96,29 @@ class GeodesicTether:
         # per cent
         spread = 0.1 * self.delta if voxel is None else max(0.1 * self.delta, voxel)
         flat = 1e-6 if voxel is None else 0.02
-        return PullSettings(self.delta, spread, flat, self.rounds, precision)
+        return pull_settings(
+            self.policy,
+            delta=self.delta,
+            spread=spread,
+            flat=flat,
+            rounds=self.rounds,
+            precision=precision,
+        )
 
     def start(self, anchor: npt.ArrayLike, robot: npt.ArrayLike) -> Tether:
-        """A tether along the line of sight.
+        """Return a straight tether along the line of sight.
 
         Parameters
         ----------
         anchor : array_like, shape (3,)
-            Where it is fixed, metres.
+            Position of the anchor, metres.
         robot : array_like, shape (3,)
-            Where it ends, metres.
-
-        Returns
-        -------
-        Tether
-            The straight tether.
+            Position of the robot, metres.
 
         Raises
         ------
         InputError
-            Anchor or robot inside a solid or not finite, or no line of sight: then `lay` a tether
+            Anchor or robot inside a solid or not finite, or no line of sight; then `lay` a tether
             along a path.
         """
         a, r = self.field.free_point(anchor, "anchor"), self.field.free_point(robot, "robot")
@@ -117,20 +127,15 @@ class GeodesicTether:
                 f"robot: {_show(r)} is not in sight of the anchor {_show(a)}; lay the tether along "
                 "a path"
             )
-        return self._taut(strand_of([a, r]))
+        return self._taut(new_strand([a, r]))
 
     def lay(self, path: npt.ArrayLike) -> Tether:
-        """A tether laid along a path, then pulled taut.
+        """Return a tether laid along a path and pulled taut.
 
         Parameters
         ----------
         path : array_like, shape (k, 3)
-            From the anchor to the robot, metres.
-
-        Returns
-        -------
-        Tether
-            The taut tether.
+            Path from the anchor to the robot, metres.
 
         Raises
         ------
@@ -147,44 +152,34 @@ class GeodesicTether:
                 raise InputError(
                     f"path[{k}] to path[{k + 1}]: passes through a solid; expected a free path"
                 )
-        tether = self._taut(strand_of(np.array([points[0], points[0]])))
+        tether = self._taut(new_strand(np.array([points[0], points[0]])))
         return self.refine(self.drive(tether, points[1:])[0])
 
     def relaxed(self, path: npt.ArrayLike, rounds: int) -> Tether:
-        """A tether along a free path, pulled for some rounds only.
+        """Return a tether along a free path, pulled for some rounds only.
 
-        Faster than `lay` where its class matters more than the last millimetre.
+        This is faster than `lay` where the class matters more than the last millimetre.
 
         Parameters
         ----------
         path : array_like, shape (k, 3)
-            From the anchor to the robot, metres; not checked.
+            Path from the anchor to the robot, metres; it is not checked.
         rounds : int
-            Rounds of pulling.
-
-        Returns
-        -------
-        Tether
-            The tether; `residual` tells how far from taut.
+            Number of rounds.
         """
-        return self._taut(strand_of(path), rounds)
+        return self._taut(new_strand(path), rounds)
 
     def pulled(self, path: npt.ArrayLike, rounds: int) -> Floats:
-        """The nodes of `relaxed` alone: its length is not measured.
+        """Return the nodes of `relaxed` (n, 3), without measuring the length.
 
         Parameters
         ----------
         path : array_like, shape (k, 3)
-            From the anchor to the robot, metres; not checked.
+            Path from the anchor to the robot, metres; it is not checked.
         rounds : int
-            Rounds of pulling.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            The path, pulled, metres.
+            Number of rounds.
         """
-        strand, count, _ = self._pull(strand_of(path), rounds)
+        strand, count, _ = self._pull(new_strand(path), rounds)
         return strand[:count, :3].copy()
 
     def _taut(self, strand: Floats, rounds: int | None = None) -> Tether:
@@ -192,31 +187,26 @@ class GeodesicTether:
 
     def _pull(self, strand: Floats, rounds: int) -> tuple[Floats, int, float]:
         end_if_abandoned()
-        return pull(
-            self.field.arrays, strand, len(strand), self._settings, rounds, 0,
-            MOST_NUDGE if rounds >= MORE_ROUNDS else 1,
-        )  # fmt: skip
+        is_thorough = rounds >= self.policy.max_extra_rounds
+        steps = self.policy.max_sidesteps if is_thorough else 1
+        return pull(self.field.arrays, strand, len(strand), self._settings, rounds, 0, steps)
 
     def update(
         self, tether: Tether, robot: npt.ArrayLike, anchor: npt.ArrayLike | None = None
     ) -> Tether:
-        """The tether after the robot (and the anchor, on a ship) has moved in a straight line.
+        """Return the tether after the robot, and on a ship the anchor, has moved in a straight
+        line.
 
-        Long motions are followed in steps as short as the scene asks for; any is allowed.
+        Long motions are allowed; they are followed in steps as short as the scene needs.
 
         Parameters
         ----------
         tether : Tether
-            Before; it is not changed.
+            Tether before the motion; it is not changed.
         robot : array_like, shape (3,)
             New position of the robot, metres.
         anchor : array_like, shape (3,), optional
-            New position of the anchor, metres; None where it was.
-
-        Returns
-        -------
-        Tether
-            After.
+            New position of the anchor, metres; None if it has not moved.
 
         Raises
         ------
@@ -238,26 +228,27 @@ class GeodesicTether:
     def drive(
         self, tether: Tether, path: npt.ArrayLike, floor: float = 0.0
     ) -> tuple[Tether, Floats]:
-        """The tether after the robot has followed a path: look-ahead in one call.
+        """Return the tether after the robot has followed a path, and its lengths on the way.
 
-        That the robot's own path is free is the caller's to see to, as by `field.line_of_sight`:
-        through a solid the tether follows as well as it can, and its length means nothing.
+        The caller must make sure that the path of the robot itself is free, such as by
+        `DistanceField.line_of_sight`. Through a solid, the tether follows as well as it can, and
+        its length means nothing.
 
         Parameters
         ----------
         tether : Tether
-            Before; it is not changed.
+            Tether before the motion; it is not changed.
         path : array_like, shape (k, 3)
             Points that the robot passes, metres.
         floor : float
-            Metres. What edges cut off of the corners of voxels (about a hundredth at most) is added
-            to lengths from this one on, and to the last: for callers who ask whether a tether stays
-            below a limit.
+            Length from which on lengths are corrected for the corners of voxels that edges cut,
+            metres. The correction is at most about a hundredth. The last length is always
+            corrected. For callers who ask whether the tether stays below a limit.
 
         Returns
         -------
         tether : Tether
-            At the last point.
+            Tether at the last point.
         lengths : ndarray, shape (k,)
             Length at each point, metres.
         """
@@ -273,23 +264,24 @@ class GeodesicTether:
     def drive_under(
         self, tether: Tether, path: npt.ArrayLike, load: Load
     ) -> tuple[Tether, Floats, Floats]:
-        """As `drive`, with what must be out under a load.
+        """Return the tether after the robot has followed a path, with payout and turning under a
+        load.
 
         Parameters
         ----------
         tether : Tether
-            Before; it is not changed.
+            Tether before the motion; it is not changed.
         path : array_like, shape (k, 3)
             Points that the robot passes, metres.
         load : Load
-            What acts on the tether.
+            Forces on the tether.
 
         Returns
         -------
         tether : Tether
-            At the last point.
+            Tether at the last point.
         payouts : ndarray, shape (k,)
-            Length that must be out at each point, metres.
+            Payout at each point, metres.
         turnings : ndarray, shape (k,)
             Sum of turning angles at each point, radians.
         """
@@ -301,20 +293,15 @@ class GeodesicTether:
         return self._state(strand, count, residual), payouts, turnings
 
     def refine(self, tether: Tether) -> Tether:
-        """The same tether, every contact looked at afresh, pulled until nothing moves.
+        """Return the tether after pulling until nothing moves, with every contact sampled anew.
 
-        For use after a change of the scene, too. It ends after 5000 rounds (`Tether.residual`
-        tells).
+        It serves after a change of the scene, too. Pulling ends after 5000 rounds at the latest;
+        then `Tether.residual` is above the precision.
 
         Parameters
         ----------
         tether : Tether
-            Before; it is not changed.
-
-        Returns
-        -------
-        Tether
-            The taut tether.
+            Tether before; it is not changed.
         """
         return self.relaxed(tether.nodes, rounds=5000)
 
@@ -322,13 +309,13 @@ class GeodesicTether:
         self, strand: Floats, count: int, residual: float, length: float | None = None
     ) -> Tether:
         if length is None:
-            more = cut_off(self.field.arrays, strand, count, self._settings)
+            more = corner_excess(self.field.arrays, strand, count, self._settings)
             length = strand_length(strand, count) + more
         return Tether(strand[:count].copy(), float(length), float(residual))
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What in the scene is too thin for this delta."""
+        """Parts of the scene that are too thin for this delta, one line each."""
         return self.field.thinner_than(THINNEST * self.delta)
 
 
@@ -337,7 +324,7 @@ def _show(point: Floats) -> str:
 
 
 def _points(path: npt.ArrayLike) -> Floats:
-    """(k, 3) a path; InputError if it has another shape or is not finite."""
+    """Return a path as an array (k, 3); InputError if it has another shape or is not finite."""
     try:
         points = np.ascontiguousarray(path, dtype=float)
     except (TypeError, ValueError):

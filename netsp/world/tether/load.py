@@ -1,15 +1,15 @@
-"""What a tether needs beyond its taut length: slack, sag in a current, and friction at contacts.
+"""Tether length beyond the taut one: slack, sag in a current, and friction at contacts.
 
-Sag. A span of chord c hangs in a current. Drag along a cable is small; what acts is the drag normal
-to it, w per metre on the chord and w cos^2 a where it is inclined by a against the chord (Morison's
-law for inclined cylinders, as in Faltinsen, "Sea Loads on Ships and Offshore Structures", 1990).
-With no force along it the tension T is the same everywhere, and the balance of a piece,
-``T da = w cos^2 a ds``, says ``tan a = w s / T`` from the middle on: a catenary. Its length is
-``(2 T / w) sinh(q / 2)`` with ``q = w c / T``, that is c (1 + q^2 / 24) while q is small.
+Sag. A span of chord c hangs in a current. Drag along a cable is small. The drag normal to it is w
+per metre on the chord, and w cos^2 a where it is inclined by a against the chord (Morison's law for
+inclined cylinders, as in Faltinsen, "Sea Loads on Ships and Offshore Structures", 1990). With no
+force along it the tension T is the same everywhere, and the balance of a piece, ``T da = w cos^2 a
+ds``, gives ``tan a = w s / T`` from the middle on: a catenary. Its length is ``(2 T / w) sinh(q /
+2)`` with ``q = w c / T``, that is c (1 + q^2 / 24) while q is small.
 
 Friction. Around contacts the tension grows by e^(mu theta), theta the sum of turning angles (Euler,
-Eytelwein: the capstan). The tension at the anchor, where it is held, is therefore the least, and
-sag worked out with it is never too small.
+Eytelwein: the capstan). The tension is least at the anchor, where it is held, so sag calculated
+with it is never too small.
 """
 
 from __future__ import annotations
@@ -24,23 +24,31 @@ from netsp.base.arrays import Floats
 from netsp.base.compiled.kernel import kernel
 from netsp.model.solution import tension_ratio
 from netsp.world.scene.sampling import Field
-from netsp.world.tether.measure import cut_off
-from netsp.world.tether.pull import PullSettings, pull_end
-from netsp.world.tether.strand import EXTRA, X, Y, Z, gap, rests, strand_length
+from netsp.world.tether.measure import corner_excess
+from netsp.world.tether.pull import pull_end
+from netsp.world.tether.strand import EXTRA, X, Y, Z, gap, is_resting, strand_length
 from netsp.world.tether.taut_tether import Tether
-
-MOST_SAG = 40.0
-"""q at most: beyond, a span is as good as endless."""
-
-
-SHORT = 0.3
-"""In units of delta: shorter pieces of a strand say nothing about its direction."""
+from netsp.world.tether.tether_policy import PullSettings, TetherPolicy
 
 
 class Load(NamedTuple):
-    """What acts on a tether: slack (share of its length), drag (N s^2 / m^3: of a metre at 1 m/s
-    across), the water's velocity (m/s), the tension at the anchor (N), and how much faster the
-    water may be in any direction (m/s)."""
+    """Forces on a tether.
+
+    Attributes
+    ----------
+    slack
+        Additional tether as a share of its length.
+    drag
+        Drag of a metre of tether in a flow of 1 m/s across it, N s^2 / m^3.
+    x, y, z
+        Velocity of the water, m/s.
+    tension
+        Tension at the anchor, N.
+    gusts
+        Additional speed of the water in any direction, m/s.
+    max_sag
+        Maximum ratio of the drag on a span to its tension. A span with more is practically endless.
+    """
 
     slack: float
     drag: float
@@ -49,29 +57,30 @@ class Load(NamedTuple):
     z: float
     tension: float
     gusts: float = 0.0
+    max_sag: float = 40.0
 
 
 @kernel
 def span_length(c: float, dx: float, dy: float, dz: float, load: Load) -> float:
-    """Length of a span of chord c along (dx, dy, dz)."""
+    """Return the length of a span of chord c along (dx, dy, dz)."""
     if c <= 0.0 or load.drag == 0.0:
         return c
     along = (load.x * dx + load.y * dy + load.z * dz) / c
     across = math.sqrt(max(load.x**2 + load.y**2 + load.z**2 - along * along, 0.0)) + load.gusts
-    q = min(load.drag * across * across * c / load.tension, MOST_SAG)
+    q = min(load.drag * across * across * c / load.tension, load.max_sag)
     if q < 1e-3:
         return c * (1.0 + q * q / 24.0)
     return 2.0 * c / q * math.sinh(0.5 * q)
 
 
 @kernel
-def payout_of(strand: Floats, count: int, load: Load) -> float:
-    """Length that must be out for a strand to lie as it does. Nodes in the air part no spans."""
+def strand_payout(strand: Floats, count: int, load: Load) -> float:
+    """Return the payout of a strand. Nodes in the air do not divide spans."""
     total, first, chord, over = 0.0, 0, 0.0, 0.0
     for i in range(1, count):
         chord += gap(strand, i - 1, i)
         over += strand[i - 1, EXTRA]
-        if i < count - 1 and not rests(strand, i):
+        if i < count - 1 and not is_resting(strand, i):
             continue
         sagging = span_length(
             chord,
@@ -86,10 +95,12 @@ def payout_of(strand: Floats, count: int, load: Load) -> float:
 
 
 @kernel
-def turning_of(strand: Floats, count: int, least: float) -> float:
-    """Sum of the angles (rad) by which a strand turns at its contacts, between pieces no shorter
-    than `least`: two contacts that have not come to rest can lie so close together that the piece
-    between them points backwards."""
+def strand_turning(strand: Floats, count: int, least: float) -> float:
+    """Return the sum of the angles by which a strand turns at its contacts, radians.
+
+    Pieces shorter than `least` do not count: two contacts that are not at rest yet can be so close
+    together that the piece between them points backwards.
+    """
     total, begun = 0.0, False
     px, py, pz = strand[0, X], strand[0, Y], strand[0, Z]
     ax, ay, az = 0.0, 0.0, 0.0
@@ -115,41 +126,37 @@ def drive_under(
     settings: PullSettings,
     load: Load,
 ) -> tuple[Floats, int, float, Floats, Floats]:
-    """`drive.drive` with payout and turning after each point instead of the length."""
+    """Move the robot as `drive` does, with payout and turning at each point instead of the
+    length."""
     payouts, turnings, residual = np.empty(len(path)), np.empty(len(path)), 0.0
     for k in range(len(path)):
         strand, count, residual = pull_end(
             field, strand, count, True, path[k, 0], path[k, 1], path[k, 2], settings
         )
-        more = cut_off(field, strand, count, settings)
-        payouts[k] = payout_of(strand, count, load) + (1.0 + load.slack) * more
-        turnings[k] = turning_of(strand, count, SHORT * settings.delta)
+        more = corner_excess(field, strand, count, settings)
+        payouts[k] = strand_payout(strand, count, load) + (1.0 + load.slack) * more
+        turnings[k] = strand_turning(strand, count, settings.min_piece * settings.delta)
     return strand, count, residual, payouts, turnings
 
 
 def payout(tether: Tether, load: Load) -> float:
-    """Length that must be out for a tether to lie as it does.
+    """Return the payout of a tether: the length that must be out, metres.
 
     Parameters
     ----------
     tether : Tether
         The taut tether.
     load : Load
-        What acts on it.
-
-    Returns
-    -------
-    float
-        Metres.
+        Forces on it.
     """
     if load.slack == 0.0 and load.drag == 0.0:
         return tether.length
     more = tether.length - strand_length(tether.strand, len(tether.strand))
-    return float(payout_of(tether.strand, len(tether.strand), load) + (1.0 + load.slack) * more)
+    return float(strand_payout(tether.strand, len(tether.strand), load) + (1.0 + load.slack) * more)
 
 
-def turning(tether: Tether, delta: float) -> float:
-    """Sum of the angles by which a tether turns at its contacts.
+def turning(tether: Tether, delta: float, *, min_piece: float = TetherPolicy.min_piece) -> float:
+    """Return the sum of the angles by which a tether turns at its contacts, radians.
 
     Parameters
     ----------
@@ -157,29 +164,21 @@ def turning(tether: Tether, delta: float) -> float:
         The taut tether.
     delta : float
         Resolution of its model, metres.
-
-    Returns
-    -------
-    float
-        Radians.
+    min_piece : float
+        Minimum length of the pieces that count (`TetherPolicy`), in units of delta.
     """
-    return float(turning_of(tether.strand, len(tether.strand), SHORT * delta))
+    return float(strand_turning(tether.strand, len(tether.strand), min_piece * delta))
 
 
 def payout_along(line: npt.ArrayLike, load: Load) -> float:
-    """The same for a taut line whose corners all rest on something.
+    """Return the payout of a taut line whose corners all rest on something, metres.
 
     Parameters
     ----------
     line : array_like, shape (k, 3)
-        Its corners, metres.
+        Corners, metres.
     load : Load
-        What acts on it.
-
-    Returns
-    -------
-    float
-        Metres.
+        Forces on the tether.
     """
     steps = np.diff(np.asarray(line, dtype=float), axis=0)
     chords = np.linalg.norm(steps, axis=1)
@@ -190,30 +189,25 @@ def payout_along(line: npt.ArrayLike, load: Load) -> float:
 def pull_on_robot(
     tether: Tether, load: Load, friction: float, velocity: Floats, delta: float
 ) -> Floats:
-    """The force of a tether on the robot at its end: tension at the anchor, grown by friction at
-    contacts, along the last span, and half of the drag on that span.
+    """Return the force of a tether on the robot at its end, N.
 
-    A lumped model: the span's shape and its inertia are left out.
+    It is the tension at the anchor, grown by friction at contacts, along the last span, plus half
+    of the drag on that span. A lumped model: the span's shape and inertia are ignored.
 
     Parameters
     ----------
     tether : Tether
         The taut tether.
     load : Load
-        What acts on it.
+        Forces on it.
     friction : float
         Coefficient of friction at contacts.
     velocity : ndarray, shape (3,)
-        Of the robot, m/s: half of it is that of the span.
+        Velocity of the robot, m/s. The span moves at half of it.
     delta : float
         Resolution of the tether's model, metres.
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        N.
     """
-    resting = [i for i in range(len(tether.strand) - 1) if i == 0 or rests(tether.strand, i)]
+    resting = [i for i in range(len(tether.strand) - 1) if i == 0 or is_resting(tether.strand, i)]
     span = tether.nodes[resting[-1]] - tether.robot
     length = float(np.linalg.norm(span))
     if length < 1e-9:

@@ -1,14 +1,15 @@
-"""`react`: Algorithm 1 of Amer et al. 2025, so that the paper can be compared with.
+"""`react`: Algorithm 1 of Amer et al. 2025, for comparison with the paper.
 
 Where the paper leaves room:
 
 - Listing and text differ. The listing stops at the first node that is out of sight (``break``); the
   text lets j go on to the preceding node "until a collision-free line of sight is found". Both are
-  here (`reading`); the text's jumps over solids and so unwinds a tether from a pipe.
-- ``checkLineOfSight(M, P_tether)`` is given no pair of nodes: taken as (i, j).
-- ``pullNode(P[j], end, delta)`` is listed for nodes in collision, and told of "each node" in the
-  text: here each node is moved by up to delta towards the tether's end, when its two edges stay
-  free and the tether gets shorter.
+  implemented (`reading`). The text's version jumps over solids, and so unwinds a tether from a
+  pipe.
+- ``checkLineOfSight(M, P_tether)`` is given no pair of nodes; the pair is taken as (i, j).
+- ``pullNode(P[j], end, delta)`` is listed for nodes in collision, but the text speaks of "each
+  node". Here each node moves by up to delta towards the tether's end, where its two edges stay free
+  and the tether becomes shorter.
 - "Until convergence": until a pass shortens the tether by less than 1e-5 m, as in the authors'
   public code, which also uses delta = 0.5 m.
 """
@@ -28,32 +29,32 @@ from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.sampling import Field, distance
-from netsp.world.tether.strand import see
-from netsp.world.tether.taut_tether import Tether, strand_of
+from netsp.world.tether.strand import is_segment_free
+from netsp.world.tether.taut_tether import Tether, new_strand
 
 READINGS = ("listing", "text")
 
 
 @dataclass(frozen=True)
 class ReactTether:
-    """The tether model of the REACT paper; the same methods as `GeodesicTether`.
+    """Tether model of the REACT paper, with the methods of `GeodesicTether`.
 
     Source: Amer et al. 2025, section III.
 
     Parameters
     ----------
     field : DistanceField
-        The scene.
+        Distance field of the scene.
     delta : float
-        Metres between nodes.
+        Distance between nodes, metres.
     reading : str
-        Which reading of the paper: its `listing` or its `text`.
+        Reading of the paper: its `listing` or its `text`.
     clearance : float
-        Metres; sight passes no solid closer than this.
+        Distance that lines of sight keep from solids, metres.
     tolerance : float
-        Metres; the passes end when a node moves less.
+        Reduction of the length, metres, below which the passes end.
     passes : int
-        At most so many in one update.
+        Maximum number of passes in one update.
     """
 
     field: DistanceField
@@ -72,24 +73,19 @@ class ReactTether:
             raise InputError(f"reading: expected listing or text, got {self.reading!r}")
 
     def start(self, anchor: npt.ArrayLike, robot: npt.ArrayLike) -> Tether:
-        """A tether along the line of sight.
+        """Return a tether along the line of sight.
 
         Parameters
         ----------
         anchor : array_like, shape (3,)
-            Where it is fixed, metres.
+            Position of the anchor, metres.
         robot : array_like, shape (3,)
-            Where it ends, metres.
-
-        Returns
-        -------
-        Tether
-            The straight tether.
+            Position of the robot, metres.
 
         Raises
         ------
         InputError
-            As of `GeodesicTether.start`.
+            As `GeodesicTether.start` raises it.
         """
         a, r = self.field.free_point(anchor, "anchor"), self.field.free_point(robot, "robot")
         if not self.field.line_of_sight(a, r, depth=0.01 * self.delta):
@@ -97,17 +93,12 @@ class ReactTether:
         return self.update(_tether(np.array([a, a])), r)
 
     def lay(self, path: npt.ArrayLike) -> Tether:
-        """A tether laid along a path.
+        """Return a tether laid along a path.
 
         Parameters
         ----------
         path : array_like, shape (k, 3)
-            From the anchor to the robot, metres.
-
-        Returns
-        -------
-        Tether
-            The tether.
+            Path from the anchor to the robot, metres.
         """
         points = np.asarray(path, dtype=float).reshape(-1, 3)
         if len(points) < 2:
@@ -118,21 +109,16 @@ class ReactTether:
     def update(
         self, tether: Tether, robot: npt.ArrayLike, anchor: npt.ArrayLike | None = None
     ) -> Tether:
-        """The tether after a motion of the robot, of the anchor, or both.
+        """Return the tether after a motion of the robot, the anchor, or both.
 
         Parameters
         ----------
         tether : Tether
-            Before; it is not changed.
+            Tether before the motion; it is not changed.
         robot : array_like, shape (3,)
             New position of the robot, metres.
         anchor : array_like, shape (3,), optional
-            New position of the anchor, metres; None where it was.
-
-        Returns
-        -------
-        Tether
-            After.
+            New position of the anchor, metres; None if it has not moved.
         """
         nodes = tether.nodes
         text = self.reading == "text"
@@ -152,19 +138,19 @@ class ReactTether:
         return _tether(nodes)
 
     def drive(self, tether: Tether, path: npt.ArrayLike) -> tuple[Tether, Floats]:
-        """The tether after the robot has followed a path.
+        """Return the tether after the robot has followed a path, and its lengths on the way.
 
         Parameters
         ----------
         tether : Tether
-            Before; it is not changed.
+            Tether before the motion; it is not changed.
         path : array_like, shape (k, 3)
             Points that the robot passes, metres.
 
         Returns
         -------
         tether : Tether
-            At the last point.
+            Tether at the last point.
         lengths : ndarray, shape (k,)
             Length at each point, metres.
         """
@@ -176,7 +162,7 @@ class ReactTether:
 
 
 def _tether(nodes: Floats) -> Tether:
-    return Tether(strand_of(nodes), polylines.length(nodes))
+    return Tether(new_strand(nodes), polylines.length(nodes))
 
 
 @kernel
@@ -189,7 +175,8 @@ def tighten(
     tolerance: float,
     passes: int,
 ) -> Floats:
-    """Algorithm 1 after ``appendPath``: shortcut and pull until nothing changes."""
+    """Shorten a tether after ``appendPath`` of Algorithm 1: shortcut and pull until nothing
+    changes."""
     slack = 0.01 * delta
     before = _length(nodes)
     for _ in range(passes):
@@ -204,7 +191,7 @@ def tighten(
 
 @kernel
 def _sees(field: Field, nodes: Floats, i: int, j: int, clearance: float, slack: float) -> bool:
-    return see(
+    return is_segment_free(
         field, nodes[i, 0], nodes[i, 1], nodes[i, 2], nodes[j, 0], nodes[j, 1], nodes[j, 2],
         slack - clearance, slack,
     )  # fmt: skip

@@ -1,7 +1,7 @@
-"""A tether as rows of numbers, and what is the same in every model: frames, checks, lengths.
+"""Tethers as rows of numbers, and what all models share: frames, probes of edges, lengths.
 
 Row i of a strand describes node i and the edge from it to node i + 1. The first node is the anchor,
-the last the robot, the others rest on something. Compiled; positions in metres.
+the last one the robot; the others rest on something. Positions are in metres.
 """
 
 from __future__ import annotations
@@ -14,53 +14,84 @@ from netsp.base.arrays import Floats
 from netsp.base.compiled.dynamic_array import write_rows
 from netsp.base.compiled.kernel import kernel
 from netsp.world.scene.sampling import Field, distance, lowest_along, sample
+from netsp.world.tether.tether_policy import SLIP, STRIDE, PullSettings
 
-X, Y, Z = 0, 1, 2
-"""Position."""
+Vector = tuple[float, float, float]
 
-EX, EY, EZ = 3, 4, 5
-"""Unit direction in which the node may slide: where the surface's tangent plane stays the same
-(the ruling of a cylinder, the edge of a box)."""
+X = 0
+"""Column of the x coordinate."""
 
-NX, NY, NZ = 6, 7, 8
-"""Unit normal of the contact, away from the solid."""
+Y = 1
+"""Column of the y coordinate."""
+
+Z = 2
+"""Column of the z coordinate."""
+
+EX = 3
+"""Column of x of the unit direction in which the node may slide: along it, the surface's tangent
+plane stays the same, as along the ruling of a cylinder or the edge of a box."""
+
+EY = 4
+"""Column of y of that direction."""
+
+EZ = 5
+"""Column of z of that direction."""
+
+NX = 6
+"""Column of x of the contact's unit normal, which points away from the solid; 0 in all three
+columns for a node that rests on nothing."""
+
+NY = 7
+"""Column of y of the normal."""
+
+NZ = 8
+"""Column of z of the normal."""
 
 EXTRA = 9
-"""Length of the surface's arc over the edge, less the edge."""
+"""Column of the length of the surface's arc over the edge, minus that of the edge."""
 
-REACH0, REACH1, USED = 10, 11, 12
-"""The edge stays free as long as its ends move by less than REACH0 and REACH1, together: USED is
-the sum of the fractions used up. Above 1 the edge must be looked at again."""
+REACH0 = 10
+"""Column of the distance by which the edge's first node alone may move before the edge may be too
+deep."""
+
+REACH1 = 11
+"""Column of the same distance for the edge's second node."""
+
+USED = 12
+"""Column of the sum of both nodes' motions, each as a fraction of `REACH0` or `REACH1`; above 1,
+the edge must be probed again."""
 
 STALE = 13
-"""How far the node has moved since its frame was taken."""
+"""Column of the distance that the node has moved since its frame was updated; infinite for a new
+node, and for one in the air that waits to land."""
 
 SHARP = 14
-"""1 on an edge or corner of the scene, else 0."""
+"""Column of 1 for a node on an edge or corner of a solid, else 0."""
 
 PART = 15
-"""Which solid the node rests on; -1 for voxels."""
+"""Column of the index of the solid that the node rests on, -1 for voxels."""
 
 CURVE = 16
-"""Curvature of the surface along the slide direction; positive where it is convex."""
+"""Column of the curvature of the surface along the slide direction, positive where it is convex."""
 
 STEP = 17
-"""The node's last Newton step along its direction."""
+"""Column of the node's last Newton step along its slide direction."""
 
 CONE = 18
-"""On an edge, the cosine of half the angle between the normals of its two faces: the contact holds
-only what presses within it. Elsewhere, +1 or -1 where the surface ends in an edge close by, along
-or against the slide direction, else 0."""
+"""Column of the cone of a contact.
+
+On a sharp edge, it is the cosine of half the angle between the normals of its two faces: the
+contact holds only what presses within that cone. Elsewhere, it is +1 or -1 where the surface ends
+in an edge close by, along or against the slide direction, else 0.
+"""
 
 WIDTH = 19
-
-SHARP_SINE = 0.5
-"""Normals that differ by more than 30 degrees across a contact mean a sharp edge."""
+"""Format of a strand: number of columns."""
 
 
 @kernel
-def grown(strand: Floats, count: int) -> Floats:
-    """The strand with room for one more node."""
+def with_room(strand: Floats, count: int) -> Floats:
+    """Return the strand with room for one more node."""
     if count < len(strand):
         return strand
     out = np.zeros((2 * len(strand) + 8, WIDTH))
@@ -69,9 +100,11 @@ def grown(strand: Floats, count: int) -> Floats:
 
 
 @kernel
-def insert(strand: Floats, count: int, at: int, x: float, y: float, z: float) -> tuple[Floats, int]:
-    """A new node before row `at`, its frame and the two edges beside it unknown."""
-    strand = grown(strand, count)
+def insert_node(
+    strand: Floats, count: int, at: int, x: float, y: float, z: float
+) -> tuple[Floats, int]:
+    """Insert a node before row `at`; its frame and both its edges are unknown."""
+    strand = with_room(strand, count)
     for i in range(count, at, -1):
         strand[i] = strand[i - 1]
     strand[at] = 0.0
@@ -85,8 +118,8 @@ def insert(strand: Floats, count: int, at: int, x: float, y: float, z: float) ->
 
 
 @kernel
-def remove(strand: Floats, count: int, at: int) -> int:
-    """Without row `at`; the edge that takes its place is unknown."""
+def remove_node(strand: Floats, count: int, at: int) -> int:
+    """Remove row `at`; the edge that replaces its two edges is unknown."""
     for i in range(at, count - 1):
         strand[i] = strand[i + 1]
     strand[at - 1, USED] = math.inf
@@ -96,7 +129,7 @@ def remove(strand: Floats, count: int, at: int) -> int:
 
 @kernel
 def gap(strand: Floats, i: int, j: int) -> float:
-    """Distance between two nodes."""
+    """Return the distance between two nodes."""
     return math.sqrt(
         (strand[i, X] - strand[j, X]) ** 2
         + (strand[i, Y] - strand[j, Y]) ** 2
@@ -106,7 +139,7 @@ def gap(strand: Floats, i: int, j: int) -> float:
 
 @kernel
 def strand_length(strand: Floats, count: int) -> float:
-    """Arc-corrected length of a strand."""
+    """Return the length of a strand, with the arcs over its edges."""
     total = 0.0
     for i in range(count - 1):
         total += gap(strand, i, i + 1) + strand[i, EXTRA]
@@ -115,7 +148,7 @@ def strand_length(strand: Floats, count: int) -> float:
 
 @kernel
 def note_motion(strand: Floats, count: int, i: int, by: float) -> None:
-    """Book a motion of node i against the edges beside it."""
+    """Book a motion of node i against its two edges."""
     strand[i, STALE] += by
     if i > 0:
         strand[i - 1, USED] += by / strand[i - 1, REACH1]
@@ -124,9 +157,18 @@ def note_motion(strand: Floats, count: int, i: int, by: float) -> None:
 
 
 @kernel
-def look_along(field: Field, strand: Floats, i: int, tolerance: float) -> tuple[float, float]:
-    """Look along edge i: (least distance, its place as a fraction), and book how far its ends may
-    move before the edge is deeper than `tolerance`, and the arc over it."""
+def probe_edge(field: Field, strand: Floats, i: int, tolerance: float) -> tuple[float, float]:
+    """Probe edge i for its deepest point, and note how far its ends may move before it must be
+    probed again.
+
+    The arc over the edge is noted, too. Returns the least distance, and where it is, as a fraction
+    of the edge.
+
+    Parameters
+    ----------
+    tolerance : float
+        Depth that is allowed, and least distance between two samples, metres.
+    """
     ax, ay, az = strand[i, X], strand[i, Y], strand[i, Z]
     bx, by, bz = strand[i + 1, X], strand[i + 1, Y], strand[i + 1, Z]
     length = gap(strand, i, i + 1)
@@ -135,8 +177,8 @@ def look_along(field: Field, strand: Floats, i: int, tolerance: float) -> tuple[
         strand[i, REACH0] = strand[i, REACH1] = tolerance
         strand[i, USED] = 0.0
         return 0.0, 0.0
-    if length <= 8.0 * tolerance and rests(strand, i) and rests(strand, i + 1):
-        return _look_across(field, strand, i, length, tolerance)
+    if length <= 8.0 * tolerance and is_resting(strand, i) and is_resting(strand, i + 1):
+        return _probe_short_edge(field, strand, i, length, tolerance)
     low, where, s = math.inf, 0.0, 0.0
     reach0 = reach1 = 1e6 * tolerance
     before, step = 0.0, 0.0
@@ -165,17 +207,20 @@ def look_along(field: Field, strand: Floats, i: int, tolerance: float) -> tuple[
 
 
 @kernel
-def rests(strand: Floats, i: int) -> bool:
-    """Whether node i rests on something."""
+def is_resting(strand: Floats, i: int) -> bool:
+    """Return whether node i rests on something."""
     return bool(strand[i, NX] != 0.0 or strand[i, NY] != 0.0 or strand[i, NZ] != 0.0)
 
 
 @kernel
-def _look_across(
+def _probe_short_edge(
     field: Field, strand: Floats, i: int, length: float, tolerance: float
 ) -> tuple[float, float]:
-    """`look_along` for a short edge between two contacts, by its quarter points: no point of it is
-    farther than an eighth of the edge, at most the tolerance, from one of them."""
+    """Probe a short edge between two contacts at its quarter points.
+
+    No point of the edge is farther than an eighth of it, which is at most the tolerance, from one
+    of them.
+    """
     low, where, middle = math.inf, 0.5, 0.0
     for k in range(1, 4):
         t = 0.25 * k
@@ -210,12 +255,12 @@ def _arc_over(
     low: float,
     where: float,
 ) -> float:
-    """What the surface's arc over an edge is longer than the edge.
+    """Return by how much the surface's arc over an edge is longer than the edge.
 
-    Both ends on the surface: the edge is the chord of an arc of sagitta g, and an arc of half angle
-    a = 2 atan(2 g / c) over a chord c has the length c a / sin a. Only one end on it: the edge
-    leaves the solid again on its way, its inner part is a chord c of which the arc turns only half
-    before it goes off along the tangent; that is longer by r (a - sin a), about (4/3) g^2 / c.
+    With both ends on the surface, the edge is the chord c of an arc of sagitta g. Its half angle is
+    a = 2 atan(2 g / c), and its length c a / sin a. With one end on the surface, the edge leaves
+    the solid again. The arc over its inner part turns half as far before it goes on along the
+    tangent, and is longer by r (a - sin a), about (4/3) g^2 / c.
     """
     if 0.3 < where < 0.7:
         g = -distance(field, 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz))
@@ -230,8 +275,8 @@ def _arc_over(
 
 
 @kernel
-def let_go(strand: Floats, i: int) -> None:
-    """Node i rests on nothing: no direction to slide in, no normal that holds it."""
+def release(strand: Floats, i: int) -> None:
+    """Note that node i rests on nothing."""
     for k in range(EX, NZ + 1):
         strand[i, k] = 0.0
     strand[i, SHARP] = strand[i, STALE] = strand[i, CURVE] = strand[i, STEP] = 0.0
@@ -242,8 +287,11 @@ def let_go(strand: Floats, i: int) -> None:
 def to_surface(
     field: Field, x: float, y: float, z: float, tolerance: float
 ) -> tuple[float, float, float]:
-    """From a point near the surface, or not deep, to the surface. Out of one solid may be into
-    another: in the crease between two it goes back and forth, ever less."""
+    """Return the point of the surface near a point that is not deep.
+
+    Out of one solid may be into another: in the crease between two solids, the point goes back and
+    forth in ever smaller steps.
+    """
     for turn in range(12):
         d, nx, ny, nz, _ = sample(field, x, y, z)
         if -tolerance <= d and (turn > 0 or d <= tolerance):
@@ -254,22 +302,14 @@ def to_surface(
 
 @kernel
 def edge_point(
-    ax: float,
-    ay: float,
-    az: float,
-    na: tuple[float, float, float],
-    da: float,
-    bx: float,
-    by: float,
-    bz: float,
-    nb: tuple[float, float, float],
-    db: float,
-    px: float,
-    py: float,
-    pz: float,
+    a: Vector, na: Vector, da: float, b: Vector, nb: Vector, db: float, p: Vector
 ) -> tuple[float, float, float, float]:
-    """The point nearest to p on the planes that touch the solid near a and near b (distances da and
-    db, normals na and nb there), and the sine of their angle; p itself if they are parallel."""
+    """Return the point nearest to p on two tangent planes of a solid, and the sine of their angle.
+
+    The planes belong to the points a and b with distances da and db and normals na and nb. Where
+    they are parallel, the point is p.
+    """
+    (ax, ay, az), (bx, by, bz), (px, py, pz) = a, b, p
     cosine = na[0] * nb[0] + na[1] * nb[1] + na[2] * nb[2]
     det = 1.0 - cosine * cosine
     if det < 1e-9:
@@ -287,11 +327,14 @@ def edge_point(
 
 
 @kernel
-def path_out(
-    field: Field, strand: Floats, i: int, where: float, slip: float
+def exit_point(
+    field: Field, strand: Floats, i: int, where: float, settings: PullSettings
 ) -> tuple[float, float, float]:
-    """Where a strand that is too deep at fraction `where` of edge i comes to the surface: on the
-    sharp edge of the solid if it cuts one off, else straight out."""
+    """Return where a strand comes out of a solid at fraction `where` of edge i, which is too deep.
+
+    That is on the sharp edge of the solid that the strand cuts off, else straight out.
+    """
+    slip = SLIP * settings.delta
     ux = strand[i + 1, X] - strand[i, X]
     uy = strand[i + 1, Y] - strand[i, Y]
     uz = strand[i + 1, Z] - strand[i, Z]
@@ -305,36 +348,27 @@ def path_out(
     da, fx, fy, fz, _ = sample(field, ax, ay, az)
     db, gx, gy, gz, _ = sample(field, bx, by, bz)
     qx, qy, qz, sine = edge_point(
-        ax, ay, az, (fx, fy, fz), da, bx, by, bz, (gx, gy, gz), db, mx, my, mz
+        (ax, ay, az), (fx, fy, fz), da, (bx, by, bz), (gx, gy, gz), db, (mx, my, mz)
     )
     near = (qx - mx) ** 2 + (qy - my) ** 2 + (qz - mz) ** 2 <= (4.0 * slip) ** 2
-    if sine > SHARP_SINE and near and abs(distance(field, qx, qy, qz)) < 0.1 * slip:
+    if sine > settings.min_sharp_sine and near and abs(distance(field, qx, qy, qz)) < 0.1 * slip:
         return qx, qy, qz
     return to_surface(field, mx, my, mz, 0.01 * slip)
 
 
 @kernel
-def take_frame(
-    field: Field, strand: Floats, i: int, spread: float, flat: float, reach: float
-) -> float:
-    """Slide direction and normal of contact i, from the surface a little before and after it.
+def update_frame(field: Field, strand: Floats, i: int, settings: PullSettings) -> float:
+    """Update the slide direction and normal of contact i from samples of the surface before and
+    after it.
 
-    The two normals span the plane in which the tether turns over the surface; their cross product
-    is the direction conjugate to the tether. Where they differ much the contact is on a sharp edge,
-    and the node is put on it: the point on both tangent planes. Else the node is put on the
+    The two normals span the plane in which the tether turns over the surface. Their cross product
+    is the direction conjugate to the tether. Where the normals differ much, the contact is on a
+    sharp edge, and the node is put on it: on both tangent planes. Otherwise the node is put on the
     surface.
 
     Returns how far the node was moved.
-
-    Parameters
-    ----------
-    spread
-        Distance of the two samples.
-    flat
-        Sines below it mean no curvature.
-    reach
-        A node is put on a sharp edge from no farther than this.
     """
+    spread, reach = settings.spread, STRIDE * settings.delta
     px, py, pz = strand[i, X], strand[i, Y], strand[i, Z]
     ux, uy, uz = px - strand[i - 1, X], py - strand[i - 1, Y], pz - strand[i - 1, Z]
     wx, wy, wz = strand[i + 1, X] - px, strand[i + 1, Y] - py, strand[i + 1, Z] - pz
@@ -351,18 +385,17 @@ def take_frame(
     cosine = ax * bx + ay * by + az * bz
     qx, qy, qz = px, py, pz
     strand[i, SHARP] = 0.0
-    if sine > SHARP_SINE and cosine > -0.95:
-        qx, qy, qz, _ = edge_point(
-            px - s * ux, py - s * uy, pz - s * uz, (ax, ay, az), d1,
-            px + t * wx, py + t * wy, pz + t * wz, (bx, by, bz), d2, px, py, pz,
-        )  # fmt: skip
+    if sine > settings.min_sharp_sine and cosine > -0.95:
+        first = (px - s * ux, py - s * uy, pz - s * uz)
+        second = (px + t * wx, py + t * wy, pz + t * wz)
+        qx, qy, qz, _ = edge_point(first, (ax, ay, az), d1, second, (bx, by, bz), d2, (px, py, pz))
         if (qx - px) ** 2 + (qy - py) ** 2 + (qz - pz) ** 2 <= reach * reach:
             strand[i, SHARP] = 1.0
         else:
             qx, qy, qz = px, py, pz
     d, nx, ny, nz, part = sample(field, qx, qy, qz)
     if d > reach:
-        let_go(strand, i)
+        release(strand, i)
         return 0.0
     if abs(d) > 1e-4 * reach:
         qx, qy, qz = to_surface(field, qx, qy, qz, 1e-3 * reach)
@@ -377,22 +410,13 @@ def take_frame(
     if length > 1e-9:
         tx, ty, tz = tx / length, ty / length, tz / length
     along = (ex * tx + ey * ty + ez * tz) / sine if sine > 0.0 else 1.0
-    if sine <= flat or (strand[i, SHARP] == 0.0 and abs(along) > 0.95):
+    if sine <= settings.flat or (strand[i, SHARP] == 0.0 and abs(along) > 0.95):
         ex, ey, ez = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
         sine = math.sqrt(ex * ex + ey * ey + ez * ez)
     if sine > 1e-12:
         strand[i, EX], strand[i, EY], strand[i, EZ] = ex / sine, ey / sine, ez / sine
-        ex, ey, ez = ex / sine, ey / sine, ez / sine
         if strand[i, SHARP] == 0.0:
-            _, ax, ay, az, _ = sample(field, qx - spread * ex, qy - spread * ey, qz - spread * ez)
-            _, bx, by, bz, _ = sample(field, qx + spread * ex, qy + spread * ey, qz + spread * ez)
-            before, after = ax * ex + ay * ey + az * ez, bx * ex + by * ey + bz * ez
-            strand[i, CURVE] = (after - before) / (2.0 * spread)
-            strand[i, CONE] = 0.0
-            if after > SHARP_SINE and before > -0.1:
-                strand[i, CONE] = 1.0
-            elif before < -SHARP_SINE and after < 0.1:
-                strand[i, CONE] = -1.0
+            _note_curvature(field, strand, i, (qx, qy, qz), settings)
         else:
             strand[i, CURVE] = 0.0
     strand[i, NX], strand[i, NY], strand[i, NZ] = nx, ny, nz
@@ -400,6 +424,25 @@ def take_frame(
     strand[i, PART] = part
     strand[i, STALE] = 0.0
     return math.sqrt((qx - px) ** 2 + (qy - py) ** 2 + (qz - pz) ** 2)
+
+
+@kernel
+def _note_curvature(
+    field: Field, strand: Floats, i: int, point: Vector, settings: PullSettings
+) -> None:
+    """Note the curvature of the surface along the slide direction of node i, and edges near it."""
+    qx, qy, qz = point
+    ex, ey, ez = strand[i, EX], strand[i, EY], strand[i, EZ]
+    spread = settings.spread
+    _, ax, ay, az, _ = sample(field, qx - spread * ex, qy - spread * ey, qz - spread * ez)
+    _, bx, by, bz, _ = sample(field, qx + spread * ex, qy + spread * ey, qz + spread * ez)
+    before, after = ax * ex + ay * ey + az * ez, bx * ex + by * ey + bz * ez
+    strand[i, CURVE] = (after - before) / (2.0 * spread)
+    strand[i, CONE] = 0.0
+    if after > settings.min_sharp_sine and before > -0.1:
+        strand[i, CONE] = 1.0
+    elif before < -settings.min_sharp_sine and after < 0.1:
+        strand[i, CONE] = -1.0
 
 
 @kernel
@@ -416,8 +459,11 @@ def sweep_is_free(
     bz: float,
     tolerance: float,
 ) -> bool:
-    """Whether the triangle that an edge sweeps, one end held at c and the other moved from a to b,
-    is free to within `tolerance`: a point at fraction t of the edge moves by t |ab|."""
+    """Return whether the triangle is free that an edge from c sweeps when its other end moves from
+    a to b.
+
+    A point at fraction t of the edge moves by t |ab|. Depths up to `tolerance` count as free.
+    """
     motion = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2)
     length = math.sqrt((bx - cx) ** 2 + (by - cy) ** 2 + (bz - cz) ** 2)
     if length == 0.0:
@@ -435,7 +481,7 @@ def sweep_is_free(
 
 
 @kernel
-def see(
+def is_segment_free(
     field: Field,
     ax: float,
     ay: float,
@@ -446,6 +492,8 @@ def see(
     depth: float,
     step: float,
 ) -> bool:
-    """Whether the segment is nowhere deeper than `depth` (negative: nearer than), to within
-    `step`."""
+    """Return whether no point of a segment is deeper than `depth`, to within `step`.
+
+    A negative depth is a distance to keep.
+    """
     return lowest_along(field, ax, ay, az, bx, by, bz, step)[0] >= -depth

@@ -1,4 +1,4 @@
-"""The tether as its users see it: an immutable state with nodes, length and contacts."""
+"""Tethers as their users see them: immutable states with nodes, length and contacts."""
 
 from __future__ import annotations
 
@@ -14,18 +14,16 @@ from netsp.world.tether.strand import EXTRA, NX, NZ, PART, REACH0, REACH1, USED,
 
 @dataclass(frozen=True)
 class Contact:
-    """A stretch of the tether that rests on one part of the scene.
+    """Stretch of a tether that rests on one part of the scene.
 
     Parameters
     ----------
-    first : int
-        First node of the tether.
-    last : int
-        Last node, included.
+    first, last : int
+        First and last node of the stretch.
     part : int
         Index of the solid in the scene, -1 for voxels.
     length : float
-        Metres of tether between the two nodes, along the surface.
+        Length of the tether between the two nodes along the surface, metres.
     """
 
     first: int
@@ -36,17 +34,17 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class Tether(ComparesArrays):
-    """A tether at rest, from its anchor to the robot.
+    """Tether at rest, from its anchor to the robot.
 
     Parameters
     ----------
     strand : ndarray, shape (n, 19)
-        What the model keeps of each node (`netsp.world.tether.strand`); never changed in place, so
-        a state can be kept, compared and continued from.
+        Rows of the nodes (`netsp.world.tether.strand`). They are never changed in place, so a state
+        can be kept, compared and continued from.
     length : float
-        Metres, along the surface where the tether rests on it.
+        Length along the surfaces on which the tether rests, metres.
     residual : float
-        Metres by which a node still moved when the model stopped.
+        Motion of a node in the last round of pulling, metres.
     """
 
     strand: Floats
@@ -55,27 +53,28 @@ class Tether(ComparesArrays):
 
     @property
     def nodes(self) -> Floats:
-        """(n, 3) from the anchor to the robot; all between rest on something (geodesic model)."""
+        """Nodes (n, 3) from the anchor to the robot. In the geodesic model, all between rest on
+        something."""
         return self.strand[:, :3]
 
     @property
     def anchor(self) -> Floats:
-        """(3,) where the tether starts."""
+        """Position of the anchor (3,)."""
         return self.strand[0, :3]
 
     @property
     def robot(self) -> Floats:
-        """(3,) where it ends."""
+        """Position of the robot (3,)."""
         return self.strand[-1, :3]
 
     @cached_property
     def contacts(self) -> tuple[Contact, ...]:
-        """Which stretches touch which parts of the scene, from the anchor on."""
-        rests = np.any(self.strand[:, NX : NZ + 1] != 0.0, axis=1)
-        rests[[0, -1]] = False
+        """Contacts with parts of the scene, from the anchor on."""
+        resting = np.any(self.strand[:, NX : NZ + 1] != 0.0, axis=1)
+        resting[[0, -1]] = False
         edges = np.linalg.norm(np.diff(self.nodes, axis=0), axis=1) + self.strand[:-1, EXTRA]
         found: list[Contact] = []
-        for i in np.flatnonzero(rests):
+        for i in np.flatnonzero(resting):
             part = int(self.strand[i, PART])
             last = found[-1] if found else None
             # the edge between lies on the surface where it is bent over it or is short
@@ -91,8 +90,8 @@ class Tether(ComparesArrays):
         return tuple(found)
 
 
-def strand_of(nodes: npt.ArrayLike) -> Floats:
-    """A strand through given nodes about which nothing else is known."""
+def new_strand(nodes: npt.ArrayLike) -> Floats:
+    """Return a strand through nodes (n, 3) of which only the positions are known."""
     points = np.asarray(nodes, dtype=float).reshape(-1, 3)
     strand = np.zeros((len(points), WIDTH))
     strand[:, :3] = points

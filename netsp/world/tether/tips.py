@@ -1,4 +1,4 @@
-"""What hangs on the tips of corners, and in the notches of voxels, is taken off them sideways."""
+"""Sidesteps of a strand off the tips of corners, and out of the notches of voxels."""
 
 from __future__ import annotations
 
@@ -21,65 +21,62 @@ from netsp.world.tether.strand import (
     Y,
     Z,
     gap,
+    is_resting,
     note_motion,
-    rests,
     strand_length,
     to_surface,
 )
-
-TURNING, CLOSE, TIP = 0.95, 8.0, 4
-"""Cosine of the angle by which a strand turns sharply, strides between contacts that it turns about
-together, and how many of them a tip may have at most."""
-
-SIDESTEP, MOST_NUDGE = 0.7, 9
-"""Of a stride, what such contacts are taken sideways at a time, which leaves room for the way to
-the surface; and how often at most: a strand whose ends stand still. One whose ends move is taken
-once, and has another chance at once."""
+from netsp.world.tether.tether_policy import SLIP, STRIDE, PullSettings
 
 
 @kernel
 def nudge(
-    field: Field, strand: Floats, count: int, slip: float, stride: float, room: int, worth: float,
-    steps: int,
-) -> tuple[Floats, int, bool]:  # fmt: skip
-    """Take the contacts that the strand turns about sharply sideways, in up to so many steps,
-    where that makes it shorter by what it is worth. Returns (strand, count, whether anything was).
+    field: Field, strand: Floats, count: int, settings: PullSettings, room: int, steps: int
+) -> tuple[Floats, int, bool]:
+    """Move contacts at which the strand turns sharply sideways, where that makes it shorter.
 
-    Over the tip of a corner each contact by itself is held, and a strand that is taut to both sides
-    of the tip lies on a saddle: only all of them together, and across, get off it. And an edge in
-    voxels is uneven: in its notches, millimetres deep, a strand would stay.
+    Over the tip of a corner each contact by itself is held, and a strand that is taut on both sides
+    of the tip lies on a saddle: only all contacts together, moved across the strand, leave it.
+    Edges of voxels are uneven, and a strand would stay in their notches, which are millimetres
+    deep.
+
+    Returns the strand, the number of its nodes, and whether any contact was moved.
     """
+    stride, slip = STRIDE * settings.delta, SLIP * settings.delta
+    min_gain = settings.min_gain * settings.precision
     i = 1 if field.data[VOXELS] > 0.0 else count  # exact edges and corners need none of it
     while i < count - 1:
         j = i
-        while j + 1 < count - 1 and gap(strand, j, j + 1) <= CLOSE * stride:
+        while j + 1 < count - 1 and gap(strand, j, j + 1) <= settings.tip_strides * stride:
             j += 1
-        wx, wy, wz, turned = across(strand, i, j)
-        sharp = False
+        wx, wy, wz, is_turning = sidestep_direction(strand, i, j, settings.max_tip_cosine)
+        is_sharp = False
         for k in range(i, j + 1):
             # voxels are uneven everywhere: round parts of them are left to strands that stand still
-            uneven = strand[k, PART] < 0.0 and steps > 1
-            edge = strand[k, SHARP] + abs(strand[k, CONE]) > 0.0
-            sharp = sharp or uneven or edge or not rests(strand, k)
-        if turned and sharp and j < i + TIP:
+            is_uneven = strand[k, PART] < 0.0 and steps > 1
+            is_edge = strand[k, SHARP] + abs(strand[k, CONE]) > 0.0
+            is_sharp = is_sharp or is_uneven or is_edge or not is_resting(strand, k)
+        if is_turning and is_sharp and j < i + settings.max_tip_contacts:
             before, kept = strand_length(strand, count), strand[:count].copy()
             # over an edge that it crosses at a slant, a strand slips along the edge
             along_edge = i == j and strand[i, SHARP] == 1.0
-            for way in range(4 if along_edge else 2):
-                side, grown = (1.0, -1.0)[way % 2], count
+            for attempt in range(4 if along_edge else 2):
+                side, new_count = (1.0, -1.0)[attempt % 2], count
                 vx, vy, vz = side * wx, side * wy, side * wz
-                if way >= 2:
+                if attempt >= 2:
                     vx, vy, vz = side * kept[i, EX], side * kept[i, EY], side * kept[i, EZ]
                 for _ in range(steps):
-                    if not sidestep(field, strand, grown, i, j, vx, vy, vz, stride):
+                    if not sidestep(field, strand, new_count, i, j, (vx, vy, vz), settings):
                         break
-                    strand, grown = mend(field, strand, grown, slip, room, slip)
-                    if strand_length(strand, grown) < before - worth:
-                        return strand, grown, True
-                    ux, uy, uz, turned = across(strand, i, j)
-                    if grown != count or not turned:
+                    strand, new_count = mend(field, strand, new_count, settings, room, slip)
+                    if strand_length(strand, new_count) < before - min_gain:
+                        return strand, new_count, True
+                    ux, uy, uz, is_turning = sidestep_direction(
+                        strand, i, j, settings.max_tip_cosine
+                    )
+                    if new_count != count or not is_turning:
                         break
-                    if way >= 2:
+                    if attempt >= 2:
                         continue
                     same = 1.0 if ux * vx + uy * vy + uz * vz > 0.0 else -1.0
                     vx, vy, vz = same * ux, same * uy, same * uz
@@ -90,15 +87,25 @@ def nudge(
 
 @kernel
 def sidestep(
-    field: Field, strand: Floats, count: int, i: int, j: int,
-    vx: float, vy: float, vz: float, stride: float,
-) -> bool:  # fmt: skip
-    """Take nodes i to j along (vx, vy, vz), and onto the surface. Where that took one of them
-    farther than a stride, past which the class may change, the step is not to be used: False."""
-    by = SIDESTEP * stride
+    field: Field,
+    strand: Floats,
+    count: int,
+    i: int,
+    j: int,
+    direction: tuple[float, float, float],
+    settings: PullSettings,
+) -> bool:
+    """Move nodes i to j along a direction and onto the surface.
+
+    Returns False where a node moved farther than a stride, after which the homotopy class may
+    differ; then the step must not be used.
+    """
+    stride = STRIDE * settings.delta
+    step = settings.sidestep_strides * stride
+    vx, vy, vz = direction
     for k in range(i, j + 1):
         x, y, z = strand[k, X], strand[k, Y], strand[k, Z]
-        px, py, pz = to_surface(field, x + by * vx, y + by * vy, z + by * vz, 1e-3 * stride)
+        px, py, pz = to_surface(field, x + step * vx, y + step * vy, z + step * vz, 1e-3 * stride)
         if (px - x) ** 2 + (py - y) ** 2 + (pz - z) ** 2 > stride * stride:
             return False
         strand[k, X], strand[k, Y], strand[k, Z] = px, py, pz
@@ -107,9 +114,13 @@ def sidestep(
 
 
 @kernel
-def across(strand: Floats, i: int, j: int) -> tuple[float, float, float, bool]:
-    """The unit vector across the strand, and along the surface, where it rests on nodes i to j; and
-    whether it turns there by more than `TURNING`."""
+def sidestep_direction(
+    strand: Floats, i: int, j: int, max_cosine: float
+) -> tuple[float, float, float, bool]:
+    """Return the unit vector across the strand along the surface at nodes i to j.
+
+    The last value is whether the strand turns sharply there; without it, there is no direction.
+    """
     la, lb = gap(strand, i - 1, i), gap(strand, j, j + 1)
     if la == 0.0 or lb == 0.0:
         return 0.0, 0.0, 0.0, False
@@ -118,16 +129,16 @@ def across(strand: Floats, i: int, j: int) -> tuple[float, float, float, bool]:
         (strand[i, Y] - strand[i - 1, Y]) / la,
         (strand[i, Z] - strand[i - 1, Z]) / la,
     )
-    bx, by, bz = (
+    bx, step, bz = (
         (strand[j + 1, X] - strand[j, X]) / lb,
         (strand[j + 1, Y] - strand[j, Y]) / lb,
         (strand[j + 1, Z] - strand[j, Z]) / lb,
     )
-    if ax * bx + ay * by + az * bz > TURNING:
+    if ax * bx + ay * step + az * bz > max_cosine:
         return 0.0, 0.0, 0.0, False
     # out of the surface, and on along it
-    nx, ny, nz = ax - bx, ay - by, az - bz
-    tx, ty, tz = ax + bx, ay + by, az + bz
+    nx, ny, nz = ax - bx, ay - step, az - bz
+    tx, ty, tz = ax + bx, ay + step, az + bz
     wx, wy, wz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
     length = math.sqrt(wx * wx + wy * wy + wz * wz)
     if length < 1e-6:
