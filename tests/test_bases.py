@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.subtours import fractional_cuts
-from tests.test_blossoms import all_legs, some_cut
-from tests.test_contract import random_graph
+from tests.cut_points import all_legs, some_cut
+from tests.travel_graphs import random_graph
 
 
 def steps(lp):

@@ -12,7 +12,7 @@ from netsp.gtsp.neighbourhood import cheapest_insertions
 from netsp.gtsp.travel.graph import least_tethers
 from netsp.mip.mip_solver import MipRun
 from netsp.plan.random_worlds import random_world
-from tests.test_contract import random_graph
+from tests.travel_graphs import random_graph
 
 
 def lengthens(graph, tour, v):

@@ -18,39 +18,12 @@ from netsp.mip.lagrangian_bound import exact_bound
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
 from tests.brute import brute_tour
-from tests.test_contract import random_graph
+from tests.cut_points import all_legs, some_cut, tours_as_points
+from tests.travel_graphs import random_graph
 from tests.worlds import costs_of
 
 PRISM = np.array([(0, 1), (1, 2), (0, 2), (3, 4), (4, 5), (3, 5), (0, 3), (1, 4), (2, 5)])
 HALVES = np.array([0.5] * 6 + [1.0] * 3)
-
-
-def all_legs(graph):
-    legs = np.argwhere(np.triu(np.isfinite(graph.costs), 1))
-    return legs, graph.costs[legs[:, 0], legs[:, 1]]
-
-
-def some_cut(chance, graph):
-    """A handle and an odd number of teeth across it."""
-    m = graph.goal_count + 1
-    handle = np.zeros(m, dtype=bool)
-    handle[chance.sample(range(m), chance.randint(1, m - 1))] = True
-    across = [p for p in itertools.combinations(range(m), 2) if handle[p[0]] != handle[p[1]]]
-    odd = list(range(3, len(across) + 1, 2))
-    teeth = chance.sample(across, chance.choice(odd)) if odd else []
-    return Cut(handle[graph.cluster], -1, tuple(sorted(teeth)))
-
-
-def tours_as_points(chance, graph, legs, count=30):
-    """Random tours, and how each uses legs (k, 2)."""
-    place = {tuple(e): k for k, e in enumerate(legs.tolist())}
-    for _ in range(count):
-        order = chance.sample(range(1, graph.goal_count + 1), graph.goal_count)
-        tour = [0, *(chance.choice(graph.members(g).tolist()) for g in order)]
-        y = np.zeros(len(legs))
-        for u, v in zip(tour, [*tour[1:], 0], strict=True):
-            y[place[min(u, v), max(u, v)]] = 1.0
-        yield tour, y
 
 
 def test_the_prism_of_halves_is_cut():

@@ -26,8 +26,8 @@ from netsp.mip.program import duals_of_relaxation
 from netsp.mip.root import Root
 from netsp.mip.subtours import component_cuts
 from tests.brute import brute_tour
-from tests.test_blossoms import all_legs, some_cut, tours_as_points
-from tests.test_contract import random_graph
+from tests.cut_points import all_legs, some_cut, tours_as_points
+from tests.travel_graphs import random_graph
 from tests.worlds import costs_of
 
 

@@ -15,6 +15,7 @@ from netsp import InputError, Problem, Status, TravelGraph, solve, solve_graph, 
 from netsp.plan.solve_problem import travel_graph
 from netsp.plan.solver_table import ROADMAPS, SOLVERS
 from tests.brute import brute_tour
+from tests.travel_graphs import random_graph
 from tests.worlds import random_world
 
 BLIND = {s.name for s in SOLVERS.values() if s.blind}
@@ -46,15 +47,6 @@ def optimum(roadmap):
     result = solve_graph(graph(roadmap), "mip")
     assert result.status is PROVEN[roadmap]
     return result
-
-
-def random_graph(seed, goals, most=4):
-    """A generalised TSP of random points; costs inf nowhere but within clusters."""
-    rng = np.random.default_rng(seed)
-    sizes = [1, *rng.integers(1, most + 1, goals)]
-    cluster = np.repeat(np.arange(goals + 1), sizes)
-    at = rng.uniform(0, 1, (len(cluster), 3))
-    return TravelGraph.from_costs(np.linalg.norm(at[:, None] - at[None, :], axis=2), cluster)
 
 
 @pytest.mark.parametrize("roadmap", ROADMAPS)

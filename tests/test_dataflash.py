@@ -11,65 +11,17 @@ from netsp.online.guard.replay import read_fixes
 from netsp.online.guard.stream import replayed
 from netsp.online.guard.tether_guard import Guard, GuardOptions
 from netsp.online.link.geo_frame import Frame
+from tests.dataflash_bytes import TYPES, header, packed, place
 
 SITE = Problem(
     base=(0, 0), goals=[(9, 0, -1)], tether_length=30,
     obstacles=[Circle(center=(5, 0), radius=0.5, name="A")],
 )  # fmt: skip
 
-FORMATS = {
-    "FMT": ("BBnNZ", "Type,Length,Name,Format,Columns"),
-    "XKF1": ("QBccCfffffffccce", "TimeUS,C,Roll,Pitch,Yaw,VN,VE,VD,dPD,PN,PE,PD,GX,GY,GZ,OH"),
-    "XKF4": ("QBcccccfffHBIHb", "TimeUS,C,SV,SP,SH,SM,SVT,errRP,OFN,OFE,FS,TS,SS,GPS,PI"),
-    "NKF1": ("QBccCfffffffccce", "TimeUS,C,Roll,Pitch,Yaw,VN,VE,VD,dPD,PN,PE,PD,GX,GY,GZ,OH"),
-    "NKF4": ("QBcccccfbbHBIHb", "TimeUS,C,SV,SP,SH,SM,SVT,errRP,OFN,OFE,FS,TS,SS,GPS,PI"),
-    "ARM": ("QBIBB", "TimeUS,ArmState,ArmChecks,Forced,Method"),
-    "MODE": ("QMBB", "TimeUS,Mode,ModeNum,Rsn"),
-    "POS": ("QLLfff", "TimeUS,Lat,Lng,Alt,RelHomeAlt,RelOriginAlt"),
-    "WINC": ("QBBBBBfffHfb", "TimeUS,Heal,ThEnd,Mov,Clut,Mode,DLen,Len,DRate,Tens,Vcc,Temp"),
-}
-CODES = {
-    "n": "4s", "N": "16s", "Z": "64s", "c": "h", "C": "H", "e": "i", "M": "B", "L": "i",
-    **{k: k for k in "BbHIQf"},
-}  # fmt: skip
-TYPES = {name: 128 + k for k, name in enumerate(FORMATS)}
 
 GOOD = 1 | 2 | 8 | 16 | 32
 """Attitude, horizontal velocity, horizontal positions, vertical position."""
 TURNED, CONSTANT = 1024, 128
-
-
-def packed(name, *values):
-    code = "<" + "".join(CODES[c] for c in FORMATS[name][0])
-    return struct.pack("<BBB", 0xA3, 0x95, TYPES[name]) + struct.pack(code, *values)
-
-
-def header():
-    out = b""
-    for name, (letters, columns) in FORMATS.items():
-        size = 3 + struct.calcsize("<" + "".join(CODES[c] for c in letters))
-        out += packed("FMT", TYPES[name], size, name.encode(), letters.encode(), columns.encode())
-    return out
-
-
-def place(t, north, east, down, velocity=(0.0, 0.0, 0.0), yaw=0.0, core=0, name="XKF1"):
-    return packed(
-        name,
-        int(t * 1e6),
-        core,
-        0,
-        0,
-        int(yaw * 100),
-        *velocity,
-        0.0,
-        north,
-        east,
-        down,
-        0,
-        0,
-        0,
-        0,
-    )
 
 
 def status(t, flags, core=0, primary=0, name="XKF4"):

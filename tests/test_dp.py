@@ -19,7 +19,7 @@ from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.prices import Prices
 from netsp.mip.program import Duals
 from tests.brute import brute_tour
-from tests.test_contract import random_graph
+from tests.travel_graphs import random_graph
 from tests.worlds import costs_of, random_world
 
 SOLVE = importlib.import_module("netsp.gtsp.dp.dp_solver")

@@ -35,8 +35,8 @@ from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
 from netsp.plan.random_worlds import random_world
 from tests.brute import brute_tour
-from tests.test_blossoms import all_legs, tours_as_points
-from tests.test_contract import random_graph
+from tests.cut_points import all_legs, small, tours_as_points, towers
+from tests.travel_graphs import random_graph
 from tests.worlds import costs_of
 
 
@@ -116,12 +116,6 @@ def test_a_ring_that_lies_on_two_sheets_by_halves_is_cut():
     assert (cut_coefficients([cut], cluster, legs) @ y)[0] == pytest.approx(-2.0 * cut.room - 1.0)
 
 
-def small(seed, **more):
-    """A world of few goals and obstacles."""
-    how = {"goals": 5, "obstacles": 4, "side": 60.0, "radii": (4.0, 8.0), "tether_length": 90.0}
-    return random_world(seed, **{**how, **more})
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_ways_are_the_shortest_legs_of_their_parity(seed):
     graph = travel_graph(small(seed, tether_length=150.0))
@@ -147,14 +141,6 @@ def test_ways_are_the_shortest_legs_of_their_parity(seed):
         # a leg between classes that the tether reaches is a path as well
         if found[key] <= 100.0:
             assert found[key] == pytest.approx(cost, abs=1e-6)
-
-
-def towers(seed):
-    """Covers below the classes of a small world, and below its ways."""
-    graph = travel_graph(small(seed, tether_length=150.0))
-    odd = odd_letters(graph.signatures)
-    classes = ClassCovers(graph.costs, graph.cluster, odd)
-    return graph, odd, classes, PathCovers(graph.ways_by_parity(), np.inf)
 
 
 @pytest.mark.parametrize("seed", range(3))

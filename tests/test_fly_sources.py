@@ -13,8 +13,8 @@ from netsp.online.fly.standby import stand_by
 from netsp.online.fly.tour_flight import fly
 from netsp.online.fly.vehicle import LinkedVehicle
 from netsp.online.link.position_source import PositionSources
+from tests.scripted_vehicle import Scripted, driven
 from tests.simulated_session import SimulatedSession
-from tests.test_fly_vehicle import Scripted, driven
 
 SITE = Problem(base=(0, 0), goals=[(9, 2, -1), (9, -2, -1)], tether_length=15)
 OPTIONS = ExecutionOptions(speed=0.5, reach=0.3)

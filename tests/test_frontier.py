@@ -30,7 +30,7 @@ from netsp.mip.subtours import cover_branches
 from netsp.roadmap.slits import _taut, build_slits, slit_lengths
 from netsp.roadmap.taut import TautRoadmap
 from tests.brute import brute_tour
-from tests.test_contract import random_graph
+from tests.travel_graphs import random_graph
 from tests.worlds import random_world, small_worlds
 
 

@@ -19,7 +19,7 @@ from netsp.plan.random_worlds import random_world as papers_world
 from netsp.plan.solve_problem import travel_graph
 from netsp.plan.solver_table import ROADMAPS
 from tests.brute import brute_tour
-from tests.test_contract import random_graph
+from tests.travel_graphs import random_graph
 from tests.worlds import random_world, small_worlds
 
 

@@ -96,5 +96,5 @@ def entries():
 
 def test_entries_of_the_changelog_have_at_most_two_lines():
     assert entries()
-    long = [e for e in entries() if e.count("\n") > 1 or max(map(len, e.splitlines())) > 130]
+    long = [e for e in entries() if e.count("\n") > 1 or max(map(len, e.splitlines())) > 150]
     assert long == []

@@ -13,8 +13,8 @@ from netsp.online.fly import tour_flight
 from netsp.online.fly.flight_policy import FlightPolicy
 from netsp.online.fly.leg_corridor import LegCorridor
 from netsp.online.fly.tour_flight import fly
+from tests.scripted_vehicle import driven
 from tests.simulated_session import SimulatedSession
-from tests.test_fly_vehicle import driven
 
 SQUARE = Problem(
     base=(0, 0), goals=[(14, 0, -2), (14, 14, -2), (0, 14, -2), (1, 1, -2)], tether_length=60

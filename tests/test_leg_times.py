@@ -20,7 +20,7 @@ from netsp.online.execute.execution_log import ExecutionRow
 from netsp.online.fly.flight_time import FlightClock, FlightTime, predicted_flight
 from netsp.plan.tour_plan import HOME, legs_of
 from tests.autopilot import Earth
-from tests.test_autopilot_recordings import log, track
+from tests.recorded_flights import log, track
 
 DATA = Path(__file__).parent / "data"
 PROBLEMS = Path(__file__).parent.parent / "problems"

@@ -29,8 +29,8 @@ from netsp.roadmap.class_alternatives import graph_of_choices
 from netsp.roadmap.from_state import graph_from_state
 from netsp.roadmap.roadmap_policy import LegPolicy, RoadmapPolicy
 from netsp.roadmap.taut import TautRoadmap
-from tests.test_contract import random_graph
-from tests.test_even_crossings import small
+from tests.cut_points import small
+from tests.travel_graphs import random_graph
 
 SOLVE = importlib.import_module("netsp.mip.mip_solver")  # the package has a function of that name
 NO_TOUR = np.zeros(0, dtype=np.int64)

@@ -14,7 +14,7 @@ from netsp.gtsp.search.links import Tables, best_place, link, no_links, put, tak
 from netsp.gtsp.search.lns_solver import Params, solve
 from netsp.gtsp.search.local_search import Search
 from netsp.gtsp.search.ruin import ruin_and_recreate
-from tests.test_contract import random_graph
+from tests.travel_graphs import random_graph
 
 
 @pytest.mark.parametrize("how", [{"time": 0.5}, {"iterations": 400}])

@@ -13,7 +13,7 @@ from netsp.world.mission.equipment import TetherPhysics
 from netsp.world.mission.mission import Mission
 from netsp.world.simulator.mission_run import simulate
 from netsp.world.tether.load import payout, payout_along, pull_on_robot, turning
-from tests.test_simulate import POST, ring
+from tests.posts_and_rings import POST, ring
 
 DIAMETER, DRAG = 0.0076, 1.2
 """A BlueROV2's tether, and a cylinder across the flow."""

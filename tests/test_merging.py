@@ -17,7 +17,7 @@ from netsp.mip.merging import merge, merged_tour, visited_classes
 from netsp.mip.mip_solver import solve_merged
 from netsp.plan.random_worlds import random_world
 from tests.brute import brute_tour
-from tests.test_contract import random_graph
+from tests.travel_graphs import random_graph
 
 
 def some_tours(graph, chance, count):

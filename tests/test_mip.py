@@ -46,7 +46,7 @@ from netsp.model.solution import Status
 from netsp.plan.random_worlds import random_world as far_world
 from netsp.roadmap.taut import TautRoadmap
 from tests.brute import brute_tour as brute
-from tests.test_contract import random_graph
+from tests.travel_graphs import random_graph
 from tests.worlds import costs_of, random_world
 
 

@@ -23,8 +23,8 @@ from netsp.world.mission.mission import Mission, MissionState, MissionWaypoint, 
 from netsp.world.planner import PlannerOptions
 from netsp.world.simulator.mission_run import simulate
 from netsp.world.simulator.surprises import SceneSurprises
-from tests.test_tour import written
 from tests.worlds import FEW_CELLS
+from tests.written_problems import written
 
 
 @pytest.fixture(scope="module")

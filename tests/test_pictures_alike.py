@@ -23,7 +23,7 @@ from netsp.view.pictures.problem_picture import save_classes, save_roadmap
 from netsp.view.pictures.sizing import draw_tether_curve
 from netsp.view.report import figures
 from netsp.view.report.stats import best_lengths, cells, methods
-from tests.test_style import WHARF, basin_flight, mission, of, rows, run, tour
+from tests.drawn_samples import WHARF, basin_flight, mission, of, rows, run, tour
 
 __all__ = ["mission", "rows", "run", "tour"]  # fixtures
 

@@ -10,7 +10,7 @@ from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip.cbc_program import CbcInteger
 from netsp.model.solution import Status
 from tests.brute import brute_tour
-from tests.test_contract import random_graph
+from tests.travel_graphs import random_graph
 
 
 def two_groups():

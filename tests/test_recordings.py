@@ -388,7 +388,7 @@ def test_degrees_that_cannot_be_placed_say_what_would_help(tmp_path, m, site, ki
 
 def test_a_log_with_pos_only_is_read_where_the_site_is_on_the_earth(tmp_path):
     pytest.importorskip("pymavlink")
-    from tests.test_dataflash import FORMATS, header, packed, place
+    from tests.dataflash_bytes import FORMATS, header, packed, place
 
     pos = [
         packed("POS", int(1e6 * t), *((580000050, 55000030) if t > 1 else (0, 0)), -1.0, -1.5, -1.0)

@@ -15,7 +15,7 @@ from netsp.command.main import COMMANDS, main
 from netsp.online.fly.flight_rehearsal import rehearse
 from netsp.plan.space.space_plan import plan
 from netsp.world.mission.mission import Mission
-from tests.test_tour import written
+from tests.written_problems import written
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "netsp"

@@ -29,9 +29,9 @@ from netsp.world.simulator.mission_run import simulate
 from netsp.world.simulator.sensing import Positions
 from netsp.world.vehicle.kinematic import advance
 from tests.pages import unpacked
+from tests.posts_and_rings import POST, ring
 
 MISSIONS = Path(__file__).parent.parent / "missions"
-POST = Scene(solids=[{"post": {"center": [0, 0], "radius": 0.5}}], bounds=(-4, -4, -1, 4, 4, 1))
 
 
 def mission(waypoints, length, **more):
@@ -43,11 +43,6 @@ def mission(waypoints, length, **more):
 
 def fly(planner, waypoints, length, **more):
     return simulate(mission(waypoints, length, **more), planner, scene=POST)
-
-
-def ring(turns, radius=1.2, steps=16):
-    angle = math.pi + np.arange(1, int(turns * steps) + 1) * 2 * math.pi / steps
-    return [(radius * math.cos(a), radius * math.sin(a), 0.0) for a in angle]
 
 
 def test_without_a_planner_the_tether_winds_up():

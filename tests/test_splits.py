@@ -15,7 +15,7 @@ from netsp.mip import covers
 from netsp.mip.cover_bounds import Cells
 from netsp.mip.cover_refinement import CoverRefinement, frustration
 from netsp.mip.root import Root
-from tests.test_even_crossings import towers
+from tests.cut_points import towers
 
 
 def least_frustration(ends, excess, sides):

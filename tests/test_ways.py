@@ -24,8 +24,8 @@ from netsp.mip.program import Duals, duals_of_relaxation
 from netsp.mip.reducedcosts import reduced_costs
 from netsp.model.solution import Status
 from netsp.plan.random_worlds import random_world
-from tests.test_blossoms import some_cut
-from tests.test_contract import random_graph
+from tests.cut_points import some_cut
+from tests.travel_graphs import random_graph
 from tests.worlds import costs_of
 
 
