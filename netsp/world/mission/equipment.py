@@ -1,4 +1,4 @@
-"""What a mission's robot carries: camera, tether and sensors, as its file has them."""
+"""Equipment of a mission's robot: camera, tether and sensors, as in its file."""
 
 from __future__ import annotations
 
@@ -17,19 +17,7 @@ SEA_WATER_DENSITY = 1025.0
 
 
 class Camera(Model):
-    """What the robot sees with.
-
-    Attributes
-    ----------
-    range : float
-        Metres.
-    field_of_view : float
-        Full angle, degrees.
-    tilt : float
-        Maximum angle that it turns up or down, degrees.
-    patch : float
-        Metres; pieces of surface that coverage is counted in.
-    """
+    """Camera with a square field of view."""
 
     range: Annotated[Positive, Field(description="range of sight, m")] = 2.0
     field_of_view: Annotated[
@@ -44,26 +32,8 @@ class Camera(Model):
 
 
 class TetherPhysics(Model):
-    """What a tether needs beyond its taut length; all of it is nothing by default. See
-    `netsp.world.tether.load` for the formulas and their sources.
-
-    Attributes
-    ----------
-    slack : float
-        Share of the taut length that is out beyond it.
-    diameter : float
-        Metres; with 0 the water does not act on the tether.
-    drag_coefficient : float
-        Of a cylinder across the flow.
-    tension : float
-        Newtons, that the tether is held with at the anchor.
-    friction : float
-        Coefficient of friction at contacts.
-    max_tension_ratio : float or None
-        Most that friction may multiply the tension by, from anchor to robot; None for no limit.
-    pulls_vehicle : bool
-        Whether tension and drag act on a vehicle with dynamics.
-    """
+    """Properties of a tether that need more than its taut length, zero by default; see
+    `netsp.world.tether.load` for formulas and sources."""
 
     slack: Annotated[
         Annotated[NonNegative, Field(le=1.0)],
@@ -92,38 +62,19 @@ class TetherPhysics(Model):
     ] = False
 
     def load(self, water: Floats) -> Load:
-        """What acts on the tether in moving water.
-
-        Parameters
-        ----------
-        water : ndarray, shape (3,)
-            Its velocity, m/s.
-
-        Returns
-        -------
-        Load
-            For `netsp.world.tether.load`.
-        """
+        """Return what acts on the tether in water of a velocity (3,), m/s."""
         drag = 0.5 * SEA_WATER_DENSITY * self.drag_coefficient * self.diameter
         x, y, z = (float(v) for v in water)
         return Load(self.slack, drag, x, y, z, self.tension)
 
     @property
     def max_turning(self) -> float:
-        """Sum of turning angles (rad) at which friction reaches its limit."""
+        """Sum of turning angles at which friction reaches its limit, rad."""
         return max_turning(self.friction, self.max_tension_ratio)
 
 
 class PositionSensor(Model):
-    """How the robot's position is known: by default exactly and at once.
-
-    Attributes
-    ----------
-    noise : float
-        Standard deviation along each axis, metres.
-    delay : float
-        Age of a position when it arrives, seconds.
-    """
+    """Error and delay of the robot's position as the planner knows it, zero by default."""
 
     noise: Annotated[
         Annotated[NonNegative, Field(le=100.0)],
@@ -135,34 +86,13 @@ class PositionSensor(Model):
     ] = 0.0
 
     def reserve(self, speed: float) -> float:
-        """How far from where it is thought the robot may be: three standard deviations, and what it
-        travels until it is known.
-
-        Parameters
-        ----------
-        speed : float
-            Of the robot, m/s.
-
-        Returns
-        -------
-        float
-            Metres.
-        """
+        """Return the largest distance of a robot from where it is believed to be, metres: three
+        standard deviations, and what it travels at its speed (m/s) during the delay."""
         return 3.0 * self.noise + self.delay * speed
 
 
 class RangeSensor(Model):
-    """A forward-looking range sensor, as a scanning sonar: it looks along the path.
-
-    Attributes
-    ----------
-    range : float
-        Metres.
-    field_of_view : float
-        Full angle of its cone, degrees.
-    noise : float
-        Standard deviation of a range, metres.
-    """
+    """Forward-looking range sensor, such as a scanning sonar, which looks along the path."""
 
     range: Annotated[Positive, Field(description="farthest that it sees, m")] = 5.0
     field_of_view: Annotated[

@@ -1,4 +1,4 @@
-"""A mission: what a robot on a tether is to visit in a scene, and within what limits."""
+"""Mission: the waypoints that a robot on a tether visits in a scene, and its limits."""
 
 from __future__ import annotations
 
@@ -41,15 +41,7 @@ MAX_DWELL_S = 86400.0
 
 
 class Viewpoint(Model):
-    """A place and a heading that serve as well as a waypoint's own.
-
-    Attributes
-    ----------
-    position : (x, y, z)
-        Metres.
-    heading : float or None
-        Degrees from the x axis towards the y axis.
-    """
+    """Place and heading that serve as well as a waypoint's own."""
 
     position: Annotated[Point3, Field(description="(x, y, z), m")]
     heading: Annotated[
@@ -59,15 +51,7 @@ class Viewpoint(Model):
 
 
 class MissionState(Model):
-    """Where a robot is that is under way, and how its tether lies.
-
-    Attributes
-    ----------
-    position : (x, y, z)
-        Of the robot, metres.
-    tether : tuple of (x, y, z)
-        A line of its class from the anchor to the robot, taut or not, metres.
-    """
+    """Position of a robot under way, and the line of its tether, which need not be taut."""
 
     position: Annotated[Point3, Field(description="(x, y, z) of the robot, m")]
     tether: Annotated[
@@ -77,19 +61,9 @@ class MissionState(Model):
 
 
 class MissionWaypoint(Model):
-    """A place to visit, and what to do there.
+    """Place to visit, with a heading to turn to and a time to stay.
 
-    Attributes
-    ----------
-    position : (x, y, z)
-        Metres.
-    heading : float or None
-        Degrees from the x axis towards the y axis, to be turned to before the robot goes on.
-    dwell : float
-        Seconds to stay there, at that heading.
-    alternatives : tuple of Viewpoint
-        Other places that would do as well: `netsp.plan.space.space_plan` chooses, all else goes to
-        `position`.
+    `netsp.plan.space.space_plan` chooses among the alternatives; everything else visits `position`.
     """
 
     position: Annotated[Point3, Field(description="(x, y, z) to reach, m")]
@@ -107,7 +81,7 @@ class MissionWaypoint(Model):
 
     @model_serializer(mode="wrap")
     def _plain(self, handler: SerializerFunctionWrapHandler) -> Any:
-        """A bare position where there is nothing else to say."""
+        """Serialise as a bare position if nothing else is set."""
         if self.heading is None and not self.dwell and not self.alternatives:
             return self.position
         told = handler(self)
@@ -116,18 +90,8 @@ class MissionWaypoint(Model):
         return told
 
     def at(self, choice: int) -> MissionWaypoint:
-        """The same waypoint with one of its alternatives in the place of its own.
-
-        Parameters
-        ----------
-        choice : int
-            Number of the alternative, from 1 on; 0 for what it has.
-
-        Returns
-        -------
-        MissionWaypoint
-            What was its own place is among its alternatives.
-        """
+        """Return the waypoint with one of its alternatives, counted from 1, in exchange for its own
+        place; 0 keeps its own."""
         if choice == 0:
             return self
         own = Viewpoint(position=self.position, heading=self.heading)
@@ -182,60 +146,12 @@ WaypointLike = Annotated[
 
 
 class Mission(FileModel):
-    """Waypoints to visit in their order.
+    """Waypoints to visit in order, in a scene, with the limits of the robot and its tether.
 
-    Attributes
-    ----------
-    scene : str
-        Scene file, relative to the mission file.
-    anchor : (x, y, z)
-        Where the tether is fixed, metres.
-    track : tuple of (t, x, y, z)
-        Where the anchor goes, on a ship or a second vehicle: seconds since the start, ascending,
-        and metres; straight and steady from `anchor` at 0 s on. By default it stays.
-    start : (x, y, z)
-        Where the robot starts, and where it comes home to, metres; with a track, as far from the
-        anchor at the end as at the start where there is room for it, else at the anchor.
-    state : MissionState or None
-        Where the robot is by now, and how its tether lies; None for the start, with the tether laid
-        out to it. Waypoints are those that are left to visit.
-    waypoints : tuple of MissionWaypoint
-        To be visited in this order; a bare ``[x, y, z]`` is accepted.
-    tether_length : float
-        Metres of taut tether that must never be exceeded.
-    clearance : float
-        Metres that the robot keeps from solids, where it can.
-    reach : float
-        Metres; a waypoint this near counts as visited.
-    speed : float
-        Metres per second.
-    camera : Camera or None
-        What coverage is counted for; none without.
-    inspect : tuple of str or None
-        Names of the solids to be seen, by default all.
-    current : (x, y, z)
-        A steady current, m/s; a kinematic vehicle does not feel it.
-    gusts : float
-        Standard deviation of what comes and goes on top, m/s.
-    sensor : PositionSensor
-        How the planner knows where the robot is; by default exactly.
-    range_sensor : RangeSensor or None
-        How the planner gets to know what is not on the map; None where it is told of every change.
-    tether : TetherPhysics
-        What the tether needs beyond its taut length; by default nothing.
-    delta : float
-        Resolution of the tether, metres.
-    cell : float or None
-        Of the grid that paths are sought on, metres; None for 0.2 m, or as much more as two million
-        cells ask for.
-    tour : PlannedTour or None
-        How the robot is to get from waypoint to waypoint (`netsp.plan.space.mission_solver`), which
-        `predictive` keeps to; None to leave it to the planner.
-
-    Raises
-    ------
-    InputError
-        From `load`, in one line.
+    With a track, the robot comes home as far from the anchor as at the start where there is room,
+    else to the anchor. With a state, only the waypoints left to visit are listed. Planner
+    `predictive` keeps to a planned tour (`netsp.plan.space.mission_solver`). A kinematic vehicle
+    does not feel the current.
     """
 
     file_kind: ClassVar[str] = "mission"
@@ -305,16 +221,6 @@ class Mission(FileModel):
     def load(cls, path: str | Path) -> Self:
         """Read a mission file; the scene's name becomes relative to the working directory.
 
-        Parameters
-        ----------
-        path : str or Path
-            The file.
-
-        Returns
-        -------
-        Mission
-            The mission.
-
         Raises
         ------
         InputError
@@ -364,18 +270,18 @@ class Mission(FileModel):
 
     @property
     def begin(self) -> Point3:
-        """Where the robot is when the mission begins, metres."""
+        """Position of the robot when the mission begins, metres."""
         return self.start if self.state is None else self.state.position
 
     @property
     def places(self) -> Floats:
-        """(n, 3) where the waypoints are, metres."""
+        """Positions (n, 3) of the waypoints, metres."""
         return np.array([w.position for w in self.waypoints]).reshape(-1, 3)
 
     @property
     def every_place(self) -> Floats:
-        """(n, 3) anchor, start, waypoints and their alternatives, where a moving anchor goes, and
-        the tether of a state, metres."""
+        """Every position (n, 3) in the mission: anchor and track, start, waypoints and
+        alternatives, and the tether of a state, metres."""
         track = np.array(self.track).reshape(-1, 4)[:, 1:]
         others = [v.position for w in self.waypoints for v in w.alternatives]
         line = () if self.state is None else self.state.tether
@@ -387,24 +293,17 @@ class Mission(FileModel):
         )  # fmt: skip
 
     def checked_waypoints(self, field: DistanceField, *, snap: bool = False) -> Self:
-        """The mission with every waypoint outside of solids.
+        """Return the mission with every waypoint outside of solids.
 
         Parameters
         ----------
-        field : DistanceField
-            The scene.
         snap : bool
-            Move waypoints inside solids out to the clearance.
-
-        Returns
-        -------
-        Mission
-            The mission, with waypoints moved where needed.
+            Whether waypoints inside solids are moved out to the clearance.
 
         Raises
         ------
         InputError
-            Waypoints inside solids, with their numbers, without `snap`.
+            Waypoints lie inside solids, without `snap`.
         """
         points = self.places
         inside = np.flatnonzero(field.distance(points) < 0.0)
@@ -424,16 +323,5 @@ class Mission(FileModel):
         return self.model_copy(update={"waypoints": moved})
 
     def load_scene(self) -> Scene:
-        """The scene it takes place in.
-
-        Returns
-        -------
-        Scene
-            The scene.
-
-        Raises
-        ------
-        InputError
-            The file cannot be read or is not valid, in one line.
-        """
+        """Read the scene; raise InputError, in one line, if that fails."""
         return Scene.load(self.scene)

@@ -1,4 +1,4 @@
-"""What a mission may ask for: names that exist, and sizes that end."""
+"""Checks of a mission before it is simulated: names that exist, and numbers that make sense."""
 
 from __future__ import annotations
 
@@ -16,17 +16,9 @@ from netsp.world.vehicle import VEHICLES
 
 
 def check_names(planner: object, vehicle: object, tether: object) -> None:
-    """Refuse a name that no record has, before a scene is read, which takes longer.
+    """Raise InputError for a planner, vehicle or tether model that does not exist.
 
-    Parameters
-    ----------
-    planner, vehicle, tether : str or callable
-        As of `simulate`.
-
-    Raises
-    ------
-    InputError
-        No record has that name.
+    This comes before a scene is read, which takes longer.
     """
     for known, name in ((PLANNERS, planner), (VEHICLES, vehicle), (TETHERS, tether)):
         if not callable(name):
@@ -34,20 +26,7 @@ def check_names(planner: object, vehicle: object, tether: object) -> None:
 
 
 def check_bounds(mission: Mission, scene: Scene) -> None:
-    """Refuse places beyond the bounds of a scene: nothing is known of the water there.
-
-    Parameters
-    ----------
-    mission : Mission
-        Its anchor, start, state, waypoints and their alternatives count.
-    scene : Scene
-        Its bounds count.
-
-    Raises
-    ------
-    InputError
-        One of them is outside; says which, and where.
-    """
+    """Raise InputError for a place of a mission outside the bounds of its scene."""
     if scene.bounds is None:
         return
     low, high = np.array(scene.bounds[:3]), np.array(scene.bounds[3:])
@@ -68,20 +47,8 @@ def check_bounds(mission: Mission, scene: Scene) -> None:
 
 
 def check_tether(mission: Mission, length: float) -> None:
-    """Refuse a tether that does not lead from the anchor to where the robot begins.
-
-    Parameters
-    ----------
-    mission : Mission
-        The mission.
-    length : float
-        Of the taut tether there, metres.
-
-    Raises
-    ------
-    InputError
-        It is longer than the mission's tether.
-    """
+    """Raise InputError if the taut tether at the first position of the robot, of a length in
+    metres, is longer than the mission's tether."""
     if length > mission.tether_length:
         raise InputError(
             f"tether_length: {mission.tether_length:g} is shorter than the path from anchor to "

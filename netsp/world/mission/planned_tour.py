@@ -1,4 +1,4 @@
-"""A tour that was planned for a mission: how the robot is to get from stop to stop."""
+"""Tour that was planned for a mission: the robot's path from waypoint to waypoint."""
 
 from __future__ import annotations
 
@@ -18,22 +18,7 @@ PathField = Annotated[tuple[Point3, ...], Field(min_length=2)]
 
 
 class PlannedStop(Model):
-    """One stop of a tour.
-
-    Attributes
-    ----------
-    path : tuple of (x, y, z)
-        From the stop before, or the start, to the waypoint, metres.
-    signature : tuple of int
-        Word of the tether there (`netsp.plan.space.space_signature`), among the letters of this
-        mission.
-    tether_length : float
-        Of the taut tether there, metres.
-    longest_tether : float
-        Of the taut tether on the way there, metres.
-    given_as : int or None
-        Number of the waypoint in the mission that was planned.
-    """
+    """Visit of a planned tour."""
 
     path: Annotated[PathField, Field(description="from the stop before to the waypoint, m")]
     signature: Annotated[tuple[int, ...], Field(description="word of the tether there")] = ()
@@ -46,15 +31,7 @@ class PlannedStop(Model):
 
 
 class UnresolvedGap(Model):
-    """Passage that the robot fits through but the grid of a mission does not show.
-
-    Attributes
-    ----------
-    position : (x, y, z)
-        Middle of the passage, metres.
-    width : float
-        Twice the distance of `position` from solids, metres.
-    """
+    """Passage that the robot fits through but the grid of a mission does not show."""
 
     position: Annotated[Point3, Field(description="(x, y, z) in the middle of it, m")]
     width: Annotated[NonNegative, Field(description="twice the distance from solids there, m")]
@@ -70,45 +47,15 @@ def _within(gap: Any) -> bool:
 
 
 class PlannedTour(Model):
-    """A tour through the first waypoints of a mission, and what is known of it.
+    """Tour through the first waypoints of a mission, with what is proven about it.
 
-    Attributes
-    ----------
-    stops : tuple of PlannedStop
-        One for each waypoint of the mission, in its order; waypoints that no tether reaches come
-        after all others and have none.
-    home : tuple of (x, y, z)
-        From the last stop back to the start, metres.
-    status : Status
-        `optimal` if `bound_of_all` proves that no tour to these waypoints is shorter, in any class
-        of the tether; `optimal_of_states` if the tour is the shortest along the states and legs
-        that were found.
-    solver : str
-        Name of the solver.
-    seed : int
-        Of all that was random.
-    length : float
-        Of the tour, metres.
-    lower_bound : float or None
-        Of tours along the states and legs that were found, metres.
-    gap : float or None
-        (length - lower_bound) / length.
-    bound_of_all : float or None
-        Certified lower bound on all tours to these waypoints, in any class of the tether
-        (`netsp.plan.space.path_bound`).
-    gap_to_all : float or None
-        (length - bound_of_all) / length.
-    states : int
-        In how many ways the tether was found to hang at the waypoints.
-    legs : int
-        How many legs between these were driven.
-    exact : bool
-        Whether different words always belong to different classes of paths through the mission's
-        cells. It does not cover gaps that the grid does not show, nor the tour's length.
-    unresolved_gaps : tuple of UnresolvedGap, or None
-        Passages that the robot fits through but the grid does not show. No tour through them was
-        considered; `bound_of_all` also holds for such tours. None if there was no time to search
-        for them.
+    Waypoints that no tether reaches come after all others and have no visit. The status is
+    `optimal` if `bound_of_all` (`netsp.plan.space.path_bound`) proves that no tour to these
+    waypoints is shorter, in any class of the tether; `optimal_of_states` if the tour is the
+    shortest along the states and legs that were found. If `exact`, different words always belong to
+    different classes of paths through the mission's cells; that covers neither gaps that the grid
+    does not show nor the tour's length. No tour through an unresolved gap was considered;
+    `bound_of_all` holds for such tours, too.
     """
 
     stops: Annotated[
@@ -168,39 +115,23 @@ class PlannedTour(Model):
         return data
 
     def leg(self, index: int) -> Floats | None:
-        """How the robot gets to a waypoint.
-
-        Parameters
-        ----------
-        index : int
-            The waypoint.
-
-        Returns
-        -------
-        ndarray of shape (k, 3), or None
-            The path from the stop before, metres; None where the tour does not go there.
-        """
+        """Return the path (k, 3) to a waypoint from the visit before, metres; None if the tour does
+        not visit the waypoint."""
         return np.array(self.stops[index].path) if index < len(self.stops) else None
 
     @property
     def line(self) -> Floats:
-        """(n, 3) the whole tour, metres."""
+        """The whole tour (n, 3), metres."""
         legs = [*(stop.path for stop in self.stops), self.home]
         return np.vstack([legs[0][:1], *(leg[1:] for leg in legs)])
 
     @property
     def longest_tether(self) -> float:
-        """Of the tether all along, but for the way home, metres."""
+        """Length of the longest tether before the way home, metres."""
         return max((stop.longest_tether for stop in self.stops), default=0.0)
 
     def mended(self) -> PlannedTour:
-        """The same paths, of which nothing is proven any more, and their length.
-
-        Returns
-        -------
-        PlannedTour
-            Feasible, without bounds.
-        """
+        """Return a feasible tour of the same paths, without bounds."""
         legs = [*(stop.path for stop in self.stops), self.home]
         return self.model_copy(
             update={
@@ -211,23 +142,17 @@ class PlannedTour(Model):
         )  # fmt: skip
 
     def against(self, begin: Point3, start: Point3, places: Floats, tolerance: float) -> str | None:
-        """What does not match the mission that the tour is part of.
+        """Return what does not match the mission that the tour is part of, in one line; None if all
+        does.
 
         Parameters
         ----------
-        begin : (x, y, z)
-            Where the robot is when the mission begins, metres.
-        start : (x, y, z)
-            Where it comes home to, metres.
+        begin, start : (x, y, z)
+            Positions of the robot when the mission begins and when it is home, metres.
         places : ndarray, shape (n, 3)
-            Its waypoints, metres.
+            Waypoints, metres.
         tolerance : float
-            Metres that ends of paths may be off.
-
-        Returns
-        -------
-        str or None
-            One line that names the field, the value and what was expected.
+            Largest distance of the ends of paths from these, metres.
         """
         if len(self.stops) > len(places):
             return (
@@ -254,18 +179,7 @@ class PlannedTour(Model):
 
 
 def in_file(path: Floats) -> tuple[Point3, ...]:
-    """A path as a tour's file has it: without points on the line between their neighbours.
-
-    Parameters
-    ----------
-    path : ndarray, shape (k, 3)
-        Metres.
-
-    Returns
-    -------
-    tuple of (x, y, z)
-        The same path.
-    """
+    """Return a path (k, 3) for a file, without points on the line between their neighbours."""
     keep = [0]
     for k in range(1, len(path) - 1):
         a, b, c = path[keep[-1]], path[k], path[k + 1]

@@ -1,4 +1,4 @@
-"""The log of a run, and its files."""
+"""Log of a mission run, and its files."""
 
 from __future__ import annotations
 
@@ -37,34 +37,30 @@ class LogRow:
     ----------
     time : float
         Seconds since the start.
-    x : float
-        Position, metres.
-    y : float
-        Position, metres.
-    z : float
-        Position, metres, up.
+    x, y, z : float
+        Position, metres, z up.
     yaw : float
-        Heading, radians.
+        Heading, rad.
     waypoint : int
-        The waypoint that is next.
+        Next waypoint.
     mode : str
-        As of `netsp.world.planner.Command`.
+        Mode of the planner, as in `netsp.world.planner.Command`.
     tether : float
         Length of the taut tether, metres.
     payout : float
-        Length that must be out, with slack and sag: what the limit is about, metres.
+        Length that must be out, with slack and sag, metres. The limit applies to it.
     turning : float
-        Sum of the angles by which the tether turns at its contacts, radians.
+        Sum of the angles by which the tether turns at its contacts, rad.
     coverage : float
         Share of the surface seen.
     coverage_through : float
-        The same as if nothing stood in between.
+        Share of the surface seen if nothing stood in between.
     replan_s : float
-        Seconds of CPU that planning took.
+        CPU time of planning, s.
     limit : float
-        Metres that must not be exceeded.
+        Maximum payout, metres.
     shortening : bool
-        Whether the limit was lowered below the tether, which has not been short enough since.
+        Whether the limit was lowered below the payout, which has not fitted since.
     """
 
     time: float
@@ -86,24 +82,24 @@ class LogRow:
 
 @dataclass(frozen=True, repr=False)
 class Run(Drawn):
-    """What came of a mission.
+    """Result of a mission run.
 
     Parameters
     ----------
     mission : Mission
-        What was flown.
+        The mission as flown.
     planner : str
         Name of the planner.
     log : tuple of LogRow
         One row per step.
     tether : Tether
-        At the end.
+        The tether at the end.
     summary : dict
-        The numbers (`netsp.world.simulator.summary.summarise`).
+        Numbers of the run (`netsp.world.simulator.summary.summarise`).
     scene : Scene or None
-        As it was at the end, where it has changed.
+        The scene at the end, if it has changed.
     tethers : tuple of (int, Tether)
-        Row of the log and tether now and then, where the scene has changed.
+        Rows of the log with their tethers, at intervals, if the scene has changed.
     """
 
     picture: ClassVar[str] = "netsp.view.pictures.mission_picture:draw_run"
@@ -117,12 +113,8 @@ class Run(Drawn):
     tethers: tuple[tuple[int, Tether], ...] = ()
 
     def to_frame(self) -> pandas.DataFrame:
-        """Return the log as a pandas DataFrame, a row per step and a column per field of `LogRow`.
-
-        Returns
-        -------
-        pandas.DataFrame
-            In the order of time.
+        """Return the log as a pandas DataFrame, with a row per step and a column per field of
+        `LogRow`.
 
         Raises
         ------
@@ -132,7 +124,7 @@ class Run(Drawn):
         return frame_of(self.log)
 
     def __repr__(self) -> str:
-        """In a line."""
+        """Return mission, planner and results in one line."""
         s = self.summary
         return (
             f"<Run of {s['mission']!r} by {self.planner}: {s['visited']} of {s['waypoints']} "
@@ -144,17 +136,10 @@ class Run(Drawn):
 def write_run(run: Run, folder: str | Path) -> None:
     """Write log.csv, summary.json and mission.json into a folder, which is made.
 
-    Parameters
-    ----------
-    run : Run
-        The run.
-    folder : str or Path
-        The folder.
-
     Raises
     ------
     InputError
-        It cannot be written.
+        The folder cannot be written.
     """
     place = Path(folder)
     try:
@@ -176,24 +161,12 @@ def write_run(run: Run, folder: str | Path) -> None:
 
 
 FINITE = ("time", "x", "y", "z", "tether", "limit")
-"""Columns of every log whose numbers are drawn."""
+"""Columns of every log that are drawn, and must be finite."""
 
 
 def check_log(rows: Sequence[dict[str, str]], file: Path) -> None:
-    """InputError for rows of a log with a number that is none, or times that do not go on.
-
-    Parameters
-    ----------
-    rows : sequence of dict
-        Of log.csv, of a flight or of a tour that was carried out.
-    file : Path
-        Where they are from.
-
-    Raises
-    ------
-    InputError
-        Naming line, column and value.
-    """
+    """Raise InputError, with line and column, for rows of log.csv with a missing number or times
+    that descend."""
     before = -math.inf
     for number, row in enumerate(rows, 2):
         for column in FINITE:
@@ -214,24 +187,13 @@ def check_log(rows: Sequence[dict[str, str]], file: Path) -> None:
 
 
 def read_run(folder: str | Path) -> Run:
-    """A run from its files. How its tether hung is a matter of driving it again; here it is
-    straight.
-
-    Parameters
-    ----------
-    folder : str or Path
-        As of `write_run`.
-
-    Returns
-    -------
-    Run
-        As it was.
+    """Return a run read from its files, with a straight tether: only simulating it again would show
+    its shape.
 
     Raises
     ------
     InputError
-        Files that cannot be read or are damaged; a run whose map changed: how its tether hung
-        meanwhile is not kept.
+        Files cannot be read or are damaged, or the map changed during the run.
     """
     place = Path(folder)
     mission = Mission.load(place / "mission.json")
@@ -264,7 +226,7 @@ _KINDS: dict[str, Callable[[str], Any]] = {
     **dict.fromkeys(LogRow.__dataclass_fields__, float), "waypoint": int, "mode": str,
     "shortening": _yes,
 }  # fmt: skip
-"""What the columns of log.csv hold."""
+"""Types of the columns of log.csv."""
 
 
 def _short(value: Any) -> Any:
@@ -272,20 +234,7 @@ def _short(value: Any) -> Any:
 
 
 def describe_run(run: Run, units: str) -> str:
-    """A run in a few lines.
-
-    Parameters
-    ----------
-    run : Run
-        The run.
-    units : str
-        Name of the unit of length.
-
-    Returns
-    -------
-    str
-        The lines.
-    """
+    """Return a run in a few lines."""
     s = run.summary
     lines = [
         f"mission  {s['mission']}, planner {s['planner']}: {s['status']}",
@@ -367,7 +316,7 @@ def describe_run(run: Run, units: str) -> str:
 
 
 def _given(summary: dict[str, Any], waypoint: int) -> int:
-    """The number of a waypoint in the mission before anything was planned anew."""
+    """Return the number of a waypoint in the mission before anything was planned anew."""
     given = summary.get("given_as")
     return waypoint if given is None else int(given[waypoint])
 
