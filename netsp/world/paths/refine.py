@@ -99,14 +99,14 @@ def stepped(
     field: DistanceField, path: Floats, clearance: float, rng: np.random.Generator,
     params: RefineParams,
 ) -> Floats:  # fmt: skip
-    """Carry out the paper's three steps once; the result need not be free."""
+    """Return a path after one round of the paper's three steps; it need not be free."""
     moved = offset(path, clearance)
     moved = perturbed(field, moved, params.step_share * clearance, rng, params)
     return smoothed(moved, params)
 
 
 def offset(path: Floats, by: float) -> Floats:
-    """Every point but the ends moved away from the centroid of all."""
+    """Return a path with every point but the ends moved away from the centroid of all."""
     away = path - path.mean(axis=0)
     far = np.linalg.norm(away, axis=1, keepdims=True)
     out = path + by * away / np.maximum(far, 1e-12)
@@ -117,8 +117,8 @@ def offset(path: Floats, by: float) -> Floats:
 def perturbed(
     field: DistanceField, path: Floats, by: float, rng: np.random.Generator, params: RefineParams
 ) -> Floats:
-    """Move every point but the ends in random directions, and keep the moves that the rule
-    accepts."""
+    """Return a path with every point but the ends moved at random, where the rule accepts a
+    move."""
     out = path.copy()
     waits = np.ones(len(path) - 2, dtype=bool)
     for _ in range(params.max_trials):
@@ -134,7 +134,8 @@ def perturbed(
 
 
 def smoothed(path: Floats, params: RefineParams | None = None) -> Floats:
-    """Fit cubics to overlapping segments by least squares, and average where they overlap."""
+    """Return a path smoothed by cubics fitted to overlapping segments, averaged where they
+    overlap."""
     params = params or RefineParams()
     total, count = np.zeros_like(path), np.zeros((len(path), 1))
     for first in range(0, max(1, len(path) - params.overlap), params.segment - params.overlap):
@@ -156,18 +157,19 @@ def smoothed(path: Floats, params: RefineParams | None = None) -> Floats:
 
 
 def lifted(field: DistanceField, path: Floats, clearance: float) -> Floats:
-    """Every point but the ends moved up the distance field's gradient to the clearance."""
+    """Return a path with every point but the ends moved up the distance field to the clearance."""
     out = path.copy()
     out[1:-1] = pushed_out(field, path[1:-1], clearance)
     return out
 
 
 def lowest(field: DistanceField, path: Floats) -> float:
-    """Least distance at the points of a path."""
+    """Return the smallest distance of the points of a path from solids."""
     return float(field.distance(path).min())
 
 
 def clear(field: DistanceField, path: Floats, room: float) -> bool:
-    """Whether the straight lines between the points keep `room` from solids."""
+    """Return whether the straight lines between the points of a path keep a distance from
+    solids."""
     grown = field.grown(room)
     return all(grown.line_of_sight(a, b, depth=1e-2 * max(room, 0.1)) for a, b in pairwise(path))

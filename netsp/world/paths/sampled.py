@@ -1,4 +1,4 @@
-"""Short paths by OMPL's planners, as the paper found them; the same interface as our tree.
+"""Short paths by OMPL's planners, as the paper searched them.
 
 Sucan, Moll and Kavraki, "The Open Motion Planning Library", IEEE RAM 19(4), 2012.
 """
@@ -20,20 +20,7 @@ OMPL_PLANNERS = {"rrtstar": "RRTstar", "bitstar": "BITstar", "prmstar": "PRMstar
 
 
 class SampledPaths:
-    """Paths to a target, each planned when it is asked for.
-
-    Parameters
-    ----------
-    name
-        Of the planner (`OMPL_PLANNERS`).
-    grid
-        Its box, field and clearance count.
-    target
-        (3,) where the paths end.
-    points
-        (n, 3) where they start.
-    seed
-        Of the sampling.
+    """Paths from points (n, 3) to a target (3,) by one of `OMPL_PLANNERS`, each planned on demand.
 
     Raises
     ------
@@ -58,7 +45,7 @@ class SampledPaths:
         self._paths: dict[int, Floats | None] = {}
 
     def path(self, n: int) -> Floats | None:
-        """(k, 3) from point n to the target; None if none was found."""
+        """Return the path (k, 3) from point n to the target; None if none was found."""
         if n not in self._paths:
             self._paths[n] = self._plan(self.points[n])
         return self._paths[n]

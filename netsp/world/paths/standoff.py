@@ -1,4 +1,4 @@
-"""A path beside a tether: off the surfaces that the tether rests on, and in its class."""
+"""Path beside a tether: off the surfaces that the tether rests on, and in its class."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def beside(
 
 @kernel
 def sees(field: Field, a: Floats, b: Floats, depth: float) -> Bools:
-    """Which of the points a[k] and b[k] (n, 3) see one another, but for `depth`."""
+    """Return which of the points a[k] and b[k] (n, 3) see one another, up to a depth in solids."""
     out = np.empty(len(a), dtype=np.bool_)
     for k in range(len(a)):
         low, _ = lowest_along(

@@ -1,7 +1,8 @@
 """Shortest paths to one place from everywhere: a tree on a grid, and its paths pulled taut.
 
-The tree serves every pivot of a recovery at once. A path along the grid is up to 8 % longer than it
-need be (26 directions); pulled taut as a tether it is the shortest of its class, at the clearance.
+The tree serves every pivot of a recovery at once. A path along the grid is up to 8 % longer than
+necessary (26 directions); pulled taut as a tether, it is the shortest of its class at the
+clearance.
 """
 
 from __future__ import annotations
@@ -29,18 +30,16 @@ from netsp.world.tether.geodesic import GeodesicTether
 
 
 class Grid:
-    """Free cells of a box in a scene.
+    """Grid of the free cells of a box in a scene.
 
     Parameters
     ----------
-    field
-        The scene.
     low, high
-        (3,) corners of the box.
+        Corners (3,) of the box, metres.
     cell
-        Metres.
+        Cell size, metres.
     clearance
-        A cell is free when its centre is at least this far from every solid, metres.
+        Minimum distance of the centre of a free cell from solids, metres.
 
     Raises
     ------
@@ -92,8 +91,8 @@ class Grid:
         return len(self._kept)
 
     def toward(self, root: Ints, wanted: Ints) -> npt.NDArray[np.int8]:
-        """The step that leads on to the root, of the wanted cells (n, 3) and those on their way:
-        see `grow`."""
+        """Return the step that leads on to the root from the wanted cells (n, 3) and those on their
+        way; see `grow`."""
         kept = self._kept.get(tuple(root))
         if kept is not None:
             if all(
@@ -105,7 +104,7 @@ class Grid:
         return grow(self.states, root, wanted)
 
     def over(self, field: DistanceField, box: Floats) -> Grid:
-        """The same cells in a scene that is another within a box (2, 3)."""
+        """Return the same cells in a scene that differs within a box (2, 3)."""
         room = self.clearance + self.cell
         first, last = self.index(box[0] - room), self.index(box[1] + room) + 1
         nx, ny, nz = (int(s) for s in last - first)
@@ -124,22 +123,22 @@ class Grid:
 
     @property
     def states(self) -> npt.NDArray[np.uint8]:
-        """Of `states_of`."""
+        """States of the cells, see `states_of`."""
         if self._states is None:
             self._states = states_of(self.free)
         return self._states
 
     def index(self, points: npt.ArrayLike) -> npt.NDArray[np.int64]:
-        """Cells (..., 3) of points (..., 3), the nearest within the box."""
+        """Return the cells (..., 3) of points (..., 3), the nearest ones within the box."""
         cells = np.floor((np.asarray(points, dtype=float) - self.low) / self.cell).astype(np.int64)
         return np.asarray(np.clip(cells, 0, np.array(self.free.shape) - 1))
 
     def centre(self, cells: npt.ArrayLike) -> Floats:
-        """Centres (..., 3) of cells (..., 3)."""
+        """Return the centres (..., 3) of cells (..., 3)."""
         return np.asarray(self.low + (np.asarray(cells) + 0.5) * self.cell)
 
     def free_near(self, point: npt.ArrayLike) -> npt.NDArray[np.int64] | None:
-        """The free cell nearest to a point that sees it, within three cells; None if there is
+        """Return the nearest free cell within three cells that a point sees; None if there is
         none."""
         p = np.asarray(point, dtype=float)
         at = self.index(p)
@@ -160,21 +159,13 @@ class Paths(Protocol):
     """Short paths to one target from some points, however they are found."""
 
     def path(self, n: int) -> Floats | None:
-        """(k, 3) from point n to the target; None if there is none."""
+        """Return the path (k, 3) from point n to the target; None if there is none."""
 
 
 class ShortestTree:
-    """Paths to a target from the points asked about.
+    """Shortest-path tree that leads from points (n, 3) to a target (3,).
 
-    Parameters
-    ----------
-    grid
-        Where they run.
-    target
-        (3,) where they end.
-    points
-        (n, 3) where they start; the tree grows until it has them all, if `Grid.prepare` has not
-        kept it.
+    It grows until it has all points, unless `Grid.prepare` has kept it.
     """
 
     def __init__(self, grid: Grid, target: npt.ArrayLike, points: npt.ArrayLike) -> None:
@@ -187,7 +178,8 @@ class ShortestTree:
             self._toward = grid.toward(root, wanted.reshape(-1, 3))
 
     def path(self, n: int) -> Floats | None:
-        """(k, 3) from point n to the target along the grid; None if there is none."""
+        """Return the path (k, 3) from point n to the target along the grid; None if there is
+        none."""
         cell = self._cells[n]
         if cell is None or self._toward[tuple(cell)] < 0:
             return None
@@ -200,9 +192,12 @@ _LONG = np.sqrt((STEPS**2).sum(1).astype(float))
 
 
 def _onward() -> Ints:
-    """(26, 8) how many steps follow on a step in open water, and which: those that go on along some
-    of its axes. Every other cell beside is reached as soon by way of cells about the middle one:
-    the canonical order of jump point search (Harabor & Grastien 2011), in space."""
+    """Return (26, 8) the number of steps that follow on a step in open water, and these steps: they
+    go on along some of its axes.
+
+    Every other neighbour is reached as soon through cells about the middle one: the canonical order
+    of jump point search (Harabor & Grastien 2011), in space.
+    """
     out = np.zeros((26, 8), dtype=np.int64)
     for s, step in enumerate(STEPS):
         on = [t for t, next_ in enumerate(STEPS) if all(next_[next_ != 0] == step[next_ != 0])]
@@ -213,7 +208,7 @@ def _onward() -> Ints:
 ONWARD = _onward()
 
 BLOCKED, FREE, OPEN = range(3)
-"""Of a cell: its centre is not free, is free, is free as are all 26 about it."""
+"""Codes of a cell: its centre is not free, is free, or is free as are all 26 cells about it."""
 
 
 @kernel
@@ -259,8 +254,8 @@ def _free_cells_in_numpy(
 
 @kernel
 def states_of(free: Bools) -> npt.NDArray[np.uint8]:
-    """(nx + 2, ny + 2, nz + 2) `BLOCKED`, `FREE` or `OPEN`, with a border that is blocked: then
-    neighbours need no check, and are at constant offsets in memory."""
+    """Return (nx + 2, ny + 2, nz + 2) the codes of cells, with a blocked border. So neighbours need
+    no check, and are at constant offsets in memory."""
     nx, ny, nz = free.shape
     out = np.zeros((nx + 2, ny + 2, nz + 2), dtype=np.uint8)
     for i in range(nx):
@@ -296,25 +291,25 @@ def _states_of_in_numpy(free: Bools) -> npt.NDArray[np.uint8]:
 
 @kernel
 def grow(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> npt.NDArray[np.int8]:
-    """Shortest paths to the root from cells around it, until all wanted cells are settled.
+    """Return shortest paths to the root from cells around it, until all wanted cells are settled.
 
-    Cells wait in buckets by the whole part of their length. No step is shorter than 1, so what is
-    in the first bucket is settled, in any order (Dial 1969; Denardo & Fox 1979), and none is as
-    long as 2, so three buckets do. In open water only those neighbours are looked at that lie
-    further on (`_onward`).
+    Cells wait in buckets by the whole part of their distance. No step is shorter than 1, so the
+    cells of the first bucket are settled in any order (Dial 1969; Denardo & Fox 1979), and none is
+    as long as 2, so three buckets suffice. In open water only the neighbours further on are tried
+    (`_onward`).
 
     Parameters
     ----------
     states
-        Of `states_of`.
+        Codes of `states_of`.
     root, wanted
-        (3,), (n, 3) cells; one of (-1, -1, -1) is never settled.
+        Cells (3,) and (n, 3); (-1, -1, -1) is never settled.
 
     Returns
     -------
     toward
-        (nx, ny, nz) the step that leads on to the root, 26 at the root, -1 where it is not known,
-        as of wanted cells from which no path leads there.
+        (nx, ny, nz) the step that leads on to the root, 26 at the root, -1 where it is unknown, as
+        for wanted cells without a path.
     """
     row = states.shape[2]
     plane = states.shape[1] * row
@@ -373,9 +368,9 @@ def grow(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> npt.NDArray
 def _grow_in_numpy(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> npt.NDArray[np.int8]:
     """Vectorise `grow` over the cells of a bucket.
 
-    The cells of a bucket do not change one another, so their order only matters where two paths to
+    The cells of a bucket do not change one another, so their order matters only where two paths to
     a cell have the same length: the first one stays. `grow` reads a bucket from its last entry to
-    its first, so the last entry of a cell is the one that `grow` uses.
+    its first, so it uses the last entry of a cell.
     """
     shape = np.array(states.shape)
     strides = np.array([shape[1] * shape[2], shape[2], 1])
@@ -437,7 +432,7 @@ _NEXT_STEPS[:26, : ONWARD.shape[1] - 1], _NEXT_STEPS[26] = ONWARD[:, 1:], np.ara
 
 @kernel
 def way(toward: npt.NDArray[np.int8], start: Ints) -> Ints:
-    """Cells (k, 3) from one that the tree has to its root, both ends among them."""
+    """Return the cells (k, 3) from one in the tree to the root, both ends among them."""
     out, count = np.empty((64, 3), dtype=np.int64), 1
     # axis by axis: assigning a row would compile NumPy's error messages, which takes seconds
     for axis in range(3):
@@ -515,7 +510,8 @@ def ever_tauter(
 def _grown(
     field: DistanceField, path: Floats, clearance: float, delta: float
 ) -> tuple[DistanceField, float]:
-    """The field grown by as much of the clearance as the ends of a path have, and how much."""
+    """Return the field grown by the clearance, or by as much of it as the ends of a path have, and
+    that distance."""
     ends = field.distance(path[[0, -1]])
     room = max(0.0, min(clearance, float(ends.min()) - 1e-3 * delta))
     return field.grown(room), room
@@ -534,9 +530,12 @@ def _relaxed(grown: DistanceField, line: Floats, delta: float, rounds: int) -> F
 
 @kernel
 def shortcut(field: Field, path: Floats, tolerance: float) -> Floats:
-    """A path without the points that can be left out: from each point straight to the last of those
-    that it sees without a break. The triangles that are swept are as wide as the path's points are
-    apart, so nothing wider is passed over."""
+    """Return a path without points that can be left out: from each point straight to the last of
+    those that it sees without a break.
+
+    The triangles that are swept are as wide as the path's points are apart, so nothing wider is
+    passed over.
+    """
     out = np.empty_like(path)
     for axis in range(3):  # assigning a row would compile NumPy's error messages
         out[0, axis] = path[0, axis]
@@ -559,9 +558,11 @@ def shortcut(field: Field, path: Floats, tolerance: float) -> Floats:
 
 
 def homotopic(field: DistanceField, a: Floats, b: Floats, step: float) -> bool:
-    """Whether two paths between the same ends certainly are of one class: points at most `step`
-    apart, at the same share of both paths, all see one another. Nothing wider than `step` can then
-    stand between the paths."""
+    """Return whether two paths between the same ends certainly belong to one class.
+
+    Points at most `step` apart, at the same share of both paths, must all see one another. Then
+    nothing wider than `step` can stand between the paths.
+    """
     k = 2 + int(max(polylines.length(a), polylines.length(b)) / step)
     return bool(all_see(field.arrays, _shares(a, k), _shares(b, k), 0.1 * step))
 
@@ -574,7 +575,7 @@ def _shares(path: Floats, k: int) -> Floats:
 
 @kernel
 def all_see(field: Field, a: Floats, b: Floats, step: float) -> bool:
-    """Whether the points a[k] and b[k] (n, 3) see one another, all of them, in steps of `step`."""
+    """Return whether all points a[k] and b[k] (n, 3) see one another, in steps of `step`."""
     for k in range(len(a)):
         low, _ = lowest_along(
             field, a[k, 0], a[k, 1], a[k, 2], b[k, 0], b[k, 1], b[k, 2], step

@@ -31,39 +31,20 @@ PLANNERS: Registry[Callable[..., Planner]] = Registry(
     },
     later,
 )
-"""Name → what makes a planner of (mission, field, tether model, grid, options)."""
+"""Factories of planners by name, each called with (mission, field, tether model, grid, options)."""
 
 
 def make_planner(
     name: str | Callable[..., Planner], mission: Mission, scene: DistanceField, tethers: Tethers,
     grid: Grid, options: PlannerOptions | None = None,
 ) -> Planner:  # fmt: skip
-    """A planner by name, or made by a callable.
-
-    Parameters
-    ----------
-    name : str or callable
-        One of `PLANNERS`, or a callable such as a class derived from `Planner`.
-    mission : Mission
-        What is flown.
-    scene : DistanceField
-        The map.
-    tethers : TetherModel
-        The tether model that the planner believes.
-    grid : Grid
-        The grid that paths are sought on.
-    options : PlannerOptions, optional
-        How paths are found.
-
-    Returns
-    -------
-    Planner
-        The planner.
+    """Make a planner by name, or by calling a factory such as a class derived from `Planner`.
 
     Raises
     ------
     InputError
-        No planner, or none of the options, has that name.
+        An unknown name of a planner, of path search or of refinement, a pivot spacing that is not
+        positive, or a tether model that the planner cannot use.
     """
     options = options or PlannerOptions()
     make = name if callable(name) else PLANNERS.named(name)

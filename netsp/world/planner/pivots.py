@@ -17,13 +17,6 @@ class Pivots:
     Paths and tethers are computed on demand and cached, so a search that stops at an early pivot
     computes no later one.
 
-    Parameters
-    ----------
-    planner : Planner
-        Planner with the waypoint, scene, tether model and path search.
-    tether : Tether
-        Present tether, as the planner believes it.
-
     Attributes
     ----------
     points : ndarray, shape (n, 3)

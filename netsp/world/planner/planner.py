@@ -1,4 +1,4 @@
-"""What all planners share: waypoints, where they are in them, and a path to follow."""
+"""Base of all planners: the waypoints, how far the robot has come, and the path that it follows."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ NORMAL, RECOVERY, WAIT, DWELL, HOME, HOLD, DONE = (
 
 @dataclass(frozen=True)
 class Command:
-    """Where to go now.
+    """Command of a planner to the robot.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Command:
     mode : {"normal", "recovery", "wait", "dwell", "home", "hold", "done"}
         What the robot is doing.
     replan_s : float
-        Seconds of CPU that planning took in this step.
+        CPU time of planning in this step, s.
     """
 
     path: Floats
@@ -55,27 +55,27 @@ class Command:
 
 @dataclass(frozen=True)
 class PlannerOptions:
-    """How paths are found.
+    """Options of the search for paths.
 
     Parameters
     ----------
     paths : str
         ``tree``, or one of OMPL's planners (`netsp.world.paths.sampled`).
     refine : {"none", "paper", "gradient"}, optional
-        See `netsp.world.paths.refine`; by default `paper` for the paper's planners and `none` for
-        the others, whose paths keep the clearance from the start.
+        Refinement of paths, see `netsp.world.paths.refine`; by default `paper` for the paper's
+        planners and `none` for the others, whose paths keep the clearance from the start.
     seed : int
-        Of what is random in either.
+        Seed of sampling and refinement.
     refine_params : RefineParams
         Options of the paper's refinement.
     pivot_spacing : float, optional
         Distance between pivots along a tether for the paper's planners, metres; more than 0. By
         default 0.25 m, or one cell if a cell is larger.
     looks : int
-        How often `predictive` simulates the tether ahead for one plan; then the best path so far is
-        taken, and the first if there is none yet.
+        Maximum number of simulations ahead for one plan of `predictive`; then it takes the best
+        path so far, and the first if there is none yet.
     metres : float
-        Of paths along which it does so, likewise.
+        Maximum length of the paths of these simulations, likewise.
     planning_limit : float
         Seconds that `repair` may take to plan the rest of a tour; the robot holds its place.
     prepared : bool
@@ -103,46 +103,46 @@ class PlannerOptions:
 
 @dataclass
 class Planner:
-    """Follows the waypoints of a mission. Planners are derived from it.
+    """Planner that follows the waypoints of a mission, and base of all others.
 
     Parameters
     ----------
     mission : Mission
-        What is flown.
+        The mission, with the events so far.
     scene : DistanceField
         The map.
     tethers : TetherModel
-        The tether model that the planner believes.
+        The planner's tether model.
     grid : Grid
-        The grid that paths are sought on.
+        The grid on which paths are searched.
     options : PlannerOptions
-        How paths are found.
+        Options of path search.
     laid : Tether
         The tether when the mission began.
     index : int
-        The waypoint that is next; their number on the way home.
+        The next waypoint; the number of waypoints on the way home.
     mode : str
-        As of `Command`.
+        See `Command`.
     path : ndarray, shape (k, 3)
         The path that is followed.
     left_out : list of (int, str)
         Waypoints left out, with the reason.
     defects : list of str
-        What went wrong in planning that never should, one text each time.
+        Errors of planning that should never happen.
     reached : list of int
         Waypoints visited.
     home : bool
         Whether the robot is back at the start.
     not_home : str or None
-        Why it has given up getting there.
+        Why the robot has given up getting home.
     now : float
-        Seconds since the start; whoever runs the mission keeps it up to date.
+        Seconds since the start, which the simulator updates.
     caught : float
-        Metres of tether that are out beyond what the map explains.
+        Length of tether that is out beyond what the map explains, metres.
     trail : ndarray, shape (n, 3)
-        The way that the tether was laid along, where it is known.
+        Line along which the tether was laid, if it is known.
     given : list of int
-        What number each waypoint had when the mission began; those added come after all others.
+        Number of each waypoint when the mission began; added ones come after all others.
     """
 
     mission: Mission
@@ -175,35 +175,25 @@ class Planner:
 
     @cached_property
     def load(self) -> Load:
-        """What acts on the tether: the steady current, and gusts of three standard deviations from
-        any side."""
+        """Load on the tether: the steady current, and gusts of three standard deviations from any
+        side."""
         load = self.mission.tether.load(np.array(self.mission.current))
         return load._replace(gusts=3.0 * self.mission.gusts)
 
     @cached_property
     def reserve(self) -> float:
-        """Metres of tether to be kept for what positions are wrong by."""
+        """Length of tether kept for errors of the position, metres."""
         return self.mission.sensor.reserve(self.mission.speed)
 
     @property
     def loaded(self) -> bool:
-        """Whether the tether needs more than its taut length, or may turn by so much only."""
+        """Whether the tether needs more than its taut length, or has a limit of turning."""
         physics = self.mission.tether
         return physics.slack > 0.0 or physics.diameter > 0.0 or math.isfinite(physics.max_turning)
 
     def payout(self, tether: Tether) -> float:
-        """Length that must be out for a tether to lie as it does: what the limit is about.
-
-        Parameters
-        ----------
-        tether : Tether
-            As the model has it.
-
-        Returns
-        -------
-        float
-            Metres.
-        """
+        """Return the length (m) that must be out for a tether to lie as it does; the limit applies
+        to it."""
         if not self.loaded:
             return tether.length
         if isinstance(self.tethers, GeodesicTether):
@@ -211,17 +201,11 @@ class Planner:
         return payout_along(tether.nodes, self.load)
 
     def __post_init__(self) -> None:
-        """Waypoints have their own numbers at first."""
+        """Number the waypoints."""
         self.given = list(range(len(self.mission.waypoints)))
 
     def add_waypoint(self, waypoint: MissionWaypoint) -> None:
-        """Visit one more, after all others.
-
-        Parameters
-        ----------
-        waypoint : MissionWaypoint
-            The waypoint.
-        """
+        """Visit another waypoint, after all others."""
         if self.done:
             return
         if self.homeward:
@@ -231,17 +215,12 @@ class Planner:
         self.mission = self.mission.model_copy(update={"waypoints": waypoints})
 
     def cancel_waypoint(self, number: int) -> int | None:
-        """Do not visit one, if it is still to be visited.
-
-        Parameters
-        ----------
-        number : int
-            That it was given.
+        """Cancel a waypoint by the number it was given, if it is still to be visited.
 
         Returns
         -------
         int or None
-            What number it had by now; None where the robot has been there already.
+            The waypoint's present number; None if the robot has been there.
         """
         k = self.given.index(number) if number in self.given else -1
         if k < self.index or self.done:
@@ -254,17 +233,11 @@ class Planner:
         return k
 
     def take_limit(self, limit: float) -> None:
-        """Keep to another length of tether from now on.
-
-        Parameters
-        ----------
-        limit : float
-            Metres.
-        """
+        """Keep to another length of tether (m) from now on."""
         self.mission = self.mission.model_copy(update={"tether_length": limit})
 
     def carried_off(self) -> None:
-        """The robot is not where it was: what was planned does not begin there."""
+        """Forget the path, because the robot was carried off it."""
         self.path = self.path[:0]
 
     @property
@@ -273,35 +246,29 @@ class Planner:
         return self.mission
 
     def told(self) -> dict[str, Any]:
-        """What it adds to the summary of a run.
-
-        Returns
-        -------
-        dict
-            Numbers by name.
-        """
+        """Return what the planner adds to the summary of a run."""
         changed = self.given != list(range(len(self.given)))
         return {"given_as": self.given} if changed else {}
 
     @property
     def waypoint(self) -> Floats:
-        """(3,) the waypoint that is next; on the way home where that is."""
+        """Position (3,) of the next waypoint, or of home."""
         return self.home_now if self.homeward else self.mission.places[self.index]
 
     @cached_property
     def track(self) -> Track | None:
-        """Where a moving anchor goes."""
+        """Track of a moving anchor."""
         return Track.of(self.mission)
 
     @property
     def anchor_moves(self) -> bool:
-        """Whether the anchor is on its way."""
+        """Whether the anchor still moves."""
         return self.track is not None and self.now < self.track.end
 
     @property
     def home_now(self) -> Floats:
-        """(3,) the start; of a moving anchor as far from it as when the mission began, where that
-        is in the water and in sight of it, else the anchor."""
+        """Position (3,) of home: the start, or for a moving anchor the place as far from it as when
+        the mission began, if that is in free water and in sight of the anchor; else the anchor."""
         start = np.array(self.mission.start)
         if self.track is None:
             return start
@@ -313,7 +280,7 @@ class Planner:
 
     @property
     def laid_now(self) -> Tether:
-        """The tether as it is to lie at home."""
+        """The tether as it should lie at home."""
         assert self.laid is not None
         if self.track is None:
             return self.laid
@@ -321,7 +288,7 @@ class Planner:
 
     @property
     def homeward(self) -> bool:
-        """Whether all waypoints are visited or left out: what is left is the way home."""
+        """Whether all waypoints are visited or left out, so that only the way home remains."""
         return self.index >= len(self.mission.waypoints)
 
     @property
@@ -330,22 +297,11 @@ class Planner:
         return self.index > len(self.mission.waypoints)
 
     def step(self, robot: Floats, tether: Tether) -> Command:
-        """What to do now.
+        """Return the next command for a robot at a position (3,) with the tether as the model has
+        it.
 
-        Never raises: where no plan is found the robot holds its place or leaves the waypoint out,
+        Never raises: if no plan is found, the robot holds its place or leaves the waypoint out,
         with the reason.
-
-        Parameters
-        ----------
-        robot : ndarray, shape (3,)
-            Position of the robot, metres.
-        tether : Tether
-            The tether as the model has it.
-
-        Returns
-        -------
-        Command
-            Where to go.
         """
         self._advance(robot, tether)
         self._follow_home(robot)
@@ -370,20 +326,18 @@ class Planner:
     def take_map(
         self, scene: DistanceField, tethers: Tethers, box: Floats, robot: Floats, tether: Tether
     ) -> None:
-        """Go by another map from now on. A path that no longer keeps off solids is forgotten.
+        """Plan with another map from now on, and forget a path that is no longer clear of solids.
 
         Parameters
         ----------
-        scene : DistanceField
-            The map.
-        tethers : TetherModel
-            The tether model in it.
+        scene, tethers : DistanceField, TetherModel
+            The map, and the tether model in it.
         box : ndarray, shape (2, 3)
-            Within which it is another, metres.
+            Box within which the map has changed, metres.
         robot : ndarray, shape (3,)
             Position of the robot, metres.
         tether : Tether
-            The tether in it.
+            The tether in the new map.
         """
         del tether
         self.scene, self.tethers, self.grid = scene, tethers, self.grid.over(scene, box)
@@ -391,38 +345,29 @@ class Planner:
             self.path = self.path[:0]
 
     def keeps_off(self, path: Floats) -> bool:
-        """Whether a path keeps off all solids of the map.
-
-        Parameters
-        ----------
-        path : ndarray, shape (k, 3)
-            From the robot on, metres.
-
-        Returns
-        -------
-        bool
-            Whether it does, by most of the clearance, or of what its ends have of it.
-        """
+        """Return whether a path (k, 3) from the robot on is clear of all solids of the map, by most
+        of the clearance, or of what its ends have of it."""
         line = polylines.dense(path, 0.5 * self.grid.cell)
         room = min(self.mission.clearance, float(self.scene.distance(path[[0, -1]]).min()))
         needed = self.policy.min_clearance_share * room
         return not len(line) or bool(self.scene.distance(line).min() >= needed)
 
     def hear_of_payout(self, more: float, trail: Floats) -> None:
-        """How much more tether is out than the map explains.
+        """Note that more tether is out than the map explains, because something unmapped has caught
+        it.
 
         Parameters
         ----------
         more : float
-            Metres; something that is not on the map has caught the tether.
+            Excess length, metres.
         trail : ndarray, shape (n, 3)
-            The way from the anchor to the robot on which the tether was laid: whoever goes back
-            along it frees the tether of whatever has caught it.
+            Line from the anchor to the robot along which the tether was laid: going back along it
+            frees the tether.
         """
         self.caught, self.trail = more, trail
 
     def _hold(self, robot: Floats, error: Exception, spent: float) -> Command:
-        """Stay, and try again at the next step; leave the waypoint out after a while."""
+        """Return a command to stay and try again; leave the waypoint out after a while."""
         self._held += 1
         self.defects.append(f"{type(error).__name__}: {error}")
         if self._held > self.policy.max_holds:
@@ -430,15 +375,7 @@ class Planner:
         return Command(np.array([robot]), HOLD, spent)
 
     def warm_up(self, robot: Floats, tether: Tether) -> None:
-        """Load what is compiled, so that the first plan takes no longer than the others.
-
-        Parameters
-        ----------
-        robot : ndarray, shape (3,)
-            Position of the robot, metres.
-        tether : Tether
-            The tether as the model has it.
-        """
+        """Load what is compiled, so that the first plan takes no longer than the others."""
         del tether
         self.prepare()
         path = self.paths(robot[None]).path(0)
@@ -446,24 +383,17 @@ class Planner:
             self.pulled(path)
 
     def prepare(self) -> None:
-        """Find the shortest paths to all waypoints, and home, from everywhere, before the mission:
-        they depend on the map alone.
+        """Find the shortest paths to all waypoints, and home, before the mission.
 
-        Where kernels are interpreted, this does nothing: finding the paths that are needed takes
-        less time than finding all of them."""
+        If kernels are interpreted, this does nothing: finding the paths that are needed takes less
+        time.
+        """
         if self.options.paths == "tree" and self.options.prepared and runs_compiled(grow):
             home = [] if self.track is not None else [np.array(self.mission.start)]
             self.grid.prepare([*self.mission.places, *home])
 
     def plan(self, robot: Floats, tether: Tether) -> bool:
-        """Set `path` and `mode`; here, on to the waypoint whatever the tether.
-
-        Parameters
-        ----------
-        robot : ndarray, shape (3,)
-            Position of the robot, metres.
-        tether : Tether
-            The tether as the model has it.
+        """Set `path` and `mode`, here straight on to the waypoint whatever the tether.
 
         Returns
         -------
@@ -474,15 +404,8 @@ class Planner:
         return False if len(self.path) else self.go_on(robot)
 
     def plan_home(self, robot: Floats, tether: Tether) -> bool:
-        """Set `path` and `mode` for the way home, after the last waypoint; here, straight to the
-        start whatever the tether.
-
-        Parameters
-        ----------
-        robot : ndarray, shape (3,)
-            Position of the robot, metres.
-        tether : Tether
-            The tether as the model has it.
+        """Set `path` and `mode` after the last waypoint, here straight to the start whatever the
+        tether.
 
         Returns
         -------
@@ -497,36 +420,14 @@ class Planner:
         return planned
 
     def ends_here(self, tether: Tether) -> bool:
-        """Whether the mission may end now that the robot is home; else the way home is planned
-        again.
-
-        Parameters
-        ----------
-        tether : Tether
-            The tether as the model has it.
-
-        Returns
-        -------
-        bool
-            Whether it may; here always.
-        """
+        """Return whether the mission may end now that the robot is home; otherwise the way home is
+        planned again."""
         del tether
         return True
 
     def back_along(self, tether: Tether) -> Floats:
-        """The way back along a tether to the anchor, and on to the start as the tether was laid
-        there: whoever goes it has the tether free at its end.
-
-        Parameters
-        ----------
-        tether : Tether
-            The tether as the model has it.
-
-        Returns
-        -------
-        ndarray, shape (k, 3)
-            From the robot to the start, at the clearance where there is room, metres.
-        """
+        """Return the path (k, 3) back along a tether to the anchor, and on to the start as the
+        tether was first laid. At its end the tether is free."""
         return self.beside(np.vstack([tether.nodes[::-1], self.laid_now.nodes[1:]]))
 
     def beside(self, line: Floats) -> Floats:
@@ -537,22 +438,17 @@ class Planner:
 
     @property
     def fine(self) -> float:
-        """Metres between points of the way back along a tether: the model may lose a solid of twice
-        that thickness."""
+        """Distance between points of a path back along a tether, metres. The tether model may miss
+        a solid of twice that thickness."""
         return min(self.grid.cell, 0.5 * THINNEST * self.mission.delta)
 
     def go_on(self, robot: Floats) -> bool:
-        """Go straight to the waypoint, or along the shortest path round what is between.
-
-        Parameters
-        ----------
-        robot : ndarray, shape (3,)
-            Position of the robot, metres.
+        """Plan a straight path to the waypoint, or the shortest path round what is between.
 
         Returns
         -------
         bool
-            Whether a path had to be sought.
+            Whether a path had to be searched.
         """
         straight = np.array([robot, self.waypoint])
         if self.is_free(straight):
@@ -566,18 +462,7 @@ class Planner:
         return True
 
     def paths(self, points: Floats) -> Paths:
-        """Short paths to the waypoint.
-
-        Parameters
-        ----------
-        points : ndarray, shape (n, 3)
-            Where they start, metres.
-
-        Returns
-        -------
-        Paths
-            A path from each of them.
-        """
+        """Return a short path to the waypoint from each of some points (n, 3)."""
         if self.options.paths == "tree":
             return ShortestTree(self.grid, self.waypoint, points)
         seed = 1000 * self.options.seed + self.index
@@ -585,18 +470,7 @@ class Planner:
         return SampledPaths(name, self.grid, self.waypoint, points, seed, policy)
 
     def refined(self, path: Floats) -> Floats:
-        """A path made safer and smoother, as the options have it.
-
-        Parameters
-        ----------
-        path : ndarray, shape (k, 3)
-            The path, metres.
-
-        Returns
-        -------
-        ndarray, shape (m, 3)
-            The refined path, metres.
-        """
+        """Return a path (k, 3) refined as the options say."""
         name = self.options.refine or self.refine
         if name == "none":
             return path
@@ -606,19 +480,13 @@ class Planner:
         return refined(name, self.scene, even, self.mission.clearance, rng, params)
 
     def refined_once(self, path: Floats, number: int) -> Floats:
-        """Refine a path once, even if the result is not free; only `paper` differs from `refined`.
+        """Return a path refined once, even if the result is not free; only `paper` differs from
+        `refined`.
 
         Parameters
         ----------
-        path : ndarray, shape (k, 3)
-            The path, metres.
         number : int
             Number of the path, which seeds the random moves.
-
-        Returns
-        -------
-        ndarray, shape (m, 3)
-            The refined path, metres.
         """
         if (self.options.refine or self.refine) != "paper" or len(path) < 3:
             return self.refined(path)
@@ -633,40 +501,19 @@ class Planner:
         return self.options.pivot_spacing or max(self.grid.cell, self.policy.min_pivot_spacing)
 
     def pulled(self, path: Floats) -> Floats:
-        """A path pulled taut in its class, at the clearance.
-
-        Parameters
-        ----------
-        path : ndarray, shape (k, 3)
-            The path, metres.
-
-        Returns
-        -------
-        ndarray, shape (m, 3)
-            The taut path, metres.
-        """
+        """Return a path (k, 3) pulled taut in its class, at the clearance."""
         mission = self.mission
         return taut(self.scene, path, mission.clearance, mission.delta, self.policy.paths)
 
     def is_free(self, path: Floats) -> bool:
-        """Whether a path keeps the clearance, or what its ends have of it.
-
-        Parameters
-        ----------
-        path : ndarray, shape (k, 3)
-            The path, metres.
-
-        Returns
-        -------
-        bool
-            Whether it does.
-        """
+        """Return whether a straight path (2, 3) keeps the clearance, or what its ends have of
+        it."""
         ends = float(self.scene.distance(path).min())
         room = min(self.mission.clearance, ends) - 1e-3
         return self.scene.grown(max(0.0, room)).line_of_sight(path[0], path[1], depth=1e-3)
 
     def _advance(self, robot: Floats, tether: Tether) -> None:
-        """Past the waypoint, when it is reached at the end of the path."""
+        """Go on to the next waypoint if this one is reached at the end of the path."""
         reach = self.mission.reach
         if self.done or self.mode == WAIT or len(self.path) > 1:
             return
@@ -681,7 +528,7 @@ class Planner:
             self._next()
 
     def _follow_home(self, robot: Floats) -> None:
-        """The way home ends where that is now; it is planned anew where it cannot be led on."""
+        """Lead the path home to where home is now; forget the path if that is not possible."""
         if not self.homeward or self.track is None or not len(self.path):
             return
         last = np.array([self.path[-2] if len(self.path) > 1 else robot, self.waypoint])
@@ -692,23 +539,12 @@ class Planner:
         self.path, self.mode, self._held = np.zeros((0, 3)), NORMAL, 0
 
     def passed(self, count: int) -> None:
-        """The robot has passed points of the path; the last one stays ahead.
-
-        Parameters
-        ----------
-        count : int
-            How many.
-        """
+        """Remove points that the robot has passed from the path; the last point stays."""
         self.path = self.path[min(count, max(0, len(self.path) - 1)) :]
 
     def leave_out(self, reason: str) -> None:
-        """Leave the waypoint that is next out; on the way home, end the mission where the robot is.
-
-        Parameters
-        ----------
-        reason : str
-            Why; it is logged.
-        """
+        """Leave the next waypoint out, for a reason that is logged; on the way home, end the
+        mission."""
         if self.homeward:
             self.not_home = reason
         else:

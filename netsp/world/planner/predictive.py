@@ -1,8 +1,8 @@
 """`predictive`: simulates the tether along the coming path before the robot moves.
 
-So the limit is never exceeded on the path that was planned. A waypoint is left out only when the
-shortest tether to it in every class found is over the limit, or when even the way back to the
-anchor and along that tether does not keep to it; which of both, and by how much, is told.
+So the limit is never exceeded on a planned path. A waypoint is left out only if the shortest tether
+to it, in every class found, is over the limit, or if even the way back to the anchor and along that
+tether exceeds it; the reason states which, and by how much.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from netsp.world.tether import GeodesicTether, Tether
 
 
 class Candidate(NamedTuple):
-    """A homotopy class of the tether at the waypoint: a tether in it (k, 3), a path that brings it
-    there (m, 3), and that path roughly pulled (n, 3)."""
+    """Homotopy class of the tether at the waypoint: a tether in it (k, 3), a path that brings the
+    tether there (m, 3), and that path roughly pulled (n, 3)."""
 
     tether: Floats
     path: Floats
@@ -36,7 +36,7 @@ class Candidate(NamedTuple):
 
 @dataclass
 class PredictivePlanner(Planner):
-    """`Planner` with look-ahead."""
+    """Planner that looks ahead."""
 
     _planned: int = field(default=-1)
     _warned: int = field(default=-1)
@@ -57,7 +57,7 @@ class PredictivePlanner(Planner):
         return self.policy.predictive
 
     def plan(self, robot: Floats, tether: Tether) -> bool:
-        """One path per waypoint, planned when the robot sets out for it."""
+        """Plan one path for each waypoint when the robot sets out for it."""
         if (
             self._planned == self.index
             and len(self.path)
@@ -98,8 +98,8 @@ class PredictivePlanner(Planner):
         return True
 
     def _leg(self, robot: Floats, tether: Tether) -> Floats | None:
-        """The leg of the mission's tour, where the robot is where it begins, the tether as the tour
-        has it there, and nothing on the map in the way."""
+        """Return the leg of the mission's tour if robot and tether are where it begins and nothing
+        on the map is in the way."""
         leg, meant = self._planned_leg()
         tolerance = self.predictive.tour_tolerance
         if (
@@ -116,8 +116,8 @@ class PredictivePlanner(Planner):
         return None
 
     def _planned_leg(self) -> tuple[Floats | None, float | None]:
-        """The tour's leg to the waypoint, and metres of tether where it begins: None where that is
-        whatever there is when the mission begins."""
+        """Return the tour's leg to the waypoint and the length of tether where it begins; None for
+        the length if the mission begins there."""
         tour = self.mission.tour
         if tour is None or self.track is not None:
             return None, None
@@ -131,7 +131,7 @@ class PredictivePlanner(Planner):
         self._planned = -1
 
     def cancel_waypoint(self, number: int) -> int | None:
-        """See `Planner`; the legs of a tour are no longer those that lead to the others."""
+        """See `Planner`; the tour is forgotten, because its legs lead to other waypoints."""
         k = super().cancel_waypoint(number)
         if k is not None:
             self._planned = -1
@@ -139,39 +139,41 @@ class PredictivePlanner(Planner):
         return k
 
     def take_limit(self, limit: float) -> None:
-        """See `Planner`; where more is out, the robot first goes back along its tether."""
+        """See `Planner`; if more is out, the robot first goes back along its tether."""
         shorter = limit < self.mission.tether_length
         super().take_limit(limit)
         if shorter:
             self.path, self._planned = self.path[:0], -1
 
     def _shortened(self, tether: Tether) -> Floats | None:
-        """The way back along a tether that is too long, as far as need be; None for others."""
+        """Return the path back along a tether that is over the limit, as far as necessary; None for
+        others."""
         over = self.payout(tether) - self.limit
         if over <= 0.0 or self.payout(tether) <= self.mission.tether_length:
             return None
         return polylines.part(self.back_along(tether), 0.0, over + self.mission.reach)
 
     def _without_stop(self, k: int) -> None:
-        """Forget the tour, whose legs would lead to other waypoints."""
+        """Forget the tour, because its legs would lead to other waypoints."""
         del k
         self.mission = self.mission.model_copy(update={"tour": None})
 
     @property
     def limit(self) -> float:
-        """Metres of tether that plans may use."""
+        """Length of tether that plans may use, metres."""
         margin = self.policy.preview.limit_margin
         return self.mission.tether_length * (1.0 - margin) - self._kept
 
     @property
     def _kept(self) -> float:
-        """Metres of tether kept back: for positions, a moving anchor, what is not on the map."""
+        """Length of tether in reserve for positions, a moving anchor and what is not on the map,
+        metres."""
         unknown = 0.0 if self.mission.range_sensor is None else self.predictive.unmapped_reserve
         return self.reserve + self._anchors_way + self.caught + unknown
 
     @property
     def _anchors_way(self) -> float:
-        """Metres of tether kept back for a moving anchor."""
+        """Length of tether in reserve for a moving anchor, metres."""
         if self.track is None or not self.anchor_moves:
             return 0.0
         return self.predictive.anchor_lag_s * self.track.speed
@@ -181,7 +183,8 @@ class PredictivePlanner(Planner):
         return f", of which {self._kept:.2f} m are kept in reserve" if self._kept else ""
 
     def _surprised(self, tether: Tether) -> bool:
-        """Whether half of the reserve is used up, as in a current: said once for each waypoint."""
+        """Return whether half of the reserve is used up, as in a current; true once for each
+        waypoint."""
         margin = self.policy.preview.limit_margin
         if (
             self._warned == self.index
@@ -193,8 +196,11 @@ class PredictivePlanner(Planner):
         return True
 
     def _overtaken(self, robot: Floats, tether: Tether) -> bool:
-        """Whether a moving anchor asks for another plan: asked now and then, of a robot that waits
-        always, of others when the tether no longer lasts for what is left of the path."""
+        """Return whether a moving anchor requires another plan.
+
+        Checked at intervals; true for a robot that waits, and for others if the tether no longer
+        lasts for the rest of the path.
+        """
         if self.mode == WAIT and not self.anchor_moves:
             return True
         if not self.anchor_moves or self.now < self._checked + self.predictive.anchor_check_s:
@@ -204,8 +210,11 @@ class PredictivePlanner(Planner):
         return self.mode == WAIT or not self._fits(tether, np.vstack([robot, self.path]), limit)
 
     def _wait(self, robot: Floats, tether: Tether, limit: float) -> None:
-        """For an anchor that comes nearer: where the robot is, as long as the tether lasts there,
-        else back along the tether, which is shorter by more than the anchor can take it along."""
+        """Wait for an anchor that comes nearer.
+
+        The robot stays while the tether lasts; else it goes back along the tether, which gets
+        shorter faster than the anchor can take it along.
+        """
         self.path, self.mode = robot[None], WAIT
         wait_s = 2.0 * self.predictive.anchor_check_s
         if not self._fits(tether, np.array([robot, robot]), limit, wait_s):
@@ -213,8 +222,9 @@ class PredictivePlanner(Planner):
             self.path = polylines.part(self.back_along(tether), 0.0, distance)[1:]
 
     def _near_enough(self, robot: Floats, waypoint: Floats) -> Floats:
-        """Where on the straight path the waypoint counts as visited: the tether may fit there only.
-        A fifth of the reach is left for a vehicle that does not stop on the spot."""
+        """Return the point on the straight path at which the waypoint counts as visited, in case
+        the tether fits only there. A fifth of the reach is left for a vehicle that does not stop on
+        the spot."""
         path = waypoint - robot
         far = float(np.linalg.norm(path))
         return waypoint - path * min(1.0, 0.8 * self.mission.reach / max(far, 1e-12))
@@ -248,7 +258,7 @@ class PredictivePlanner(Planner):
 
     @property
     def _ahead(self) -> Ahead:
-        """Looks ahead by the map and the clock of now."""
+        """Preview by the present map and time."""
         return Ahead(
             self.mission,
             self._model,
@@ -260,7 +270,7 @@ class PredictivePlanner(Planner):
 
     @property
     def _stay(self) -> float:
-        """Seconds at the end of the path that is planned."""
+        """Time at the end of the path that is planned, s."""
         if self.homeward:
             return 0.0
         waypoint = self.mission.waypoints[self.index]
@@ -269,14 +279,14 @@ class PredictivePlanner(Planner):
     def _fits(
         self, tether: Tether, path: Floats, limit: float, staying: float | None = None
     ) -> bool:
-        """Whether the tether stays within the limit all along a path, and at its end."""
+        """Return whether the tether stays within the limit all along a path, and at its end."""
         self._looks += 1
         self._looked += polylines.length(path)
         return self._ahead.fits(tether, path, limit, self._stay if staying is None else staying)
 
     def _straight(self, robot: Floats, tether: Tether, limit: float) -> Floats | None:
-        """The straight path to the waypoint, or to where it counts as visited, if the tether fits
-        there only."""
+        """Return the straight path to the waypoint, or to where it counts as visited, if the tether
+        fits."""
         far = None
         for end in (self.waypoint, self._near_enough(robot, self.waypoint)):
             path = np.array([robot, end])
@@ -291,14 +301,14 @@ class PredictivePlanner(Planner):
     def _shortest_feasible(
         self, robot: Floats, tether: Tether, limit: float
     ) -> tuple[Floats | None, str]:
-        """The shortest path on which the tether fits: on from the robot, or back along the tether
-        to a pivot and on from there; and as what it counts. One tree serves all pivots.
+        """Return the shortest path on which the tether fits, with its mode: on from the robot, or
+        back along the tether to a pivot and on from there. One tree serves all pivots.
 
-        What a pivot decides is the class of the tether at the waypoint, and with it its length
-        there. Pivots in a row that lead to one class are taken together; classes over the limit
-        need no more. For the others the path is pulled taut as a whole, the part back along the
-        tether too: there is none shorter in its class. Where the tether is over the limit on that
-        path, as much of the part back along the tether as need be is left as it is.
+        A pivot decides the class of the tether at the waypoint, and so its length there.
+        Consecutive pivots that lead to one class are merged; classes over the limit are skipped. In
+        the others, the whole path is pulled taut, with the part back along the tether: no path in
+        its class is shorter. If the tether is over the limit on that path, as much as necessary of
+        the part back along the tether stays as it is.
         """
         # the tether back from the robot, finely, off the surfaces; some of its points are pivots
         nodes = tether.nodes[::-1]
@@ -353,15 +363,15 @@ class PredictivePlanner(Planner):
         return best, RECOVERY
 
     def _over_at_its_end(self, candidate: Candidate, limit: float) -> bool:
-        """Whether even the taut tether at the end of a path is over the limit, less slack, however
-        near the anchor may have come by then."""
+        """Return whether even the taut tether at the end of a path is over the limit, less slack,
+        however near the anchor may have come by then."""
         if self.track is not None and self.anchor_moves:
             way = polylines.length(candidate.rough) / self.mission.speed
             limit += self.track.travelled(self.now, self.now + way)
         return self._longer_than(candidate.tether, limit / (1.0 + self.mission.tether.slack))
 
     def _in_time(self, paths: Iterator[Floats]) -> Iterator[Floats]:
-        """The same, as long as there is time."""
+        """Yield paths while there is time."""
         for path in paths:
             if self.options.clock is not None and self.options.clock.up:
                 raise KeyboardInterrupt
@@ -369,16 +379,16 @@ class PredictivePlanner(Planner):
 
     @property
     def _looked_enough(self) -> bool:
-        """Whether the best path so far is to be taken. Looks and their metres are counted and not
+        """Whether the best path so far is taken. Simulations and their metres are counted, not
         seconds, so that a plan is the same on every machine."""
         return self._looks >= self.options.looks or self._looked >= self.options.metres
 
     def _tautest(
         self, tether: Tether, line: Floats, limit: float, least: float = np.inf
     ) -> Floats | None:
-        """Of ever less pulled paths in the class of a line the tautest on which the tether fits:
-        the less of a retreat is saved, the sooner it does. None where none is shorter than
-        `least`."""
+        """Return the tautest path in the class of a line on which the tether fits, by bisection of
+        ever tauter paths: the less of a retreat is saved, the more likely the tether fits. None if
+        none is shorter than `least`."""
         best = None
         paths = [p for p in self._in_time(self._ever_tauter(line)) if polylines.length(p) < least]
         while paths and not (self._looked_enough and (best is not None or least < np.inf)):
@@ -394,8 +404,8 @@ class PredictivePlanner(Planner):
         return best
 
     def plan_home(self, robot: Floats, tether: Tether) -> bool:
-        """The shortest path home on which the tether fits and at whose end it is free: that of the
-        class back along the tether, pulled as far as both hold."""
+        """Plan the shortest path home on which the tether fits and comes free: that of the class
+        back along the tether, pulled as far as both hold."""
         if (
             len(self.path)
             and not self._led_astray(robot, tether)
@@ -419,7 +429,7 @@ class PredictivePlanner(Planner):
         return True
 
     def _leg_home(self, robot: Floats, tether: Tether) -> Floats | None:
-        """The way home of the mission's tour, if the tether fits on it and comes free."""
+        """Return the tour's path home, if the tether fits on it and comes free."""
         leg = self._leg(robot, tether)
         if leg is None:
             return None
@@ -427,7 +437,7 @@ class PredictivePlanner(Planner):
         return leg if np.isinf(far) and self._is_free(end) else None
 
     def _direct_home(self, robot: Floats, tether: Tether) -> Floats | None:
-        """The shortest path of all, if it happens to free the tether."""
+        """Return the shortest path home of all classes, if it happens to free the tether."""
         path = self.paths(robot[None]).path(0)
         if path is None:
             return None
@@ -438,7 +448,8 @@ class PredictivePlanner(Planner):
         return path if np.isinf(far) and self._is_free(end) else None
 
     def _home_along(self, tether: Tether) -> Floats:
-        """Back along the tether, pulled as far as it fits and comes free."""
+        """Return the path back along the tether, pulled as far as the tether fits and comes
+        free."""
         line = self.back_along(tether)
         path = self.pulled(line)
         far, end = self._ahead.follow(tether, path, self.limit, 0.0)
@@ -453,15 +464,16 @@ class PredictivePlanner(Planner):
         return path
 
     def _led_astray(self, robot: Floats, tether: Tether) -> bool:
-        """Whether on what is left of the way home the tether no longer comes free, as when a
-        vehicle that cuts corners has taken it past something. Asked now and then."""
+        """Return whether the tether no longer comes free on the rest of the way home, as when a
+        vehicle that cuts corners has taken it past something. Checked at intervals."""
         self._asked += 1
         if self._asked % self.predictive.home_check_steps or not self._sure:
             return False
         return not self._comes_free(tether, np.vstack([robot, self.path]))
 
     def ends_here(self, tether: Tether) -> bool:
-        """At home with the tether not free, the robot goes back along it and comes home again."""
+        """Return whether the tether is free at home; if not, the robot goes back along it and comes
+        home again."""
         policy, max_attempts = self.predictive, self.predictive.max_home_attempts
         if self.caught > policy.snag_tolerance and self._homes < max_attempts:
             self._homes += 1
@@ -475,18 +487,18 @@ class PredictivePlanner(Planner):
         return False
 
     def _comes_free(self, tether: Tether, path: Floats) -> bool:
-        """Whether the tether lies at the end of a path as at the start of the mission."""
+        """Return whether the tether lies at the end of a path as at the start of the mission."""
         points = polylines.dense(path, 5.0 * self.grid.cell)
         return self._is_free(self._model.drive(tether, points)[0])
 
     def _is_free(self, tether: Tether) -> bool:
-        """Whether a tether at home comes to lie as at the start of the mission."""
+        """Return whether a tether at home comes to lie as at the start of the mission."""
         rounds = self.predictive.release_rounds
         return self._model.relaxed(tether.nodes, rounds).length <= self._free_length
 
     @property
     def _free_length(self) -> float:
-        """A tether that is no longer is free at home, metres."""
+        """Length up to which a tether is free at home, metres."""
         return self.laid_now.length + self.policy.free_tolerance * self.mission.delta
 
     def _roughly_pulled(self, path: Floats) -> Floats:
@@ -498,7 +510,7 @@ class PredictivePlanner(Planner):
         return ever_tauter(self.scene, path, mission.clearance, mission.delta, self.policy.paths)
 
     def _classes(self, back: Floats, onward: Mapping[int, Floats | None]) -> list[int]:
-        """Pivots in a row often lead to paths of one class: the last of each such row."""
+        """Return the last pivot of each row of pivots that lead to paths of one class."""
         out: list[int] = []
         pivots = list(onward)
         for i, j in zip(pivots, [*pivots[1:], None], strict=True):
@@ -514,8 +526,8 @@ class PredictivePlanner(Planner):
         return out
 
     def _longer_than(self, line: Floats, limit: float) -> bool:
-        """Whether a tether that lies along a line is longer even when it is taut, as far as that
-        can be foreseen: what a pull takes away becomes ever less."""
+        """Return whether a tether along a line is longer than a limit even when taut, as far as
+        that can be predicted: each pull takes less away than the one before."""
         policy = self.predictive
         tether = self._model.relaxed(line, policy.pull_rounds)
         length, less = tether.length, np.inf
@@ -530,9 +542,9 @@ class PredictivePlanner(Planner):
         return length > limit
 
     def _by_the_anchor(self, tether: Tether, limit: float) -> Floats | None:
-        """Where no path was found: back to the anchor, and on beside the shortest tether that the
-        waypoint has in any class found. None where that does not fit either: the waypoint is then
-        left out, with the reason."""
+        """Return a path back to the anchor and on beside the shortest tether that any class found
+        has at the waypoint. If that does not fit either, leave the waypoint out with the reason and
+        return None."""
         own = self._shortest_tether(limit)
         if own is None:
             self.leave_out("no free path to it")
@@ -553,7 +565,8 @@ class PredictivePlanner(Planner):
         return None
 
     def _shortest_tether(self, limit: float) -> Tether | None:
-        """The shortest tether at the waypoint, of all classes that the last search has found."""
+        """Return the shortest tether at the waypoint among the classes that the last search has
+        found."""
         found: list[Tether] = []
         policy = self.predictive
         for candidate in self._candidates:

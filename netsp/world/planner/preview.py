@@ -1,4 +1,4 @@
-"""Looking ahead: does the tether stay within its limit while the robot follows a path?"""
+"""Preview: simulates whether the tether stays within its limit while the robot follows a path."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ tether model's nodes let paths dip in."""
 
 @dataclass(frozen=True)
 class Ahead:
-    """The tether along paths that are not followed yet.
+    """Preview of the tether along paths that are not followed yet.
 
     Parameters
     ----------
     mission : Mission
-        What is flown.
+        The mission.
     model : GeodesicTether
         The tether model, with the map.
     load : Load or None
-        What acts on the tether; None where its taut length is all that counts.
+        Load on the tether; None if only its taut length counts.
     track : Track or None
-        Where the anchor goes, if it still moves.
+        Track of the anchor, if it still moves.
     now : float
         Seconds since the start of the mission.
     policy : PreviewPolicy
@@ -50,25 +50,25 @@ class Ahead:
     def follow(
         self, tether: Tether, path: Floats, limit: float, staying: float
     ) -> tuple[float, Tether]:
-        """How far along a path the tether stays within the limit, and how it lies there.
+        """Return how far along a path the tether stays within the limit, and how it lies there.
 
         Parameters
         ----------
         tether : Tether
-            Where the path begins.
+            The tether where the path begins.
         path : ndarray, shape (k, 3)
             The path, metres.
         limit : float
-            Metres of tether that may be out; as much as is out now may be at least.
+            Length of tether that may be out, metres; at least what is out now.
         staying : float
-            Seconds that the robot stays at its end: there too, the tether must last.
+            Time that the robot stays at the end, s, for which the tether must last, too.
 
         Returns
         -------
-        far : float
-            Metres; infinite where it lasts to the end, and as long as the robot stays there.
+        distance : float
+            Metres; infinite if the tether lasts to the end and through the stay.
         tether : Tether
-            At the end then; else somewhere on the way.
+            The tether at the end then; otherwise one on the way.
         """
         if self._meets_solid(path):
             return 0.0, tether
@@ -79,12 +79,15 @@ class Ahead:
         return self._taut(tether, path, limit)
 
     def fits(self, tether: Tether, path: Floats, limit: float, staying: float) -> bool:
-        """Whether it stays so to the end; as `follow`."""
+        """Return whether the tether stays within the limit to the end; see `follow`."""
         return math.isinf(self.follow(tether, path, limit, staying)[0])
 
     def _taut(self, tether: Tether, path: Floats, limit: float) -> tuple[float, Tether]:
-        """A taut tether gets longer by at most the path of its end. So as far as what is left of
-        the limit the robot may go at once, and where little is left in small steps."""
+        """Follow a path with a taut tether.
+
+        A taut tether grows by at most the path of its end, so the robot can take steps as long as
+        the rest of the limit.
+        """
         most = max(limit, tether.length + 1e-6)
         s, length = 0.0, polylines.length(path)
         while s < length:
@@ -102,8 +105,7 @@ class Ahead:
         return max(0.5 * self.mission.delta, 0.02)
 
     def _meets_solid(self, path: Floats) -> bool:
-        """Whether a path, pulled over points of a tether that lies in a crease, say, leads into a
-        solid: as deep as ends a flight."""
+        """Return whether a path leads deep enough into a solid to end a mission."""
         points = polylines.dense(path, self.mission.delta)
         depth = CONTACT_DEPTH * self.mission.delta
         return bool(len(points) and self.model.field.distance(points).min() < -depth)
@@ -111,8 +113,11 @@ class Ahead:
     def _under_load(
         self, load: Load, tether: Tether, path: Floats, limit: float
     ) -> tuple[float, Tether]:
-        """What slack and sag add has no such bound as in `_taut`: a contact that is lost joins two
-        spans. So all steps are small. The sum of turning angles has its limit, too."""
+        """Follow a path with a tether under load.
+
+        Slack and sag have no such bound as in `_taut`, because a lost contact joins two spans. So
+        all steps are small. The sum of turning angles has its limit, too.
+        """
         points = polylines.dense(path, self._fine)
         if not len(points):
             return math.inf, tether
@@ -126,8 +131,10 @@ class Ahead:
     def _by_the_clock(
         self, track: Track, tether: Tether, path: Floats, limit: float, staying: float
     ) -> tuple[float, Tether]:
-        """Both ends of the tether are on their way, the anchor also while the robot stays at its
-        end. A taut tether gets longer by at most what both travel."""
+        """Follow a path while the anchor moves, also during the stay at the end.
+
+        A taut tether grows by at most what both of its ends travel.
+        """
         most, turns = max(limit, self._payout(tether) + 1e-6), self._most_turning(tether)
         speed, far = self.mission.speed, polylines.length(path)
         whole, at, out = far / speed + staying, 0.0, self._payout(tether)
@@ -150,7 +157,7 @@ class Ahead:
         return tether.length if self.load is None else payout(tether, self.load)
 
     def _most_turning(self, tether: Tether) -> float:
-        """Sum of turning angles that plans may use, radians: what it is now if that is more."""
+        """Return the sum of turning angles that plans may use, rad: at least the present one."""
         most = self.mission.tether.max_turning
         if math.isinf(most):
             return most

@@ -85,17 +85,11 @@ class DraftRule:
 
         Parameters
         ----------
-        length : float
-            Length of the tether after the pivot's candidate, metres.
-        neighbour : float
-            Length of the tether after the neighbour's candidate, metres; inf without a neighbour.
+        length, neighbour : float
+            Length of the tether after the candidates of the pivot and of its neighbour, metres; inf
+            without a neighbour.
         limit : float
             Limit of the tether, metres.
-
-        Returns
-        -------
-        bool
-            True if both lengths of the rule are kept.
         """
         return length < self.max_share * limit and length < self.max_gain * neighbour
 
@@ -122,18 +116,10 @@ class ReactDraftPlanner(ReactPlanner):
         return False if len(self.path) else self.go_on(robot) or searched
 
     def recovery(self, pivots: Pivots) -> Floats:
-        """Return the refined recovery path (Algorithms 2 and 3) without the robot's position.
+        """Return the refined recovery path (k, 3) without the robot's position (Algorithms 2 and
+        3).
 
-        Parameters
-        ----------
-        pivots : Pivots
-            Along the tether as it is now.
-
-        Returns
-        -------
-        ndarray, shape (k, 3)
-            Points, metres; none if the refined path is not free, or the path back ends at the
-            robot.
+        It has no points if the refined path is not free, or the path back ends at the robot.
         """
         self._searches += 1
         path = self.found(pivots)
@@ -143,19 +129,15 @@ class ReactDraftPlanner(ReactPlanner):
         return safe[1:] if clear(self.scene, safe, 0.0) else safe[:0]
 
     def found(self, pivots: Pivots) -> Floats:
-        """Search for a recovery path (Algorithm 2).
+        """Search for a recovery path (k, 3) (Algorithm 2).
+
+        It leads from the robot back to two nodes before the accepted pivot; if no pivot is
+        accepted, it is the shortest path to the waypoint.
 
         Parameters
         ----------
         pivots : Pivots
-            Pivots along the present tether; number n of them is node i = |P| - 1 - n of the
-            listing.
-
-        Returns
-        -------
-        ndarray, shape (k, 3)
-            Path from the robot back to two nodes before the accepted pivot, metres; the shortest
-            path to the waypoint if no pivot is accepted.
+            Pivots along the present tether; number n is node i = |P| - 1 - n of the listing.
         """
         limit, neighbour = self.mission.tether_length, np.inf
         for n in range(2, len(pivots) - 3):
@@ -181,18 +163,7 @@ class ReactThresholdsPlanner(ReactPlanner):
     name = "react-thresholds"
 
     def recovery(self, pivots: Pivots) -> Floats:
-        """Search pivots backwards along the tether; see `ReactPlanner`.
-
-        Parameters
-        ----------
-        pivots : Pivots
-            Along the tether as it is now.
-
-        Returns
-        -------
-        ndarray, shape (k, 3)
-            The path without the robot's position, metres.
-        """
+        """Search pivots backwards along the tether for a path (k, 3); see `ReactPlanner`."""
         limit, count = self.mission.tether_length, len(pivots)
         for n in range(count):
             if pivots.length(n) >= self.rule.max_share * limit:

@@ -65,18 +65,10 @@ class ReactPlanner(Planner):
         self._soft = -1
 
     def recovery(self, pivots: Pivots) -> Floats:
-        """Search pivots backwards along the tether; stop at the first feasible one (Algorithm 3).
+        """Return the refined recovery path (k, 3) without the robot's position, from the first
+        feasible pivot backwards along the tether (Algorithm 3).
 
-        Parameters
-        ----------
-        pivots : Pivots
-            Pivots along the present tether.
-
-        Returns
-        -------
-        ndarray, shape (k, 3)
-            Refined recovery path without the robot's position, metres; the shortest path to the
-            waypoint, whatever the tether, if no pivot is feasible.
+        If no pivot is feasible, it is the shortest path to the waypoint, whatever the tether.
         """
         limit = self.mission.tether_length
         n = next((n for n in range(len(pivots)) if pivots.length(n) <= limit), None)
