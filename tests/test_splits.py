@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from netsp import solve_graph
 from netsp.base.clock import Clock
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.solver_run import LimitReachedError
+from netsp.gtsp.solver_run import RunStopped
 from netsp.mip import covers
 from netsp.mip.cover_bounds import Cells
 from netsp.mip.cover_refinement import CoverRefinement, frustration
@@ -174,7 +174,7 @@ def test_a_cover_that_has_proven_nothing_tells_nothing(monkeypatch):
 
     def priced(self, *args, **more):
         if len(self.costs) > graph.goal_count + 1:
-            raise LimitReachedError
+            raise RunStopped
         return price(self, *args, **more)
 
     monkeypatch.setattr(Root, "_price", priced)
