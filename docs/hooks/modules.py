@@ -1,8 +1,9 @@
-"""The list of all modules, by room, from the first sentences of their docstrings."""
+"""Lists of all modules and of all tolerances, from the docstrings of the code."""
 
 from __future__ import annotations
 
 import ast
+import itertools
 import re
 from pathlib import Path
 
@@ -27,6 +28,23 @@ def module_list(root: Path = ROOT / "netsp") -> list[str]:
     return out
 
 
+def tolerances(root: Path = ROOT / "netsp") -> list[str]:
+    """Return Markdown: a row for each constant whose docstring begins with "Tolerance"."""
+    rows = []
+    for file in sorted(root.rglob("*.py")):
+        body = ast.parse(file.read_text(encoding="utf-8")).body
+        for node, following in itertools.pairwise(body):
+            match node, following:
+                case (
+                    ast.Assign(targets=[ast.Name(name)], value=value),
+                    ast.Expr(ast.Constant(str(text))),
+                ) if text.startswith("Tolerance"):
+                    place = ".".join(file.relative_to(root).with_suffix("").parts)
+                    meaning = " ".join(text.split()).replace("|", "\\|")
+                    rows.append(f"| `{place}.{name}` | {ast.unparse(value)} | {meaning} |")
+    return ["| name | value | meaning |", "|---|---|---|", *rows]
+
+
 def first_sentence(file: Path) -> str:
     """Return the first sentence of a module's docstring in one line."""
     text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
@@ -35,4 +53,4 @@ def first_sentence(file: Path) -> str:
 
 
 if __name__ == "__main__":
-    print("\n".join(module_list()))
+    print("\n".join([*module_list(), *tolerances()]))

@@ -19,7 +19,8 @@ from nbconvert.preprocessors import ExecutePreprocessor
 ROOT = Path(__file__).parents[2]
 BESIDE = {"problems.md": "problems/README.md", "scenes.md": "scenes/README.md"}
 EXAMPLES = ROOT / "examples"
-FORMATS, LICENCES, MODULES = "<!-- formats -->", "<!-- licences -->", "<!-- modules -->"
+FORMATS, LICENCES = "<!-- formats -->", "<!-- licences -->"
+MODULES, TOLERANCES = "<!-- modules -->", "<!-- tolerances -->"
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -62,6 +63,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     if MODULES in markdown:
         hook = runpy.run_path(str(Path(__file__).with_name("modules.py")))
         markdown = markdown.replace(MODULES, "\n".join(hook["module_list"]()))
+        markdown = markdown.replace(TOLERANCES, "\n".join(hook["tolerances"]()))
     return markdown
 
 
