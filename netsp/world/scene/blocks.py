@@ -1,12 +1,12 @@
-"""Grid points in blocks, only where surfaces are near: distances, windings, flood. Compiled.
+"""Grid points in blocks near surfaces: distances, windings, floods. Compiled.
 
-The box of a scene is cut into cells of `SIDE` voxels a side. Cells near a surface are *blocks*: all
-their grid points are held. Of the others only the corners are (the two upper levels of OpenVDB's
-trees, Museth 2013, with the blocks in one array and no hashing). `table` (nx, ny, nz) has each
-cell's block, or -1.
+The box of a scene is divided into cells of `SIDE` voxels along each side. Cells near a surface are
+*blocks*, all of whose grid points are stored; of other cells, only the corners are. These are the
+two upper levels of OpenVDB's trees (Museth 2013), with all blocks in one array and without hashing.
+`table` (nx, ny, nz) holds the block of each cell, or -1.
 
-Everything here gives at the points of blocks what `netsp.world.scene.closest` gives in a full
-grid: the same passes in an order in which each point still comes after those that it asks.
+All results at the points of blocks are those of `netsp.world.scene.closest` in a full grid: the
+passes are the same, in an order in which each point comes after the neighbours that it needs.
 """
 
 from __future__ import annotations
@@ -53,8 +53,10 @@ def nearest_in_blocks(
     owner: Owners,
     stop: Flag,
 ) -> None:
-    """Measure some of the sites from the points around them, as far as these lie in blocks of a
-    slab; distances and owner are (n, 512). Ends early once `stop` is set."""
+    """Measure sites from the points around them that lie in blocks of a slab, until `stop` is set.
+
+    Distances and owners are (n, 512).
+    """
     origin, size, begin = place
     low, high = np.zeros(3, dtype=np.int64), np.zeros(3, dtype=np.int64)
     reach = (0.5 * math.sqrt(3.0) * SIDE + 4.0) * size
@@ -106,8 +108,10 @@ def nearest_to_corners(
     distances: Singles,
     owner: Owners,
 ) -> None:
-    """Measure at the eight outermost points of each block the sites nearest to the cell's corners,
-    (nx + 1, ny + 1, nz + 1): so every block has something to hand on."""
+    """Measure the sites nearest to a cell's corners at the outermost points of each block.
+
+    So every block has a site to hand on. `corners` is (nx + 1, ny + 1, nz + 1).
+    """
     origin, size, _ = place
     for b in range(len(blocks)):
         bi, bj, bk = blocks[b, 0], blocks[b, 1], blocks[b, 2]
@@ -138,12 +142,19 @@ def sweep_blocks(
     asked: Ints,
     stop: Flag,
 ) -> None:
-    """Pass through a slab's points in one of the eight diagonal directions, blocks in an order in
-    which the three neighbours that a point asks were passed before it.
+    """Sweep a slab's points in one of the eight diagonal directions, until `stop` is set.
 
-    `changed` (n,) is the turn, from 1 on, at which anything last changed in a block, and `asked`
-    (n, 6) that at which it last asked in each direction: if neither block has changed since, there
-    is nothing new to hear. Ends early once `stop` is set.
+    `order` lists the blocks so that each comes after the three neighbours that its points need.
+
+    Parameters
+    ----------
+    turn : int
+        Index of the direction, from 0 to 7.
+    changed : ndarray of int, shape (n,)
+        Last turn, counted from 1, in which anything changed in each block.
+    asked : ndarray of int, shape (n, 6)
+        Last turn in which each block looked at its neighbour in each direction. A block is skipped
+        where nothing has changed since.
     """
     origin, size, begin = place
     di = 1 if turn % 2 == 0 else -1
@@ -226,7 +237,8 @@ def sweep_blocks(
 def turn_inside(
     values: Singles, triangles: Floats, place: Place, blocks: Blocks, table: Table
 ) -> int:
-    """Negate the values (n, 512) of points that a mesh winds around; how often it does at most."""
+    """Negate the values (n, 512) of points that a mesh winds around; return the maximum winding
+    number."""
     ny, nz = SIDE * table.shape[1], SIDE * table.shape[2]
     first = np.zeros(ny * nz + 1, dtype=np.int64)
     nothing = first[:0]
@@ -259,8 +271,11 @@ def turn_inside(
 
 @kernel
 def _cross(t: Floats, s: int, place: Place, ny: int, nz: int, free: Ints, crossings: Ints) -> None:
-    """Count a triangle's crossings with the grid's lines along x; or write them to where `free` has
-    room, where there are any to write: the next point along the line, and the direction."""
+    """Count a triangle's crossings with the grid's lines along x, or write them where `free` has
+    room.
+
+    They are written if `crossings` is not empty: the next point along the line, and the direction.
+    """
     origin, size, _ = place
     y0, y1 = min(t[s, 0, 1], t[s, 1, 1], t[s, 2, 1]), max(t[s, 0, 1], t[s, 1, 1], t[s, 2, 1])
     z0, z1 = min(t[s, 0, 2], t[s, 1, 2], t[s, 2, 2]), max(t[s, 0, 2], t[s, 1, 2], t[s, 2, 2])
@@ -285,8 +300,8 @@ def _cross(t: Floats, s: int, place: Place, ny: int, nz: int, free: Ints, crossi
 def flood(states: States, cells: States, table: Table) -> None:
     """Mark the water that is reached from the border of the box.
 
-    `states` (n, 8, 8, 8) and `cells` (nx, ny, nz) hold water (1) and solid (0), and in the end
-    water that was reached (above 1). Cells that are blocks are looked at by their points.
+    `states` (n, 8, 8, 8) of points in blocks and `cells` (nx, ny, nz) of other cells hold water (1)
+    and solid (0), and at the end water that was reached (above 1).
     """
     nx, ny, nz = table.shape
     queue = np.empty(nx * ny * nz, dtype=np.int64)
@@ -342,7 +357,7 @@ def flood(states: States, cells: States, table: Table) -> None:
 
 @kernel
 def _spread(points: States, stack: Ints) -> None:
-    """Reach all water of a block that joins what is reached."""
+    """Mark all water of a block that is connected to reached water."""
     top = 0
     for i in range(SIDE):
         for j in range(SIDE):
@@ -368,7 +383,7 @@ def _spread(points: States, stack: Ints) -> None:
 def _over_face(
     states: States, cells: States, source: Cell, target: Cell, axis: int, side: int
 ) -> bool:
-    """Reach over the face between two cells; whether anything new was."""
+    """Mark water as reached over the face between two cells; return whether any of it is new."""
     i, j, k, b = source
     u, v, w, c = target
     if b < 0 and cells[i, j, k] < REACHED:
@@ -408,8 +423,11 @@ def _over_face(
 
 @kernel
 def meet_corners(corners: Singles, values: Singles, blocks: Blocks, table: Table) -> None:
-    """Give the points (n, 512) on faces to cells that are no blocks what those read there between
-    their corners: then nothing jumps."""
+    """Set points (n, 512) on faces to cells without blocks to the values between the cells'
+    corners.
+
+    So distances have no jump there.
+    """
     for b in range(len(blocks)):
         bi, bj, bk = blocks[b, 0], blocks[b, 1], blocks[b, 2]
         for i in range(SIDE):
@@ -445,7 +463,7 @@ def _between(corners: Singles, bi: int, bj: int, bk: int, i: int, j: int, k: int
 def least_in_blocks(
     corners: Singles, values: Singles, table: Table, points: Ints, reach: int
 ) -> Singles:
-    """(m,) least of the values (n, 512) at grid points up to `reach` voxels around some (m, 3)."""
+    """Return the least value (m,) at grid points up to `reach` voxels around m points (m, 3)."""
     nx, ny, nz = table.shape
     out = np.empty(len(points), dtype=np.float32)
     for c in range(len(points)):
@@ -468,12 +486,12 @@ def least_in_blocks(
 
 @kernel
 def understate(values: Singles, side: float, corners_only: float) -> None:
-    """Take off, far from surfaces, what reading between the corners of cells may add.
+    """Subtract, far from surfaces, what interpolation between the corners of cells may add.
 
-    A distance d to a point curves by 1 / d in two directions, and linear reading between values
-    `side` apart is above it by up to side² / (4 d). Without that a ray that advances by the
-    distance could pass through something thin. From 0.8 sides on, and to the full amount from where
-    on there are corners only (in sides).
+    A distance d to a point curves by 1 / d in two directions, and linear interpolation between
+    values `side` apart exceeds it by up to side² / (4 d). Otherwise a ray that advances by the
+    distance could pass through something thin. The subtraction begins at 0.8 sides, and is complete
+    where only corners are stored, at `corners_only` sides.
     """
     for at in range(len(values)):
         d = values[at]
@@ -484,7 +502,7 @@ def understate(values: Singles, side: float, corners_only: float) -> None:
 
 @kernel
 def along_x(sites: Floats) -> tuple[Floats, Floats]:
-    """(m,) least and greatest x of each site."""
+    """Return the least and greatest x (m,) of each site."""
     low, high = np.empty(len(sites)), np.empty(len(sites))
     for s in range(len(sites)):
         low[s], high[s] = extent(sites, s, 0)

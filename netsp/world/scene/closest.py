@@ -1,4 +1,4 @@
-"""Closest sites of all points of a grid, and how often a mesh winds around them. Compiled."""
+"""Closest sites of all points of a grid, and winding numbers of meshes around them. Compiled."""
 
 from __future__ import annotations
 
@@ -50,9 +50,10 @@ def sweep(
     turn: int,
     stop: Flag,
 ) -> None:
-    """Pass through the grid in one of the eight diagonal directions; each grid point measures the
-    nearest sites of the three neighbours that were passed before it. Ends early once `stop` is
-    set."""
+    """Sweep the grid in one of the eight diagonal directions, until `stop` is set.
+
+    Each grid point measures the nearest sites of the three neighbours that come before it.
+    """
     nx, ny, nz = distances.shape
     di = 1 if turn % 2 == 0 else -1
     dj = 1 if turn // 2 % 2 == 0 else -1
@@ -91,8 +92,10 @@ def sweep(
 def windings(
     triangles: Floats, origin: Floats, size: float, counts: tuple[int, int, int]
 ) -> npt.NDArray[np.int16]:
-    """(nx, ny, nz) how often the mesh winds around each grid point: the signed crossings of the ray
-    from it in the direction -x."""
+    """Return how often a mesh winds around each grid point (nx, ny, nz).
+
+    That is the sum of the signed crossings of the ray from the point in the direction -x.
+    """
     nx, ny, nz = counts
     out = np.zeros((nx, ny, nz), dtype=np.int16)
     for s in range(len(triangles)):
@@ -116,8 +119,11 @@ def windings(
 
 @kernel
 def yz_crossing(t: Floats, s: int, y: float, z: float) -> tuple[float, int]:
-    """Where the line along x through (y, z) crosses a triangle t[s] (3, 3), and whether the mesh
-    winds once more (1) or less (-1) behind it; 0: it does not cross."""
+    """Return where the line along x through (y, z) crosses triangle t[s], and the change of
+    winding.
+
+    The change is 1 or -1 behind the crossing; 0 without a crossing.
+    """
     ay, az, by, bz, cy, cz = t[s, 0, 1], t[s, 0, 2], t[s, 1, 1], t[s, 1, 2], t[s, 2, 1], t[s, 2, 2]
     area = (by - ay) * (cz - az) - (bz - az) * (cy - ay)
     if area == 0.0:
@@ -136,7 +142,7 @@ def yz_crossing(t: Floats, s: int, y: float, z: float) -> tuple[float, int]:
 
 @kernel
 def _side(ay: float, az: float, by: float, bz: float, y: float, z: float) -> float:
-    """Twice the signed area of a, b and the point, computed alike for both triangles at an edge."""
+    """Return twice the signed area of a, b and a point, the same for both triangles at an edge."""
     if (ay, az) < (by, bz):
         return (by - ay) * (z - az) - (bz - az) * (y - ay)
     return -((ay - by) * (z - bz) - (az - bz) * (y - by))

@@ -1,4 +1,4 @@
-"""The signed distance field of a scene: distance to the nearest solid, negative inside."""
+"""Signed distance field of a scene: the distance to the nearest solid, negative inside."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FILE_VERSION = 4
 
 
 def finite_point(value: npt.ArrayLike, name: str) -> tuple[float, float, float]:
-    """Three finite coordinates; InputError, that names them, if they are something else."""
+    """Return three finite coordinates; raise InputError, which names them, for anything else."""
     try:
         x, y, z = (float(v) for v in np.asarray(value, dtype=float))
     except (TypeError, ValueError):
@@ -38,21 +38,23 @@ def finite_point(value: npt.ArrayLike, name: str) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, eq=False)
 class DistanceField:
-    """Distance, gradient and sight in a scene.
+    """Distance, gradient and lines of sight in a scene.
 
     Parameters
     ----------
     arrays : Field
-        What kernels take (`netsp.world.scene.sampling.Field`).
+        Arrays for kernels (`netsp.world.scene.sampling.Field`).
     voxel : float, optional
-        Size of a voxel, metres; None when all is exact.
+        Size of a voxel, metres; None without voxels, where all distances are exact.
     notes : tuple of str
-        What was assumed about meshes and clouds.
+        Assumptions about meshes and clouds, one line each.
     thickness : tuple of (str, float)
-        Thickness of each part, metres.
+        Name and thickness of each part, metres.
     seams : tuple of int
-        For each solid that was put in at the end to fill a seam between two others
-        (`netsp.world.scene.seams`), the number of one of them.
+        For each solid at the end that fills a seam between two others (`netsp.world.scene.seams`),
+        the index of one of the two.
+    policy : FieldPolicy
+        Policy of fields.
     """
 
     arrays: Field
@@ -75,31 +77,28 @@ class DistanceField:
         seams: Sequence[int] = (),
         policy: FieldPolicy | None = None,
     ) -> DistanceField:
-        """A field from encoded solids, their bounding boxes and voxels.
+        """Return the field of encoded solids, their bounding boxes and voxels.
 
         Parameters
         ----------
         kinds : list of int
             Kind of each solid (`netsp.world.scene.solids`).
         rows : list of list of float
-            Its numbers.
-        outline : array_like, shape (e, 4)
-            Edges of the prisms, all in one list.
+            Numbers of each solid.
+        outline : array_like, shape (n, 2)
+            Corners of all prisms.
         boxes : sequence of ndarray
-            Bounding box of each solid.
+            Bounding box (2, 3) of each solid that has one.
         grid : VoxelGrid or None
-            The voxels.
+            Voxels.
         offset : float
-            Metres that everything is grown by.
+            Length by which everything is grown, metres.
         thickness : sequence of (str, float)
-            Thickness of each part, metres.
+            Name and thickness of each part, metres.
         seams : sequence of int
             As the attribute.
-
-        Returns
-        -------
-        DistanceField
-            The field.
+        policy : FieldPolicy, optional
+            Policy of fields.
         """
         policy = policy or FieldPolicy()
         data = packing.of_solids(kinds, rows, outline)
@@ -123,20 +122,15 @@ class DistanceField:
         )
 
     def distance(self, points: npt.ArrayLike) -> Floats:
-        """Distances of points, negative inside a solid.
+        """Return the distances of points, negative inside a solid.
 
-        Exact outside of solids, and trilinear between voxels. Inside overlapping solids it is the
-        distance to the nearest of their surfaces.
+        Distances are exact outside of solids, and trilinear between voxels. Inside overlapping
+        solids, they are those to the nearest of their surfaces.
 
         Parameters
         ----------
         points : array_like, shape (..., 3)
-            Metres.
-
-        Returns
-        -------
-        ndarray, shape (...)
-            Metres.
+            Points, metres.
         """
         p = self._points(points)
         rows, out = p.reshape(-1, 3), np.empty(p.shape[:-1])
@@ -148,33 +142,23 @@ class DistanceField:
         return out
 
     def gradient(self, points: npt.ArrayLike) -> Floats:
-        """Unit gradients of the distance: the direction out, or away from the nearest solid.
+        """Return the unit gradients of the distance, which point away from the nearest solid.
 
         Parameters
         ----------
         points : array_like, shape (..., 3)
-            Metres.
-
-        Returns
-        -------
-        ndarray, shape (..., 3)
-            Unit vectors.
+            Points, metres.
         """
         p = self._points(points)
         return np.asarray(sample_many(self.arrays, p.reshape(-1, 3))[:, 1:4].reshape(p.shape))
 
     def nearest(self, points: npt.ArrayLike) -> npt.NDArray[np.int64]:
-        """The solid nearest to each point.
+        """Return the index of the solid nearest to each point, -1 for voxels.
 
         Parameters
         ----------
         points : array_like, shape (..., 3)
-            Metres.
-
-        Returns
-        -------
-        ndarray of int, shape (...)
-            Index of the solid, -1 for voxels.
+            Points, metres.
         """
         p = self._points(points)
         found = sample_many(self.arrays, p.reshape(-1, 3))[:, 4].astype(np.int64)
@@ -185,23 +169,16 @@ class DistanceField:
         return np.asarray(found.reshape(p.shape[:-1]))
 
     def line_of_sight(self, a: npt.ArrayLike, b: npt.ArrayLike, depth: float = 0.0) -> bool:
-        """Whether a segment is nowhere deeper inside a solid than allowed.
+        """Return whether no point of a segment is deeper inside a solid than `depth`.
 
-        To within a thousandth of its length or of a voxel (sphere tracing).
+        The answer is right to within a thousandth of the segment's length, or a tenth of a voxel.
 
         Parameters
         ----------
-        a : array_like, shape (3,)
-            One end, metres.
-        b : array_like, shape (3,)
-            The other end, metres.
+        a, b : array_like, shape (3,)
+            Ends, metres.
         depth : float
             Depth that is allowed, metres.
-
-        Returns
-        -------
-        bool
-            Whether the segment is free.
         """
         p, q = self._points(a), self._points(b)
         step = max(1e-3 * float(np.linalg.norm(q - p)), 1e-9)
@@ -213,26 +190,21 @@ class DistanceField:
         return bool(low >= -max(depth, 1e-9))
 
     def free_point(self, value: npt.ArrayLike, name: str, depth: float = 1e-6) -> Floats:
-        """A point as floats, checked.
+        """Return a point as floats, after checking that it is free.
 
         Parameters
         ----------
         value : array_like, shape (3,)
-            The point, metres.
+            Point, metres.
         name : str
-            What messages call it.
+            Name of the point in messages.
         depth : float
             Depth inside a solid that is allowed, metres.
-
-        Returns
-        -------
-        ndarray, shape (3,)
-            The point.
 
         Raises
         ------
         InputError
-            It is not three finite numbers, or deeper inside a solid.
+            The point is not three finite numbers, or is deeper inside a solid.
         """
         point = np.array(finite_point(value, name))
         d = float(sample_many(self.arrays, point[None])[0, 0])
@@ -242,18 +214,7 @@ class DistanceField:
         return point
 
     def thinner_than(self, thickness: float) -> tuple[str, ...]:
-        """Parts of the scene that are thinner than a thickness.
-
-        Parameters
-        ----------
-        thickness : float
-            Metres.
-
-        Returns
-        -------
-        tuple of str
-            One line for each such part.
-        """
+        """Return one line for each part of the scene that is thinner than a thickness in metres."""
         lines = [
             f"{name} is {t:.3g} thick, thinner than {thickness:.3g}"
             for name, t in self.thickness
@@ -268,7 +229,8 @@ class DistanceField:
         return tuple(lines)
 
     def _thin_share(self, thickness: float) -> float:
-        """Share of solid voxels that no ball of this diameter inside the solid covers."""
+        """Return the share of solid voxels that no ball of this diameter inside the solid
+        covers."""
         from scipy.ndimage import distance_transform_edt
 
         size, reach = self._size, 0.5 * thickness + 1.74 * self._size
@@ -298,29 +260,24 @@ class DistanceField:
         return self.voxel or math.nan
 
     def grown(self, by: float) -> DistanceField:
-        """The field of the same scene with everything grown.
+        """Return the field of the same scene with everything grown.
 
         Parameters
         ----------
         by : float
-            Metres.
-
-        Returns
-        -------
-        DistanceField
-            The grown field.
+            Growth, metres.
         """
         arrays = self.arrays._replace(offset=float(self.arrays.offset) + by)
         return replace(self, arrays=arrays)
 
     @property
     def voxels(self) -> VoxelGrid | None:
-        """The voxels, to be had in another field; None where all is exact."""
+        """Voxels, for use in another field; None without voxels."""
         return packing.voxels_of(self.arrays.data, self.arrays.grid, self.notes)
 
     @property
     def box(self) -> Floats | None:
-        """(2, 3) bounding box of the voxels' solid part; None without voxels."""
+        """Bounding box (2, 3) of the voxels' solid part; None without voxels."""
         if self.voxel is None:
             return None
         begin = packing.PLACE + 4
@@ -335,12 +292,7 @@ class DistanceField:
         return p
 
     def save(self, path: str | Path) -> None:
-        """Write the field to an .npz file, voxels and solids.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file.
+        """Write the field, voxels and solids, to an .npz file.
 
         Raises
         ------
@@ -363,22 +315,12 @@ class DistanceField:
 
     @classmethod
     def load(cls, path: str | Path) -> DistanceField:
-        """Read what `save` wrote.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file.
-
-        Returns
-        -------
-        DistanceField
-            The field.
+        """Read a field that `save` wrote.
 
         Raises
         ------
         InputError
-            The file cannot be read or is something else.
+            The file cannot be read or holds something else.
         """
         try:
             with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
@@ -406,8 +348,11 @@ class DistanceField:
 def pushed_out(
     field: DistanceField, points: npt.ArrayLike, clearance: float, rounds: int = 20
 ) -> npt.NDArray[np.float64]:
-    """Points (n, 3) moved along the distance's gradient until they are at the clearance, as far as
-    that goes; never to where the distance is smaller than it was."""
+    """Return points (n, 3) moved along the distance's gradient until they keep the clearance.
+
+    No point is moved to where its distance is smaller. A point that cannot be moved far enough
+    stays where it is.
+    """
     p = np.array(points, dtype=float).reshape(-1, 3)
     d = field.distance(p)
     for _ in range(rounds):

@@ -1,4 +1,4 @@
-"""A sea floor from a bathymetry grid: GeoTIFF, ASC, tables and other formats of rasterio."""
+"""Sea floor from a bathymetry grid: GeoTIFF, ASC, tables and other formats of rasterio."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def floor_mesh(
     origin: tuple[float, float] = (0.0, 0.0),
     depths: bool | None = None,
 ) -> tuple[Floats, npt.NDArray[np.int64]]:
-    """The floor as a closed mesh, as of `load_floor` without its notes."""
+    """Return the closed mesh of `load_floor` without its notes."""
     vertices, faces, _ = load_floor(path, scale=scale, origin=origin, depths=depths)
     return vertices, faces
 
@@ -63,9 +63,9 @@ def load_floor(
     origin: tuple[float, float] = (0.0, 0.0),
     depths: bool | None = None,
 ) -> tuple[Floats, npt.NDArray[np.int64], tuple[str, ...]]:
-    """Read a sea floor as a closed mesh: heights at the middles of the grid's cells joined by
-    triangles, walls, and a flat bottom.
+    """Read a sea floor as a closed mesh.
 
+    Heights at the middles of the grid's cells are joined by triangles, walls and a flat bottom.
     Heights are the grid's values times the scale of its band plus its offset, in the unit of the
     band, else of its vertical system, else of its map. Cells without a value take that of the
     nearest cell that has one.
@@ -73,11 +73,11 @@ def load_floor(
     Parameters
     ----------
     path : str or Path
-        The grid, with its place on the map.
+        Grid with a place on the map.
     scale : float
-        Metres per unit of map and heights, of a grid that states no unit.
+        Metres per unit of map and heights, for a grid that states no unit.
     origin : (x, y)
-        What becomes (0, 0), in units of the map.
+        Point that becomes (0, 0), in units of the map.
     depths : bool, optional
         Whether values count downwards, where the grid's vertical system does not say so. None:
         decided by the name of the band or column, else upwards.
@@ -85,11 +85,11 @@ def load_floor(
     Returns
     -------
     vertices : ndarray, shape (n, 3)
-        Metres, z up.
+        Vertices, metres, z upwards.
     faces : ndarray, shape (m, 3)
         Outward triangles.
     notes : tuple of str
-        What was converted, and cells without a height, one line each.
+        Conversions, and cells without a height, one line each.
 
     Raises
     ------
@@ -130,24 +130,7 @@ def read_floor(
     depths: bool | None = None,
     policy: FloorPolicy | None = None,
 ) -> FloorReading:
-    """Read a sea floor as `load_floor` does, with the numbers of its cells.
-
-    Parameters
-    ----------
-    path : str or Path
-        As `load_floor` takes it.
-    scale : float
-        As `load_floor` takes it.
-    origin : (x, y)
-        As `load_floor` takes it.
-    depths : bool, optional
-        As `load_floor` takes it.
-
-    Raises
-    ------
-    InputError
-        As `load_floor` raises it.
-    """
+    """Read a sea floor as `load_floor` does, with the numbers of its cells."""
     policy = policy or FloorPolicy()
     is_table = Path(path).suffix.lower() in TABLES or _is_plain_table(path)
     grid = _grid_of_table(path, policy) if is_table else _read(path, policy)
@@ -203,10 +186,11 @@ def read_floor(
 
 @dataclass(frozen=True)
 class _Grid:
-    """Middles x (n,), y (m,) of the cells, units of the map, and finite values z (m, n).
+    """Middles x (n,) and y (m,) of the cells, in units of the map, and finite values z (m, n).
 
-    Metres per unit of the map and of the heights (None: as the map's), whether they count downwards
-    by their system, whether they are called depths, notes, and the number of cells without a value.
+    The next fields are the metres per unit of the map and of the heights (None: as the map's),
+    whether heights count downwards by their system, whether they are called depths, notes, and the
+    number of cells without a value.
     """
 
     x: Floats
@@ -222,7 +206,7 @@ class _Grid:
 
 @dataclass(frozen=True)
 class _Band:
-    """Band of a grid: its number from 1, the name that says what it holds, and the meaning."""
+    """Band of a grid: its number from 1, the name that states its contents, and their meaning."""
 
     number: int
     title: str

@@ -1,4 +1,5 @@
-"""Distances at grid points, as they are built (`netsp.world.scene.voxels`) and packed."""
+"""Distance grids, as `netsp.world.scene.voxels` builds and `netsp.world.scene.packing` packs
+them."""
 
 from __future__ import annotations
 
@@ -15,25 +16,27 @@ SIDE = 8
 
 @dataclass(frozen=True)
 class VoxelGrid:
-    """Distances at the points of a regular grid, linear in between; near surfaces finer ones.
+    """Distances at the points of a regular grid, and at finer points near surfaces.
+
+    Distances are linear between points.
 
     Attributes
     ----------
     values
-        Metres, negative inside: of the (nx, ny, nz) points of the grid, then of the (8, 8, 8)
-        points of each block, all in one row.
+        Distances, metres, negative inside: of the (nx, ny, nz) points of the grid, then of the (8,
+        8, 8) points of each block, in one row.
     counts
-        (nx, ny, nz).
+        Counts (nx, ny, nz) of the points.
     origin
-        (3,) of the first point.
+        First point (3,).
     size
-        Metres between points of the grid.
+        Distance between points of the grid, metres.
     solid
-        (2, 3) bounding box of what is solid, well within the grid.
+        Bounding box (2, 3) of the solid, which lies well within the grid.
     notes
-        What was assumed when it was built.
+        Assumptions of the build, one line each.
     table
-        (nx - 1, ny - 1, nz - 1) which block a cell has, -1 where it has none; None without blocks.
+        Block of each cell (nx - 1, ny - 1, nz - 1), -1 for none; None without blocks.
     """
 
     values: Singles
@@ -46,5 +49,5 @@ class VoxelGrid:
 
     @property
     def voxel(self) -> float:
-        """Metres between the finest points."""
+        """Distance between the finest points, metres."""
         return self.size if self.table is None else self.size / SIDE

@@ -1,7 +1,7 @@
-"""Where a distance grid is built: at all points of a box, or at all only near surfaces.
+"""Points at which a distance grid is built: all points of a box, or all only near surfaces.
 
-Both kinds of lattice number their points in one row, so that what is computed point by point
-(`netsp.world.scene.voxels`) is written once.
+Both kinds of lattice number their points in one row, so `netsp.world.scene.voxels` treats them
+alike.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ OnStage = Callable[[str, float], None] | None
 
 @dataclass
 class Dense:
-    """All points of a box.
+    """Lattice of all points of a box.
 
     Parameters
     ----------
     origin : ndarray, shape (3,)
-        The first point, metres.
+        First point, metres.
     size : float
-        Metres between points.
+        Distance between points, metres.
     counts : (int, int, int)
-        Points along x, y and z.
+        Number of points along x, y and z.
     """
 
     origin: Floats
@@ -47,18 +47,20 @@ class Dense:
     def closest(
         self, sites: Floats, on_progress: OnStage = None, *, whose: bool = True
     ) -> tuple[Singles, Owners]:
-        """Distance to the nearest site and, if wanted, which it is, at each point."""
+        """Return the distance of each point to the nearest site, and if wanted the index of that
+        site."""
         distances, owner = _closest(sites, self.origin, self.size, self.counts, on_progress)
         return distances.ravel(), owner.ravel()
 
     def turn_inside(self, values: Singles, triangles: Floats) -> int:
-        """Negate the values where a mesh (m, 3, 3) winds around; how often it does at most."""
+        """Negate the values where a mesh (m, 3, 3) winds around; return the maximum winding
+        number."""
         around = windings(triangles, self.origin, self.size, self.counts).ravel()
         np.negative(values, out=values, where=around != 0)
         return int(np.abs(around).max(initial=0))
 
     def unreached(self, values: Singles) -> Bools:
-        """Points outside of the solid that water from the border does not reach."""
+        """Return the points outside the solid that water from the border does not reach."""
         from scipy.ndimage import label
 
         parts, count = label(values.reshape(self.counts) > 0.0)
@@ -72,12 +74,12 @@ class Dense:
         return np.asarray(~border[parts]).ravel()
 
     def positions(self, chosen: Bools) -> tuple[Floats, Ints]:
-        """(m, 3) of the points that are chosen, each place once, and which they are."""
+        """Return the positions (m, 3) and indices of chosen points, each place once."""
         at = np.argwhere(chosen.reshape(self.counts))
         return self.origin + self.size * at, np.flatnonzero(chosen)
 
     def least_around(self, values: Singles, points: Floats, reach: int) -> Singles:
-        """(m,) least value up to some voxels around each of some places (m, 3)."""
+        """Return the least value (m,) up to `reach` voxels around each of m places (m, 3)."""
         from scipy.ndimage import minimum_filter
 
         cell = np.rint((points - self.origin) / self.size).astype(int)
@@ -86,23 +88,25 @@ class Dense:
         return np.asarray(least[tuple(cell.T)])
 
     def grid(self, values: Singles, solid: Floats, notes: tuple[str, ...]) -> VoxelGrid:
-        """The grid that has the values."""
+        """Return the grid with the given values."""
         return VoxelGrid(values, self.counts, self.origin, self.size, solid, notes)
 
 
 class Sparse:
-    """The corners of cells of 8³ voxels, and all points of the cells near surfaces.
+    """Lattice of the corners of cells of 8³ voxels, and of all points of the cells near surfaces.
+
+    Its methods are those of `Dense`.
 
     Parameters
     ----------
     origin : ndarray, shape (3,)
-        The first corner, metres.
+        First corner, metres.
     size : float
-        Metres between points of a block.
+        Distance between points of a block, metres.
     near : ndarray of bool, shape (nx, ny, nz)
-        Which cells are blocks.
+        Cells that are blocks.
     known : (ndarray, ndarray, ndarray)
-        Sites, the distances of the corners to them, and which is nearest to each.
+        Sites, the distances of the corners to them, and the nearest site of each corner.
     policy : GridPolicy
         Reach of the blocks, and sizes of the slabs.
     """
@@ -124,14 +128,16 @@ class Sparse:
         self.table[tuple(self.blocks.T)] = np.arange(len(self.blocks))
 
     def _parts(self, row: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-        """Of a row of values those of corners (nx + 1, …) and of blocks (n, 512)."""
+        """Split a row of values into those of the corners (nx + 1, …) and those of the blocks (n,
+        512)."""
         shape = (len(self.blocks), SIDE**3)
         return row[: self.first].reshape(self.counts), row[self.first :].reshape(shape)
 
     def closest(
         self, sites: Floats, on_progress: OnStage = None, *, whose: bool = True
     ) -> tuple[Singles, Owners]:
-        """As of `Dense`; slab by slab, so that what is in between needs little memory."""
+        """Return distances and sites as `Dense` does, slab by slab, to need little memory in
+        between."""
         total = self.first + len(self.blocks) * SIDE**3
         distances = np.empty(total, dtype=np.float32)
         owner = np.empty(total if whose else 0, dtype=np.int32)
@@ -164,7 +170,7 @@ class Sparse:
         return distances, owner
 
     def _slabs(self) -> list[tuple[int, int]]:
-        """Ranges of cells along x with not too many blocks each."""
+        """Return ranges of cells along x that each hold few enough blocks."""
         many = np.cumsum(np.bincount(self.blocks[:, 0], minlength=len(self.table)))
         slab = many // self.policy.slab_size
         cuts: list[Any] = [0, *(np.flatnonzero(np.diff(slab)) + 1), len(slab)]
@@ -178,7 +184,8 @@ class Sparse:
         corners: Owners,
         stop: Flag,
     ) -> tuple[Singles, Owners, slice]:
-        """Distances and owners of the blocks of a slab and around it, and which are its own."""
+        """Return distances and sites of the blocks in and around a slab, and which blocks are in
+        it."""
         low, high = slab
         halo = self.policy.halo_cells
         cuts = np.array([low - halo, low, high, high + halo])
@@ -205,7 +212,7 @@ class Sparse:
         return distances, owner, slice(first - begin, last - begin)
 
     def turn_inside(self, values: Singles, triangles: Floats) -> int:
-        """As of `Dense`."""
+        """Negate values as `Dense` does."""
         corners, fine = self._parts(values)
         around = windings(triangles, self.origin, SIDE * self.size, self.counts)
         np.negative(corners, out=corners, where=around != 0)
@@ -213,7 +220,7 @@ class Sparse:
         return int(compiled.turn_inside(fine, triangles, place, self.blocks, self.table))
 
     def unreached(self, values: Singles) -> Bools:
-        """As of `Dense`."""
+        """Return unreached points as `Dense` does."""
         water = values > 0.0
         corners, fine = self._parts(water.view(np.uint8))
         cells = corners[:-1, :-1, :-1].copy()
@@ -225,20 +232,20 @@ class Sparse:
         return np.equal(water.view(np.uint8), WATER, out=water)
 
     def positions(self, chosen: Bools) -> tuple[Floats, Ints]:
-        """As of `Dense`; corners of cells that are no blocks are left out."""
+        """Return positions as `Dense` does, without the corners of cells that are no blocks."""
         fine = self._parts(chosen)[1].reshape(-1, SIDE, SIDE, SIDE)
         at = np.argwhere(fine)
         places = self.origin + self.size * (SIDE * self.blocks[at[:, 0]] + at[:, 1:])
         return places, np.flatnonzero(fine) + self.first
 
     def least_around(self, values: Singles, points: Floats, reach: int) -> Singles:
-        """As of `Dense`."""
+        """Return least values as `Dense` does."""
         cell = np.rint((points - self.origin) / self.size).astype(np.int64)
         corners, fine = self._parts(values)
         return np.asarray(compiled.least_in_blocks(corners, fine, self.table, cell, reach))
 
     def grid(self, values: Singles, solid: Floats, notes: tuple[str, ...]) -> VoxelGrid:
-        """As of `Dense`."""
+        """Return the grid as `Dense` does."""
         side = SIDE * self.size
         compiled.understate(values, side, self.policy.block_reach)
         compiled.meet_corners(*self._parts(values), self.blocks, self.table)
@@ -256,29 +263,26 @@ def sparse_near(
     triangles: Floats | None,
     region: Floats | None,
 ) -> Sparse:
-    """The lattice with blocks wherever a surface is near.
+    """Return the lattice with blocks wherever a surface is near.
 
     Parameters
     ----------
     origin : ndarray, shape (3,)
-        The first corner, metres.
+        First corner, metres.
     size : float
-        Metres between points of a block.
+        Distance between points of a block, metres.
     cells : (int, int, int)
-        Cells along x, y and z.
+        Number of cells along x, y and z.
     sites : ndarray
-        As of `netsp.world.scene.sites`.
+        Sites (`netsp.world.scene.sites`).
+    policy : GridPolicy
+        Reach of the blocks, and sizes of the slabs.
     shell : float
-        Metres by which they are thickened to either side.
+        Distance by which sites are thickened on either side, metres.
     triangles : ndarray, shape (m, 3, 3), or None
-        Those of a closed mesh, whose inside needs fewer blocks.
+        Triangles of a closed mesh, whose inside needs fewer blocks.
     region : ndarray, shape (2, 3), or None
-        Box, metres, outside of which no blocks are needed.
-
-    Returns
-    -------
-    Sparse
-        The lattice.
+        Box outside of which no blocks are needed, metres.
     """
     corners = (cells[0] + 1, cells[1] + 1, cells[2] + 1)
     side = SIDE * size
@@ -301,21 +305,11 @@ def sparse_near(
 
 
 Lattice = Dense | Sparse
-"""The points at which a grid is built, in one row."""
+"""Points at which a grid is built, in one row."""
 
 
 def tell(on_progress: OnStage, stage: str, fraction: float) -> None:
-    """Hand on how far a stage has come, if anybody asks.
-
-    Parameters
-    ----------
-    on_progress : callable or None
-        Takes both.
-    stage : str
-        Its name.
-    fraction : float
-        From 0 to 1.
-    """
+    """Report the progress of a stage, from 0 to 1, if there is a listener."""
     if on_progress is not None:
         on_progress(stage, fraction)
 
@@ -323,7 +317,8 @@ def tell(on_progress: OnStage, stage: str, fraction: float) -> None:
 def _closest(
     sites: Floats, origin: Floats, size: float, counts: tuple[int, ...], on_progress: OnStage
 ) -> tuple[Singles, Owners]:
-    """Distances of all points of a grid to the nearest site, and which it is."""
+    """Return the distances of all points of a grid to the nearest site, and the index of that
+    site."""
     tell(on_progress, "distances", 0.0)
     distances = np.full(counts, np.float32(np.inf))
     owner = np.full(counts, -1, dtype=np.int32)

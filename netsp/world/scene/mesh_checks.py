@@ -32,11 +32,6 @@ _FAN = 6
 def gltf_parts(path: str | Path) -> tuple[int, list[tuple[str, int]]]:
     """Count the parts of a glTF file that are read, and those left out, by reason.
 
-    Parameters
-    ----------
-    path : str or Path
-        glTF 2.0 as text or binary (GLB).
-
     Returns
     -------
     used : int
@@ -146,11 +141,6 @@ def _node_parts(
 def collada_parts(path: str | Path) -> list[tuple[str, int]]:
     """Count the parts of a COLLADA file that are left out, by reason.
 
-    Parameters
-    ----------
-    path : str or Path
-        COLLADA 1.4 or 1.5.
-
     Raises
     ------
     InputError
@@ -174,7 +164,7 @@ class PlainObj:
     Attributes
     ----------
     text
-        Its contents.
+        Contents of the file.
     faces
         Number of faces of three corners or more.
     triangles
@@ -194,15 +184,6 @@ def plain_obj(path: str | Path) -> PlainObj:
 
     A negative index counts back from the last vertex before its line; readers that count back from
     the end of the file would join other vertices.
-
-    Parameters
-    ----------
-    path : str or Path
-        OBJ file.
-
-    Returns
-    -------
-    PlainObj
     """
     data = read_bytes(path).replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
     lines = len(re.findall(rb"^[ \t]*[lp][ \t]", data, re.MULTILINE))
@@ -251,11 +232,6 @@ def binary_stl(path: str | Path) -> Floats | None:
 
     The header of a binary file may begin with "solid", as text does, so the size that follows from
     the stated number of triangles decides. Bytes after the last triangle are ignored.
-
-    Parameters
-    ----------
-    path : str or Path
-        STL file.
 
     Raises
     ------

@@ -1,12 +1,12 @@
-"""All of a field but its voxels in one vector: how it is laid out, and written.
+"""Layout of a distance field, without its voxels, in one vector.
 
-A kernel that takes an array out of a tuple counts a reference, with an atomic instruction: of a
-distance to one solid that was four fifths of the time while each table was an array of its own. So
-there is one vector: a header, a row for each solid, the corners of prisms, and the look-up.
+The vector holds a header, a row for each solid, the corners of prisms, and the look-up. There is
+one vector instead of several tables, because a kernel that takes an array out of a tuple counts a
+reference with an atomic instruction, which would take most of the time of a distance.
 
-Look-up: a coarse grid of cells, with the solids that may be nearest somewhere in each. The list of
-cell k is ``data[int(data[c + k]) : int(data[c + k + 1])]``, c at `CELLS`; it holds where their rows
-begin.
+The look-up is a coarse grid of cells, with the solids that may be nearest somewhere in each. The
+list of cell k is ``data[int(data[c + k]) : int(data[c + k + 1])]``, where c is stored at `CELLS`;
+it holds the places at which rows begin.
 """
 
 from __future__ import annotations
@@ -56,8 +56,10 @@ ROW = 17
 
 
 def of_solids(kinds: list[int], rows: list[list[float]], outline: npt.ArrayLike) -> Floats:
-    """The vector of some solids, without look-up; rows of prisms say which corners of the outline
-    (m, 2) are theirs."""
+    """Return the vector of solids, without look-up.
+
+    Rows of prisms state the range of their corners in the outline (m, 2).
+    """
     corners = np.asarray(outline, dtype=float).reshape(-1, 2)
     data = np.zeros(ROWS + ROW * len(kinds) + corners.size)
     data[COUNT] = len(kinds)
@@ -73,7 +75,7 @@ def of_solids(kinds: list[int], rows: list[list[float]], outline: npt.ArrayLike)
 
 
 def with_lookup(data: Floats, low: Floats, high: Floats, size: float) -> Floats:
-    """The same with a look-up: cells of a size over a box."""
+    """Return a vector with a look-up whose cells have a size and cover a box."""
     counts = np.ceil((high - low) / size)
     data = data.copy()
     data[NEAR : NEAR + 7] = [*low, size, *counts]
@@ -84,7 +86,7 @@ def with_lookup(data: Floats, low: Floats, high: Floats, size: float) -> Floats:
 
 
 def with_voxels(data: Floats, grid: VoxelGrid) -> Floats:
-    """The same for a field with voxels."""
+    """Return the vector of a field with voxels."""
     data = data.copy()
     data[VOXELS] = 1.0
     data[PLACE : PLACE + 10] = [*grid.origin, grid.size, *np.ravel(grid.solid)]
@@ -98,7 +100,7 @@ def with_voxels(data: Floats, grid: VoxelGrid) -> Floats:
 
 
 def voxels_of(data: Floats, values: Singles, notes: tuple[str, ...]) -> VoxelGrid | None:
-    """What `with_voxels` was given; None where there are no voxels."""
+    """Return the grid of a vector; None without voxels."""
     if data[VOXELS] == 0.0:
         return None
     nx, ny, nz = data[SHAPE : SHAPE + 3].astype(int).tolist()
@@ -114,8 +116,10 @@ def voxels_of(data: Floats, values: Singles, notes: tuple[str, ...]) -> VoxelGri
 
 
 def block_points(data: Floats, voxels: Singles, offset: float, most: int) -> Floats:
-    """(n, 3) of points in blocks where the distance is below an offset, at most so many: as many of
-    each of some blocks, evenly chosen."""
+    """Return at most `most` points (n, 3) in blocks whose distance is below an offset.
+
+    They are chosen evenly, as many from each of evenly chosen blocks.
+    """
     counts = data[SHAPE : SHAPE + 3].astype(int) - 1
     begin = int(data[BLOCKS])
     table = data[begin : begin + int(np.prod(counts))].reshape(counts)
@@ -132,9 +136,15 @@ def block_points(data: Floats, voxels: Singles, offset: float, most: int) -> Flo
 
 @kernel
 def candidates(data: Floats) -> tuple[Ints, Ints]:
-    """For every cell of the look-up, the solids that may be nearest to some point of it: those no
-    farther from its centre than the nearest plus the cell's diagonal. Returns (cells, items): in
-    cell k the rows that begin at ``items[cells[k] : cells[k + 1]]``."""
+    """Return, for every cell of the look-up, the solids that may be nearest to some point of it.
+
+    These are the solids no farther from its centre than the nearest one plus the cell's diagonal.
+
+    Returns
+    -------
+    cells, items : ndarray of int
+        The rows of the solids of cell k begin at ``items[cells[k] : cells[k + 1]]``.
+    """
     near = data[NEAR : NEAR + 7]
     nx, ny, nz = int(near[4]), int(near[5]), int(near[6])
     count = int(data[COUNT])

@@ -24,10 +24,10 @@ PADDING = "_"
 
 @dataclass(frozen=True)
 class _Head:
-    """Head of a PCD file.
+    """Header of a PCD file.
 
-    Names, types and counts of its fields, the number of points, the form of its data, the place of
-    their first byte, and the seven numbers of its viewpoint.
+    The fields are names, types and counts of its fields, the number of points, the form of its
+    data, the place of their first byte, and the seven numbers of its viewpoint.
     """
 
     names: tuple[str, ...]
@@ -191,18 +191,11 @@ def _from_columns(
 
 
 def unpack_lzf(packed: bytes, size: int) -> bytes:
-    """Unpack data in Marc Lehmann's LZF format.
+    """Unpack data in Marc Lehmann's LZF format to `size` bytes.
 
     A control byte n below 32 is followed by n + 1 literal bytes. Any other begins a reference: its
     upper three bits are the length less two (seven: the next byte is added), its lower five bits
     and the following byte are the distance back less one.
-
-    Parameters
-    ----------
-    packed : bytes
-        Packed data.
-    size : int
-        Number of bytes that they unpack to.
 
     Raises
     ------

@@ -37,7 +37,7 @@ class PlyFile:
     names : tuple of str
         Properties of a vertex that are no lists.
     values : ndarray, shape (n, k)
-        Their values.
+        Values of these properties.
     faces : list of ndarray
         Corners of each face, as indices of vertices.
     others : mapping of str to int
@@ -71,14 +71,7 @@ class _Element:
 
 
 def read_ply(path: str | Path, *, max_head_bytes: int = 100_000) -> PlyFile:
-    """Read a polygon file as text or binary.
-
-    Parameters
-    ----------
-    path : str or Path
-        PLY 1.0 with vertices.
-    max_head_bytes : int
-        Maximum size of the header.
+    """Read a polygon file, PLY 1.0 with vertices, as text or binary.
 
     Raises
     ------

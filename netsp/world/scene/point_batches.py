@@ -33,30 +33,12 @@ Row = list[Any]
 
 
 def is_short(data: Floats, count: int) -> bool:
-    """Return whether a loop over points is faster than NumPy.
-
-    Parameters
-    ----------
-    data : ndarray
-        Vector of a field.
-    count : int
-        Number of points.
-    """
+    """Return whether a loop over points is faster than NumPy."""
     return count * (2 + int(data[COUNT])) < current_policy().min_numpy_items
 
 
 def distances(data: Floats, offset: float, x: Floats, y: Floats, z: Floats) -> Floats:
-    """Return the distances of points; the field has no voxels.
-
-    Parameters
-    ----------
-    data : ndarray
-        Vector of a field.
-    offset : float
-        Subtracted from every distance.
-    x, y, z : ndarray, shape (n,)
-        Coordinates of the points.
-    """
+    """Return the distances of points, minus an offset; the field has no voxels."""
     out = np.empty(len(x))
     chunk = current_policy().numpy_chunk_items
     for first in range(0, len(x), chunk):
@@ -66,17 +48,8 @@ def distances(data: Floats, offset: float, x: Floats, y: Floats, z: Floats) -> F
 
 
 def samples(data: Floats, offset: float, points: Floats) -> Floats:
-    """Return distances, gradients and nearest solids as `sampling.sample_many` does.
-
-    Parameters
-    ----------
-    data : ndarray
-        Vector of a field, without voxels.
-    offset : float
-        Subtracted from every distance.
-    points : ndarray, shape (n, 3)
-        The points.
-    """
+    """Return distances, gradients and nearest solids as `sampling.sample_many` does, without
+    voxels."""
     out = np.empty((len(points), 5))
     chunk = current_policy().numpy_chunk_items
     for first in range(0, len(points), chunk):
@@ -97,19 +70,8 @@ def samples(data: Floats, offset: float, points: Floats) -> Floats:
 
 
 def lowest_along(data: Floats, offset: float, a: Floats, b: Floats, tolerance: float) -> Floats:
-    """Return the least distance along each of some segments as `sampling.lowest_along` does.
-
-    Parameters
-    ----------
-    data : ndarray
-        Vector of a field, without voxels.
-    offset : float
-        Subtracted from every distance.
-    a, b : ndarray, shape (n, 3)
-        Ends of the segments.
-    tolerance : float
-        Maximum error of the result.
-    """
+    """Return the least distance along each of n segments as `sampling.lowest_along` does, without
+    voxels."""
     begins = [np.ascontiguousarray(a[:, axis]) for axis in range(3)]
     sides = [b[:, axis] - a[:, axis] for axis in range(3)]
     lengths = np.sqrt(sides[0] * sides[0] + sides[1] * sides[1] + sides[2] * sides[2])
@@ -211,21 +173,16 @@ def _by_kind(data: Floats, rows: Ints) -> Iterator[tuple[int, Ints]]:
 
 
 def _solids(data: Floats, kind: int, at: Any, p: Vectors, has_gradient: bool = True) -> Samples:
-    """Return distances and gradients as `solids.solid_distance` does; without gradients the
-    distances are those of `solids.capsule_gap`, `cylinder_gap` and `box_gap`.
+    """Return distances and gradients as `solids.solid_distance` does.
+
+    Without gradients the distances are those of `solids.capsule_gap`, `cylinder_gap` and `box_gap`.
 
     Parameters
     ----------
-    data : ndarray
-        The vector of a field.
     kind : int
         Kind of all the solids.
     at : int or ndarray of int, shape (n,)
         Row of one solid for all points, or the row of one solid for each point.
-    p : tuple of ndarray, shape (n,)
-        The points.
-    has_gradient : bool
-        Whether gradients are needed.
     """
     if kind != PRISM:
         length, measure = _BY_KIND.get(kind, (6, _half_space))

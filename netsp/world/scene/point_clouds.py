@@ -1,4 +1,4 @@
-"""Clouds of points from files: which columns, classes and units they hold, and what is left out."""
+"""Clouds of points from files: their columns, classes and units, and what is left out."""
 
 from __future__ import annotations
 
@@ -47,8 +47,7 @@ class PointCloud:
     notes : tuple of str
         Points, columns and classes that were left out, one line each.
     tally : Tally, optional
-        Number of points of the file, and how many of them were left out and why; None where all
-        are used.
+        Numbers of points used and left out; None if all are used.
     """
 
     points: Floats = field(repr=False)
@@ -60,17 +59,12 @@ class PointCloud:
 class SurfaceFilter:
     """Selection of the points of a file that lie on surfaces; counts the others by reason.
 
-    Parameters
-    ----------
-    count : int
-        Number of points of the file.
-
     Attributes
     ----------
     kept : ndarray of bool
         Points that lie on surfaces.
     reasons : list of (str, int)
-        Reasons, and how many points were left out for each.
+        Reasons, and the number of points left out for each.
     """
 
     def __init__(self, count: int) -> None:
@@ -78,30 +72,15 @@ class SurfaceFilter:
         self.reasons: list[tuple[str, int]] = []
 
     def leave_out(self, which: Any, reason: str) -> None:
-        """Leave out points that were not left out before.
-
-        Parameters
-        ----------
-        which : ndarray of bool
-            Points.
-        reason : str
-            Reason, which follows "3 points" in a note.
-        """
+        """Leave out points for a reason, such as "of class 7", unless they are left out already."""
         more = np.asarray(which, dtype=bool) & self.kept
         if more.any():
             self.kept &= ~more
             self.reasons.append((reason, int(more.sum())))
 
     def leave_out_noise(self, classes: Any, withheld: Any) -> None:
-        """Leave out points of noise classes, and those that are marked as withheld.
-
-        Parameters
-        ----------
-        classes : ndarray or None
-            Classes of ASPRS.
-        withheld : ndarray or None
-            Marks.
-        """
+        """Leave out points of the noise classes of ASPRS, and points that are marked as
+        withheld."""
         if classes is not None:
             for number, name in NOISE_CLASSES.items():
                 self.leave_out(np.asarray(classes) == number, f"of class {number} ({name})")
@@ -109,43 +88,32 @@ class SurfaceFilter:
             self.leave_out(withheld, "marked as withheld")
 
     def leave_out_unmeasured(self, points: Floats) -> None:
-        """Leave out points that are not finite, or whose height is a nodata value.
-
-        Parameters
-        ----------
-        points : ndarray, shape (n, 3)
-            All points of the file.
-        """
+        """Leave out points (n, 3) that are not finite, or whose height is a nodata value."""
         self.leave_out(~np.isfinite(points).all(axis=1), "without coordinates")
         heights = np.where(self.kept, points[:, 2], np.nan)
         for value, which in marks_of_no_height(heights):
             self.leave_out(which, f"of height {value:.6g}, which marks a missing height,")
 
     def tally(self, before: Sequence[tuple[str, int]] = ()) -> Tally:
-        """Return the numbers of points read and left out.
-
-        Parameters
-        ----------
-        before : sequence of (str, int)
-            Reasons and numbers of points that were left out before.
-        """
+        """Return the numbers of points used and left out; `before` lists points left out
+        earlier."""
         left_out = (*before, *self.reasons)
         total = len(self.kept) + sum(count for _, count in before)
         return Tally("point", total, int(self.kept.sum()), left_out)
 
     @property
     def notes(self) -> list[str]:
-        """Return one line for each reason."""
+        """Notes on the points left out, one line for each reason."""
         return [f"{counted(count, 'point')} {reason} left out" for reason, count in self.reasons]
 
 
 def read_text_cloud(path: str | Path) -> PointCloud:
-    """Read a cloud from a table: by the names of its columns, or its first three without names.
+    """Read a cloud from a table: by the names of its columns, or its first three if they have none.
 
     Parameters
     ----------
     path : str or Path
-        Table as `netsp.base.axes.read_table` takes it, or PTS, which begins with the number of
+        Table as `netsp.base.axes.read_table` reads it, or PTS, which begins with the number of
         points.
 
     Raises
@@ -188,12 +156,12 @@ def read_text_cloud(path: str | Path) -> PointCloud:
 def coordinate_fields(
     names: Sequence[str], source: str, where: str
 ) -> tuple[tuple[int, Column], tuple[int, Column], tuple[int, Column]]:
-    """Return the places and meanings of the fields that hold x, y and z.
+    """Return the indices and meanings of the fields that hold x, y and z.
 
     Parameters
     ----------
     names : sequence of str
-        Names of the fields, as `netsp.base.axes.column` takes them.
+        Names of the fields, as `netsp.base.axes.column` reads them.
     source : str
         Name of the file, for messages.
     where : str
@@ -218,13 +186,14 @@ def cloud_of_fields(
 ) -> PointCloud:
     """Return the cloud of records with named fields.
 
+    Points that are not finite mark beams without an echo; they are left out.
+
     Parameters
     ----------
     names : sequence of str
-        Names of k fields, as `netsp.base.axes.column` takes them.
+        Names of k fields, as `netsp.base.axes.column` reads them.
     values : ndarray, shape (n, k)
-        Values of n points. Points that are not finite mark beams without an echo; they are left
-        out.
+        Values of n points.
     source : str
         Name of the file, for messages.
     where : str
@@ -289,11 +258,6 @@ def _withheld(table: Table) -> Bools | None:
 
 def read_las(path: str | Path) -> PointCloud:
     """Read a LAS or LAZ cloud without noise and withheld points, in the units of its system.
-
-    Parameters
-    ----------
-    path : str or Path
-        LAS 1.0 to 1.4.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Meshes and clouds of points from files, by libraries that know their formats."""
+"""Meshes and clouds of points from files, read by libraries that know their formats."""
 
 from __future__ import annotations
 
@@ -44,8 +44,11 @@ _TURNS = {
     "x": ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)),
     "y": ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)),
 }
-"""Rotations to z upwards. Of y: (x, y, z) is (x, -z, y) here (glTF 2.0, 3.4). Of x: right is -y and
-inwards is z (COLLADA 1.4, up_axis)."""
+"""Rotations to z upwards.
+
+From y, (x, y, z) becomes (x, -z, y) (glTF 2.0, 3.4). From x, right is -y and inwards is z (COLLADA
+1.4, up_axis).
+"""
 
 
 @dataclass(frozen=True)
@@ -55,9 +58,9 @@ class MeshReading:
     Attributes
     ----------
     vertices
-        (n, 3), metres, z upwards.
+        Vertices (n, 3), metres, z upwards.
     faces
-        (m, 3) indices of their corners.
+        Indices (m, 3) of the corners.
     notes
         Parts that were turned, converted or left out, one line each.
     tally
@@ -77,7 +80,7 @@ class CloudReading:
     Attributes
     ----------
     points
-        (n, 3), metres, z upwards.
+        Points (n, 3), metres, z upwards.
     notes
         Points and columns that were left out or converted, one line each.
     tally
@@ -101,7 +104,7 @@ class Placement:
     scale : float
         Metres per unit of the file.
     up : str, optional
-        Axis of the file that points upwards; None for what its format says, or z.
+        Axis of the file that points upwards; None for the axis of its format, or z.
     origin : (x, y)
         Point of the file, z upwards, that becomes (0, 0), in units of the file.
     rotate : (x, y, z)
@@ -127,9 +130,9 @@ class Placement:
         points : ndarray, shape (n, 3)
             Points of the file.
         up : str
-            Axis that points upwards by its format.
+            Axis that points upwards by the file's format.
         metres : tuple of float
-            Metres per unit by its format.
+            Metres per unit of x, y and z by the file's format.
         source : str
             Name of the file, for messages.
 
@@ -156,8 +159,10 @@ class Placement:
 
 
 def read_mesh(path: str | Path) -> tuple[Floats, npt.NDArray[np.int64]]:
-    """Vertices (n, 3), metres, z upwards, and faces (m, 3) of a mesh file. InputError if there are
-    none, or coordinates are not finite."""
+    """Return vertices (n, 3), metres, z upwards, and faces (m, 3) of a mesh file.
+
+    InputError if there are none, or coordinates are not finite.
+    """
     vertices, faces, _ = load_mesh(path)
     return vertices, faces
 
@@ -170,18 +175,18 @@ def load_mesh(
     Parameters
     ----------
     path : str or Path
-        STL, OBJ, PLY, GLB, glTF, COLLADA, or what else trimesh reads.
+        STL, OBJ, PLY, GLB, glTF, COLLADA, or another format that trimesh reads.
     placement : Placement, optional
-        Where it stands.
+        Place of the mesh in the scene.
 
     Returns
     -------
     vertices : ndarray, shape (n, 3)
-        Metres, z upwards.
+        Vertices, metres, z upwards.
     faces : ndarray, shape (m, 3)
-        Indices of their corners.
+        Indices of the corners.
     notes : tuple of str
-        What was turned, converted or left out, one line each.
+        Parts that were turned, converted or left out, one line each.
 
     Raises
     ------
@@ -193,20 +198,8 @@ def load_mesh(
 
 
 def read_mesh_file(path: str | Path, placement: Placement | None = None) -> MeshReading:
-    """Read a mesh file into a scene, with the numbers of its parts that are used and left out.
-
-    Parameters
-    ----------
-    path : str or Path
-        As `load_mesh` takes it.
-    placement : Placement, optional
-        Where it stands.
-
-    Raises
-    ------
-    InputError
-        As `load_mesh` raises it.
-    """
+    """Read a mesh file as `load_mesh` does, with the numbers of its parts that are used and left
+    out."""
     _exists(path)
     kind = Path(path).suffix.lower()
     try:
@@ -244,8 +237,9 @@ def read_mesh_file(path: str | Path, placement: Placement | None = None) -> Mesh
 class _RawMesh:
     """Mesh in the axes and units of its file.
 
-    Vertices, faces, the axis that points upwards, metres per unit, and the number of parts of the
-    file that were used (None: all faces) and left out, by reason.
+    The fields are vertices, faces, the axis that points upwards, metres per unit, the name of a
+    part of the file, and the number of parts that are used (None: all faces) and left out, by
+    reason.
     """
 
     vertices: Floats
@@ -341,7 +335,7 @@ def _collada_axes(path: str | Path) -> tuple[Up, float]:
 
 
 def read_cloud(path: str | Path) -> Floats:
-    """Points (n, 3) of a cloud file, metres, z upwards. InputError if there are none."""
+    """Return the points (n, 3) of a cloud file, metres, z upwards; InputError if there are none."""
     return load_cloud(path)[0]
 
 
@@ -355,14 +349,14 @@ def load_cloud(
     path : str or Path
         npz, npy, csv, txt, xyz, asc, PTS, PCD, PLY, LAS or LAZ.
     placement : Placement, optional
-        Where it stands.
+        Place of the cloud in the scene.
 
     Returns
     -------
     points : ndarray, shape (n, 3)
-        Metres, z upwards.
+        Points, metres, z upwards.
     notes : tuple of str
-        What was left out or converted, one line each.
+        Points and columns that were left out or converted, one line each.
 
     Raises
     ------
@@ -374,20 +368,7 @@ def load_cloud(
 
 
 def read_cloud_file(path: str | Path, placement: Placement | None = None) -> CloudReading:
-    """Read a cloud file into a scene, with the numbers of its points used and left out.
-
-    Parameters
-    ----------
-    path : str or Path
-        As `load_cloud` takes it.
-    placement : Placement, optional
-        Where it stands.
-
-    Raises
-    ------
-    InputError
-        As `load_cloud` raises it.
-    """
+    """Read a cloud file as `load_cloud` does, with the numbers of its points used and left out."""
     _exists(path)
     kind = Path(path).suffix.lower()
     try:

@@ -1,7 +1,7 @@
-"""What a distance field says at a point: the one query beneath tether, planner and pictures.
+"""Distance and gradient at points: the query that tethers, planners and pictures share. Compiled.
 
-Exact for solids (`netsp.world.scene.solids`), trilinear for voxels, the least of both for both.
-Compiled; `Field` is a plain tuple of arrays, so that every kernel takes it whole.
+Distances are exact for solids (`netsp.world.scene.solids`) and trilinear for voxels. `Field` is a
+plain tuple of arrays, so that every kernel takes it whole.
 """
 
 from __future__ import annotations
@@ -41,16 +41,16 @@ from netsp.world.scene.solids import (
 
 
 class Field(NamedTuple):
-    """The arrays of a distance field.
+    """Arrays of a distance field.
 
     Attributes
     ----------
     data
-        Solids, and where they and the voxels are (`netsp.world.scene.packing`).
+        Solids and layout of the voxels (`netsp.world.scene.packing`).
     grid
         Distances at grid points and in blocks, in one row; empty without voxels.
     offset
-        Subtracted from every distance (the tether's radius).
+        Length subtracted from every distance: the tether's radius.
     """
 
     data: Floats
@@ -60,8 +60,7 @@ class Field(NamedTuple):
 
 @kernel
 def sample(field: Field, x: float, y: float, z: float) -> tuple[float, float, float, float, int]:
-    """(d, gx, gy, gz, solid): distance, its unit gradient, and which solid is nearest (-1: the
-    voxels)."""
+    """Return distance, its unit gradient (3), and the index of the nearest solid, -1 for voxels."""
     data = field.data
     d, at = _nearest(data, x, y, z)
     gx, gy, gz, which = 0.0, 0.0, 1.0, -1
@@ -80,7 +79,7 @@ def sample(field: Field, x: float, y: float, z: float) -> tuple[float, float, fl
 
 @kernel
 def distance(field: Field, x: float, y: float, z: float) -> float:
-    """Distance alone."""
+    """Return the distance alone."""
     data = field.data
     d, _ = _nearest(data, x, y, z)
     if data[VOXELS] > 0.0:
@@ -90,7 +89,7 @@ def distance(field: Field, x: float, y: float, z: float) -> float:
 
 @kernel
 def _nearest(data: Floats, x: float, y: float, z: float) -> tuple[float, int]:
-    """(distance, row) of the nearest solid; infinite, 0 where there is none."""
+    """Return the distance and the row of the nearest solid; infinite and 0 without solids."""
     begin, end, looked_up = 0, int(data[COUNT]), False
     if data[CELLS] > 0.0:
         size = data[NEAR + 3]
@@ -142,7 +141,8 @@ def _voxel_distance(grid: Singles, data: Floats, x: float, y: float, z: float) -
 def _between(
     grid: Singles, data: Floats, nx: int, ny: int, nz: int, u: float, v: float, w: float
 ) -> float:
-    """Linear between the points around (u, v, w), in steps of the grid, or of a block."""
+    """Return the linear interpolation at (u, v, w), in steps of the grid, between grid or block
+    points."""
     i, j, k = min(int(u), nx - 2), min(int(v), ny - 2), min(int(w), nz - 2)
     u, v, w = u - i, v - j, w - k
     at, across, along = (i * ny + j) * nz + k, ny * nz, nz
@@ -171,7 +171,7 @@ def _across_blocks(
     v: float,
     w: float,
 ) -> float:
-    """Linear between points of more than one block."""
+    """Return the linear interpolation between points of more than one block."""
     i, j, k = at
     value = 0.0
     for n in range(8):
@@ -184,7 +184,7 @@ def _across_blocks(
 
 @kernel
 def _fine_point(grid: Singles, data: Floats, ny: int, nz: int, i: int, j: int, k: int) -> float:
-    """Of a block; where its cell is none, linear between the cell's corners."""
+    """Return the distance at a point of a block, or interpolated where its cell is no block."""
     p, q, r = i // SIDE, j // SIDE, k // SIDE
     begin = data[int(data[BLOCKS]) + (p * (ny - 1) + q) * (nz - 1) + r]
     i, j, k = i - SIDE * p, j - SIDE * q, k - SIDE * r
@@ -222,7 +222,7 @@ def _voxels(
 
 @kernel
 def sample_many(field: Field, points: Floats) -> Floats:
-    """(n, 5) distance, gradient and nearest solid at (n, 3) points."""
+    """Return (n, 5) distance, gradient and nearest solid at points (n, 3)."""
     out = np.empty((len(points), 5))
     for p in range(len(points)):
         d, gx, gy, gz, which = sample(field, points[p, 0], points[p, 1], points[p, 2])
@@ -243,11 +243,11 @@ def _sample_many_in_numpy(field: Field, points: Floats) -> Floats:
 def lowest_along(
     field: Field, ax: float, ay: float, az: float, bx: float, by: float, bz: float, tolerance: float
 ) -> tuple[float, float]:
-    """Least distance along a segment and where (fraction), to within `tolerance`.
+    """Return the least distance along a segment and its place as a fraction, to within `tolerance`.
 
-    Sphere tracing: within a distance d of a point no distance is below 0, so the next sample may be
-    d + tolerance further and nothing in between is deeper than -tolerance. The samples are that
-    dense only near solids.
+    The method is sphere tracing: within a distance d of a point no distance is below 0, so the next
+    sample may be d + tolerance further, and nothing in between is deeper than -tolerance. Samples
+    are dense only near solids.
     """
     length = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2)
     if length == 0.0:
@@ -264,16 +264,18 @@ def lowest_along(
 
 
 def lowest_along_each(field: Field, a: Floats, b: Floats, tolerance: float) -> Floats:
-    """Return the least distance along each segment, for kernels that run interpreted.
+    """Return the least distance along each of n segments, for kernels that run interpreted.
+
+    The distances are those of `lowest_along` to the last bit.
 
     Parameters
     ----------
     field : Field
-        The field, without voxels.
+        Field without voxels.
     a, b : ndarray, shape (n, 3)
         Ends of the segments.
     tolerance : float
-        Tolerance of `lowest_along`; the distances are the same to the last bit.
+        Tolerance of `lowest_along`.
     """
     if not point_batches.is_short(field.data, len(a)):
         return point_batches.lowest_along(field.data, field.offset, a, b, tolerance)

@@ -1,6 +1,7 @@
-"""The scene: what stands in the water. Solids, a mesh, a cloud of points, or an NE-TSP problem.
+"""Scene: what stands in the water. Solids, a mesh, a cloud of points, or the obstacles of a
+problem.
 
-Validated at the door like a problem; `netsp schema scene` prints the JSON Schema.
+Scene files are validated like problems; `netsp schema scene` prints their JSON Schema.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ _KINDS = ("sphere", "capsule", "cylinder", "box", "torus", "post", "prism", "hal
 
 
 class Solid(Model):
-    """One solid: exactly one of its shapes, and a name."""
+    """One solid: exactly one shape, and a name."""
 
     name: Annotated[Name | None, Field(description="shown in pictures, reports and `inspect`")] = (
         None
@@ -68,29 +69,13 @@ class Solid(Model):
 
     @property
     def shape(self) -> Shape:
-        """The shape it is."""
+        """Shape of the solid."""
         shapes: list[Shape | None] = [getattr(self, k) for k in _KINDS]
         return next(s for s in shapes if s is not None)
 
 
 class Source(Model):
-    """A mesh or cloud in a file beside the scene's.
-
-    Attributes
-    ----------
-    file
-        Path, relative to the scene file.
-    scale
-        Metres per unit of the file.
-    voxel
-        Metres; size of a voxel, default 1/200 of the longest side.
-    origin
-        (x, y) in the file, z upwards, that is (0, 0) of the scene, in units of the file.
-    up
-        Axis of the file that points upwards; None for what its format says, or z.
-    rotate
-        Degrees about the axes x, then y, then z of the scene.
-    """
+    """Mesh or cloud in a file beside the scene's."""
 
     file: Annotated[
         str,
@@ -122,21 +107,7 @@ class Source(Model):
 
 
 class Floor(Model):
-    """A sea floor from a bathymetry grid beside the scene's file.
-
-    Attributes
-    ----------
-    file
-        Bathymetry grid, relative to the scene file.
-    scale
-        Metres per unit of the file.
-    voxel
-        Metres; as of `Source`.
-    origin
-        (x, y) on the file's map that is (0, 0) of the scene.
-    depths
-        Whether its values count downwards; None for what its band or column is called.
-    """
+    """Sea floor from a bathymetry grid in a file beside the scene's."""
 
     file: Annotated[
         str,
@@ -162,30 +133,27 @@ class Floor(Model):
 
 
 class Scene(FileModel):
-    """The union of solids, a mesh, a cloud and the obstacles of a problem.
+    """Union of solids, a mesh, a cloud, a sea floor and the obstacles of a problem.
+
+    Mesh, cloud and floor become voxels (`netsp.world.scene.voxels`), mesh and floor together.
 
     Attributes
     ----------
     solids : tuple of Solid
         Exact shapes.
     mesh : Source or None
-        A file, turned into voxels (`netsp.world.scene.voxels`).
+        File with a mesh.
     cloud : Source or None
-        A file, turned into voxels.
+        File with a cloud of points.
     floor : Floor or None
-        A bathymetry grid, turned into voxels, together with the mesh if there is one.
+        File with a bathymetry grid.
     problem : str or None
-        An NE-TSP problem file, whose obstacles, grown by its clearance, stand from the sea floor to
-        the surface.
+        NE-TSP problem file whose obstacles, grown by its clearance, stand from the sea floor to the
+        surface.
     tether_radius : float
-        Everything is grown by it for the tether, metres.
+        Length by which everything is grown for the tether, metres.
     bounds : (xmin, ymin, zmin, xmax, ymax, zmax) or None
-        What the robot stays in, metres.
-
-    Raises
-    ------
-    InputError
-        From `load` and `field`, in one line.
+        Box that the robot stays in, metres.
     """
 
     file_kind: ClassVar[str] = "scene"
@@ -228,16 +196,6 @@ class Scene(FileModel):
     def load(cls, path: str | Path) -> Self:
         """Read a scene file; file names in it become relative to the working directory.
 
-        Parameters
-        ----------
-        path : str or Path
-            The file.
-
-        Returns
-        -------
-        Scene
-            The scene.
-
         Raises
         ------
         InputError
@@ -256,28 +214,12 @@ class Scene(FileModel):
 
     @classmethod
     def from_problem(cls, problem: Problem) -> Self:
-        """The obstacles of an NE-TSP problem as posts and prisms: offline and online share one
-        world.
-
-        Parameters
-        ----------
-        problem : Problem
-            Its obstacles are grown by its clearance.
-
-        Returns
-        -------
-        Scene
-            The scene.
-        """
+        """Return the obstacles of an NE-TSP problem, grown by its clearance, as posts and
+        prisms."""
         return cls(name=problem.name, units=problem.units, solids=_standing(problem))
 
     def all_solids(self) -> tuple[Solid, ...]:
-        """The solids with those of the problem.
-
-        Returns
-        -------
-        tuple of Solid
-            All solids.
+        """Return the solids of the scene and of its problem.
 
         Raises
         ------
@@ -288,12 +230,7 @@ class Scene(FileModel):
         return (*self.solids, *more)
 
     def thickness(self) -> list[tuple[str, float]]:
-        """How thick each solid is where it is thinnest, without mesh and cloud.
-
-        Returns
-        -------
-        list of (str, float)
-            Name and metres of each solid; inf where nothing of it is thin.
+        """Return the name and least thickness of each solid, metres; infinite for a half space.
 
         Raises
         ------
@@ -310,26 +247,24 @@ class Scene(FileModel):
         on_progress: Callable[[str, float], None] | None = None,
         policy: ScenePolicy | None = None,
     ) -> DistanceField:
-        """The distance field of the scene.
+        """Return the distance field of the scene.
 
         Parameters
         ----------
         voxel : float, optional
-            Metres; overrides that of mesh and cloud.
+            Edge of a voxel, metres; by default that of the scene's files.
         memory_limit : float
-            GiB; a grid that needs more is refused with a voxel size that does not.
+            Maximum memory, GiB. The message about a grid that needs more names a voxel size that
+            does not.
         on_progress : callable, optional
             Called with (stage, fraction done) of long builds.
-
-        Returns
-        -------
-        DistanceField
-            The field.
+        policy : ScenePolicy, optional
+            Policy of grids, fields and seams.
 
         Raises
         ------
         InputError
-            Nothing in the scene, unreadable files, a grid that is too large.
+            Nothing in the scene, unreadable files, or a grid that is too large.
         """
         solids = self.all_solids()
         if not solids and self.mesh is None and self.cloud is None and self.floor is None:
@@ -347,19 +282,16 @@ class Scene(FileModel):
         grid: VoxelGrid | None,
         policy: ScenePolicy | None = None,
     ) -> DistanceField:
-        """The field of other solids about the same voxels.
+        """Return the field of other solids with the same voxels.
 
         Parameters
         ----------
         solids : tuple of Solid
-            Instead of the scene's.
+            Solids in place of the scene's.
         grid : VoxelGrid or None
-            Of `voxels`.
-
-        Returns
-        -------
-        DistanceField
-            The field.
+            Result of `voxels`.
+        policy : ScenePolicy, optional
+            Policy of fields and seams.
         """
         kind, rows, outline = encode(solids)
         boxes = [b for s in solids if (b := s.shape.box()) is not None]
@@ -385,26 +317,23 @@ class Scene(FileModel):
         on_progress: Callable[[str, float], None] | None = None,
         policy: ScenePolicy | None = None,
     ) -> VoxelGrid | None:
-        """Distances to what no solid describes.
+        """Return the distances to mesh, cloud and floor; None without them.
 
         Parameters
         ----------
         voxel : float, optional
-            As of `field`.
+            Edge of a voxel, metres; by default that of the scene's files.
         memory_limit : float
-            As of `field`.
+            Maximum memory, GiB.
         on_progress : callable, optional
-            As of `field`.
-
-        Returns
-        -------
-        VoxelGrid or None
-            None where there is none of it.
+            Called with (stage, fraction done) of long builds.
+        policy : ScenePolicy, optional
+            Policy of grids and of the sea floor.
 
         Raises
         ------
         InputError
-            Unreadable files, a grid that is too large.
+            Unreadable files, or a grid that is too large.
         """
         if self.mesh is None and self.cloud is None and self.floor is None:
             return None
@@ -431,8 +360,7 @@ class Scene(FileModel):
         return replace(grid, notes=(*notes, *grid.notes))
 
     def _water(self, parts: Mapping[str, Any]) -> Floats:
-        """Return the box above a sea floor; below it, and beyond its walls, there is nothing to
-        know."""
+        """Return the box of water above a sea floor; nothing below or beside it is needed."""
         vertices = parts["floor"][0]
         top = vertices[: len(vertices) // 2]
         water = np.array([top.min(0), [*top.max(0)[:2], np.inf]])
@@ -442,7 +370,7 @@ class Scene(FileModel):
         return water
 
     def _voxel(self) -> float | None:
-        """Return the edge of voxels that the scene asks for: the smallest of its files, metres."""
+        """Return the smallest edge of voxels that the scene's files state, metres."""
         given = [f.voxel for f in (self.floor, self.mesh, self.cloud) if f is not None and f.voxel]
         return min(given) if given else None
 
@@ -453,7 +381,8 @@ class Scene(FileModel):
     def _files(
         self, policy: FloorPolicy | None = None
     ) -> tuple[dict[str, tuple[Floats, npt.NDArray[np.int64]]], Floats | None, list[str]]:
-        """Read mesh, floor and cloud: triangles by name, points, and notes of what was left out."""
+        """Read mesh, floor and cloud; return triangles by name, points, and notes of what was left
+        out."""
         parts: dict[str, tuple[Floats, npt.NDArray[np.int64]]] = {}
         points: Floats | None = None
         notes: list[str] = []
@@ -480,12 +409,8 @@ class Scene(FileModel):
         return parts, points, notes
 
     def reading_notes(self) -> list[str]:
-        """Return what was left out, turned or converted when the scene's files were read.
-
-        Returns
-        -------
-        list of str
-            One line for each file and reason.
+        """Return notes on what was left out, turned or converted in the scene's files, one line
+        each.
 
         Raises
         ------
@@ -495,7 +420,7 @@ class Scene(FileModel):
         return self._files()[2]
 
     def meshes(self) -> list[tuple[str, tuple[Floats, npt.NDArray[np.int64]]]]:
-        """Mesh and sea floor as triangles.
+        """Return mesh and sea floor as triangles.
 
         Returns
         -------
@@ -512,7 +437,7 @@ class Scene(FileModel):
 
 
 def _file_notes(file: str, notes: Sequence[str], tally: Tally) -> list[str]:
-    """Return the notes on a file, and how many of its parts are used where not all are."""
+    """Return the notes on a file, and how many of its parts are used if not all are."""
     return [f"{file}: {note}" for note in (*notes, tally.note) if note]
 
 
@@ -534,7 +459,7 @@ def _standing(problem: Problem) -> tuple[Solid, ...]:
 
 
 def encode(solids: tuple[Solid, ...]) -> tuple[list[int], list[list[float]], Floats]:
-    """Kinds, rows and polygon vertices for `netsp.world.scene.packing.of_solids`."""
+    """Return kinds, rows and polygon corners for `netsp.world.scene.packing.of_solids`."""
     kind: list[int] = []
     rows: list[list[float]] = []
     outline: list[tuple[float, float]] = []
@@ -549,8 +474,10 @@ def encode(solids: tuple[Solid, ...]) -> tuple[list[int], list[list[float]], Flo
 
 
 def scene_of(problem: Problem) -> Scene:
-    """The scene of a problem; where there is no obstacle, with a solid far below the base, because
-    a scene needs one."""
+    """Return the scene of a problem.
+
+    Because a scene needs a solid, a problem without obstacles gets one far below its base.
+    """
     if problem.obstacles:
         return Scene.from_problem(problem)
     x, y, z = problem.base

@@ -1,10 +1,10 @@
-"""Where solids touch along a face, the distance to their union is 0 inside it: a seam.
+"""Boxes that fill the seams where solids touch.
 
-The distance field of a scene is the least of its solids' distances, which outside of them is exact.
-Inside, a point on a face that two solids share is 0 deep, though there is no water for metres
-around, and a tether whose edges may dip into a surface by an eighth of delta would pass along such
-a face as through a slit. So every flat seam is filled with boxes that lie within the two solids:
-no distance outside changes, but by the millimetre that counts as touching.
+The distance field of a scene is the least of its solids' distances, which is exact outside of them.
+Inside, a point on a face that two solids share has depth 0, although there is no water for metres
+around. A tether, whose edges may dip into a surface by an eighth of delta, would pass along such a
+face as through a slit. So every flat seam is filled with boxes that lie within the two solids.
+Distances outside change by at most the gap that counts as touching.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ Rectangle = tuple[tuple[float, float, float, float], Floats]
 
 @dataclass(frozen=True)
 class Face:
-    """A flat face of a solid.
+    """Flat face of a solid.
 
     Parameters
     ----------
     corners : ndarray, shape (k, 3)
-        Of a convex polygon, metres.
+        Corners of a convex polygon, metres.
     normal : ndarray, shape (3,)
         Unit vector out of the solid.
     depth : float
-        Metres that the solid goes on behind all of the face, but for `inset`.
+        Depth of the solid behind all of the face, metres.
     inset : bool
-        Whether it goes on there only as far from the face's rim as it is deep.
+        Whether the solid is only as deep behind a point of the face as the point is from its rim.
     """
 
     corners: Floats
@@ -52,17 +52,19 @@ class Face:
 def seam_boxes(
     shapes: Sequence[Shape], policy: SeamPolicy | None = None
 ) -> list[tuple[int, list[float]]]:
-    """Boxes that fill the seams between solids.
+    """Return boxes that fill the seams between solids.
 
     Parameters
     ----------
     shapes : sequence of Shape
-        The solids.
+        Solids.
+    policy : SeamPolicy, optional
+        Policy of seams.
 
     Returns
     -------
     list of (int, list of float)
-        Number of one of the two solids, and the row of a box for `netsp.world.scene.solids`.
+        Index of one of the two solids, and the row of a box (`netsp.world.scene.solids`).
     """
     policy = policy or SeamPolicy()
     flat = [k for k, s in enumerate(shapes) if isinstance(s, Box | Cylinder | Prism | HalfSpace)]
@@ -83,7 +85,7 @@ def seam_boxes(
 
 
 def _ends(shape: Shape, policy: SeamPolicy) -> Floats:
-    """(2, 3) bounding box; `FAR` where there is no end."""
+    """Return the bounding box (2, 3) of a solid, cut off at a large size where there is no end."""
     found, far = shape.box(), policy.endless_size
     if found is None:
         return np.array([[-far] * 3, [far] * 3])
@@ -93,7 +95,7 @@ def _ends(shape: Shape, policy: SeamPolicy) -> Floats:
 
 
 def _faces(shape: Shape, at: Floats, policy: SeamPolicy) -> Iterator[Face]:
-    """The flat faces of a solid; of those without end the part about a point."""
+    """Yield the flat faces of a solid; of faces without end, the part about a point."""
     if isinstance(shape, Box):
         axes, half = shape.axes(), 0.5 * np.array(shape.size)
         for k in range(3):
@@ -130,14 +132,14 @@ def _faces(shape: Shape, at: Floats, policy: SeamPolicy) -> Iterator[Face]:
 
 
 def _across(axis: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors across an axis and one another."""
+    """Return two unit vectors across an axis and one another."""
     u = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     u /= np.linalg.norm(u)
     return u, np.cross(axis, u)
 
 
 def _between(first: Face, second: Face, policy: SeamPolicy) -> Iterator[list[float]]:
-    """Rows of the boxes between two faces that touch or nearly so."""
+    """Yield the rows of the boxes between two faces that touch or nearly touch."""
     if first.normal @ second.normal > -np.cos(policy.max_angle):
         return
     gap = float((second.corners.mean(0) - first.corners[0]) @ first.normal)
@@ -171,7 +173,7 @@ def _between(first: Face, second: Face, policy: SeamPolicy) -> Iterator[list[flo
 
 
 def _width(shared: Polygon) -> float:
-    """Of the rectangle about a convex polygon, the shorter side."""
+    """Return the shorter side of the rectangle about a convex polygon."""
     if not isinstance(shared, Polygon) or shared.is_empty:
         return 0.0
     corners = np.array(shared.minimum_rotated_rectangle.exterior.coords)[:3]
@@ -179,8 +181,7 @@ def _width(shared: Polygon) -> float:
 
 
 def _rectangles(shared: Polygon, policy: SeamPolicy) -> Iterator[Rectangle]:
-    """Rectangles inside a convex polygon that cover it but for slivers, in a frame of their own:
-    the ends of each, and the first axis of the frame."""
+    """Yield rectangles inside a convex polygon that cover it except for slivers."""
     around = shared.minimum_rotated_rectangle
     corners = np.array(around.exterior.coords)[:4]
     edges = np.diff(corners[:3], axis=0)
@@ -199,7 +200,7 @@ def _rectangles(shared: Polygon, policy: SeamPolicy) -> Iterator[Rectangle]:
 
 
 def _on_sides(shared: Polygon, policy: SeamPolicy) -> Iterator[Rectangle]:
-    """Rectangles of growing heights on each side of a convex polygon."""
+    """Yield rectangles of growing heights on each side of a convex polygon."""
     corners = np.array(orient(shared).exterior.coords)
     for p, q in pairwise(corners):
         length = float(np.linalg.norm(q - p))
@@ -219,7 +220,8 @@ def _on_sides(shared: Polygon, policy: SeamPolicy) -> Iterator[Rectangle]:
 
 
 def _in_strips(shared: Polygon, first: Floats, policy: SeamPolicy) -> Iterator[Rectangle]:
-    """Rectangles between cuts across a convex polygon, in a frame with the given first axis."""
+    """Yield rectangles between cuts across a convex polygon, in a frame with the given first
+    axis."""
     turned = Polygon(
         np.array(shared.exterior.coords) @ np.column_stack([first, [-first[1], first[0]]])
     )

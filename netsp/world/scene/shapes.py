@@ -1,4 +1,4 @@
-"""Solids of a scene: what a file says, and their rows for the kernels."""
+"""Solids of a scene as files state them, and their rows for kernels."""
 
 from __future__ import annotations
 
@@ -20,46 +20,46 @@ SolidRow = tuple[int, list[float]]
 
 
 class Sphere(Model):
-    """A ball."""
+    """Ball."""
 
     center: Annotated[Point3, Field(description="(x, y, z), m")]
     radius: Annotated[Positive, Field(description="m")]
 
     def row(self) -> SolidRow:
-        """Its kind, and the numbers that the kernels read of it (`netsp.world.scene.solids`)."""
+        """Return the kind and the row for kernels (`netsp.world.scene.solids`)."""
         return kinds.CAPSULE, [*self.center, *self.center, self.radius]
 
     def thickness(self) -> float:
-        """Of its thinnest part (m); inf if nothing of it is thin."""
+        """Return the thickness of the thinnest part, metres; infinite for a half space."""
         return 2.0 * self.radius
 
     def box(self) -> Floats:
-        """(2, 3) least and greatest coordinates (m); 0 and 0 where it has no end."""
+        """Return the least and greatest coordinates (2, 3), metres; 0 along axes without end."""
         return _around([self.center], self.radius)
 
 
 class Capsule(Model):
-    """All points within a radius of a segment: a pipe or a strut with round ends."""
+    """All points within a radius of a segment: a pipe or strut with round ends."""
 
     a: Annotated[Point3, Field(description="(x, y, z) of one end of its axis, m")]
     b: Annotated[Point3, Field(description="(x, y, z) of the other end, m")]
     radius: Annotated[Positive, Field(description="m")]
 
     def row(self) -> SolidRow:
-        """Its kind, and the numbers that the kernels read of it (`netsp.world.scene.solids`)."""
+        """Return the kind and the row for kernels (`netsp.world.scene.solids`)."""
         return kinds.CAPSULE, [*self.a, *self.b, self.radius]
 
     def thickness(self) -> float:
-        """Of its thinnest part (m); inf if nothing of it is thin."""
+        """Return the thickness of the thinnest part, metres; infinite for a half space."""
         return 2.0 * self.radius
 
     def box(self) -> Floats:
-        """(2, 3) least and greatest coordinates (m); 0 and 0 where it has no end."""
+        """Return the least and greatest coordinates (2, 3), metres; 0 along axes without end."""
         return _around([self.a, self.b], self.radius)
 
 
 class Cylinder(Model):
-    """A solid cylinder with flat ends: a pipe, a flange."""
+    """Cylinder with flat ends: a pipe, a flange."""
 
     a: Annotated[Point3, Field(description="(x, y, z) of the centre of one face, m")]
     b: Annotated[Point3, Field(description="(x, y, z) of the centre of the other, m")]
@@ -73,20 +73,20 @@ class Cylinder(Model):
 
     @property
     def length(self) -> float:
-        """Of its axis (m)."""
+        """Length of its axis, metres."""
         return math.dist(self.a, self.b)
 
     def row(self) -> SolidRow:
-        """Its kind, and the numbers that the kernels read of it (`netsp.world.scene.solids`)."""
+        """Return the kind and the row for kernels (`netsp.world.scene.solids`)."""
         axis = (np.array(self.b) - np.array(self.a)) / self.length
         return kinds.CYLINDER, [*self.a, *axis, self.radius, self.length]
 
     def thickness(self) -> float:
-        """Of its thinnest part (m); inf if nothing of it is thin."""
+        """Return the thickness of the thinnest part, metres; infinite for a half space."""
         return min(2.0 * self.radius, self.length)
 
     def box(self) -> Floats:
-        """(2, 3) least and greatest coordinates (m); 0 and 0 where it has no end."""
+        """Return the least and greatest coordinates (2, 3), metres; 0 along axes without end."""
         axis = (np.array(self.b) - np.array(self.a)) / self.length
         reach = self.radius * np.sqrt(np.maximum(0.0, 1.0 - axis**2))
         ends = np.array([self.a, self.b])
@@ -94,7 +94,7 @@ class Cylinder(Model):
 
 
 class Box(Model):
-    """A box of a full size, turned by angles in degrees about x, then y, then z."""
+    """Box of a full size, turned by angles in degrees about x, then y, then z."""
 
     center: Annotated[Point3, Field(description="(x, y, z), m")]
     size: Annotated[
@@ -105,29 +105,31 @@ class Box(Model):
     ] = (0.0, 0.0, 0.0)
 
     def axes(self) -> Floats:
-        """Rows: the axes of the box in the world."""
+        """Return the axes of the box in the world, as rows."""
         from scipy.spatial.transform import Rotation
 
         return np.asarray(Rotation.from_euler("xyz", self.rotation, degrees=True).as_matrix().T)
 
     def row(self) -> SolidRow:
-        """Its kind, and the numbers that the kernels read of it (`netsp.world.scene.solids`)."""
+        """Return the kind and the row for kernels (`netsp.world.scene.solids`)."""
         half = [0.5 * s for s in self.size]
         return kinds.BOX, [*self.center, *half, *self.axes().ravel()]
 
     def thickness(self) -> float:
-        """Of its thinnest part (m); inf if nothing of it is thin."""
+        """Return the thickness of the thinnest part, metres; infinite for a half space."""
         return min(self.size)
 
     def box(self) -> Floats:
-        """(2, 3) least and greatest coordinates (m); 0 and 0 where it has no end."""
+        """Return the least and greatest coordinates (2, 3), metres; 0 along axes without end."""
         reach = 0.5 * np.abs(self.axes()).T @ np.array(self.size)
         return np.array([np.array(self.center) - reach, np.array(self.center) + reach])
 
 
 class Torus(Model):
-    """All points within `minor_radius` of an arc of `major_radius` about an axis, that begins in
-    the direction `start` and turns by `angle` degrees: a ring, or an elbow of a pipe."""
+    """All points within a radius of an arc: a ring, or an elbow of a pipe.
+
+    The arc begins in the direction `start`, and turns by `angle` degrees about `axis`.
+    """
 
     center: Annotated[Point3, Field(description="(x, y, z), m")]
     axis: Annotated[Point3, Field(description="direction (x, y, z), of any length")] = (
@@ -164,7 +166,7 @@ class Torus(Model):
         return self
 
     def frame(self) -> tuple[Floats, Floats, Floats]:
-        """Unit axis, start and their cross product."""
+        """Return the unit axis, the start, and their cross product."""
         axis = np.array(self.axis) / np.linalg.norm(self.axis)
         start = np.array(self.start if self.start is not None else np.eye(3)[np.abs(axis).argmin()])
         start = start - (start @ axis) * axis
@@ -172,7 +174,7 @@ class Torus(Model):
         return axis, start, np.cross(axis, start)
 
     def row(self) -> SolidRow:
-        """Its kind, and the numbers that the kernels read of it (`netsp.world.scene.solids`)."""
+        """Return the kind and the row for kernels (`netsp.world.scene.solids`)."""
         axis, start, _ = self.frame()
         angle = math.radians(self.angle)
         return kinds.TORUS, [
@@ -185,41 +187,41 @@ class Torus(Model):
         ]
 
     def thickness(self) -> float:
-        """Of its thinnest part (m); inf if nothing of it is thin."""
+        """Return the thickness of the thinnest part, metres; infinite for a half space."""
         return 2.0 * self.minor_radius
 
     def centreline(self) -> Floats:
-        """(k, 3) points of the arc."""
+        """Return points (k, 3) of the arc."""
         _, start, across = self.frame()
         t = np.radians(np.linspace(0.0, self.angle, max(3, int(self.angle / 5.0) + 1)))[:, None]
         return self.center + self.major_radius * (np.cos(t) * start + np.sin(t) * across)
 
     def box(self) -> Floats:
-        """(2, 3) least and greatest coordinates (m); 0 and 0 where it has no end."""
+        """Return the least and greatest coordinates (2, 3), metres; 0 along axes without end."""
         return _around(self.centreline(), self.minor_radius + 0.002 * self.major_radius)
 
 
 class Post(Model):
-    """A vertical cylinder without ends."""
+    """Vertical cylinder without ends."""
 
     center: Annotated[Point2, Field(description="(x, y) of an upright post through all depths, m")]
     radius: Annotated[Positive, Field(description="m")]
 
     def row(self) -> SolidRow:
-        """Its kind, and the numbers that the kernels read of it (`netsp.world.scene.solids`)."""
+        """Return the kind and the row for kernels (`netsp.world.scene.solids`)."""
         return kinds.POST, [*self.center, self.radius]
 
     def thickness(self) -> float:
-        """Of its thinnest part (m); inf if nothing of it is thin."""
+        """Return the thickness of the thinnest part, metres; infinite for a half space."""
         return 2.0 * self.radius
 
     def box(self) -> Floats:
-        """(2, 3) least and greatest coordinates (m); 0 and 0 where it has no end."""
+        """Return the least and greatest coordinates (2, 3), metres; 0 along axes without end."""
         return _around([(*self.center, 0.0)], self.radius) * [1.0, 1.0, 0.0]
 
 
 class Prism(Model):
-    """A vertical prism without ends over a simple polygon, grown by `grow`."""
+    """Vertical prism without ends over a simple polygon, grown by `grow`."""
 
     polygon: Annotated[
         Annotated[tuple[Point2, ...], Field(min_length=3)],
@@ -235,15 +237,15 @@ class Prism(Model):
         return self
 
     def row(self) -> SolidRow:
-        """Its kind, and the numbers that the kernels read of it (`netsp.world.scene.solids`)."""
+        """Return the kind and the row for kernels (`netsp.world.scene.solids`)."""
         return kinds.PRISM, [0.0, 0.0, self.grow]
 
     def thickness(self) -> float:
-        """Of its thinnest part (m); inf if nothing of it is thin."""
+        """Return the thickness of the thinnest part, metres; infinite for a half space."""
         return polygon_thickness(self.polygon) + 2.0 * self.grow
 
     def box(self) -> Floats:
-        """(2, 3) least and greatest coordinates (m); 0 and 0 where it has no end."""
+        """Return the least and greatest coordinates (2, 3), metres; 0 along axes without end."""
         xy = np.array(self.polygon)
         flat = np.column_stack([xy, np.zeros(len(xy))])
         return _around(flat, self.grow) * [1.0, 1.0, 0.0]
@@ -266,16 +268,16 @@ class HalfSpace(Model):
         return self
 
     def row(self) -> SolidRow:
-        """Its kind, and the numbers that the kernels read of it (`netsp.world.scene.solids`)."""
+        """Return the kind and the row for kernels (`netsp.world.scene.solids`)."""
         n = np.array(self.normal) / np.linalg.norm(self.normal)
         return kinds.HALF_SPACE, [*self.point, *n]
 
     def thickness(self) -> float:
-        """Of its thinnest part (m); inf if nothing of it is thin."""
+        """Return the thickness of the thinnest part, metres; infinite for a half space."""
         return math.inf
 
     def box(self) -> None:
-        """None: it has no end."""
+        """Return None, because a half space has no end."""
         return None
 
 

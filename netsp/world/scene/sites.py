@@ -1,9 +1,9 @@
-"""What grid points measure their distance to: triangles, or points with a radius. Compiled.
+"""Sites, to which grid points measure their distance: triangles, or points with a radius. Compiled.
 
-A site is a row of numbers. Of a point: its place (3) and a radius, that is taken off the distance.
-Of a triangle: a corner (3), 0, the edges b and c from there (3, 3), the vectors p and q (3, 3) in
-its plane that tell how far along each a point is (p · b = 1, p · c = 0, q · b = 0, q · c = 1), a
-unit normal (3) and 1 where it has no area.
+A site is a row of numbers. The row of a point holds its position (3) and a radius, which is
+subtracted from the distance. The row of a triangle holds a corner (3), 0, the edges b and c from
+that corner (3, 3), the vectors p and q (3, 3) in its plane that give a point's coordinates along
+the edges (p · b = 1, p · c = 0, q · b = 0, q · c = 1), a unit normal (3), and 1 if it has no area.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ TRIANGLE = 20
 
 
 def point_sites(points: Floats, radii: npt.ArrayLike = 0.0) -> Floats:
-    """Rows of points (n, 3) with radii (n,) or one."""
+    """Return the rows of points (n, 3) with radii (n,) or one radius."""
     return np.column_stack([points, np.broadcast_to(radii, len(points))]).astype(float, order="C")
 
 
 def triangle_sites(triangles: Floats) -> Floats:
-    """Rows of triangles (n, 3, 3)."""
+    """Return the rows of triangles (n, 3, 3)."""
     b, c = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     bb, bc, cc = ((u * v).sum(1) for u, v in ((b, b), (b, c), (c, c)))
     det = bb * cc - bc * bc
@@ -46,11 +46,11 @@ def triangle_sites(triangles: Floats) -> Floats:
 
 @kernel
 def site_distance(sites: Floats, s: int, x: float, y: float, z: float) -> float:
-    """Distance of a place to a site. (Its row is not taken out: that counts a reference, which
-    takes longer than the distance.)
+    """Return the distance of a place to a site.
 
-    The closest point of a triangle is the foot of the perpendicular where that lies inside, else it
-    is on an edge that the foot is beyond.
+    The closest point of a triangle is the foot of the perpendicular if it lies inside, else it is
+    on an edge that the foot is beyond. The row is not taken out of the array, because counting the
+    reference would take longer than the distance.
     """
     x, y, z = x - sites[s, 0], y - sites[s, 1], z - sites[s, 2]
     if sites.shape[1] == POINT:
@@ -74,7 +74,7 @@ def site_distance(sites: Floats, s: int, x: float, y: float, z: float) -> float:
 
 @kernel
 def _squared(px: float, py: float, pz: float, ex: float, ey: float, ez: float) -> float:
-    """Squared distance of a point p to the edge from the origin to e."""
+    """Return the squared distance of a point p to the edge from the origin to e."""
     ee = ex * ex + ey * ey + ez * ez
     f = min(1.0, max(0.0, (px * ex + py * ey + pz * ez) / ee)) if ee > 0.0 else 0.0
     qx, qy, qz = px - f * ex, py - f * ey, pz - f * ez
@@ -83,7 +83,7 @@ def _squared(px: float, py: float, pz: float, ex: float, ey: float, ez: float) -
 
 @kernel
 def extent(sites: Floats, s: int, axis: int) -> tuple[float, float]:
-    """Least and greatest coordinate of a site along an axis, without its radius."""
+    """Return the least and greatest coordinate of a site along an axis, without its radius."""
     a = sites[s, axis]
     if sites.shape[1] == POINT:
         return a, a

@@ -1,9 +1,9 @@
-"""Signed distance and its gradient, exact for each kind of solid. Compiled, no policy.
+"""Signed distance and gradient of each kind of solid, exact. Compiled.
 
-A solid is a kind and a row of up to 16 numbers (`netsp.world.scene.shapes` has them), here from
-place r on in the one vector of a field (`netsp.world.scene.packing`). Distances are to the
-surface, negative inside; gradients are unit vectors away from the solid. Formulas: the closest
-point of each solid, by hand.
+A solid is a kind and a row of up to 16 numbers (`netsp.world.scene.shapes` lists them), here from
+place r on in the vector of a field (`netsp.world.scene.packing`). Distances are to the surface,
+negative inside; gradients are unit vectors away from the solid. All formulas find the closest point
+of the solid.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ CAPSULE, CYLINDER, BOX, TORUS, POST, PRISM, HALF_SPACE = range(7)
 def solid_distance(
     data: Floats, at: int, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
-    """(d, gx, gy, gz) at a point, of the solid with its kind at data[at] and its row behind."""
+    """Return distance and gradient at a point of the solid whose kind is data[at], before its
+    row."""
     kind, r = int(data[at]), at + 1
     if kind == CAPSULE:
         return capsule(data, r, x, y, z)
@@ -42,7 +43,7 @@ def solid_distance(
 
 @kernel
 def capsule_gap(data: Floats, r: int, x: float, y: float, z: float) -> float:
-    """The distance of `capsule` alone."""
+    """Return the distance of `capsule` alone."""
     px, py, pz = _three(data, r)
     qx, qy, qz = _three(data, r + 3)
     ax, ay, az = qx - px, qy - py, qz - pz
@@ -57,7 +58,7 @@ def capsule_gap(data: Floats, r: int, x: float, y: float, z: float) -> float:
 
 @kernel
 def cylinder_gap(data: Floats, r: int, x: float, y: float, z: float) -> float:
-    """The distance of `_cylinder` alone."""
+    """Return the distance of `_cylinder` alone."""
     px, py, pz = _three(data, r)
     ux, uy, uz = _three(data, r + 3)
     vx, vy, vz = x - px, y - py, z - pz
@@ -72,7 +73,7 @@ def cylinder_gap(data: Floats, r: int, x: float, y: float, z: float) -> float:
 
 @kernel
 def box_gap(data: Floats, r: int, x: float, y: float, z: float) -> float:
-    """The distance of `_box` alone."""
+    """Return the distance of `_box` alone."""
     px, py, pz = _three(data, r)
     vx, vy, vz = x - px, y - py, z - pz
     best, squares = -math.inf, 0.0
@@ -87,13 +88,13 @@ def box_gap(data: Floats, r: int, x: float, y: float, z: float) -> float:
 
 @kernel
 def _three(data: Floats, at: int) -> tuple[float, float, float]:
-    """A point or vector of a row."""
+    """Return a point or vector of a row."""
     return data[at], data[at + 1], data[at + 2]
 
 
 @kernel
 def _round(vx: float, vy: float, vz: float, radius: float) -> tuple[float, float, float, float]:
-    """From the vector out of the closest point of the core."""
+    """Return distance and gradient for the vector v from the closest point of the core."""
     length = math.sqrt(vx * vx + vy * vy + vz * vz)
     if length == 0.0:
         return -radius, 1.0, 0.0, 0.0
@@ -104,7 +105,7 @@ def _round(vx: float, vy: float, vz: float, radius: float) -> tuple[float, float
 def capsule(
     data: Floats, r: int, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
-    """All points within a radius of a segment: its ends (3, 3), radius."""
+    """Measure a capsule: ends of its axis (3, 3), radius."""
     px, py, pz = _three(data, r)
     qx, qy, qz = _three(data, r + 3)
     ax, ay, az = qx - px, qy - py, qz - pz
@@ -120,7 +121,7 @@ def capsule(
 def _cylinder(
     data: Floats, r: int, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
-    """A solid cylinder with flat ends: start (3) and unit vector (3) of its axis, radius,
+    """Measure a solid cylinder with flat ends: start (3) and unit vector (3) of its axis, radius,
     length."""
     px, py, pz = _three(data, r)
     ux, uy, uz = _three(data, r + 3)
@@ -153,7 +154,7 @@ def _cylinder(
 
 @kernel
 def _box(data: Floats, r: int, x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    """Centre (3), half sizes (3), the three axes (9)."""
+    """Measure a box: centre (3), half sizes (3), axes (9)."""
     px, py, pz = _three(data, r)
     vx, vy, vz = x - px, y - py, z - pz
     best, axis, sign, squares = -math.inf, 0, 1.0, 0.0
@@ -177,9 +178,11 @@ def _box(data: Floats, r: int, x: float, y: float, z: float) -> tuple[float, flo
 
 @kernel
 def _torus(data: Floats, r: int, x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    """All points within a radius of an arc: its centre (3), axis (3), direction of its first point
-    (3), radius of the arc, radius about it, angle that it turns by about the axis (2 pi:
-    closed)."""
+    """Measure a torus, or the part of one about an arc.
+
+    The row holds its centre (3), axis (3), direction of its first point (3), radius of the arc,
+    radius about the arc, and the angle of the arc, 2 pi if it is closed.
+    """
     px, py, pz = _three(data, r)
     ax, ay, az = _three(data, r + 3)
     sx, sy, sz = _three(data, r + 6)
@@ -204,8 +207,8 @@ def _torus(data: Floats, r: int, x: float, y: float, z: float) -> tuple[float, f
 
 @kernel
 def _prism(data: Floats, r: int, x: float, y: float) -> tuple[float, float, float, float]:
-    """A vertical prism without ends over a polygon: where its corners (x, y) begin and end in the
-    vector, what it is grown by."""
+    """Measure a vertical prism without ends: range of its corners (x, y) in the vector, and
+    growth."""
     start, stop, grow = int(data[r]), int(data[r + 1]), data[r + 2]
     best, inside = math.inf, False
     vx, vy, nx, ny = 0.0, 0.0, 1.0, 0.0

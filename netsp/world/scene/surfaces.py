@@ -49,8 +49,10 @@ class SurfacePolicy:
 def surface_of(
     shape: Shape, low: Floats, high: Floats, policy: SurfacePolicy | None = None
 ) -> Triangles:
-    """Vertices (n, 3) and faces (m, 3) of a shape; what has no end is cut off at the corners `low`
-    and `high` (3,) of the picture."""
+    """Return the vertices (n, 3) and faces (m, 3) of a shape.
+
+    A shape without end is cut off at the corners `low` and `high` (3,) of the picture.
+    """
     sides = (policy or SurfacePolicy()).circle_sides
     if isinstance(shape, Sphere):
         return _tube(np.array([shape.center, shape.center]), shape.radius, sides, round_ends=True)
@@ -80,7 +82,7 @@ _BOX = np.array(
 
 
 def _tube(line: Floats, radius: float, sides: int, round_ends: bool = False) -> Triangles:
-    """A tube about a line of points, with flat or round ends."""
+    """Return a tube about a line of points, with flat or round ends."""
     ahead = np.diff(line, axis=0, append=2 * line[-1:] - line[-2:-1])
     if not np.any(ahead):
         ahead[:] = [0.0, 0.0, 1.0]
@@ -157,7 +159,7 @@ def _plane(shape: HalfSpace, low: Floats, high: Floats) -> Triangles:
 
 
 def extent(scene: Scene, *points: Floats) -> tuple[Floats, Floats]:
-    """Corners of what a picture of the scene shows, with some room."""
+    """Return the corners of the box that a picture of the scene shows, with some room."""
     boxes = [np.asarray(p, dtype=float).reshape(-1, 3) for p in points if len(p)]
     flat = []
     for solid in scene.all_solids():
@@ -188,7 +190,7 @@ def extent(scene: Scene, *points: Floats) -> tuple[Floats, Floats]:
 
 
 def drawn_points(scene: Scene, policy: SurfacePolicy | None = None) -> Floats:
-    """Some of the points of the scene's cloud."""
+    """Return evenly chosen points of the scene's cloud, few enough to draw."""
     from netsp.world.scene.readers import load_cloud
 
     assert scene.cloud is not None

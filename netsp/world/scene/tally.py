@@ -1,4 +1,4 @@
-"""Numbers of points, cells or faces of a file that are used, and left out by reason."""
+"""Counts of the points, cells or faces of a file that are used, and left out by reason."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from netsp.base.errors import counted
 
 @dataclass(frozen=True)
 class Tally:
-    """Numbers of parts of a file.
+    """Counts of the parts of a file.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Tally:
 
     @property
     def note(self) -> str:
-        """Return how many parts are used; empty where all of them are."""
+        """Statement of how many parts are used; empty if all are."""
         if not self.left_out:
             return ""
         return f"{self.used} of {counted(self.total, self.part)} used"

@@ -1,10 +1,10 @@
-"""From a mesh or a cloud of points to a grid of signed distances, true to a fraction of a voxel.
+"""Grids of signed distances from meshes and clouds of points, true to a fraction of a voxel.
 
-Distances: every grid point near the surface knows its nearest triangle (or point) exactly; sweeps
-in the eight diagonal directions hand it on to the neighbours, that measure for themselves (a
-closest point transform). Signs: a closed mesh winds around its inside, so whatever it winds around
-is solid (overlapping parts unite); an open mesh or a cloud has no inside by itself, so water floods
-the grid from its border, and what it does not reach is solid.
+Distances: every grid point near a surface measures its nearest triangle or point. Sweeps in the
+eight diagonal directions hand the site on to neighbours, which measure their own distance to it (a
+closest point transform). Signs: whatever a closed mesh winds around is solid, so overlapping parts
+are united. An open mesh or a cloud has no inside of its own, so water floods the grid from its
+border, and what it does not reach is solid.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ def grid_of_mesh_file(
     on_progress: OnStage = None,
     policy: GridPolicy | None = None,
 ) -> VoxelGrid:
-    """The distance grid of a mesh file in any format that trimesh reads (STL, OBJ, PLY, GLB, …).
+    """Return the distance grid of a mesh file in any format that trimesh reads (STL, OBJ, PLY, GLB,
+    …).
 
     Raises
     ------
@@ -67,7 +68,8 @@ def grid_of_meshes(
     source: str = "mesh",
     policy: GridPolicy | None = None,
 ) -> VoxelGrid:
-    """The distance grid of several meshes together: vertices (n, 3) and faces (m, 3) of each."""
+    """Return the distance grid of several meshes together: vertices (n, 3) and faces (m, 3) of
+    each."""
     first = np.cumsum([0, *(len(v) for v, _ in parts)])
     return grid_of_triangles(
         np.vstack([v for v, _ in parts]),
@@ -92,7 +94,7 @@ def grid_of_triangles(
     source: str = "mesh",
     policy: GridPolicy | None = None,
 ) -> VoxelGrid:
-    """The distance grid of triangles: vertices (n, 3), faces (m, 3)."""
+    """Return the distance grid of triangles with vertices (n, 3) and faces (m, 3)."""
     v, f = np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.int64)
     if f.size == 0:
         raise InputError(f"{source}: expected a mesh with triangles, got none")
@@ -119,7 +121,7 @@ def grid_of_triangles(
 
 @dataclass
 class _Triangles:
-    """Triangles (m, 3, 3) of a mesh, with their sites and what is known of their edges."""
+    """Triangles (m, 3, 3) of a mesh, their sites, and counts of edges and parts with defects."""
 
     triangles: Floats
     sites: Floats
@@ -140,7 +142,7 @@ class _Triangles:
     def values(
         self, lattice: Lattice, on_progress: OnStage, source: str, sheet_voxels: float
     ) -> tuple[Singles, list[str]]:
-        """Return the signed distances at the points of a lattice, and what was assumed."""
+        """Return the signed distances at the points of a lattice, and notes on what was assumed."""
         size, notes = lattice.size, []
         values = lattice.closest(self.sites, on_progress, whose=False)[0]
         if self.open_edges:
@@ -181,8 +183,11 @@ def grid_of_cloud_file(
     on_progress: OnStage = None,
     policy: GridPolicy | None = None,
 ) -> VoxelGrid:
-    """The distance grid of a cloud file in any format of `netsp.world.scene.readers.load_cloud`.
-    InputError as for `grid_of_mesh_file`."""
+    """Return the distance grid of a cloud file in any format of
+    `netsp.world.scene.readers.load_cloud`.
+
+    InputError as for `grid_of_mesh_file`.
+    """
     points, notes = load_cloud(path, Placement(scale))
     grid = grid_of_cloud(
         points,
@@ -204,12 +209,12 @@ def grid_of_cloud(
     source: str = "cloud",
     policy: GridPolicy | None = None,
 ) -> VoxelGrid:
-    """The distance grid of a cloud (n, 3) that lies on the surface of something solid.
+    """Return the distance grid of a cloud (n, 3) that lies on the surface of something solid.
 
-    The cloud is closed: balls of radius r about the points, r wide enough to shut the gaps between
-    neighbours, keep the water out; what it does not reach is then eroded by r again. So the surface
-    passes through the points and bridges gaps of up to about 2 r. Where nothing solid would be left
-    (a sheet of points) the points themselves are, `SHEET` voxels to either side.
+    The cloud is closed: balls about the points, of a radius r that shuts the gaps between
+    neighbours, keep the water out. What the water does not reach is then eroded by r again. So the
+    surface passes through the points and bridges gaps of up to about 2 r. Where nothing solid would
+    be left, as of a sheet of points, the solid is the points, thickened on both sides.
     """
     p = _points(points, source)
     low, high = p.min(0), p.max(0)
@@ -238,7 +243,7 @@ def _points(points: npt.ArrayLike, source: str) -> Floats:
 
 
 def _ball(p: Floats, size: float) -> float:
-    """Radius of the balls about points that keep the water out, metres."""
+    """Return the radius of the balls about points that keep the water out, metres."""
     from scipy.spatial import cKDTree
 
     near, _ = cKDTree(p).query(p, k=min(7, len(p)))
@@ -254,8 +259,8 @@ def _cloud_values(
     source: str,
     sheet_voxels: float,
 ) -> tuple[Singles, list[str], float]:
-    """Return the signed distances at the points of a lattice, what was assumed, and by how much
-    the solid is larger than the box of the points."""
+    """Return the signed distances at the points of a lattice, notes, and growth beyond the points'
+    box."""
     size = lattice.size
     distances, owner = lattice.closest(sites, on_progress)
     tell(on_progress, "flood", 0.5)
@@ -310,16 +315,18 @@ def grid_of_meshes_and_cloud(
     voxel : float, optional
         Edge of a voxel, metres.
     memory_limit : float
-        GiB.
+        Maximum memory, GiB.
     on_progress : callable, optional
         Called with (stage, fraction done).
     source : str
         Name of the scene, for messages.
+    policy : GridPolicy, optional
+        Policy of grids.
 
     Raises
     ------
     InputError
-        As for `grid_of_triangles` and `grid_of_cloud`.
+        As `grid_of_triangles` and `grid_of_cloud` raise it.
     """
     p = _points(points, source)
     first = np.cumsum([0, *(len(v) for v, _ in parts)])
@@ -375,10 +382,16 @@ def _lattice(
     triangles: Floats | None = None,
     region: Floats | None = None,
 ) -> Lattice:
-    """The points at which the grid is built; `shell` in voxels, `extra` room in metres,
-    `block` the bytes of one at the peak.
+    """Return the points at which the grid is built; InputError if there are too many.
 
-    InputError when there would be too many.
+    Parameters
+    ----------
+    shell : float
+        Half thickness of an open mesh, voxels.
+    extra : float
+        Room around the solid in addition to that of the policy, metres.
+    has_cloud : bool
+        Whether a cloud needs memory, too.
     """
     low, high, size = place.low, place.high, place.size
     memory = place.memory_limit * 2**30
@@ -417,7 +430,7 @@ def _lattice(
 
 
 def _size(low: Floats, high: Floats, voxel: float | None, source: str, policy: GridPolicy) -> float:
-    """Edge of a voxel, metres."""
+    """Return the edge of a voxel, metres."""
     if voxel is not None and not 0.0 < voxel < math.inf:
         raise InputError(f"{source}: voxel: expected a positive length, got {voxel!r}")
     side = float((high - low).max())
@@ -427,8 +440,11 @@ def _size(low: Floats, high: Floats, voxel: float | None, source: str, policy: G
 
 
 def _edges(faces: npt.NDArray[np.int64], vertices: Floats) -> tuple[int, int]:
-    """How many edges have one triangle only, and at how many the triangles disagree on the side
-    that is out. Vertices at the same place count as one (STL files repeat them)."""
+    """Return the numbers of open edges, and of edges at which the triangles disagree on the
+    outside.
+
+    Vertices at the same place count as one, because STL files repeat them.
+    """
     _, same = np.unique(np.round(vertices, 9), axis=0, return_inverse=True)
     f = same.ravel()[faces]
     f = f[(f[:, 0] != f[:, 1]) & (f[:, 1] != f[:, 2]) & (f[:, 2] != f[:, 0])]
@@ -441,8 +457,11 @@ def _edges(faces: npt.NDArray[np.int64], vertices: Floats) -> tuple[int, int]:
 
 
 def _outward(faces: npt.NDArray[np.int64], vertices: Floats) -> tuple[npt.NDArray[np.int64], int]:
-    """The faces with every connected part turned so that its volume is positive, and how many parts
-    were not. So overlapping parts never cancel, and what is in a cavity is solid."""
+    """Return the faces with every connected part of positive volume, and the number of parts
+    turned.
+
+    So overlapping parts never cancel, and cavities are solid.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -460,7 +479,7 @@ def _outward(faces: npt.NDArray[np.int64], vertices: Floats) -> tuple[npt.NDArra
 
 
 def _spacing(points: Floats) -> float:
-    """A rough distance between neighbours, for the room around a cloud."""
+    """Return a rough distance between neighbours, for the room around a cloud, metres."""
     from scipy.spatial import cKDTree
 
     some = points[:: max(1, len(points) // 2000)]
