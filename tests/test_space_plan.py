@@ -324,7 +324,7 @@ def test_a_detour_past_the_free_end_of_a_bar_saves_the_way_back_around_it(monkey
     scene, mission = A_BAR, Mission.model_validate(BESIDE_A_BAR)
     found = plan(mission, scene=scene)
     assert verify_mission(found.to_mission(), scene=scene)
-    monkeypatch.setattr("netsp.plan.space.space_plan.Detours.shortened", lambda *_: None)
+    monkeypatch.setattr("netsp.plan.space.space_plan.Detours.shorten", lambda *_: None)
     taut = plan(mission, scene=scene)
     assert taut.result.status.value == "optimal_of_states"
     assert found.length < taut.length - 0.1

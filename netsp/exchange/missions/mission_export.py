@@ -229,7 +229,7 @@ def _checked(context: PlanningContext, points: list[Waypoint], line: Floats, exa
                 raise InputError(
                     f"mission: at waypoint #{p.goal} the lines are not of the planned class"
                 )
-    _, longest = context.drive(tether, line, fine=True)
+    _, longest = context.drive(tether, line, is_fine=True)
     limit = context.mission.tether_length
     if longest > limit:
         raise InputError(

@@ -120,34 +120,34 @@ class StateGraph:
         bool
             Whether there was time for all of them.
         """
-        whole = True
+        is_complete = True
         for v in range(len(self._out), len(self.states.entries)):
             # one way to each waypoint there must be
-            whole = whole and not clock.up
-            first = self.states.at_place[self.states.entries[v].place][0] == v
-            self._out.append(self._path_along_tether(v) if whole or first else None)
+            is_complete = is_complete and not clock.up
+            is_first = self.states.at_place[self.states.entries[v].place][0] == v
+            self._out.append(self._path_along_tether(v) if is_complete or is_first else None)
         if self.states.present is not None and self._out[self.states.present] is None:
             # the robot is there, and may go back along its tether whatever the clearance
             self._out[self.states.present] = np.vstack(
                 [self.context.start_tether.nodes[::-1], self.context.present_tether.nodes[1:]]
             )
-        every = dict[tuple[int, int], Floats]()
+        legs_by_pair = dict[tuple[int, int], Floats]()
         self._one_way = {}
         for v, w, path, both in legs.both_directions():
             pair = (min(v, w), max(v, w))
             if pair not in self._forbidden:
-                every[pair] = path if v < w else path[::-1]
+                legs_by_pair[pair] = path if v < w else path[::-1]
                 if not both:
                     self._one_way[pair] = v < w
-        self._find_ways(every)
+        self._measure_paths_home(legs_by_pair)
         self.legs = {
             (v, w): path
-            for (v, w), path in every.items()
+            for (v, w), path in legs_by_pair.items()
             if polylines.length(path) < self._home[v] + self._home[w]
             or self._via.get(v) == w
             or self._via.get(w) == v
         }
-        return whole
+        return is_complete
 
     def _path_along_tether(self, v: int) -> Floats | None:
         """Return the path from the start along a state's tether, pulled taut in its class; None if
@@ -156,28 +156,28 @@ class StateGraph:
         line = np.vstack([self.context.start_tether.nodes[::-1], tether.nodes[1:]])
         return self.context.pull_taut_nearby(line)
 
-    def _find_ways(self, legs: dict[tuple[int, int], Floats]) -> None:
+    def _measure_paths_home(self, legs: dict[tuple[int, int], Floats]) -> None:
         """How far it is from the start to each state: along its own tether, or where the robot has
         no room on that way, by way of others, there and back."""
-        beside: dict[int, list[tuple[int, float]]] = {}
+        legs_from: dict[int, list[tuple[int, float]]] = {}
         for (v, w), path in legs.items():
             if (v, w) in self._one_way:
                 continue
-            far = polylines.length(path)
-            beside.setdefault(v, []).append((w, far))
-            beside.setdefault(w, []).append((v, far))
+            length = polylines.length(path)
+            legs_from.setdefault(v, []).append((w, length))
+            legs_from.setdefault(w, []).append((v, length))
         self._home = [np.inf if path is None else polylines.length(path) for path in self._out]
         self._via = {}
-        waiting = [(far, v) for v, far in enumerate(self._home) if np.isfinite(far)]
+        waiting = [(length, v) for v, length in enumerate(self._home) if np.isfinite(length)]
         heapq.heapify(waiting)
         while waiting:
-            far, v = heapq.heappop(waiting)
-            if far > self._home[v] or not self._has_clearance(v):
+            length, v = heapq.heappop(waiting)
+            if length > self._home[v] or not self._has_clearance(v):
                 continue
-            for w, leg in beside.get(v, ()):
-                if self._out[w] is None and far + leg < self._home[w]:
-                    self._home[w], self._via[w] = far + leg, v
-                    heapq.heappush(waiting, (far + leg, w))
+            for w, leg in legs_from.get(v, ()):
+                if self._out[w] is None and length + leg < self._home[w]:
+                    self._home[w], self._via[w] = length + leg, v
+                    heapq.heappush(waiting, (length + leg, w))
 
     def _has_clearance(self, v: int) -> bool:
         """Whether others may be reached by way of a state: its waypoint may be nearer to solids
@@ -262,7 +262,7 @@ class StateGraph:
         if self.legs.pop(pair, None) is None:
             self._cut.add(pair)
         else:
-            self._find_ways(self.legs)
+            self._measure_paths_home(self.legs)
         self._forbidden.add(pair)
         return pair not in self._cut
 
@@ -279,12 +279,12 @@ class StateGraph:
         return all(np.isfinite(self._home[v]) for v in tour)
 
     @property
-    def _usable(self) -> list[int]:
+    def _reached_states(self) -> list[int]:
         """States that the robot gets to."""
         return [v for v, far in enumerate(self._home) if np.isfinite(far)]
 
     def solve(
-        self, clock: Clock, warm: Sequence[int] | None = None, **how: Any
+        self, clock: Clock, warm_start: Sequence[int] | None = None, **options: Any
     ) -> tuple[Result, list[int]] | None:
         """The graph as it is now, solved.
 
@@ -292,7 +292,7 @@ class StateGraph:
         ----------
         clock : Clock
             When it is up, the result is the best by then.
-        warm : sequence of int, optional
+        warm_start : sequence of int, optional
             States of a tour to start from.
         **how : Any
             As of `netsp.plan.solve_problem.solve_graph`.
@@ -305,12 +305,12 @@ class StateGraph:
             States in the order of its tour, but for that which the mission begins in.
             None in place of both where there is no tour.
         """
-        some = self._usable
-        vertex = {v: k for k, v in enumerate(some, 1)}
-        home = np.array([self._home[v] for v in some])
-        costs = np.zeros((len(some) + 1, len(some) + 1))
-        costs[1:, 1:] = home[:, None] + home[None, :]
-        costs[0, 1:] = costs[1:, 0] = home
+        usable = self._reached_states
+        vertex = {v: k for k, v in enumerate(usable, 1)}
+        lengths = np.array([self._home[v] for v in usable])
+        costs = np.zeros((len(usable) + 1, len(usable) + 1))
+        costs[1:, 1:] = lengths[:, None] + lengths[None, :]
+        costs[0, 1:] = costs[1:, 0] = lengths
         for (v, w), path in self.legs.items():
             if v in vertex and w in vertex:
                 costs[vertex[v], vertex[w]] = costs[vertex[w], vertex[v]] = polylines.length(path)
@@ -318,7 +318,7 @@ class StateGraph:
             a, b = vertex.get(v, 0), vertex.get(w, 0)
             costs[a, b] = costs[b, a] = np.inf
         places, begin = self.states.places, self.states.present
-        waypoint = [int(places.waypoint[self.states.entries[v].place]) for v in some]
+        waypoint = [int(places.waypoint[self.states.entries[v].place]) for v in usable]
         cluster = np.r_[0, 1 + np.unique(waypoint, return_inverse=True)[1]]
         try:
             graph = TravelGraph.from_costs(costs, cluster)
@@ -326,14 +326,14 @@ class StateGraph:
             return None
         if begin is not None:
             graph = from_state(graph, vertex[begin])
-        first = [0] if begin is None else [0, vertex[begin]]
+        fixed_start = [0] if begin is None else [0, vertex[begin]]
         start = None
-        if warm is not None and all(v in vertex for v in warm):
-            start = [*first, *(vertex[v] for v in warm)]
-        result = solve_graph(graph, time_limit=clock, warm_start=start, **how)
+        if warm_start is not None and all(v in vertex for v in warm_start):
+            start = [*fixed_start, *(vertex[v] for v in warm_start)]
+        result = solve_graph(graph, time_limit=clock, warm_start=start, **options)
         if result.tour is None:
             return None
-        return result, [some[int(k) - 1] for k in result.tour[len(first) :]]
+        return result, [usable[int(k) - 1] for k in result.tour[len(fixed_start) :]]
 
     def drive_out_and_back(self) -> DrivenTour | None:
         """Drive a tour that goes out to each waypoint along a taut tether, and back the same path.
@@ -355,28 +355,28 @@ class StateGraph:
                 and self.states.places.waypoint[state.place] not in self.reached_waypoints
             ):
                 self._out[v] = self._path_along_tether(v)
-        self._find_ways(self.legs)
-        for v in sorted(self._usable, key=lambda v: self._home[v]):
+        self._measure_paths_home(self.legs)
+        for v in sorted(self._reached_states, key=lambda v: self._home[v]):
             waypoint = int(self.states.places.waypoint[self.states.entries[v].place])
             if v == self.states.present or waypoint in first:
                 continue
-            if self._comes_back(v):
+            if self._can_return(v):
                 first[waypoint] = v
         if not first:
             return None
-        by_the_start = replace(self, legs={}, _one_way={})
+        without_legs = replace(self, legs={}, _one_way={})
         # a path out through other states follows the legs of this board
-        by_the_start._out = [self.path_out(v) for v in range(len(self._out))]
-        driven = by_the_start._drive([first[n] for n in sorted(first)])
+        without_legs._out = [self.path_out(v) for v in range(len(self._out))]
+        driven = without_legs._drive([first[n] for n in sorted(first)])
         return driven if driven.fault is None else None
 
-    def _comes_back(self, v: int) -> bool:
+    def _can_return(self, v: int) -> bool:
         """Return whether the tether keeps its limit out to a state and back, and comes free."""
-        context, way = self.context, self._path_out(v)
-        there, longest = context.drive(context.start_tether, way, fine=True)
-        back, most = context.drive(there, way[::-1], fine=True)
-        free = hang_alike(back, context.start_tether, context.mission.delta)
-        return free and max(longest, most) <= self.states.limit
+        context, path = self.context, self._path_out(v)
+        tether_out, longest = context.drive(context.start_tether, path, is_fine=True)
+        tether_back, longest_back = context.drive(tether_out, path[::-1], is_fine=True)
+        free = hang_alike(tether_back, context.start_tether, context.mission.delta)
+        return free and max(longest, longest_back) <= self.states.limit
 
     def drive(self, tour: Sequence[int]) -> DrivenTour:
         """A tour, driven with the tether it begins with, in the direction that is right for more of
@@ -394,16 +394,16 @@ class StateGraph:
         """
         if self.states.present is not None:
             return self._drive(tour)  # it begins elsewhere than it ends
-        there, back = list(tour), list(tour)[::-1]
-        if self._wrong_way(there) > self._wrong_way(back):
-            there, back = back, there
-        first = self._drive(there)
+        forward, backward = list(tour), list(tour)[::-1]
+        if self._count_reversed_legs(forward) > self._count_reversed_legs(backward):
+            forward, backward = backward, forward
+        first = self._drive(forward)
         if first.fault is None:
             return first
-        second = self._drive(back)
+        second = self._drive(backward)
         return second if second.fault is None else first
 
-    def _wrong_way(self, tour: Sequence[int]) -> int:
+    def _count_reversed_legs(self, tour: Sequence[int]) -> int:
         """How many legs of a tour arrive in the other direction only."""
         return sum(
             self._one_way.get((min(v, w), max(v, w)), v < w) != (v < w) for v, w in pairwise(tour)
@@ -412,46 +412,52 @@ class StateGraph:
     def _drive(self, tour: Sequence[int]) -> DrivenTour:
         """A tour, driven in the direction given."""
         states, context, places = self.states, self.context, self.states.places
-        tether, before = context.present_tether, -1 if states.present is None else states.present
+        tether, last = context.present_tether, -1 if states.present is None else states.present
         stops: list[TourVisit] = []
-        total, fault, astray = 0.0, None, None
+        total, fault, first_deviation = 0.0, None, None
         delta = context.mission.delta
         word, at_home = (
             context.word_number(tether.nodes),
             context.word_number(context.start_tether.nodes),
         )
         for state in [*tour, -1]:
-            path = self.path(before, state)
-            tether, longest = context.drive(tether, path, fine=True)
+            path = self.path(last, state)
+            tether, longest = context.drive(tether, path, is_fine=True)
             total += polylines.length(path)
-            meant = context.start_tether if state < 0 else states.entries[state].tether
-            pair = (min(before, state), max(before, state))
-            writes = context.word_number(path)
-            word = None if word is None or writes is None else context.words.multiply(word, writes)
-            as_meant = word == (at_home if state < 0 else states.entries[state].word)
+            expected = context.start_tether if state < 0 else states.entries[state].tether
+            pair = (min(last, state), max(last, state))
+            leg_word = context.word_number(path)
+            word = (
+                None if word is None or leg_word is None else context.words.multiply(word, leg_word)
+            )
+            is_as_expected = word == (at_home if state < 0 else states.entries[state].word)
             # first leg after which the tether lies otherwise than in its state, or in another
             # class; no fault if the tether comes free in the end
-            astray = None if as_meant and hang_alike(tether, meant, delta) else astray or pair
+            first_deviation = (
+                None
+                if is_as_expected and hang_alike(tether, expected, delta)
+                else first_deviation or pair
+            )
             if fault is None and (longest > states.limit or word is None):
-                fault = astray or pair
+                fault = first_deviation or pair
             if state >= 0:
-                s = states.entries[state]
+                entry = states.entries[state]
                 stops.append(
                     TourVisit(
-                        int(places.waypoint[s.place]),
-                        int(places.choice[s.place]),
+                        int(places.waypoint[entry.place]),
+                        int(places.choice[entry.place]),
                         () if word is None else context.words.letters(word),
                         tether.length,
                         path,
                         longest,
                     )
                 )
-            before = state
+            last = state
         free = word == at_home and hang_alike(tether, context.start_tether, delta)
-        return DrivenTour(list(tour), stops, path, total, free, fault or astray)
+        return DrivenTour(list(tour), stops, path, total, free, fault or first_deviation)
 
 
-def with_status(result: Result, driven: DrivenTour, share: float) -> Result:
+def with_status(result: Result, driven: DrivenTour, tolerance: float) -> Result:
     """A solver's result, of a tour that was driven: by way of the start it may be longer than what
     the solver spoke of, and is then no longer proven.
 
@@ -461,7 +467,7 @@ def with_status(result: Result, driven: DrivenTour, share: float) -> Result:
         Of the solver.
     driven : DrivenTour
         Its tour.
-    share : float
+    tolerance : float
         Of the length, and metres, that rounding may take.
 
     Returns
@@ -470,6 +476,6 @@ def with_status(result: Result, driven: DrivenTour, share: float) -> Result:
         The same, with the status that still holds.
     """
     solved = np.inf if result.length is None else result.length
-    if driven.length <= solved * (1.0 + share) + share:
+    if driven.length <= solved * (1.0 + tolerance) + tolerance:
         return result
     return replace(result, status=Status.FEASIBLE)

@@ -1,9 +1,9 @@
-"""A scene's free water as cells, edges and squares: a cubical complex that lies within it.
+"""Free water of a scene as a cubical complex of cells, edges and squares.
 
-Edges and squares count only if balls cover them within which no solid is: the field's distances
-overstate nowhere, so whatever path runs over edges that count is free, and whatever loop shrinks
-over squares that count is contractible. Without that, rings thinner than a cell would be passed
-through. Gaps narrower than a cell may close.
+Edges and squares count only if balls without solids cover them. Distances of a field overstate
+nowhere, so every path along edges that count is free, and every loop that shrinks over squares that
+count is contractible. Otherwise, paths would pass through rings thinner than a cell. Gaps narrower
+than a cell may be closed.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from netsp.base.arrays import Floats, Ints
+from netsp.base.arrays import Floats
 from netsp.base.clock import Flag, abandoned, end_if_abandoned
 from netsp.base.compiled.dynamic_array import write_ints
 from netsp.base.compiled.kernel import kernel
@@ -38,19 +38,17 @@ SQUARE_BIT = 32
 
 @dataclass(frozen=True)
 class Cells:
-    """The complex.
+    """Cubical complex of a box in a scene.
 
-    Parameters
+    Attributes
     ----------
-    field : DistanceField
-        The scene.
-    low : ndarray, shape (3,)
-        Corner of the box, metres.
-    cell : float
+    low
+        (3,) corner of the box, metres.
+    cell
         Size of a cell, metres.
-    flags : ndarray of uint8, shape (nx, ny, nz)
-        Bits of `FREE_CELL`, `OPEN_CELL`, `EDGE_BIT` and `SQUARE_BIT`; edges and squares belong to
-        their lowest corner.
+    flags
+        (nx, ny, nz) bits of `FREE_CELL`, `OPEN_CELL`, `EDGE_BIT` and `SQUARE_BIT`; edges and
+        squares belong to their lowest corner.
     """
 
     field: DistanceField
@@ -67,28 +65,13 @@ class Cells:
         cell: float,
         policy: WordPolicy | None = None,
     ) -> Cells:
-        """The complex of a box in a scene.
-
-        Parameters
-        ----------
-        field : DistanceField
-            The scene.
-        low : array_like, shape (3,)
-            Corner of the box, metres.
-        high : array_like, shape (3,)
-            The other corner, metres.
-        cell : float
-            Size of a cell, metres.
-
-        Returns
-        -------
-        Cells
-            The complex.
+        """Return the complex of a box between two corners, with cells of a given size, all in
+        metres.
 
         Raises
         ------
         InputError
-            A box without size, or more cells than go into memory.
+            A box without size, or more cells than the policy allows.
         """
         policy = policy or WordPolicy()
         low = np.asarray(low, dtype=float)
@@ -115,19 +98,9 @@ class Cells:
         end_if_abandoned()
         return cls(field, low, cell, flags)
 
-    @property
-    def free_count(self) -> int:
-        """Number of free cells."""
-        return int(np.count_nonzero(self.flags & FREE_CELL))
-
     def centre(self, cells: npt.ArrayLike) -> Floats:
-        """Centres (..., 3) of cells (..., 3), metres."""
+        """Return the centres (..., 3) of cells (..., 3), metres."""
         return np.asarray(self.low + (np.asarray(cells) + 0.5) * self.cell)
-
-    def index(self, points: npt.ArrayLike) -> Ints:
-        """Cells (..., 3) that points (..., 3) are in, the nearest within the box."""
-        at = np.floor((np.asarray(points, dtype=float) - self.low) / self.cell).astype(np.int64)
-        return np.asarray(np.clip(at, 0, np.array(self.flags.shape) - 1))
 
 
 @kernel
@@ -222,7 +195,8 @@ def complex_flags(
 
 @kernel
 def is_covered(field: Field, centre: Floats, size: float, a: int, b: int, halvings: int) -> bool:
-    """Whether balls without solids cover an edge along axis a (b < 0) or a square along a and b."""
+    """Return whether balls without solids cover an edge along axis a (b < 0) or a square along a
+    and b."""
     # (centre, half a side, halvings left) of the parts that are to be covered
     parts, left = np.empty((4 * halvings + 8, 5)), 1
     parts[0, 0], parts[0, 1], parts[0, 2] = centre[0], centre[1], centre[2]

@@ -64,7 +64,7 @@ def drive_legs(context: PlanningContext, legs: Sequence[LegTo], home: Floats) ->
         ):
             return None
         word = context.words.multiply(word, writes)
-        tether, longest = context.drive(tether, leg.path, fine=True)
+        tether, longest = context.drive(tether, leg.path, is_fine=True)
         if longest > limit:
             return None
         total += polylines.length(leg.path)

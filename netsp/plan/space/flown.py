@@ -110,15 +110,19 @@ def words_of_flight(
     if mission.track:
         raise InputError("track: of a moving anchor no words are told; expected a mission without")
     scene = scene or mission.load_scene()
-    words = _by(run, PlanningContext.for_mission(mission, scene, field or scene.field()))
+    words = _words_in_scene(
+        run, PlanningContext.for_mission(mission, scene, field or scene.field())
+    )
     if run.scene is None or words.is_complete:
         return words
     # where the map was wrong, the way may lead through what it shows
-    by_the_end = _by(run, PlanningContext.for_mission(mission, run.scene, run.scene.field()))
-    return by_the_end if by_the_end.is_complete else words
+    at_end = _words_in_scene(
+        run, PlanningContext.for_mission(mission, run.scene, run.scene.field())
+    )
+    return at_end if at_end.is_complete else words
 
 
-def _by(run: Run, context: PlanningContext) -> FlownWords:
+def _words_in_scene(run: Run, context: PlanningContext) -> FlownWords:
     """The words of a flight in some scene."""
     mission, words = run.mission, context.words
     laid, begin = context.start_tether.nodes, context.present_tether.nodes
@@ -132,11 +136,11 @@ def _by(run: Run, context: PlanningContext) -> FlownWords:
         word, broken = words.try_word(np.vstack([places[: end + 1], mission.places[k]]))
         stops.append((k, None if broken is not None else word))
     word, broken = words.try_word(np.vstack([places, laid[::-1]]))
-    planned = () if mission.tour is None else _of_tour(mission.tour, context)
+    planned = () if mission.tour is None else _planned_words(mission.tour, context)
     return FlownWords(tuple(stops), None if broken is not None else word, words.exact, planned)
 
 
-def _of_tour(tour: PlannedTour, context: PlanningContext) -> tuple[Word | None, ...]:
+def _planned_words(tour: PlannedTour, context: PlanningContext) -> tuple[Word | None, ...]:
     """Words at the stops of a tour, whose own letters may be those of another map."""
     walked, out = context.present_tether.nodes, list[Word | None]()
     for stop, place in zip(tour.stops, context.mission.places, strict=False):

@@ -187,21 +187,21 @@ class _Judge:
         far = np.linalg.norm(line - np.array(mission.anchor), axis=1)
         k = int(far.argmax())
         if far[k] > mission.tether_length * (1.0 + STATED_TOLERANCE):
-            told = f"{_shown(line[k])} is {far[k]:.4g} m from the anchor"
-            return Check(name, False, f"{told}, the tether {mission.tether_length:g} long")
+            detail = f"{_shown(line[k])} is {far[k]:.4g} m from the anchor"
+            return Check(name, False, f"{detail}, the tether {mission.tether_length:g} long")
         return Check(name, True, "all paths")
 
     def _joined(self) -> Check:
         """Validation asks the ends of each path; that one goes on where the other ended, here."""
         gaps = [float(np.linalg.norm(b[0] - a[-1])) for a, b in pairwise(self.legs)]
-        off = max(gaps, default=0.0)
+        largest_gap = max(gaps, default=0.0)
         left = len(self.mission.waypoints) - len(self.tour.stops)
-        told = counted(len(self.tour.stops), "stop")
-        told += f", {counted(left, 'waypoint')} left out" if left else ""
-        good = off <= self.mission.reach
-        given = [stop.given_as for stop in self.tour.stops if stop.given_as is not None]
-        if len(set(given)) < len(given):
-            twice = next(n for n in given if given.count(n) > 1)
+        detail = counted(len(self.tour.stops), "stop")
+        detail += f", {counted(left, 'waypoint')} left out" if left else ""
+        passed = largest_gap <= self.mission.reach
+        original_numbers = [stop.given_as for stop in self.tour.stops if stop.given_as is not None]
+        if len(set(original_numbers)) < len(original_numbers):
+            twice = next(n for n in original_numbers if original_numbers.count(n) > 1)
             return Check(
                 "leads through the waypoints and home",
                 False,
@@ -209,8 +209,10 @@ class _Judge:
             )
         return Check(
             "leads through the waypoints and home",
-            good,
-            told if good else f"a leg begins {off:.3g} m from where the one before it ended",
+            passed,
+            detail
+            if passed
+            else f"a leg begins {largest_gap:.3g} m from where the one before it ended",
         )
 
     def _left_out(self) -> Check:
@@ -242,18 +244,20 @@ class _Judge:
             k for k, leg in enumerate(self.legs) if not keeps_clearance(self.field, leg, mission)
         ]
         free = all(self.field.line_of_sight(a, b, depth=1e-3) for a, b in pairwise(line))
-        told = f"{room:.3g} m from the nearest, clearance {mission.clearance:g}"
+        detail = f"{room:.3g} m from the nearest, clearance {mission.clearance:g}"
         if room < mission.clearance and not tight:
             near = float(self.field.distance(np.vstack([mission.places, self.legs[0][:1]])).min())
-            told += (
+            detail += (
                 f"; a waypoint or the start is {near:.3g} m from it"
                 if near < mission.clearance
                 else f"; pulled taut, corners may be half of delta ({mission.delta:g}) nearer"
             )
         if tight:
-            told += f", which {self._name(tight[0])} does not keep within half of delta"
+            detail += f", which {self._name(tight[0])} does not keep within half of delta"
         return Check(
-            "keeps clear of solids", free and not tight, told if free else "passes through a solid"
+            "keeps clear of solids",
+            free and not tight,
+            detail if free else "passes through a solid",
         )
 
     def _words(self) -> list[Check]:
@@ -292,25 +296,27 @@ class _Judge:
 
     def _tethers(self) -> list[Check]:
         model, laid = self.context.model, self.context.start_tether
-        tether, longest, where, off = self.context.present_tether, 0.0, 0, []
+        tether, longest, longest_leg, deviations = self.context.present_tether, 0.0, 0, []
         for k, leg in enumerate(self.legs):
-            tether, most = self.context.drive(tether, leg, fine=True)
-            if most > longest:
-                longest, where = most, k
+            tether, longest_on_leg = self.context.drive(tether, leg, is_fine=True)
+            if longest_on_leg > longest:
+                longest, longest_leg = longest_on_leg, k
             if k < len(self.tour.stops):
                 stop = self.tour.stops[k]
-                for length, stated, where_ in (
+                for length, stated, relation in (
                     (tether.length, stop.tether_length, "at"),
-                    (most, stop.longest_tether, "on the way to"),
+                    (longest_on_leg, stop.longest_tether, "on the way to"),
                 ):
                     allowed = self.mission.delta + self.policy.max_length_error * stated
                     if abs(length - stated) > allowed:
-                        off.append(f"{where_} stop {k}: {length:.3f} m, stated {stated:.3f}")
+                        deviations.append(
+                            f"{relation} stop {k}: {length:.3f} m, stated {stated:.3f}"
+                        )
         # as at the start, but to where the tour ends, which may be its reach away
         as_laid = model.update(laid, tether.robot)
         left = model.refine(tether).length - model.refine(as_laid).length
         limit = self.mission.tether_length
-        name = "home" if where == len(self.tour.stops) else f"stop {where}"
+        name = "home" if longest_leg == len(self.tour.stops) else f"stop {longest_leg}"
         return [
             Check(
                 "within the tether's length",
@@ -319,10 +325,11 @@ class _Judge:
             ),
             Check(
                 "tethers as long as stated",
-                not off,
+                not deviations,
                 "all"
-                if not off
-                else f"{off[0]}" + (f", and {len(off) - 1} more" if len(off) > 1 else ""),
+                if not deviations
+                else f"{deviations[0]}"
+                + (f", and {len(deviations) - 1} more" if len(deviations) > 1 else ""),
             ),
             Check(
                 "free at home",
@@ -334,11 +341,13 @@ class _Judge:
     def _length(self) -> Check:
         length = sum(float(polylines.length(leg)) for leg in self.legs)
         stated = self.tour.length
-        good = abs(length - stated) <= STATED_TOLERANCE * (1.0 + stated)
+        passed = abs(length - stated) <= STATED_TOLERANCE * (1.0 + stated)
         return Check(
             "length as stated",
-            good,
-            f"{stated:.6g} m" if good else f"the path is {length:.6g} m long, stated {stated:.6g}",
+            passed,
+            f"{stated:.6g} m"
+            if passed
+            else f"the path is {length:.6g} m long, stated {stated:.6g}",
         )
 
     def _bounds(self) -> Check:

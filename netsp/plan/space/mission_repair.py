@@ -74,7 +74,7 @@ def _gaps_named(found: SpacePlan) -> str:
 
 
 @dataclass
-class _Rest:
+class _RemainingTour:
     """What is left of a tour: its legs with the tether's length at their ends, the way home last;
     waypoints that it goes to, and those that solids stand on; whether all legs are there; how long
     it was as planned, and what does not hold of that."""
@@ -98,11 +98,11 @@ class RepairPlanner(PredictivePlanner):
 
     repairs: list[Repair] = field(default_factory=list)
     mission_policy: MissionPolicy = field(default_factory=MissionPolicy)
-    _asked_for: bool = False
-    _until: float = -np.inf
+    _must_check: bool = False
+    _hold_until_s: float = -np.inf
     _walked: list[Floats] = field(default_factory=list)
     _first: tuple[int, Floats] | None = None
-    _added: bool = False
+    _has_new_waypoint: bool = False
     _as_given: Mission | None = None
 
     name = "repair"
@@ -117,14 +117,14 @@ class RepairPlanner(PredictivePlanner):
     ) -> None:
         """See `Planner`."""
         super().take_map(scene, tethers, box, robot, tether)
-        self._asked_for = self.mission.tour is not None
+        self._must_check = self.mission.tour is not None
 
     def step(self, robot: Floats, tether: Tether) -> Command:
         """See `Planner`; holds its place until a plan is due, however soon it was ready, so that
         the same seed gives the same flight."""
         self._walked.append(np.array(robot))
-        if self._asked_for and not self.done and self._shortened(tether) is None:
-            self._asked_for = False
+        if self._must_check and not self.done and self._shortened(tether) is None:
+            self._must_check = False
             begin = time.process_time()
             try:
                 self._mend(robot, tether)
@@ -133,16 +133,16 @@ class RepairPlanner(PredictivePlanner):
                     raise KeyboardInterrupt from error
                 return self._hold(robot, error, time.process_time() - begin)
             spent = time.process_time() - begin
-            if self.now < self._until:
+            if self.now < self._hold_until_s:
                 return Command(robot[None], HOLD, spent)
-        if self.now < self._until:
+        if self.now < self._hold_until_s:
             return Command(robot[None], HOLD)
         return super().step(robot, tether)
 
     def add_waypoint(self, waypoint: MissionWaypoint) -> None:
         """See `Planner`."""
         super().add_waypoint(waypoint)
-        self._asked_for = self._added = self.mission.tour is not None
+        self._must_check = self._has_new_waypoint = self.mission.tour is not None
 
     def _without_stop(self, k: int) -> None:
         """The tour goes from the stop before to the one after, pulled taut in its class."""
@@ -164,17 +164,17 @@ class RepairPlanner(PredictivePlanner):
         self.mission = self.mission.model_copy(
             update={"tour": tour.model_copy(update={"stops": tuple(stops), "home": home})}
         )
-        self._asked_for = True
+        self._must_check = True
 
     def take_limit(self, limit: float) -> None:
         """See `Planner`."""
         super().take_limit(limit)
-        self._asked_for = self.mission.tour is not None
+        self._must_check = self.mission.tour is not None
 
     def carried_off(self) -> None:
         """See `Planner`."""
         super().carried_off()
-        self._asked_for, self._planned = self.mission.tour is not None, -1
+        self._must_check, self._planned = self.mission.tour is not None, -1
 
     def _next(self) -> None:
         super()._next()
@@ -183,24 +183,24 @@ class RepairPlanner(PredictivePlanner):
     def _mend(self, robot: Floats, tether: Tether) -> None:
         """See what is left of the tour, and mend it if it no longer holds."""
         begin = time.process_time()
-        rest = self._rest(robot, tether)
+        rest = self._remaining_tour(robot, tether)
         if rest is None:
             return
-        if self._added:
+        if self._has_new_waypoint:
             rest.reason = f"waypoint #{max(self.given)} was added"
         if rest.reason is None:
             self._note(KEPT, "the rest of the tour still holds", rest.length, begin)
             return
         worth = rest.old + self.options.planning_limit * self.mission.speed
-        found, added = None, self._added
-        self._added = False
+        found, added = None, self._has_new_waypoint
+        self._has_new_waypoint = False
         if not self.homeward and (added or not rest.whole or rest.length > worth):
-            found = self._planned_anew(robot, tether, rest, added)
+            found = self._replan(robot, tether, rest, added)
         if found is not None:
-            self._take(found)
+            self._follow_plan(found)
             self._note(REPLANNED, f"{rest.reason}{_gaps_named(found)}", found.length, begin)
         elif rest.whole:
-            self._go_on_along(rest)
+            self._follow_rest(rest)
             self._note(LOCAL, rest.reason, rest.length, begin)
         else:
             self._note(BY_LEGS, f"{rest.reason}, and no tour was found", 0.0, begin)
@@ -209,13 +209,13 @@ class RepairPlanner(PredictivePlanner):
         spent = time.process_time() - begin
         self.repairs.append(Repair(self.now, self.index, response, reason, length, spent))
 
-    def _rest(self, robot: Floats, tether: Tether) -> _Rest | None:
+    def _remaining_tour(self, robot: Floats, tether: Tether) -> _RemainingTour | None:
         """What is left of the tour by the map, with ways round what blocks it."""
         tour = self.mission.tour
         assert tour is not None
         if self.index > len(tour.stops):
             return None  # beyond the tour there are only waypoints that it does not reach
-        rest, here = _Rest(), robot
+        rest, place = _RemainingTour(), robot
         for k in range(self.index, len(tour.stops) + 1):
             home = k == len(tour.stops)
             name = "the way home" if home else f"the way to waypoint #{k}"
@@ -225,67 +225,70 @@ class RepairPlanner(PredictivePlanner):
                 rest.reason = rest.reason or f"a solid stands on waypoint #{k}"
                 rest.lost.append(k)
                 continue
-            leg: Floats | None = np.vstack([here, planned])
+            leg: Floats | None = np.vstack([place, planned])
             if k == self.index:
                 leg = np.vstack([robot, self.path]) if len(self.path) else self._leg(robot, tether)
-            there, why = self._along(tether, leg, name)
-            if there is None:
-                rest.reason = rest.reason or why
-                leg = self._way_round(here, planned[-1])
-                there, _ = self._along(tether, leg, name)
-            if there is not None and home and not self._is_free(there):
+            tether_after, obstacle = self._drive_leg(tether, leg, name)
+            if tether_after is None:
+                rest.reason = rest.reason or obstacle
+                leg = self._path_around(place, planned[-1])
+                tether_after, _ = self._drive_leg(tether, leg, name)
+            if tether_after is not None and home and not self._is_free(tether_after):
                 rest.reason = rest.reason or "the tether would not be free at home"
                 leg = self.pulled(self.back_along(tether))
-                there, _ = self._along(tether, leg, name)
-                if there is not None and not self._is_free(there):
-                    there = None
-            if there is None or leg is None:
+                tether_after, _ = self._drive_leg(tether, leg, name)
+                if tether_after is not None and not self._is_free(tether_after):
+                    tether_after = None
+            if tether_after is None or leg is None:
                 rest.whole = False
                 break
-            tether, here = there, leg[-1]
+            tether, place = tether_after, leg[-1]
             rest.legs.append((leg, tether.length))
             rest.kept += [] if home else [k]
         return rest
 
-    def _way_round(self, here: Floats, there: Floats) -> Floats | None:
+    def _path_around(self, begin: Floats, end: Floats) -> Floats | None:
         """The shortest way by the map, pulled taut."""
-        path = ShortestTree(self.grid, there, here[None]).path(0)
+        path = ShortestTree(self.grid, end, begin[None]).path(0)
         return None if path is None else self.pulled(path)
 
-    def _along(self, tether: Tether, leg: Floats | None, name: str) -> tuple[Tether | None, str]:
+    def _drive_leg(
+        self, tether: Tether, leg: Floats | None, name: str
+    ) -> tuple[Tether | None, str]:
         """The tether at the end of a leg; None, and why, where the robot cannot go along it."""
         if leg is None or not self.keeps_off(leg):
             return None, f"{name} is blocked"
         step = drive_step(self.mission, self.mission_policy.tether_share)
-        there, lengths = self._model.drive(tether, polylines.dense(leg, step))
-        most = float(lengths.max(initial=0.0))
-        if most > self.limit:
+        tether_after, lengths = self._model.drive(tether, polylines.dense(leg, step))
+        longest = float(lengths.max(initial=0.0))
+        if longest > self.limit:
             return None, (
-                f"on {name} {most:.2f} m of tether would be out, of {self.mission.tether_length:g}"
+                f"on {name} {longest:.2f} m of tether would be out, of "
+                f"{self.mission.tether_length:g}"
             )
-        return there, ""
+        return tether_after, ""
 
-    def _planned_anew(
-        self, robot: Floats, tether: Tether, rest: _Rest, added: bool
+    def _replan(
+        self, robot: Floats, tether: Tether, rest: _RemainingTour, added: bool
     ) -> SpacePlan | None:
         """A tour from here, if one is found that goes to more waypoints or is shorter than what
         there is."""
-        self._until = self.now + self.options.planning_limit
+        self._hold_until_s = self.now + self.options.planning_limit
         if all(self._is_lost(k) for k in self._left):
             return None
         try:
-            found = self._rest_of_tour(robot, tether)
+            found = self._plan_rest(robot, tether)
         except (InputError, LimitReachedError):
             return None
-        more = added and len(found.order) > len(rest.kept)
-        return None if rest.whole and rest.length <= found.length and not more else found
+        visits_more = added and len(found.order) > len(rest.kept)
+        return None if rest.whole and rest.length <= found.length and not visits_more else found
 
-    def _rest_of_tour(self, robot: Floats, tether: Tether) -> SpacePlan:
+    def _plan_rest(self, robot: Floats, tether: Tether) -> SpacePlan:
         """A tour from here through the waypoints that are left, by the map."""
         mission = self.mission
-        here = pushed_out(self.scene, robot[None], 1e-3)[0] if self._inside(robot) else robot
-        line = np.vstack([tether.nodes[:-1], here])
-        state = MissionState(position=in_file(here[None])[0], tether=in_file(line))
+        place = pushed_out(self.scene, robot[None], 1e-3)[0] if self._inside(robot) else robot
+        line = np.vstack([tether.nodes[:-1], place])
+        state = MissionState(position=in_file(place[None])[0], tether=in_file(line))
         rest = mission.model_copy(
             update={
                 "state": state,
@@ -317,7 +320,7 @@ class RepairPlanner(PredictivePlanner):
         """Whether a solid stands on a waypoint."""
         return self._inside(self.mission.places[k])
 
-    def _take(self, found: SpacePlan) -> None:
+    def _follow_plan(self, found: SpacePlan) -> None:
         """Go on along a new tour: the waypoints that are left come in its order from now on."""
         rest = found.to_mission(seed=self.options.seed)
         assert rest.tour is not None
@@ -327,7 +330,7 @@ class RepairPlanner(PredictivePlanner):
         waypoints = (*rest.waypoints, *(self.mission.waypoints[k] for k in lost))
         self._splice(rest.tour, rest.tour.stops, rest.tour.home, waypoints, left)
 
-    def _go_on_along(self, rest: _Rest) -> None:
+    def _follow_rest(self, rest: _RemainingTour) -> None:
         """Go on along the same tour, round what blocks it."""
         tour = self.mission.tour
         assert tour is not None

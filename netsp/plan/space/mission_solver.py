@@ -109,11 +109,11 @@ class _Flights:
     scene: Scene
     context: PlanningContext
     clock: Clock
-    tell: Callable[[str], None]
+    on_progress: Callable[[str], None]
     policy: MissionPolicy
 
     def fly(
-        self, mission: Mission, name: str, worth: float = np.inf, clock: Clock | None = None
+        self, mission: Mission, name: str, cutoff_s: float = np.inf, clock: Clock | None = None
     ) -> tuple[Run | None, bool]:
         """Fly a mission to its end.
 
@@ -123,7 +123,7 @@ class _Flights:
             The mission.
         name : str
             Name of the tour in progress messages.
-        worth : float
+        cutoff_s : float
             Seconds after which the flight is cut short, because a better one is known.
         clock : Clock, optional
             Clock of the flight; when it is up, the flight is cut short. By default that of the run.
@@ -133,17 +133,17 @@ class _Flights:
         run : Run or None
             The flight; None if it was cut short.
         slower : bool
-            True if it was cut short because it took longer than `worth`.
+            True if it was cut short because it took longer than `cutoff_s`.
         """
         clock = clock or self.clock
         if clock.up:
             return None, False
-        self.tell(f"flying {name}")
+        self.on_progress(f"flying {name}")
         slower = False
 
         def watch(row: LogRow, _: object) -> None:
             nonlocal slower
-            slower = row.time > worth
+            slower = row.time > cutoff_s
             if slower or clock.up:
                 raise KeyboardInterrupt  # it ends a flight
 
@@ -173,7 +173,7 @@ class _Flights:
         LimitReachedError
             The time was up before it was judged.
         """
-        self.tell("judging the tour")
+        self.on_progress("judging the tour")
         return self.clock.bounded(
             "judging the tour",
             lambda: bool(verify_mission(mission, scene=self.scene, context=self.context)),
@@ -202,14 +202,14 @@ class _Incumbents:
     given: Run | None = None
     best: SolvedMission | None = None
 
-    def take_first(self, found: SolvedMission) -> bool:
+    def accept_first(self, found: SolvedMission) -> bool:
         """Accept the order of the file if it passes the judge; return whether it does."""
         if not self.flights.judged(found.mission):
             return False
         self.first = self.best = found
         return True
 
-    def take_given(self, run: Run | None) -> None:
+    def keep_given_flight(self, run: Run | None) -> None:
         """Keep the flight of the mission as it was given, unless it was cut short."""
         self.given = run or self.given
 
@@ -228,9 +228,9 @@ class _Incumbents:
             if best is None:
                 raise
             return
-        run, slower = self.flights.fly(found.mission, name, self._worth())
+        run, slower = self.flights.fly(found.mission, name, self._cutoff_s())
         found = replace(found, run=run)
-        if self._needs_flight(found) and (found.run is None or not _good(found.run)):
+        if self._needs_flight(found) and (found.run is None or not _is_good(found.run)):
             return
         if best is None or (not slower and self._is_better(found, best)):
             self.best = found
@@ -250,32 +250,32 @@ class _Incumbents:
             self.best = replace(best, run=run)
             self.first = self.best if best is self.first else self.first
 
-    def _seconds(self, found: SolvedMission) -> float | None:
+    def _time_until_home_s(self, found: SolvedMission) -> float | None:
         """Return the seconds until home of a tour, None if it was not flown. For the order of the
         file, the flight as given counts."""
         if found.run is not None:
             return seconds_until_home(found.run)
-        if found is self.first and self.given is not None and _good(self.given):
+        if found is self.first and self.given is not None and _is_good(self.given):
             return seconds_until_home(self.given)
         return None
 
-    def _worth(self) -> float:
+    def _cutoff_s(self) -> float:
         """Return the seconds after which a flight cannot replace the incumbent."""
-        seconds = None if self.best is None else self._seconds(self.best)
+        seconds = None if self.best is None else self._time_until_home_s(self.best)
         return np.inf if seconds is None else (1.0 + self.flights.policy.bound_worth) * seconds
 
     def _may_be_better(self, found: SolvedMission) -> bool:
         """Return whether a tour through as many waypoints may be better than the incumbent."""
         assert self.best is not None
-        seconds, mission = self._seconds(self.best), self.flights.mission
+        seconds, mission = self._time_until_home_s(self.best), self.flights.mission
         if seconds is None:
-            return found.tour.length < self.best.tour.length * self._allowed(found, self.best)
+            return found.tour.length < self.best.tour.length * self._max_ratio(found, self.best)
         # a flight turns back within reach of each stop, and is faster by no more than that
         saved = 2.0 * mission.reach * (1 + len(found.tour.stops))
         allowed = (1.0 + self.flights.policy.bound_worth) * seconds
         return (found.tour.length - saved) / mission.speed < allowed
 
-    def _allowed(self, found: SolvedMission, best: SolvedMission) -> float:
+    def _max_ratio(self, found: SolvedMission, best: SolvedMission) -> float:
         """Return the largest ratio of a tour to the incumbent at which it is accepted: a little
         more than 1 for a tour along states and legs, because it has a bound, and less than 1 for
         one by going straight on."""
@@ -287,25 +287,25 @@ class _Incumbents:
 
     def _is_better(self, found: SolvedMission, best: SolvedMission) -> bool:
         """Return whether a tour that passed the judge replaces the incumbent."""
-        if found.run is not None and not _good(found.run):
+        if found.run is not None and not _is_good(found.run):
             return False
         if len(found.tour.stops) > len(best.tour.stops):
             return True
-        if self.first is not None and not self._no_worse(found, self.first):
+        if self.first is not None and not self._is_no_worse(found, self.first):
             return False
-        allowed = self._allowed(found, best)
-        seconds, of_best = self._seconds(found), self._seconds(best)
+        allowed = self._max_ratio(found, best)
+        seconds, of_best = self._time_until_home_s(found), self._time_until_home_s(best)
         if seconds is not None and of_best is not None:
             return seconds < allowed * of_best
         return found.tour.length < allowed * best.tour.length
 
-    def _no_worse(self, found: SolvedMission, first: SolvedMission) -> bool:
+    def _is_no_worse(self, found: SolvedMission, first: SolvedMission) -> bool:
         """Return whether a tour is neither longer than the order of the file nor home later."""
         if len(found.tour.stops) > len(first.tour.stops):
             return True
         if found.tour.length > first.tour.length * (1.0 + LENGTH_ROUNDING):
             return False
-        seconds, of_first = self._seconds(found), self._seconds(first)
+        seconds, of_first = self._time_until_home_s(found), self._time_until_home_s(first)
         return seconds is None or of_first is None or seconds <= of_first * (1.0 + LENGTH_ROUNDING)
 
 
@@ -362,7 +362,7 @@ def solve_mission(
     """
     policy = policy or MissionPolicy()
 
-    def tell(text: str) -> None:
+    def report(text: str) -> None:
         end_if_abandoned()
         if on_progress is not None:
             on_progress(text)
@@ -374,12 +374,12 @@ def solve_mission(
             with clock.at_least(policy.first_tour_s):
                 scene = scene or clock.bounded("reading the scene", mission.load_scene)
                 context = prepare_context(
-                    mission, clock, scene=scene, field=field, tell=tell, policy=policy
+                    mission, clock, scene=scene, field=field, on_progress=report, policy=policy
                 )
                 mission, gaps = context.mission, context.gaps
                 laid = clock.bounded("laying the tether", lambda: context.present_tether)
                 check_tether(mission, laid.length)
-                flights = _Flights(mission, scene, context, clock, tell, policy)
+                flights = _Flights(mission, scene, context, clock, report, policy)
                 found = _Incumbents(flights)
                 _begin_as_given(found, clock.part(policy.given_share), seed)
         except LimitReachedError:
@@ -390,7 +390,7 @@ def solve_mission(
         planned = searched.plan
         if found.given is None:
             given, _ = flights.fly(mission, "the order as given")
-            found.take_given(given)
+            found.keep_given_flight(given)
             _offer_given_flight(found, seed)
         _offer_going_on(found, seed)
         if found.best is None:
@@ -425,7 +425,7 @@ def with_gaps(mission: Mission, context: PlanningContext) -> Mission:
 
 
 @dataclass
-class _Searched:
+class _SearchResult:
     """Result of the search.
 
     Parameters
@@ -450,21 +450,21 @@ def _begin_as_given(found: _Incumbents, flying: Clock, seed: int) -> None:
     """Accept the mission as it was given, whatever the time: its tour if that passes the judge,
     else the tour in its order. Then fly it as long as the clock allows."""
     flights = found.flights
-    mission, tell = flights.mission, flights.tell
+    mission, on_progress = flights.mission, flights.on_progress
     order = tuple(range(len(mission.waypoints)))
-    tell("the order as given")
-    taken = mission.tour is not None and found.take_first(
+    on_progress("the order as given")
+    is_accepted = mission.tour is not None and found.accept_first(
         SolvedMission(mission, order, None, None, None)
     )
-    if not taken:
+    if not is_accepted:
         context = replace(flights.context, mission=mission.model_copy(update={"tour": None}))
         driven = flights.clock.bounded(
             "driving the order as given", lambda: plan_given_order(context)
         )
         if driven is not None and driven.visits:
-            found.take_first(_of_plan(driven, AS_GIVEN, seed))
+            found.accept_first(_solved_from_plan(driven, AS_GIVEN, seed))
     given, _ = flights.fly(mission, "the order as given", clock=flying)
-    found.take_given(given)
+    found.keep_given_flight(given)
     _offer_given_flight(found, seed)
 
 
@@ -472,20 +472,20 @@ def _offer_given_flight(found: _Incumbents, seed: int) -> None:
     """Offer the flight of the mission as it was given as a tour, if it is home earlier than the
     incumbent."""
     given, best, mission = found.given, found.best, found.flights.mission
-    if given is None or not _good(given) or (best is not None and best.run is None):
+    if given is None or not _is_good(given) or (best is not None and best.run is None):
         return
-    worth = np.inf if best is None or best.run is None else seconds_until_home(best.run)
-    if seconds_until_home(given) >= worth or found.flights.clock.is_overdue:
+    cutoff_s = np.inf if best is None or best.run is None else seconds_until_home(best.run)
+    if seconds_until_home(given) >= cutoff_s or found.flights.clock.is_overdue:
         return
     order = tuple(range(len(mission.waypoints)))
     context = found.flights.context
-    kept = tour_of_flight(mission, order, given, context.field, context, None, seed, AS_GIVEN)
-    if kept is None or not kept.tour.stops:
+    flown_tour = tour_of_flight(mission, order, given, context.field, context, None, seed, AS_GIVEN)
+    if flown_tour is None or not flown_tour.tour.stops:
         return
     if best is None:
-        found.take_first(kept)
+        found.accept_first(flown_tour)
     else:
-        found.offer(kept, "it as it will be written")
+        found.offer(flown_tour, "it as it will be written")
 
 
 def _search(
@@ -496,9 +496,9 @@ def _search(
     params: Mapping[str, Any] | None,
     iteration_limit: int | None,
     seed: int,
-) -> _Searched:
+) -> _SearchResult:
     """Offer the tours of the plane and along states and legs."""
-    flights, out = found.flights, _Searched()
+    flights, out = found.flights, _SearchResult()
     if clock.up and found.best is not None:
         return out  # the stages before the first plan would overrun the limit
     candidates = candidate_plans(
@@ -511,7 +511,7 @@ def _search(
         iteration_limit=iteration_limit,
         seed=seed,
         whole_tether=True,
-        on_progress=flights.tell,
+        on_progress=flights.on_progress,
     )
 
     def next_plan() -> SpacePlan | None:
@@ -530,7 +530,7 @@ def _search(
                     "bounding all tours", partial(_raise_bound, out, plan, flights, clock, seed)
                 )
                 out.plan = out.plan if out.plan is not None and plan.kind == OUT_AND_BACK else plan
-                found.offer(_of_plan(plan, name, seed), f"the tour ({plan.kind})")
+                found.offer(_solved_from_plan(plan, name, seed), f"the tour ({plan.kind})")
                 has_tour = found.best is not None
                 if has_tour and (plan.kind == TAUT_LEGS or (needs_tour and clock.up)):
                     break
@@ -542,19 +542,19 @@ def _search(
 
 
 def _raise_bound(
-    out: _Searched, plan: SpacePlan, flights: _Flights, clock: Clock, seed: int
+    out: _SearchResult, plan: SpacePlan, flights: _Flights, clock: Clock, seed: int
 ) -> None:
     """Bound all tours to the waypoints of a plan: at the first plans by the upright solids alone,
     which takes little time, and once paths between waypoints are known by all bounds."""
     visited, part = frozenset(plan.order), clock.part(flights.policy.bound_share)
     before = out.bounds.get(visited)
     if plan.kind in (PLANE, SHORT_ORDER) and before is None:
-        flights.tell("bound on all tours by upright solids")
+        flights.on_progress("bound on all tours by upright solids")
         places = plan.paths.places
         some = [n for n in range(len(places)) if places.waypoint[n] in visited]
         bound = bound_by_upright_solids(flights.mission, flights.context, some, places, part)
     elif plan.kind not in (PLANE, SHORT_ORDER) and not out.has_all_bounds:
-        flights.tell("bound on all tours")
+        flights.on_progress("bound on all tours")
         bound = bound_all_tours(plan.paths, sorted(visited), part, seed)
         out.has_all_bounds = True
     else:
@@ -563,7 +563,7 @@ def _raise_bound(
         out.bounds[visited] = max(bound, before or 0.0)
 
 
-def _of_plan(planned: SpacePlan, solver: str, seed: int) -> SolvedMission:
+def _solved_from_plan(planned: SpacePlan, solver: str, seed: int) -> SolvedMission:
     mission = planned.to_mission(solver, seed)
     return SolvedMission(mission, planned.all_waypoints, None, None, planned)
 
@@ -578,14 +578,14 @@ def _with_bound(best: SolvedMission, bounds: Mapping[frozenset[int], float]) -> 
     if bound is None:
         return best
     tour, mission = best.tour, best.mission
-    off = sum(
+    distance = sum(
         float(np.linalg.norm(np.subtract(stop.path[-1], place)))
         for stop, place in zip(tour.stops, mission.places, strict=False)
     )
-    off = 2.0 * off + float(np.linalg.norm(np.subtract(tour.home[-1], mission.start)))
-    bound = min(tour.length, max(0.0, bound - (off if off > LENGTH_ROUNDING else 0.0)))
-    whole = len(tour.stops) == len(mission.waypoints)
-    proven = whole and LowerBound(bound, Scope.ALL_TOURS).proves(tour.length)
+    distance = 2.0 * distance + float(np.linalg.norm(np.subtract(tour.home[-1], mission.start)))
+    bound = min(tour.length, max(0.0, bound - (distance if distance > LENGTH_ROUNDING else 0.0)))
+    is_complete = len(tour.stops) == len(mission.waypoints)
+    proven = is_complete and LowerBound(bound, Scope.ALL_TOURS).proves(tour.length)
     tour = tour.model_copy(
         update={
             "bound_of_all": bound,
@@ -602,7 +602,7 @@ def _offer_going_on(found: _Incumbents, seed: int) -> None:
     mission, clock = flights.mission.model_copy(update={"tour": None}), flights.clock
     if clock.up or mission.state is not None:
         return  # going straight on begins at the start
-    flights.tell("order by going straight on")
+    flights.on_progress("order by going straight on")
     context = flights.context
     try:
         tour = clock.bounded(
@@ -619,21 +619,21 @@ def _offer_going_on(found: _Incumbents, seed: int) -> None:
     except (InputError, LimitReachedError):
         return
     rest = tuple(n for n in range(len(mission.waypoints)) if n not in tour)
-    for direction, there in (("forward", tour), ("in reverse", tour[::-1])):
-        order = (*there, *rest)
+    for direction, ordered_waypoints in (("forward", tour), ("in reverse", tour[::-1])):
+        order = (*ordered_waypoints, *rest)
         waypoints = tuple(mission.waypoints[n] for n in order)
         ordered = mission.model_copy(update={"waypoints": waypoints})
-        run, slower = flights.fly(ordered, f"that order {direction}", found._worth())
+        run, slower = flights.fly(ordered, f"that order {direction}", found._cutoff_s())
         if slower:
             continue
         if run is None or clock.is_overdue:
             break
-        kept = tour_of_flight(ordered, order, run, context.field, context, None, seed)
-        if kept is not None:
-            found.offer(kept, "it as it will be written")
+        flown_tour = tour_of_flight(ordered, order, run, context.field, context, None, seed)
+        if flown_tour is not None:
+            found.offer(flown_tour, "it as it will be written")
 
 
-def _good(run: Run) -> bool:
+def _is_good(run: Run) -> bool:
     """Whether a flight came home free, and never exceeded the limit."""
     return bool(run.summary["home"]["tether_free"]) and run.summary["exceedance_s"] == 0.0
 
@@ -646,7 +646,7 @@ def tour_of_flight(
     context: PlanningContext | None = None,
     bound: float | None = None,
     seed: int = 0,
-    name: str = GOING_ON,
+    solver: str = GOING_ON,
 ) -> SolvedMission | None:
     """Where a robot was on a flight, made the tour of its mission.
 
@@ -667,7 +667,7 @@ def tour_of_flight(
         less, by twice as much as it stays away, and once at home.
     seed : int
         Of what found the order.
-    name : str
+    solver : str
         Random seed of the search.
 
     Returns
@@ -676,12 +676,12 @@ def tour_of_flight(
         The mission with the tour. None if the robot did not come home free, went through a gap that
         the grid does not show, lost its clearance, or the tether was over the limit.
     """
-    if not _good(run):
+    if not _is_good(run):
         return None
     stops = run.summary["stops"]
     visited = [int(stop["waypoint"]) for stop in stops]
-    left = [k for k in range(len(order)) if k not in visited]
-    parts = _parts(run.log, visited)
+    left_out = [k for k in range(len(order)) if k not in visited]
+    parts = _log_of_legs(run.log, visited)
     legs = [np.array([[r.x, r.y, r.z] for r in part]) for part in parts]
     path = np.vstack([legs[0][:1], *(leg[1:] for leg in legs)])
     if not all(keeps_clearance(field, leg, mission) for leg in legs):
@@ -689,8 +689,8 @@ def tour_of_flight(
     context = context or PlanningContext.for_mission(mission, mission.load_scene(), field)
     planned_stops = []
     for k, stop in enumerate(stops):
-        way = np.vstack([context.present_tether.nodes, *legs[: k + 1]])
-        word, broken = context.words.try_word(way)
+        walked = np.vstack([context.present_tether.nodes, *legs[: k + 1]])
+        word, broken = context.words.try_word(walked)
         if broken is not None:
             return None
         planned_stops.append(
@@ -705,14 +705,14 @@ def tour_of_flight(
     length = polylines.length(path)
     if bound is not None:
         ends = np.array([leg[-1] for leg in legs[:-1]]).reshape(-1, 3)
-        off = np.linalg.norm(ends - mission.places[visited].reshape(-1, 3), axis=1)
+        distances = np.linalg.norm(ends - mission.places[visited].reshape(-1, 3), axis=1)
         short_of_home = float(np.linalg.norm(legs[-1][-1] - np.array(mission.start)))
-        bound = min(length, max(0.0, bound - 2.0 * float(off.sum()) - short_of_home))
+        bound = min(length, max(0.0, bound - 2.0 * float(distances.sum()) - short_of_home))
     tour = PlannedTour(
         stops=tuple(planned_stops),
         home=in_file(legs[-1]),
         status=Status.FEASIBLE,
-        solver=name,
+        solver=solver,
         seed=seed,
         length=length,
         bound_of_all=bound,
@@ -722,14 +722,14 @@ def tour_of_flight(
         exact=context.words.exact,
         unresolved_gaps=context.unresolved_gaps,
     )
-    chosen = [*visited, *left]
-    there = mission.model_copy(
+    chosen = [*visited, *left_out]
+    planned = mission.model_copy(
         update={"waypoints": tuple(mission.waypoints[k] for k in chosen), "tour": tour}
     )
-    return SolvedMission(there, tuple(order[k] for k in chosen), None, None, None)
+    return SolvedMission(planned, tuple(order[k] for k in chosen), None, None, None)
 
 
-def _parts(log: tuple[LogRow, ...], visited: list[int]) -> list[tuple[LogRow, ...]]:
+def _log_of_legs(log: tuple[LogRow, ...], visited: list[int]) -> list[tuple[LogRow, ...]]:
     """A log from each waypoint that was visited to the next, and home; two rows at least."""
     next_one = np.array([r.waypoint for r in log])
     ends = [int(np.argmax(next_one > k)) for k in visited]

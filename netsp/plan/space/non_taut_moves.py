@@ -40,22 +40,22 @@ HOME = -1
 
 
 @dataclass(frozen=True)
-class _Line:
+class _PartialTour:
     """The beginning of a tour: how far it goes, the tether at its end, the same of a robot that is
     not as exact, and the number of its word; and the last leg: where to, along which path, and the
     longest tether on it."""
 
     length: float
     tether: Tether
-    flown: Tether
+    in_flight: Tether
     word: int
-    before: _Line | None = None
+    before: _PartialTour | None = None
     place: int = HOME
     path: Floats | None = None
-    most: float = 0.0
+    longest_tether: float = 0.0
 
     @property
-    def legs(self) -> list[_Line]:
+    def legs(self) -> list[_PartialTour]:
         """All of its legs, in order."""
         out, line = [], self
         while line.before is not None:
@@ -78,14 +78,18 @@ class Detours:
 
     board: StateGraph
     paths: RobotPaths
-    _legs: dict[tuple[int, int], list[tuple[Floats, int]]] = field(default_factory=dict)
+    _paths: dict[tuple[int, int], list[tuple[Floats, int]]] = field(default_factory=dict)
 
     @property
     def _policy(self) -> DetourPolicy:
         return self.paths.context.policy.detours
 
-    def shortened(
-        self, best: DrivenTour | None, clock: Clock, tell: Callable[[str], None], seed: int = 0
+    def shorten(
+        self,
+        best: DrivenTour | None,
+        clock: Clock,
+        on_progress: Callable[[str], None],
+        seed: int = 0,
     ) -> DrivenTour | None:
         """A tour that is shorter than the best so far.
 
@@ -95,7 +99,7 @@ class Detours:
             That tour.
         clock : Clock
             When it is up, no more orders are driven.
-        tell : callable
+        on_progress : callable
             Called with a line of text now and then.
         seed : int
             Of the solver that orders the waypoints as if there were no tether.
@@ -108,80 +112,82 @@ class Detours:
         if clock.up and best is not None:
             return None
         states = self.board.states
-        shortest, worth = self._shortest(clock), self.paths.context.policy.bound_worth
-        first = [] if best is None else [[states.entries[v].place for v in best.tour]]
-        free = self._without_tether(shortest, clock.part(self._policy.order_share), seed)
-        first += [] if free is None else [free]
-        found: list[list[_Line]] = []
-        below = np.inf if best is None else (1.0 - worth) * best.length
-        for order in first:
-            for there in (order, order[::-1]):
-                if clock.up or (there != order and states.present is not None):
+        shortest, worth = self._shortest_lengths(clock), self.paths.context.policy.bound_worth
+        orders = [] if best is None else [[states.entries[v].place for v in best.tour]]
+        without_tether = self._order_without_tether(
+            shortest, clock.part(self._policy.order_share), seed
+        )
+        orders += [] if without_tether is None else [without_tether]
+        found: list[list[_PartialTour]] = []
+        cutoff = np.inf if best is None else (1.0 - worth) * best.length
+        for order in orders:
+            for direction in (order, order[::-1]):
+                if clock.up or (direction != order and states.present is not None):
                     continue
-                tell(f"detours along {len(order)} legs")
-                levels = self._driven(there, below, clock)
-                if levels is not None:
-                    found, below = levels, (1.0 - worth) * levels[-1][0].length
+                on_progress(f"detours along {len(order)} legs")
+                stages = self._drive_order(direction, cutoff, clock)
+                if stages is not None:
+                    found, cutoff = stages, (1.0 - worth) * stages[-1][0].length
         if not found and best is None:
             return None
-        current = first[0] if not found else [leg.place for leg in found[-1][0].legs[:-1]]
+        current = orders[0] if not found else [leg.place for leg in found[-1][0].legs[:-1]]
         seen: set[tuple[int, ...]] = set()
         moved = True
         while moved:
             moved = False
-            for order in self._moves(current, shortest, below):
+            for order in self._neighbouring_orders(current, shortest, cutoff):
                 if clock.up or len(seen) >= self._policy.max_orders:
                     break
                 if tuple(order) in seen:
                     continue
                 seen.add(tuple(order))
-                tell(f"detours, {len(seen)} orders, {below:.1f} m")
-                levels = self._driven(order, below, clock, current, found)
-                if levels is not None:
-                    found, below = levels, (1.0 - worth) * levels[-1][0].length
+                on_progress(f"detours, {len(seen)} orders, {cutoff:.1f} m")
+                stages = self._drive_order(order, cutoff, clock, current, found)
+                if stages is not None:
+                    found, cutoff = stages, (1.0 - worth) * stages[-1][0].length
                     current, moved = order, True
                     break
-        return self._as_driven(found[-1][0]) if found else None
+        return self._to_driven_tour(found[-1][0]) if found else None
 
-    def _of(self, n: int, m: int) -> list[tuple[Floats, int]]:
+    def _paths_between(self, n: int, m: int) -> list[tuple[Floats, int]]:
         """Paths from a place to another and their words, shortest first."""
-        if (n, m) in self._legs:
-            return self._legs[n, m]
+        if (n, m) in self._paths:
+            return self._paths[n, m]
         if m == HOME or (n != HOME and n > m):
             number = self.paths.context.word_number
-            back = [(path[::-1], number(path[::-1])) for path, _ in self._of(m, n)]
-            self._legs[n, m] = [(path, word) for path, word in back if word is not None]
-            return self._legs[n, m]
+            reverse = [(path[::-1], number(path[::-1])) for path, _ in self._paths_between(m, n)]
+            self._paths[n, m] = [(path, word) for path, word in reverse if word is not None]
+            return self._paths[n, m]
         context, mission = self.paths.context, self.paths.context.mission
         begin, end = self._place(n), self._place(m)
-        some = self._taut(n, m)
-        for path in self._aside(begin, end):
+        paths = self._taut_paths(n, m)
+        for path in self._detours(begin, end):
             if all(
                 is_straight_clear(context.field, a, b, mission.clearance) for a, b in pairwise(path)
             ):
-                some.append(path)
+                paths.append(path)
         numbered = [
-            (path, context.word_number(path)) for path in sorted(some, key=polylines.length)
+            (path, context.word_number(path)) for path in sorted(paths, key=polylines.length)
         ]
-        self._legs[n, m] = [(path, word) for path, word in numbered if word is not None]
-        return self._legs[n, m]
+        self._paths[n, m] = [(path, word) for path, word in numbered if word is not None]
+        return self._paths[n, m]
 
-    def _taut(self, n: int, m: int) -> list[Floats]:
+    def _taut_paths(self, n: int, m: int) -> list[Floats]:
         """Paths without detours."""
         context, mission = self.paths.context, self.paths.context.mission
         begin, end = self._place(n), self._place(m)
-        some = [] if n == HOME else [path for _, path in self.paths.between(n, m)]
+        paths = [] if n == HOME else [path for _, path in self.paths.between(n, m)]
         if n == HOME:
             states = self.board.states.at_place.get(m, ())
-            out = (self.board.path_out(v) for v in states[: self._policy.n_start_paths])
-            some = [path for path in out if path is not None]
-        if not any(len(path) == 2 for path in some) and is_straight_clear(
+            tether_paths = (self.board.path_out(v) for v in states[: self._policy.n_start_paths])
+            paths = [path for path in tether_paths if path is not None]
+        if not any(len(path) == 2 for path in paths) and is_straight_clear(
             context.field, begin, end, mission.clearance
         ):
-            some.append(np.array([begin, end]))
-        return [path for path in some if keeps_clearance(context.field, path, mission)]
+            paths.append(np.array([begin, end]))
+        return [path for path in paths if keeps_clearance(context.field, path, mission)]
 
-    def _aside(self, begin: Floats, end: Floats) -> Iterator[Floats]:
+    def _detours(self, begin: Floats, end: Floats) -> Iterator[Floats]:
         """Paths with one bend, out to all sides from the middle of the straight one."""
         effort, step = self.paths.effort, end - begin
         far = float(np.linalg.norm(step))
@@ -198,7 +204,7 @@ class Detours:
         """(3,) where it is, metres."""
         return self.paths.context.start_tether.robot if n == HOME else self.paths.points[n]
 
-    def _shortest(self, clock: Clock) -> Floats:
+    def _shortest_lengths(self, clock: Clock) -> Floats:
         """(n + 1, n + 1) metres between places, the last of which is the start; infinite where no
         way is known, or there is no time to look whether places far apart see each other."""
         count = len(self.paths.points)
@@ -209,18 +215,18 @@ class Detours:
                 known = self.paths.between(n, m) if n != HOME else []
                 far = polylines.length(known[0][1]) if known else np.inf
                 if not known and not looking.up:
-                    far = min(map(polylines.length, self._taut(n, m)), default=np.inf)
+                    far = min(map(polylines.length, self._taut_paths(n, m)), default=np.inf)
                 out[n, m] = out[m, n] = far
         return out
 
-    def _without_tether(self, shortest: Floats, clock: Clock, seed: int) -> list[int] | None:
+    def _order_without_tether(self, shortest: Floats, clock: Clock, seed: int) -> list[int] | None:
         """Places in the order of the shortest tour without a tether."""
         places, reached = self.paths.places, self.board.reached_waypoints
-        some = [
+        numbers = [
             n for n in range(len(places)) if n == places.present or places.waypoint[n] in reached
         ]
-        rows = np.array([HOME, *some])
-        cluster = np.r_[0, 1 + np.unique(places.waypoint[some], return_inverse=True)[1]]
+        rows = np.array([HOME, *numbers])
+        cluster = np.r_[0, 1 + np.unique(places.waypoint[numbers], return_inverse=True)[1]]
         costs = shortest[np.ix_(rows, rows)].copy()
         np.fill_diagonal(costs, 0.0)
         try:
@@ -229,126 +235,133 @@ class Detours:
             return None
         first = 1
         if places.present is not None:
-            graph = from_state(graph, 1 + some.index(places.present))
+            graph = from_state(graph, 1 + numbers.index(places.present))
             first = 2
         result = solve_graph(graph, "auto", time_limit=clock, seed=seed)
         return None if result.tour is None else [int(rows[v]) for v in result.tour[first:]]
 
-    def _moves(self, order: Sequence[int], shortest: Floats, below: float) -> Iterator[list[int]]:
+    def _neighbouring_orders(
+        self, order: Sequence[int], shortest: Floats, cutoff: float
+    ) -> Iterator[list[int]]:
         """Orders that a piece moved, or turned round, makes of one, shortest first without a
         tether."""
         begin = HOME if self.paths.places.present is None else self.paths.places.present
         found: set[tuple[float, tuple[int, ...]]] = set()
-        for there in _moved(list(order), self._policy.piece_lengths):
-            ends = np.array([begin, *there, HOME])
-            far = float(shortest[ends[:-1], ends[1:]].sum())
-            if far < below:
-                found.add((far, tuple(there)))
-        for _, some in sorted(found):
-            yield list(some)
+        for moved in _moved_pieces(list(order), self._policy.piece_lengths):
+            ends = np.array([begin, *moved, HOME])
+            length = float(shortest[ends[:-1], ends[1:]].sum())
+            if length < cutoff:
+                found.add((length, tuple(moved)))
+        for _, moved_order in sorted(found):
+            yield list(moved_order)
 
-    def _driven(
+    def _drive_order(
         self,
         order: Sequence[int],
-        below: float,
+        cutoff: float,
         clock: Clock,
-        like: Sequence[int] = (),
-        known: Sequence[list[_Line]] = (),
-    ) -> list[list[_Line]] | None:
+        similar: Sequence[int] = (),
+        known: Sequence[list[_PartialTour]] = (),
+    ) -> list[list[_PartialTour]] | None:
         """What is kept after each leg of an order, the tour itself at the end; None where none was
         found that is shorter than so many metres. Of an order that begins like one that was driven,
         what was kept by there is taken."""
         context, states, places = self.paths.context, self.board.states, self.paths.places
         begin = HOME if places.present is None else places.present
         ends = [begin, *order, HOME]
-        legs = [self._of(n, m) for n, m in pairwise(ends)]
+        legs = [self._paths_between(n, m) for n, m in pairwise(ends)]
         if not all(legs):
             return None
         rest = np.cumsum([0.0, *(polylines.length(leg[0][0]) for leg in legs[::-1])])[::-1]
         word = context.word_number(context.present_tether.nodes)
-        if word is None or rest[0] >= below:
+        if word is None or rest[0] >= cutoff:
             return None
-        levels = [[_Line(0.0, context.present_tether, context.present_tether, word)]]
+        stages = [[_PartialTour(0.0, context.present_tether, context.present_tether, word)]]
         shared = 0
-        while known and shared < len(order) and order[shared] == like[shared]:
+        while known and shared < len(order) and order[shared] == similar[shared]:
             shared += 1
-            levels.append(known[shared])
+            stages.append(known[shared])
         for k in range(shared, len(legs)):
             last = k + 1 == len(legs)
             ahead = sorted(
                 (line.length + polylines.length(path), i, j)
-                for i, line in enumerate(levels[k])
+                for i, line in enumerate(stages[k])
                 for j, (path, _) in enumerate(legs[k])
-                if line.length + polylines.length(path) + rest[k + 1] < below
+                if line.length + polylines.length(path) + rest[k + 1] < cutoff
             )
-            kept: list[_Line] = []
+            kept: list[_PartialTour] = []
             for far, i, j in ahead:
                 if clock.up or len(kept) >= (1 if last else self.paths.effort.detour_tethers):
                     break
-                line, (path, writes) = levels[k][i], legs[k][j]
-                word = context.words.multiply(line.word, writes)
-                tether, most = context.drive(line.tether, path)
-                if most > states.limit or any(self._same(other, tether, word) for other in kept):
+                line, (path, path_word) = stages[k][i], legs[k][j]
+                word = context.words.multiply(line.word, path_word)
+                tether, longest = context.drive(line.tether, path)
+                if longest > states.limit or any(
+                    self._is_same(other, tether, word) for other in kept
+                ):
                     continue
                 if last and not self._is_free(tether, word):
                     continue
-                flown = self._as_flown(line, path, tether)
-                if flown is None:
+                in_flight = self._tether_in_flight(line, path, tether)
+                if in_flight is None:
                     continue
-                kept.append(_Line(far, tether, flown, word, line, ends[k + 1], path, most))
+                kept.append(
+                    _PartialTour(far, tether, in_flight, word, line, ends[k + 1], path, longest)
+                )
             if not kept:
                 return None
-            levels.append(kept)
-        return levels
+            stages.append(kept)
+        return stages
 
-    def _as_flown(self, line: _Line, path: Floats, after: Tether) -> Tether | None:
+    def _tether_in_flight(self, line: _PartialTour, path: Floats, after: Tether) -> Tether | None:
         """The tether of a robot that goes in fine steps and turns back within reach of each stop,
         as flights do; None where it does not come to hang as it should. Where it slips off
         something on the way, it must do so in steps of all sizes, and with bends that are farther
         out, or less far."""
         shares = np.linspace(0.0, 1.0, len(path))[1:-1, None]
         away = path[1:-1] - (path[0] + shares * (path[-1] - path[0]))
-        aside = (
+        offsets = (
             self._policy.position_error
             * away
             / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
         )
-        flown, slips = None, False
-        for before in (line.tether, line.flown):
-            flown, slipped = self._fine(before, path, after, self._policy.drive_steps[0])
+        flown, does_slip = None, False
+        for before in (line.tether, line.in_flight):
+            flown, slipped = self._drive_finely(before, path, after, self._policy.drive_steps[0])
             if flown is None:
                 return None
-            slips = slips or slipped
-        if not slips:
+            does_slip = does_slip or slipped
+        if not does_slip:
             return flown
-        for step, off in product(
-            self._policy.drive_steps, (0.0 * aside, aside, -aside) if len(path) > 2 else (aside,)
+        for step, offset in product(
+            self._policy.drive_steps,
+            (0.0 * offsets, offsets, -offsets) if len(path) > 2 else (offsets,),
         ):
-            other = np.vstack([path[:1], path[1:-1] + off, path[-1:]])
-            for before in (line.tether, line.flown):
-                if self._fine(before, other, after, step)[0] is None:
+            moved_path = np.vstack([path[:1], path[1:-1] + offset, path[-1:]])
+            for before in (line.tether, line.in_flight):
+                if self._drive_finely(before, moved_path, after, step)[0] is None:
                     return None
         return flown
 
-    def _fine(
+    def _drive_finely(
         self, before: Tether, path: Floats, after: Tether, step: float
     ) -> tuple[Tether | None, bool]:
         """A tether, driven in steps along a path to within reach of its end, and whether it slipped
         off something; None in its place where it is not like another at the end."""
         context = self.paths.context
-        way = np.vstack([before.robot[None], path[1:]])
-        short = _cut(way, context.mission.reach)
+        line = np.vstack([before.robot[None], path[1:]])
+        shortened = _shortened_path(line, context.mission.reach)
         step *= max(1.0, polylines.length(path) / self._policy.long_leg)
-        there, lengths = context.model.drive(before, polylines.dense(short, step))
-        end, most = context.drive(there, np.vstack([short[-1:], path[-1:]]))
-        longest = max(most, float(lengths.max(initial=0.0)))
+        arrived, lengths = context.model.drive(before, polylines.dense(shortened, step))
+        end, longest_at_end = context.drive(arrived, np.vstack([shortened[-1:], path[-1:]]))
+        longest = max(longest_at_end, float(lengths.max(initial=0.0)))
         delta = context.mission.delta
         if longest > self.board.states.limit or not hang_alike(end, after, delta):
             return None, False
         drops = -np.diff(lengths, prepend=before.length)
-        return there, bool((drops > step + delta).any())
+        return arrived, bool((drops > step + delta).any())
 
-    def _same(self, line: _Line, tether: Tether, word: int) -> bool:
+    def _is_same(self, line: _PartialTour, tether: Tether, word: int) -> bool:
         delta = self.paths.context.mission.delta
         return line.word == word and hang_alike(line.tether, tether, 0.25 * delta)
 
@@ -357,7 +370,7 @@ class Detours:
         same = not context.words.exact or word == context.word_number(context.start_tether.nodes)
         return same and hang_alike(tether, context.start_tether, context.mission.delta)
 
-    def _as_driven(self, line: _Line) -> DrivenTour:
+    def _to_driven_tour(self, line: _PartialTour) -> DrivenTour:
         *legs, home = line.legs
         places, letters = self.paths.places, self.paths.context.words.letters
         stops = [
@@ -367,14 +380,14 @@ class Detours:
                 letters(leg.word),
                 leg.tether.length,
                 _path(leg),
-                leg.most,
+                leg.longest_tether,
             )
             for leg in legs
         ]
         return DrivenTour([], stops, _path(home), line.length, True, None)
 
 
-def _cut(path: Floats, short: float) -> Floats:
+def _shortened_path(path: Floats, short: float) -> Floats:
     """A path, less its last metres, or half of it where it is no longer than twice that."""
     length = polylines.length(path)
     keep = max(length - short, 0.5 * length)
@@ -384,12 +397,12 @@ def _cut(path: Floats, short: float) -> Floats:
     return np.vstack([path[:last], path[last - 1] + share * (path[last] - path[last - 1])])
 
 
-def _path(leg: _Line) -> Floats:
+def _path(leg: _PartialTour) -> Floats:
     assert leg.path is not None
     return leg.path
 
 
-def _moved(order: list[int], piece_lengths: Sequence[int]) -> Iterator[list[int]]:
+def _moved_pieces(order: list[int], piece_lengths: Sequence[int]) -> Iterator[list[int]]:
     """An order with a piece of it elsewhere, either way round, or turned round where it is."""
     count = len(order)
     for size in piece_lengths:

@@ -308,11 +308,11 @@ def _parting(between: Bools, nearest: Ints) -> Bools:
     out = np.zeros(between.shape, dtype=np.bool_)
     for step in _HALF_STEPS:
         end_if_abandoned()
-        here, there = _shifted(between.shape, step)
-        apart = np.abs(nearest[here] - nearest[there]).max(axis=-1) >= 3
-        found = between[here] & between[there] & apart
-        out[here] |= found
-        out[there] |= found
+        unshifted, shifted = _shifted(between.shape, step)
+        apart = np.abs(nearest[unshifted] - nearest[shifted]).max(axis=-1) >= 3
+        found = between[unshifted] & between[shifted] & apart
+        out[unshifted] |= found
+        out[shifted] |= found
     return out
 
 
@@ -324,12 +324,12 @@ def _shifted(
     shape: tuple[int, ...], step: tuple[int, ...]
 ) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
     """Return the slices of cells and of their neighbours by a step."""
-    here, there = [], []
+    unshifted, shifted = [], []
     for n, s in zip(shape, step, strict=True):
         d = s - 1
-        here.append(slice(max(0, -d), n - max(0, d)))
-        there.append(slice(max(0, d), n - max(0, -d)))
-    return tuple(here), tuple(there)
+        unshifted.append(slice(max(0, -d), n - max(0, d)))
+        shifted.append(slice(max(0, d), n - max(0, -d)))
+    return tuple(unshifted), tuple(shifted)
 
 
 def _links(grid: GapGrid, cells: Ints, nearest: Ints, side: int) -> tuple[Ints, Floats, Floats]:

@@ -38,7 +38,7 @@ from netsp.roadmap.from_state import from_state
 
 def bound_all_tours(
     robot_paths: RobotPaths,
-    reached: list[int],
+    waypoints: list[int],
     clock: Clock | None,
     seed: int = 0,
     policy: BoundPolicy | None = None,
@@ -54,7 +54,7 @@ def bound_all_tours(
     ----------
     robot_paths : RobotPaths
         Known paths between waypoints; their lengths only say how far to look.
-    reached : list of int
+    waypoints : list of int
         Numbers of the waypoints that the tours visit.
     clock : Clock, optional
         Clock of the run; when it is up, the bound proven so far is returned.
@@ -72,18 +72,20 @@ def bound_all_tours(
     """
     clock, defaults = clock or Clock(), robot_paths.context.policy
     policy, potential = policy or defaults.bound, potential or defaults.potential
-    places, visited = robot_paths.places, set(reached)
-    some = [n for n in range(len(places)) if n == places.present or places.waypoint[n] in visited]
-    if not some:
+    places, visited = robot_paths.places, set(waypoints)
+    place_numbers = [
+        n for n in range(len(places)) if n == places.present or places.waypoint[n] in visited
+    ]
+    if not place_numbers:
         return None
     upright = bound_by_upright_solids(
         robot_paths.context.mission,
         robot_paths.context,
-        some,
+        place_numbers,
         places,
         clock.part(policy.upright_share),
     )
-    legs = LegBounds(robot_paths, some, potential, policy)
+    legs = LegBounds(robot_paths, place_numbers, potential, policy)
     of_robot = _bound_without_tether(legs, clock, seed)
     return max(of_robot or 0.0, upright or 0.0) or None
 
@@ -96,7 +98,7 @@ class LegBounds:
     ----------
     paths : RobotPaths
         Known paths between waypoints.
-    some : list of int
+    place_numbers : list of int
         Numbers of the places, as in `robot_paths.places`.
     potential : PotentialPolicy
         Effort for each leg.
@@ -114,24 +116,26 @@ class LegBounds:
     """
 
     paths: RobotPaths
-    some: list[int]
+    place_numbers: list[int]
     potential: PotentialPolicy
     policy: BoundPolicy = field(default_factory=BoundPolicy)
     points: Floats = field(init=False)
     costs: Floats = field(init=False)
     final: Bools = field(init=False)
     _level: Ints = field(init=False)
-    _looked: Bools = field(init=False)
-    _room: Floats = field(init=False)
+    _is_sight_tested: Bools = field(init=False)
+    _clearance: Floats = field(init=False)
 
     def __post_init__(self) -> None:
         context = self.paths.context
-        self.points = np.vstack([context.mission.start, self.paths.places.points[self.some]])
+        self.points = np.vstack(
+            [context.mission.start, self.paths.places.points[self.place_numbers]]
+        )
         self.costs = np.linalg.norm(self.points[:, None] - self.points[None], axis=2)
         self.final = np.eye(len(self.points), dtype=np.bool_)
         self._level = np.zeros(self.costs.shape, dtype=np.int64)
-        self._looked = self.final.copy()
-        self._room = context.field.distance(self.points)
+        self._is_sight_tested = self.final.copy()
+        self._clearance = context.field.distance(self.points)
 
     def raise_bound(self, u: int, v: int, clock: Clock) -> bool:
         """Raise the bound of a leg on a finer grid.
@@ -154,12 +158,12 @@ class LegBounds:
             return False
         a, b, before = self.points[u], self.points[v], self.costs[u, v]
         context = self.paths.context
-        if not self._looked[u, v]:
-            self._looked[u, v] = self._looked[v, u] = True
+        if not self._is_sight_tested[u, v]:
+            self._is_sight_tested[u, v] = self._is_sight_tested[v, u] = True
             if is_straight_clear(context.field, a, b, context.mission.clearance):
                 self.final[u, v] = self.final[v, u] = True
                 return False
-        known = self._known(u, v)
+        known = self._known_length(u, v)
         farthest = self.policy.max_detour_ratio * float(np.linalg.norm(b - a))
         longest = known if math.isfinite(known) else farthest
         level = int(self._level[u, v]) + 1
@@ -180,7 +184,7 @@ class LegBounds:
         """Return the region of all legs that the judge accepts
         (`netsp.plan.space.planning_context.keeps_clearance`)."""
         mission, context = self.paths.context.mission, self.paths.context
-        room = min(mission.clearance, float(self._room[u]), float(self._room[v]))
+        room = min(mission.clearance, float(self._clearance[u]), float(self._clearance[v]))
         # between two samples of a path the distance from solids may be half a step less
         room = max(room - 0.5 * mission.delta - 2.0 * CLEARANCE_TOLERANCE, -2.0 * DEPTH_TOLERANCE)
         bounds = np.array([[-np.inf] * 3, [np.inf] * 3])
@@ -189,19 +193,19 @@ class LegBounds:
         anchor = np.asarray(mission.anchor, dtype=float)
         return Region(room, bounds, anchor, mission.tether_length * (1.0 + 1e-6))
 
-    def _known(self, u: int, v: int) -> float:
+    def _known_length(self, u: int, v: int) -> float:
         """Return the length of the shortest path found so far; infinite where there is none."""
         robot_paths = self.paths
         if u == 0 or v == 0:
             n, laid = (
-                self.some[max(u, v) - 1],
+                self.place_numbers[max(u, v) - 1],
                 polylines.length(robot_paths.context.start_tether.nodes),
             )
             return min(
                 (laid + polylines.length(t) for t in robot_paths.tethers.get(n, ())),
                 default=math.inf,
             )
-        known = robot_paths.between(self.some[u - 1], self.some[v - 1])
+        known = robot_paths.between(self.place_numbers[u - 1], self.place_numbers[v - 1])
         return min((polylines.length(path) for _, path in known), default=math.inf)
 
 
@@ -212,7 +216,7 @@ def _bound_without_tether(legs: LegBounds, clock: Clock, seed: int) -> float | N
     until no bound of a leg can be raised or the time is up.
     """
     places, best = legs.paths.places, 0.0
-    point = np.array(legs.some)
+    point = np.array(legs.place_numbers)
     cluster: Ints = np.r_[0, 1 + np.unique(places.waypoint[point], return_inverse=True)[1]]
     begin = None if places.present is None else 1 + int(np.flatnonzero(point == places.present)[0])
     while True:

@@ -136,16 +136,8 @@ def path_bound(
 def steepness(field: DistanceField) -> float:
     """Return the largest change of a field over a metre.
 
-    Parameters
-    ----------
-    field : DistanceField
-        The scene.
-
-    Returns
-    -------
-    float
-        1 for exact solids. Between the points of voxels it is linear along each axis, so it is the
-        root of three times the most between two neighbours.
+    It is 1 for exact solids. Between the points of voxels the field is linear along each axis, so
+    the change is at most the root of three times the largest one between two neighbours.
     """
     return 1.0 if field.voxel is None else math.sqrt(3.0) * _steepest_voxels(field)
 
@@ -161,12 +153,12 @@ def _steepest_voxels(field: DistanceField) -> float:
         from netsp.world.scene.grid import SIDE
 
         parts.append((grid.values[n:].reshape(-1, SIDE, SIDE, SIDE), grid.voxel))
-    most = 1.0
+    maximum = 1.0
     for values, size in parts:
         for axis in range(values.ndim - 3, values.ndim):
             if values.shape[axis] > 1 and values.size:
-                most = max(most, float(np.abs(np.diff(values, axis=axis)).max()) / size)
-    return most
+                maximum = max(maximum, float(np.abs(np.diff(values, axis=axis)).max()) / size)
+    return maximum
 
 
 def _box_of_ellipsoid(a: Floats, b: Floats, longest: float) -> tuple[Floats, Floats]:
@@ -203,10 +195,10 @@ def _bound_of_potential(
     # of one by about half a cell over d, so the cell is slowed by that share from the start
     far = distances_of_corners(possible.shape, low, cell, a)
     begin = (1.0 / (1.0 + 0.5 * cell / np.maximum(far, max(ball_a, cell)))).astype(np.float32)
-    most = longest - ball_a
+    maximum = longest - ball_a
     edges = corner_edges(possible)
-    slow, slow_cells = begin.copy(), np.ones(possible.shape, dtype=np.float32)
-    u = fast_march(edges, start, cell, slow, most, policy.bucket_cells, stop)
+    slowness, slow_cells = begin.copy(), np.ones(possible.shape, dtype=np.float32)
+    u = fast_march(edges, start, cell, slowness, maximum, policy.bucket_cells, stop)
     before_b = _corners((from_b <= ball_b) & possible)
     best = 0.0
     for k in range(2 * policy.rounds):
@@ -214,8 +206,8 @@ def _bound_of_potential(
             for turn in range(16 if k == 0 else 8):
                 if stop[0]:
                     return best
-                sweep(u, edges, cell, slow, turn)
-            slope = slow_steep_cells(u, possible, cell, slow_cells, begin, slow)
+                sweep(u, edges, cell, slowness, turn)
+            slope = slow_steep_cells(u, possible, cell, slow_cells, begin, slowness)
         else:
             for turn in range(8):
                 if stop[0]:
@@ -224,8 +216,8 @@ def _bound_of_potential(
             slope = steepest(u, possible, cell)
         # after each round, u divided by its steepest slope is a potential
         slope = max(1.0, slope)
-        there = max(_value(u, low, cell, b) / slope, ball_b + float(u[before_b].min()) / slope)
-        best = max(best, ball_a + there)
+        at_b = max(_value(u, low, cell, b) / slope, ball_b + float(u[before_b].min()) / slope)
+        best = max(best, ball_a + at_b)
         if slope <= 1.0 + SLOPE_TOLERANCE:
             break
     return min(longest, best) * (1.0 - BOUND_ROUNDING)
@@ -244,30 +236,14 @@ def _value(u: Floats, low: Floats, cell: float, point: Floats) -> float:
     """Return the trilinear value at a point."""
     at = np.clip(((point - low) / cell).astype(np.int64), 0, np.array(u.shape) - 2)
     share = np.clip((point - low) / cell - at, 0.0, 1.0)
-    corner = u[at[0] : at[0] + 2, at[1] : at[1] + 2, at[2] : at[2] + 2]
+    corners = u[at[0] : at[0] + 2, at[1] : at[1] + 2, at[2] : at[2] + 2]
     x, y, z = (np.array([1.0 - s, s]) for s in share)
-    return float(np.einsum("i,j,k,ijk", x, y, z, corner))
+    return float(np.einsum("i,j,k,ijk", x, y, z, corners))
 
 
 def distances_of_cells(shape: tuple[int, ...], low: Floats, cell: float, point: Floats) -> Floats:
-    """Return the distances (nx, ny, nz) of cells from a point, 0 of the one that holds it.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Numbers of cells.
-    low : ndarray, shape (3,)
-        Corner of the grid, metres.
-    cell : float
-        Size of a cell, metres.
-    point : ndarray, shape (3,)
-        Metres.
-
-    Returns
-    -------
-    ndarray
-        Metres.
-    """
+    """Return the distances (nx, ny, nz) of cells from a point, metres; 0 for the cell that holds
+    it."""
     gaps = []
     for axis in range(3):
         begin = low[axis] + cell * np.arange(shape[axis])
@@ -276,24 +252,8 @@ def distances_of_cells(shape: tuple[int, ...], low: Floats, cell: float, point: 
 
 
 def distances_of_corners(shape: tuple[int, ...], low: Floats, cell: float, point: Floats) -> Floats:
-    """Return the distances (nx + 1, ny + 1, nz + 1) of cells' corners from a point.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Numbers of cells.
-    low : ndarray, shape (3,)
-        Corner of the grid, metres.
-    cell : float
-        Size of a cell, metres.
-    point : ndarray, shape (3,)
-        Metres.
-
-    Returns
-    -------
-    ndarray
-        Metres.
-    """
+    """Return the distances (nx + 1, ny + 1, nz + 1) of the corners of cells from a point,
+    metres."""
     return _hypot3([low[k] + cell * np.arange(shape[k] + 1) - point[k] for k in range(3)])
 
 
@@ -329,20 +289,20 @@ def may_have_room(
     reach = 1.00001 * steep * math.sqrt(halves[0] ** 2 + halves[1] ** 2 + halves[2] ** 2)
     while left > 0:
         left -= 1
-        x, y, z, share, more = parts[left]
+        x, y, z, share, left_halvings = parts[left]
         d = distance(field, x, y, z)
         if d >= room:
             return True
         if d + share * reach < room:
             continue
-        if more == 0.0:
+        if left_halvings == 0.0:
             return True
         share *= 0.5
         for k in range(8):
             parts[left, 0] = x + share * (halves[0] if k & 1 else -halves[0])
             parts[left, 1] = y + share * (halves[1] if k & 2 else -halves[1])
             parts[left, 2] = z + share * (halves[2] if k & 4 else -halves[2])
-            parts[left, 3], parts[left, 4] = share, more - 1.0
+            parts[left, 3], parts[left, 4] = share, left_halvings - 1.0
             left += 1
     return False
 
@@ -423,16 +383,16 @@ def upwind_value(
 ) -> float:
     """Return the value of a corner from its neighbours' values, upwind (Godunov's scheme)."""
     x, y, z = math.inf, math.inf, math.inf
-    here = edges[p, q, r]
-    if here & 1:
+    bits = edges[p, q, r]
+    if bits & 1:
         x = u[p + 1, q, r]
     if p > 0 and edges[p - 1, q, r] & 1:
         x = min(x, u[p - 1, q, r])
-    if here & 2:
+    if bits & 2:
         y = u[p, q + 1, r]
     if q > 0 and edges[p, q - 1, r] & 2:
         y = min(y, u[p, q - 1, r])
-    if here & 4:
+    if bits & 4:
         z = u[p, q, r + 1]
     if r > 0 and edges[p, q, r - 1] & 4:
         z = min(z, u[p, q, r - 1])
@@ -457,17 +417,19 @@ def fast_march(
     edges: npt.NDArray[np.uint8],
     start: Bools,
     cell: float,
-    slow: Singles,
-    most: float,
+    slowness: Singles,
+    maximum: float,
     bucket_cells: float,
     stop: Flag,
 ) -> Floats:
-    """Return the distances of corners from `start` by fast marching, up to `most`, with a queue of
-    buckets. Once the flag `stop` is set, the distances are incomplete."""
+    """Return the distances of corners from `start` by fast marching, with a queue of buckets.
+
+    Distances are cut off at `maximum`. Once the flag `stop` is set, they are incomplete.
+    """
     nx, ny, nz = edges.shape
     u, done = np.full((nx, ny, nz), np.inf), np.zeros((nx, ny, nz), dtype=np.bool_)
     width = bucket_cells * cell
-    buckets = int(most / width) + 3
+    buckets = int(maximum / width) + 3
     first = np.full(buckets, -1)
     entries, count = np.empty((4096, 2), dtype=np.int64), 0
     for i in range(nx):
@@ -500,7 +462,7 @@ def fast_march(
             joined = edges[i, j, k] if sign > 0 else edges[p, q, r]
             if not joined & (1 << axis):
                 continue
-            value = upwind_value(u, edges, p, q, r, cell * slow[p, q, r])
+            value = upwind_value(u, edges, p, q, r, cell * slowness[p, q, r])
             if value < u[p, q, r]:
                 u[p, q, r] = value
                 bucket = max(now, int(value / width))
@@ -513,12 +475,14 @@ def fast_march(
     for i in range(nx):
         for j in range(ny):
             for k in range(nz):
-                u[i, j, k] = min(u[i, j, k], most)
+                u[i, j, k] = min(u[i, j, k], maximum)
     return u
 
 
 @kernel
-def sweep(u: Floats, edges: npt.NDArray[np.uint8], cell: float, slow: Singles, turn: int) -> None:
+def sweep(
+    u: Floats, edges: npt.NDArray[np.uint8], cell: float, slowness: Singles, turn: int
+) -> None:
     """Lower each value to the one that its neighbours give, in one of eight diagonal orders (fast
     sweeping, Zhao 2004)."""
     nx, ny, nz = u.shape
@@ -529,7 +493,7 @@ def sweep(u: Floats, edges: npt.NDArray[np.uint8], cell: float, slow: Singles, t
             for c in range(nz):
                 k = c if turn & 4 == 0 else nz - 1 - c
                 if u[i, j, k] > 0.0:
-                    value = upwind_value(u, edges, i, j, k, cell * slow[i, j, k])
+                    value = upwind_value(u, edges, i, j, k, cell * slowness[i, j, k])
                     u[i, j, k] = min(u[i, j, k], value)
 
 
@@ -537,46 +501,46 @@ def sweep(u: Floats, edges: npt.NDArray[np.uint8], cell: float, slow: Singles, t
 def steepest_slope(u: Floats, i: int, j: int, k: int, cell: float) -> float:
     """Return the steepest slope of the trilinear function of a cell. The square of its gradient is
     convex along each axis, so it is largest in a corner, where three edges give the gradient."""
-    most = 0.0
+    maximum = 0.0
     for n in range(8):
         p, q, r = n & 1, n >> 1 & 1, n >> 2
-        here = u[i + p, j + q, k + r]
+        corner_value = u[i + p, j + q, k + r]
         square = (
-            (u[i + 1 - p, j + q, k + r] - here) ** 2
-            + (u[i + p, j + 1 - q, k + r] - here) ** 2
-            + (u[i + p, j + q, k + 1 - r] - here) ** 2
+            (u[i + 1 - p, j + q, k + r] - corner_value) ** 2
+            + (u[i + p, j + 1 - q, k + r] - corner_value) ** 2
+            + (u[i + p, j + q, k + 1 - r] - corner_value) ** 2
         )
-        most = max(most, square)
-    return math.sqrt(most) / cell
+        maximum = max(maximum, square)
+    return math.sqrt(maximum) / cell
 
 
 @kernel
 def steepest(u: Floats, possible: Bools, cell: float) -> float:
     """Return the steepest slope in any cell that is possibly free."""
     nx, ny, nz = possible.shape
-    most = 0.0
+    maximum = 0.0
     for i in range(nx):
         for j in range(ny):
             for k in range(nz):
                 if possible[i, j, k]:
-                    most = max(most, steepest_slope(u, i, j, k, cell))
-    return most
+                    maximum = max(maximum, steepest_slope(u, i, j, k, cell))
+    return maximum
 
 
 @kernel
 def slow_steep_cells(
-    u: Floats, possible: Bools, cell: float, slow_cells: Singles, begin: Singles, slow: Singles
+    u: Floats, possible: Bools, cell: float, slow_cells: Singles, begin: Singles, slowness: Singles
 ) -> float:
     """Slow the corners of cells with too steep a slope, and return the steepest slope."""
     nx, ny, nz = possible.shape
-    most = 0.0
+    maximum = 0.0
     for i in range(nx):
         for j in range(ny):
             for k in range(nz):
                 if not possible[i, j, k]:
                     continue
                 slope = steepest_slope(u, i, j, k, cell)
-                most = max(most, slope)
+                maximum = max(maximum, slope)
                 if slope > 1.0:
                     # slow a little more than needed, because exact steps would take many rounds
                     slow_cells[i, j, k] /= slope * (1.0 + 3.0 * SLOPE_TOLERANCE)
@@ -584,8 +548,8 @@ def slow_steep_cells(
                 if factor < 1.0:
                     for n in range(8):
                         p, q, r = i + (n & 1), j + (n >> 1 & 1), k + (n >> 2)
-                        slow[p, q, r] = min(slow[p, q, r], factor * begin[p, q, r])
-    return most
+                        slowness[p, q, r] = min(slowness[p, q, r], factor * begin[p, q, r])
+    return maximum
 
 
 @kernel
@@ -614,44 +578,31 @@ def lower_corner(u: Floats, i: int, j: int, k: int, n: int, limit: float, tolera
     for axis in range(3):
         places[axis, 0], places[axis, 1], places[axis, 2] = i + p, j + q, k + r
     places[0, 0], places[1, 1], places[2, 2] = i + 1 - p, j + 1 - q, k + 1 - r
-    here = u[i + p, j + q, k + r]
+    corner_value = u[i + p, j + q, k + r]
     up, down, below, sum_below, squares_below = 0.0, 0.0, 0, 0.0, 0.0
     for m in range(3):
         value = u[places[m, 0], places[m, 1], places[m, 2]]
-        if value < here:
-            down += (here - value) ** 2
+        if value < corner_value:
+            down += (corner_value - value) ** 2
             below, sum_below = below + 1, sum_below + value
             squares_below += value * value
         else:
-            up += (value - here) ** 2
+            up += (value - corner_value) ** 2
     if up + down <= limit * (1.0 + tolerance):
         return
     share = 0.0
     if down >= limit:
         root = sum_below * sum_below - below * (squares_below - limit)
-        here = min(here, (sum_below + math.sqrt(max(root, 0.0))) / below)
-        u[i + p, j + q, k + r] = here
+        corner_value = min(corner_value, (sum_below + math.sqrt(max(root, 0.0))) / below)
+        u[i + p, j + q, k + r] = corner_value
     else:
         share = math.sqrt((limit - down) / up)
     for m in range(3):
         x, y, z = places[m, 0], places[m, 1], places[m, 2]
-        if u[x, y, z] > here:
-            u[x, y, z] = here + share * (u[x, y, z] - here)
+        if u[x, y, z] > corner_value:
+            u[x, y, z] = corner_value + share * (u[x, y, z] - corner_value)
 
 
 def cells_at_level(level: int, policy: PotentialPolicy) -> int:
-    """Return the number of cells of the grid of a level.
-
-    Parameters
-    ----------
-    level : int
-        Level, from 1 on; each has `growth` times the cells of the one before.
-    policy : PotentialPolicy
-        Effort.
-
-    Returns
-    -------
-    int
-        Number of cells, at most `max_cells`.
-    """
+    """Return the number of cells of the grid of a level, from 1 on; at most `max_cells`."""
     return min(policy.max_cells, policy.min_cells * int(policy.growth ** (level - 1)))

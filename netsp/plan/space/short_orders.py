@@ -62,15 +62,15 @@ def short_order_tour(
             return best
         seen |= {tuple(order), tuple(order[::-1])}
         # a mission under way has one direction: from the robot to the start
-        for there in (order, order[::-1])[: 1 if places.present is not None else 2]:
+        for direction in (order, order[::-1])[: 1 if places.present is not None else 2]:
             if clock.up:
                 return best
             driven = drive_order(
-                context, [(int(n), int(c)) for n, c in _stops(places, there)], clock
+                context, [(int(n), int(c)) for n, c in _stops(places, direction)], clock
             )
             if driven is None:
                 continue
-            _update_estimates(estimates, places, there, driven)
+            _update_estimates(estimates, places, direction, driven)
             if best is None or _rank(driven) < _rank(best):
                 best = driven
     return best
@@ -120,9 +120,9 @@ def _update_estimates(
 ) -> None:
     """Replace the estimates of legs by the lengths that they were driven with."""
     place_of = {places.waypoint[n]: 1 + n for n in order}
-    here = 0 if places.present is None else 1 + places.present
+    row = 0 if places.present is None else 1 + places.present
     for stop in driven.visits:
-        there = place_of[stop.waypoint]
-        estimates[here, there] = estimates[there, here] = polylines.length(stop.path)
-        here = there
-    estimates[here, 0] = estimates[0, here] = polylines.length(driven.home)
+        column = place_of[stop.waypoint]
+        estimates[row, column] = estimates[column, row] = polylines.length(stop.path)
+        row = column
+    estimates[row, 0] = estimates[0, row] = polylines.length(driven.home)

@@ -43,22 +43,25 @@ class RobotPaths:
     _known: dict[tuple[int, int], list[tuple[int, Floats]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        apart = self.places.distances
-        per = len(apart) / np.count_nonzero(self.places.choice == 0)
-        count = min(math.ceil(self.context.policy.states.n_neighbours * per), len(apart) - 1)
-        nearest = np.argsort(apart, axis=1, kind="stable")[:, :count]
-        both = np.zeros(apart.shape, dtype=bool)
-        both[np.arange(len(apart))[:, None], nearest] = True
-        both = (both | both.T) & np.isfinite(apart)
-        self.neighbours: list[Ints] = [np.flatnonzero(row) for row in both]
-        self._apart = apart
+        distances = self.places.distances
+        places_per_waypoint = len(distances) / np.count_nonzero(self.places.choice == 0)
+        count = min(
+            math.ceil(self.context.policy.states.n_neighbours * places_per_waypoint),
+            len(distances) - 1,
+        )
+        nearest = np.argsort(distances, axis=1, kind="stable")[:, :count]
+        is_near = np.zeros(distances.shape, dtype=bool)
+        is_near[np.arange(len(distances))[:, None], nearest] = True
+        is_near = (is_near | is_near.T) & np.isfinite(distances)
+        self.neighbours: list[Ints] = [np.flatnonzero(row) for row in is_near]
+        self._distances = distances
 
     @property
     def points(self) -> Floats:
         """(n, 3) the places, metres."""
         return self.places.points
 
-    def find_from(self, n: int, *, search: bool = True, pulling: Clock | None = None) -> None:
+    def find_from(self, n: int, *, search: bool = True, tether_clock: Clock | None = None) -> None:
         """Seek the ways from a waypoint to those near it that have a greater number.
 
         Parameters
@@ -67,24 +70,28 @@ class RobotPaths:
             The waypoint.
         search : bool
             Search for all classes; else there are the straight ways, and those along tethers.
-        pulling : Clock, optional
+        tether_clock : Clock, optional
             When it is up, there are no more of those along tethers, either.
         """
-        to = [int(m) for m in self.neighbours[n] if m > n and (n, int(m)) not in self._known]
-        if not to:
+        targets = [int(m) for m in self.neighbours[n] if m > n and (n, int(m)) not in self._known]
+        if not targets:
             return
         context, words = self.context, self.context.words
-        here = words.visible_cell(self.points[n])
+        begin_cell = words.visible_cell(self.points[n])
         found = None
-        if here is not None and search:
-            ends = {m: words.visible_cell(self.points[m]) for m in to}
-            limits = {
-                c: self.effort.max_path_ratio * float(self._apart[n, m])
-                for m, c in ends.items()
+        if begin_cell is not None and search:
+            end_cells = {m: words.visible_cell(self.points[m]) for m in targets}
+            max_lengths = {
+                c: self.effort.max_path_ratio * float(self._distances[n, m])
+                for m, c in end_cells.items()
                 if c is not None
             }
-            found = context.search_words(True, here, self.effort.paths, limits) if limits else None
-        for m in to:
+            found = (
+                context.search_words(True, begin_cell, self.effort.paths, max_lengths)
+                if max_lengths
+                else None
+            )
+        for m in targets:
             paths = []
             if is_straight_clear(
                 context.field, self.points[n], self.points[m], context.mission.clearance
@@ -93,37 +100,37 @@ class RobotPaths:
                 word = context.word_number(line)
                 if word is not None:
                     paths.append((word, line))
-            there = ends[m] if found is not None else None
-            if found is not None and there is not None:
-                for _, cells in context.paths_to(found, there):
+            end_cell = end_cells[m] if found is not None else None
+            if found is not None and end_cell is not None:
+                for _, cells in context.paths_to(found, end_cell):
                     path = context.pull_taut(np.vstack([self.points[n], cells, self.points[m]]))
                     word = context.word_number(path)
                     if word is not None and all(word != w for w, _ in paths):
                         paths.append((word, path))
-            if found is None and not (pulling is not None and pulling.up):
+            if found is None and not (tether_clock is not None and tether_clock.up):
                 self._add_along_tethers(n, m, paths)
-            paths.sort(key=lambda way: polylines.length(way[1]))
+            paths.sort(key=lambda entry: polylines.length(entry[1]))
             if found is not None and paths:
-                farther = self.effort.max_path_ratio * float(self._apart[n, m])
-                for path in find_bent_paths(context, [way for _, way in paths], farther):
+                max_length = self.effort.max_path_ratio * float(self._distances[n, m])
+                for path in find_bent_paths(context, [entry for _, entry in paths], max_length):
                     word = context.word_number(path)
                     if word is not None:
                         paths.append((word, path))
-                paths.sort(key=lambda way: polylines.length(way[1]))
-            back = []
+                paths.sort(key=lambda entry: polylines.length(entry[1]))
+            reversed_paths = []
             for _, path in paths:
                 word = context.word_number(path[::-1])
                 if word is not None:
-                    back.append((word, path[::-1]))
-            self._known[n, m], self._known[m, n] = paths, back
+                    reversed_paths.append((word, path[::-1]))
+            self._known[n, m], self._known[m, n] = paths, reversed_paths
 
     def _add_along_tethers(self, n: int, m: int, paths: list[tuple[int, Floats]]) -> None:
         """The shortest ways back along a tether of one place and out along one of another, pulled
         taut, each of a class of its own."""
         found: dict[int, Floats] = {}
-        for back in self.tethers.get(n, ()):
-            for out in self.tethers.get(m, ()):
-                path = self.context.pull_taut(np.vstack([back[::-1], out[1:]]))
+        for tether_back in self.tethers.get(n, ()):
+            for tether_out in self.tethers.get(m, ()):
+                path = self.context.pull_taut(np.vstack([tether_back[::-1], tether_out[1:]]))
                 word = self.context.word_number(path)
                 if word is None or not keeps_clearance(
                     self.context.field, path, self.context.mission
@@ -131,11 +138,11 @@ class RobotPaths:
                     continue
                 if word not in found or polylines.length(path) < polylines.length(found[word]):
                     found[word] = path
-        for word, path in sorted(found.items(), key=lambda way: polylines.length(way[1])):
+        for word, path in sorted(found.items(), key=lambda entry: polylines.length(entry[1])):
             if len(paths) < self.effort.paths and all(word != w for w, _ in paths):
                 paths.append((word, path))
 
-    def find_all(self, clock: Clock, tell: Callable[[str], None]) -> None:
+    def find_all(self, clock: Clock, on_progress: Callable[[str], None]) -> None:
         """Seek all ways between waypoints that are near.
 
         Parameters
@@ -143,16 +150,16 @@ class RobotPaths:
         clock : Clock
             When a share of it is up, ways are made of tethers; when another is, straight ways are
             all that is looked at.
-        tell : callable
+        on_progress : callable
             Called with a line of text now and then.
         """
         times = self.context.policy.times
-        searching, pulling = clock.part(times.path_search_share), None
+        search_clock, tether_clock = clock.part(times.path_search_share), None
         for n in range(len(self.points)):
-            tell(f"ways of the robot from waypoint {n + 1} of {len(self.points)}")
-            if searching.up and pulling is None:
-                pulling = clock.part(times.tether_path_share)
-            self.find_from(n, search=pulling is None, pulling=pulling)
+            on_progress(f"ways of the robot from waypoint {n + 1} of {len(self.points)}")
+            if search_clock.up and tether_clock is None:
+                tether_clock = clock.part(times.tether_path_share)
+            self.find_from(n, search=tether_clock is None, tether_clock=tether_clock)
 
     def between(self, n: int, m: int) -> list[tuple[int, Floats]]:
         """Ways from one waypoint to another that were found so far, shortest first.
@@ -197,11 +204,11 @@ class DrivenLegs:
             too: the lower number is then the first, and the path the shorter of the two.
         """
         for (v, w), path in self.arrives.items():
-            back = self.arrives.get((w, v))
-            if back is None:
+            reverse = self.arrives.get((w, v))
+            if reverse is None:
                 yield v, w, path, False
             elif v < w:
-                yield v, w, min(path, back[::-1], key=polylines.length), True
+                yield v, w, min(path, reverse[::-1], key=polylines.length), True
 
 
 @dataclass
@@ -221,22 +228,22 @@ class StateGrowth:
     states: States
     paths: RobotPaths
     legs: DrivenLegs = field(default_factory=DrivenLegs)
-    _waiting: list[tuple[float, int, int, int, int]] = field(default_factory=list)
-    _no_room: list[tuple[float, int, int, int, int]] = field(default_factory=list)
+    _queue: list[tuple[float, int, int, int, int]] = field(default_factory=list)
+    _postponed: list[tuple[float, int, int, int, int]] = field(default_factory=list)
     _known: int = 0
     _count: int = 0
     _shortest: dict[tuple[int, int], float] = field(default_factory=dict)
 
-    def grow(self, most: int, clock: Clock, tell: Callable[[str], None]) -> bool:
+    def grow(self, max_per_place: int, clock: Clock, on_progress: Callable[[str], None]) -> bool:
         """Drive legs until there are none left to drive, or the time is up.
 
         Parameters
         ----------
-        most : int
+        max_per_place : int
             States of a waypoint.
         clock : Clock
             When it is up, legs and states are what they are by then.
-        tell : callable
+        on_progress : callable
             Called with a line of text now and then.
 
         Returns
@@ -244,17 +251,19 @@ class StateGrowth:
         bool
             Whether there are none left for so many states.
         """
-        self.states.max_per_place = most
-        for leg in self._no_room:
-            heapq.heappush(self._waiting, leg)
-        self._no_room.clear()
-        while self._drive_on():
-            tell(f"legs, {len(self.legs.arrives)} driven between {len(self.states.entries)} states")
+        self.states.max_per_place = max_per_place
+        for leg in self._postponed:
+            heapq.heappush(self._queue, leg)
+        self._postponed.clear()
+        while self._drive_next():
+            on_progress(
+                f"legs, {len(self.legs.arrives)} driven between {len(self.states.entries)} states"
+            )
             if clock.up:
                 return False
         return True
 
-    def _look_at_new(self) -> None:
+    def _queue_new_states(self) -> None:
         """Take the ways from new states on among those that wait."""
         for v in range(self._known, len(self.states.entries)):
             state = self.states.entries[v]
@@ -263,45 +272,43 @@ class StateGrowth:
             for m in self.paths.neighbours[state.place]:
                 for k, (_, path) in enumerate(self.paths.between(state.place, int(m))):
                     self._count += 1
-                    heapq.heappush(
-                        self._waiting, (polylines.length(path), self._count, v, int(m), k)
-                    )
+                    heapq.heappush(self._queue, (polylines.length(path), self._count, v, int(m), k))
         self._known = len(self.states.entries)
 
-    def _drive_on(self) -> bool:
+    def _drive_next(self) -> bool:
         """Drive the next leg; whether there was one."""
-        self._look_at_new()
-        if not self._waiting:
+        self._queue_new_states()
+        if not self._queue:
             return False
-        leg = heapq.heappop(self._waiting)
-        _, _, v, m, k = leg
+        leg = heapq.heappop(self._queue)
+        _, _, v, target, k = leg
         states, legs = self.states, self.legs
         state = states.entries[v]
-        word, path = self.paths.between(state.place, m)[k]
-        writes = states.context.words.multiply(state.word, word)
-        if not states.can_hold(m, writes):
-            self._no_room.append(leg)
+        word, path = self.paths.between(state.place, target)[k]
+        new_word = states.context.words.multiply(state.word, word)
+        if not states.can_hold(target, new_word):
+            self._postponed.append(leg)
             return True
-        if not self._may_fit(state, m, writes, path):
+        if not self._may_fit(state, target, new_word, path):
             return True
-        there, longest = states.context.drive(state.tether, path)
+        tether, longest = states.context.drive(state.tether, path)
         if longest > states.limit:
             return True
-        w = states.find(m, writes, there)
+        w = states.find(target, new_word, tether)
         if w is None:
-            w = states.add(m, writes, there)
+            w = states.add(target, new_word, tether)
         if w is None:
-            self._no_room.append(leg)
+            self._postponed.append(leg)
         else:
             old = legs.arrives.get((v, w))
             if old is None or polylines.length(path) < polylines.length(old):
                 legs.arrives[v, w] = path
         return True
 
-    def _may_fit(self, state: State, m: int, writes: int, path: Floats) -> bool:
+    def _may_fit(self, state: State, target: int, word: int, path: Floats) -> bool:
         """Whether the tether may be within its limit at the end of a way: a drive takes ten times
         as long as to pull it taut there."""
-        key = m, writes
+        key = target, word
         if self._shortest.get(key, np.inf) > self.states.limit:
             line = np.vstack([state.tether.nodes, path[1:]])
             rounds = self.states.context.policy.states.max_pull_rounds

@@ -380,7 +380,7 @@ def candidate_plans(
             scene=scene,
             field=field,
             grid=grid,
-            tell=on_progress,
+            on_progress=on_progress,
             policy=policy,
         )
     yield from _planned(context, scene, clock, on_progress or _silent, how, whole_tether)
@@ -393,7 +393,7 @@ def prepare_context(
     scene: Scene | None = None,
     field: DistanceField | None = None,
     grid: Grid | None = None,
-    tell: Callable[[str], None] | None = None,
+    on_progress: Callable[[str], None] | None = None,
     policy: MissionPolicy | None = None,
 ) -> PlanningContext:
     """Make the water of a mission for a plan: check the mission, find the gaps that its grid does
@@ -412,7 +412,7 @@ def prepare_context(
     grid : Grid, optional
         Grid for paths. If both `field` and `grid` are given, the grid is kept and its gaps are only
         named.
-    tell : callable, optional
+    on_progress : callable, optional
         Called with a line of text at each stage.
     policy : MissionPolicy, optional
         Effort, time and limits.
@@ -429,7 +429,7 @@ def prepare_context(
     LimitReachedError
         The time was up before; says which work was broken off.
     """
-    tell, policy = tell or _silent, policy or MissionPolicy()
+    on_progress, policy = on_progress or _silent, policy or MissionPolicy()
     check_size(mission)
     if field is None or grid is None:
         scene = scene or clock.bounded("reading the scene", mission.load_scene)
@@ -437,7 +437,7 @@ def prepare_context(
         field = field or clock.bounded("measuring distances in the scene", scene.field)
         grid = None
     mission = mission.checked_waypoints(field)
-    tell("gaps that the cells do not show")
+    on_progress("gaps that the cells do not show")
     if grid is None:
         assert scene is not None
         find_gaps = partial(
@@ -453,7 +453,7 @@ def prepare_context(
     if grid is None:
         assert scene is not None
         grid = clock.bounded("measuring the cells", partial(grid_of, mission, scene, field))
-    tell("words of the scene")
+    on_progress("words of the scene")
     bounds = None if scene is None else scene.bounds
     context = clock.bounded(
         "finding the words of the scene",
@@ -536,7 +536,7 @@ def _planned(
     context: PlanningContext,
     scene: Scene | None,
     clock: Clock,
-    tell: Callable[[str], None],
+    on_progress: Callable[[str], None],
     how: dict[str, Any],
     whole_tether: bool,
 ) -> Iterator[SpacePlan]:
@@ -563,11 +563,11 @@ def _planned(
             in_plane = True
             yield _plan_of(context, places, driven, PLANE)
     if not in_plane:
-        tell("short orders")
+        on_progress("short orders")
         driven_short = short_order_tour(context, places, clock, how["seed"])
         if driven_short is not None and driven_short.visits:
             yield _plan_of(context, places, driven_short, SHORT_ORDER)
-    tell("shortest tethers to each waypoint")
+    on_progress("shortest tethers to each waypoint")
     effort = context.policy.states.effort(len(places))
     states = find_first_states(context, places, limit, effort, clock.part(times.first_states_share))
     if not states.reached - {len(mission.waypoints)}:
@@ -605,15 +605,15 @@ def _planned(
             kind,
         )
 
-    robot_paths.find_all(clock, tell)
-    tell("trees of legs")
+    robot_paths.find_all(clock, on_progress)
+    on_progress("trees of legs")
     add_states_of_trees(states, robot_paths, clock.part(times.tree_share))
     board.update(growth.legs, clock.part(times.home_path_share))
     if lacking := set(range(len(mission.waypoints))) - board.reached_waypoints:
-        tell("ways with room for the robot")
+        on_progress("ways with room for the robot")
         add_states_with_room(states, lacking, effort.words, clock.part(times.first_states_share))
         board.update(growth.legs, clock.part(times.home_path_share))
-    growth.grow(0, clock.part(times.tree_share), tell)
+    growth.grow(0, clock.part(times.tree_share), on_progress)
     taut = clock.part(times.taut_share)
     best: tuple[Result, DrivenTour] | None = None
     complete = False
@@ -621,17 +621,19 @@ def _planned(
         begin = taut.elapsed
         enough = board.legs or times.growth_share * taut.left >= times.min_growth_s
         growing = taut.part(times.growth_share) if enough else Clock(times.min_growth_s)
-        grown = growth.grow(most, growing, tell)
-        tell("ways by the anchor")
+        grown = growth.grow(most, growing, on_progress)
+        on_progress("ways by the anchor")
         complete = (
             board.update(growth.legs, taut.part(times.home_path_share)) and grown
         ) or complete
         last = most == effort.states[-1]
         share = times.solve_share if last else times.early_solve_share
-        best = _better(best, _best_driven(board, taut, tell, best, share, how))
+        best = _better(best, _best_driven(board, taut, on_progress, best, share, how))
         if taut.left < taut.elapsed - begin:
             if not last and not (best is not None and best[0].status is Status.OPTIMAL):
-                best = _better(best, _best_driven(board, taut, tell, best, times.solve_share, how))
+                best = _better(
+                    best, _best_driven(board, taut, on_progress, best, times.solve_share, how)
+                )
             break
     if not board.reached_waypoints:
         raise InputError(
@@ -641,7 +643,9 @@ def _planned(
     proven = best is not None and best[0].status is Status.OPTIMAL and complete
     shorter = None
     if states.has_free_ends or not proven:
-        shorter = Detours(board, robot_paths).shortened(best and best[1], clock, tell, how["seed"])
+        shorter = Detours(board, robot_paths).shorten(
+            best and best[1], clock, on_progress, how["seed"]
+        )
 
     along_taut = None
     if best is not None:
@@ -656,7 +660,7 @@ def _planned(
         yield planned(Result(None, shorter.length, None, Status.FEASIBLE), shorter, DETOURS)
     if along_taut is not None:
         yield along_taut
-    tell("out along the tether and back")
+    on_progress("out along the tether and back")
     fallback = board.drive_out_and_back()
     if fallback is not None:
         yield planned(Result(None, fallback.length, None, Status.FEASIBLE), fallback, OUT_AND_BACK)
@@ -691,7 +695,7 @@ def _better(
 def _best_driven(
     board: StateGraph,
     clock: Clock,
-    tell: Callable[[str], None],
+    on_progress: Callable[[str], None],
     best: tuple[Result, DrivenTour] | None,
     share: float,
     how: dict[str, Any],
@@ -703,13 +707,15 @@ def _best_driven(
     warm = None if best is None else best[1].tour
     while again < times.max_solves or clock.up:
         if found is None:
-            tell("order" if again == 0 else f"order, {counted(again, 'leg')} at fault forbidden")
+            on_progress(
+                "order" if again == 0 else f"order, {counted(again, 'leg')} at fault forbidden"
+            )
             solving = Clock(times.min_solve_s) if clock.up else clock.part(share)
             found = board.solve(solving, warm, **how)
             if found is None:
                 return None
         result, tour = found
-        tell("driving the tour")
+        on_progress("driving the tour")
         driven = board.drive(tour)
         if driven.fault is None:
             return with_status(result, driven, LENGTH_ROUNDING), driven

@@ -1,8 +1,8 @@
 """Words of paths in any scene: the second kind of `netsp.hsignature.signature_protocol.Signature`.
 
-The labels of a complex (`netsp.plan.space.triangle_labels`) after relations have eliminated what
-generators they can. How often a path's word is right: always where the path keeps off the solids by
-its tolerance, and the word then says the same of it as of any path that it can be deformed into.
+The words are the labels of a complex (`netsp.plan.space.triangle_labels`), after relations have
+eliminated as many generators as possible. The word of a path that keeps off solids by the tolerance
+is exact: it is the word of every path that the path can be deformed into.
 """
 
 from __future__ import annotations
@@ -47,22 +47,24 @@ from netsp.world.scene.field import DistanceField
 class SpaceSignature:
     """Words of paths in a scene, up to homotopy.
 
-    Parameters
+    Attributes
     ----------
-    cells : Cells
-        The complex of its free water.
-    root : Ints
-        (3,) the cell from which the labels were found.
-    group : Group
-        Of the loops at the root.
-    labels : Labels
+    cells
+        Complex of the free water.
+    root
+        (3,) cell where the labels begin.
+    group
+        Group of the loops at the root.
+    labels
         (3 n,) number of the word of every edge in the table.
-    far : ndarray of int32
-        (n,) hundredths of a cell from the root, FAR for what is cut off.
-    generators : int
-        How many there were before relations eliminated any.
-    tolerance : float
-        Metres that paths may dip into a surface.
+    far
+        (n,) distance of each cell from the root, hundredths of a cell; `FAR` for cells cut off.
+    generators
+        Number of generators before relations eliminated any.
+    tolerance
+        Depth to which paths may enter solids, metres.
+    policy
+        Size and accuracy of the complex.
     """
 
     cells: Cells
@@ -87,35 +89,27 @@ class SpaceSignature:
         tolerance: float = 0.015,
         policy: WordPolicy | None = None,
     ) -> SpaceSignature:
-        """The words of a box in a scene.
+        """Return the words of a box in a scene.
 
         Parameters
         ----------
-        scene : DistanceField
-            The scene.
-        low : array_like, shape (3,)
-            Corner of the box, metres.
-        high : array_like, shape (3,)
-            The other corner, metres.
+        low, high : array_like, shape (3,)
+            Corners of the box, metres.
         cell : float
-            Size of a cell, metres. Gaps narrower than it may count as closed.
+            Size of a cell, metres. Gaps narrower than a cell may count as closed.
         root : array_like, shape (3,)
-            A point of the water that is meant: the anchor.
+            Point in the water, such as the anchor; water that it is not connected to has no words.
         tolerance : float
-            Metres that paths may dip into a surface, as taut tethers do between their nodes (by
-            delta / 8); also the size of what is not looked at more closely. Bars thinner than four
-            times that might be passed through by a path that touches them.
-
-        Returns
-        -------
-        SpaceSignature
-            Its words.
+            Depth to which paths may enter solids, metres, as taut tethers do between their nodes
+            (by delta / 8, so the default suits a delta of 0.1); also the size of the smallest parts
+            that are checked. A path that touches a bar thinner than four times that may pass
+            through it.
 
         Raises
         ------
         InputError
-            A box without size, too many cells for the memory, a root that is not in the water, or
-            a scene with thousands of holes.
+            A box without size, too many cells, a root that is not in the water, or a scene with
+            thousands of holes.
 
         Examples
         --------
@@ -140,26 +134,12 @@ class SpaceSignature:
         tolerance: float = 0.015,
         policy: WordPolicy | None = None,
     ) -> SpaceSignature:
-        """The words of a complex.
-
-        Parameters
-        ----------
-        cells : Cells
-            The complex.
-        root : array_like, shape (3,)
-            A point of the water that is meant, metres.
-        tolerance : float
-            As of `of`, metres.
-
-        Returns
-        -------
-        SpaceSignature
-            Its words.
+        """Return the words of a complex; `root` and `tolerance` as for `in_box`.
 
         Raises
         ------
         InputError
-            As of `of`.
+            A root that is not in the water, or a scene with thousands of holes.
         """
         policy = policy or WordPolicy()
         point = np.asarray(root, dtype=float)
@@ -204,12 +184,12 @@ class SpaceSignature:
 
     @property
     def exact(self) -> bool:
-        """Whether words that differ are of different classes of the complex."""
+        """Return whether words that differ are always of different classes of the complex."""
         return self.group.exact
 
     @cached_property
     def rules(self) -> Rules:
-        """The group's rules for kernels."""
+        """Return the rules of the group, for kernels."""
         return packed(self.group.rules)
 
     @cached_property
@@ -219,43 +199,27 @@ class SpaceSignature:
 
     @property
     def table(self) -> Table:
-        """The words met so far."""
+        """Return the table of the words met so far."""
         return self._tables[0]
 
     def keep_table(self, table: Table) -> None:
-        """Take over a table that has grown.
-
-        Parameters
-        ----------
-        table : Table
-            It has all words of the one before, under the same numbers.
-        """
+        """Replace the table by one that has grown: it has all words under the same numbers, and
+        more."""
         self._tables[0] = table
 
     @cached_property
     def reached_cells(self) -> npt.NDArray[np.uint8]:
-        """(nx, ny, nz) which cells a path from the root leads to."""
+        """Return the mask (nx, ny, nz) of the cells that paths from the root reach."""
         return np.asarray((self.far < FAR).reshape(self.cells.flags.shape), dtype=np.uint8)
 
     def visible_cell(self, point: npt.ArrayLike) -> int | None:
-        """The number of the cell that a point holds on to.
-
-        Parameters
-        ----------
-        point : array_like, shape (3,)
-            Metres.
-
-        Returns
-        -------
-        int or None
-            None where no cell is in sight.
-        """
+        """Return the number of the cell that a point holds on to; None if it sees no cell."""
         at = find_visible_cell(self._complex, np.asarray(point, dtype=float))
         return None if at < 0 else int(at)
 
     def word(self, path: npt.ArrayLike, *, closed: bool = False) -> Word:
-        """The word of a path. Each end counts as joined to the root by the shortest way from the
-        cell that it holds on to.
+        """Return the word of a path. Each end counts as joined to the root by the shortest path
+        from the cell that it holds on to.
 
         Parameters
         ----------
@@ -267,7 +231,8 @@ class SpaceSignature:
         Returns
         -------
         Word
-            Empty for a contractible loop; in a group that is not `exact`, others may be, too.
+            Empty for a contractible loop; in a group that is not `exact`, some contractible loops
+            have other words.
 
         Raises
         ------
@@ -284,21 +249,14 @@ class SpaceSignature:
         return word
 
     def try_word(self, path: npt.ArrayLike, *, closed: bool = False) -> tuple[Word, Floats | None]:
-        """The same without an error.
-
-        Parameters
-        ----------
-        path : array_like, shape (k, 3)
-            Polyline, metres.
-        closed : bool
-            Whether the last point is joined to the first.
+        """Return the word of a path as `word` does, but no error if it has none.
 
         Returns
         -------
         word : Word
-            Empty where it could not be told.
+            Empty if the path has no word.
         broken : ndarray of shape (3,) or None
-            Where it could not be told any further.
+            The point up to which the word is known, if it has none.
         """
         line = np.asarray(path, dtype=float).reshape(-1, 3)
         if closed:
@@ -309,20 +267,8 @@ class SpaceSignature:
         return word_of(self.table, number), None
 
     def word_number(self, line: Floats) -> tuple[int | None, Floats]:
-        """The number of a path's word in the table.
-
-        Parameters
-        ----------
-        line : ndarray, shape (k, 3)
-            Polyline, metres.
-
-        Returns
-        -------
-        number : int or None
-            None where it cannot be told.
-        where : ndarray, shape (3,)
-            The last point that was reached.
-        """
+        """Return the number of the word of a polyline (k, 3) in the table, None if it has none, and
+        the last point (3,) that was reached."""
         number, table, where = path_word(
             self._complex, self.table, self.rules, np.ascontiguousarray(line)
         )
@@ -330,81 +276,28 @@ class SpaceSignature:
         return (None if number < 0 else int(number)), where
 
     def product(self, *words: Word) -> Word:
-        """The word of paths one after the other.
-
-        Parameters
-        ----------
-        *words : Word
-            Their words.
-
-        Returns
-        -------
-        Word
-            In its normal form.
-        """
+        """Return the word of paths one after the other, in its normal form."""
         return self.group.normal(x for word in words for x in word)
 
     def letters(self, number: int) -> Word:
-        """The word of a number.
-
-        Parameters
-        ----------
-        number : int
-            In the table.
-
-        Returns
-        -------
-        Word
-            Its letters.
-        """
+        """Return the word of a number in the table."""
         return word_of(self.table, number)
 
     def multiply(self, a: int, b: int) -> int:
-        """`product` of words by their numbers in the table.
-
-        Parameters
-        ----------
-        a : int
-            Number of the first.
-        b : int
-            Number of the second.
-
-        Returns
-        -------
-        int
-            Of both.
-        """
+        """Return the number of the product of two words, given by their numbers in the table."""
         number, table = times(self.table, self.rules, a, b)
         self.keep_table(table)
         return int(number)
 
     def inverse(self, word: Word) -> Word:
-        """The word of a path backwards.
-
-        Parameters
-        ----------
-        word : Word
-            Of the path.
-
-        Returns
-        -------
-        Word
-            In its normal form.
-        """
+        """Return the word of a reversed path, in its normal form."""
         return self.group.normal(invert(word))
 
     def windings(self, word: Word) -> tuple[int, ...]:
-        """How often a loop winds around what there is, counted with signs.
+        """Return how often a loop winds around each hole, with signs: its class in the
+        abelianisation.
 
-        Parameters
-        ----------
-        word : Word
-            Of the loop.
-
-        Returns
-        -------
-        tuple of int
-            Its class in the abelianisation; all zero for what is contractible.
+        All are zero for a contractible loop.
         """
         return self.group.windings(word)
 
@@ -433,7 +326,7 @@ def _labelled(
 def _renumbered(
     labels: Labels, table: Table, meaning: list[Word], rules: Rules
 ) -> tuple[Labels, Table]:
-    """Labels in the generators that are left."""
+    """Return labels and table in the generators that are left."""
     used = np.unique(labels)
     used = used[used != UNKNOWN]
     new, numbers = empty_table(), np.full(int(used.max(initial=0)) + 2, UNKNOWN, dtype=np.int32)
@@ -448,16 +341,5 @@ def _renumbered(
 
 
 def shown(point: Floats) -> str:
-    """A point as messages name it.
-
-    Parameters
-    ----------
-    point : ndarray, shape (3,)
-        Metres.
-
-    Returns
-    -------
-    str
-        To the centimetre.
-    """
+    """Return a point (3,) as messages name it, to the centimetre."""
     return "(" + ", ".join(f"{x:.2f}" for x in point) + ")"

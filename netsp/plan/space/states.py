@@ -103,9 +103,9 @@ class States:
         bool
             Whether it may.
         """
-        here = self.at_place.get(point, [])
-        room = len(here) < self.max_per_place and point != self.places.present
-        return room or any(self.entries[s].word == word for s in here)
+        numbers = self.at_place.get(point, [])
+        has_room = len(numbers) < self.max_per_place and point != self.places.present
+        return has_room or any(self.entries[s].word == word for s in numbers)
 
     def add(self, point: int, word: int, tether: Tether) -> int | None:
         """A new state, if there is room for one more and the tether is no longer than its limit.
@@ -124,16 +124,16 @@ class States:
         int or None
             Its number, None if there is none.
         """
-        here = self.at_place.setdefault(point, [])
+        numbers = self.at_place.setdefault(point, [])
         if (
-            len(here) >= self.max_per_place
+            len(numbers) >= self.max_per_place
             or tether.length > self.limit
-            or (point == self.places.present and here)
+            or (point == self.places.present and numbers)
         ):
             return None
-        here.append(len(self.entries))
+        numbers.append(len(self.entries))
         self.entries.append(State(point, word, tether))
-        return here[-1]
+        return numbers[-1]
 
     @property
     def present(self) -> int | None:
@@ -171,13 +171,13 @@ def hang_alike(a: Tether, b: Tether, delta: float) -> bool:
     """
     if abs(a.length - b.length) > delta:
         return False
-    one, other = (
+    points_a, points_b = (
         np.array([polylines.points_along(t.nodes, 0.25 * t.length + 1e-9)[k] for k in (1, 2)])
         if t.length > 1e-6
         else np.zeros((2, 3))
         for t in (a, b)
     )
-    return bool(np.linalg.norm(one - other, axis=1).max() < 2.0 * delta)
+    return bool(np.linalg.norm(points_a - points_b, axis=1).max() < 2.0 * delta)
 
 
 def find_first_states(
@@ -211,10 +211,10 @@ def find_first_states(
     states = States(context, places, limit, effort.states[0])
     words = context.words
     if places.present is not None:
-        number, where = words.word_number(context.present_tether.nodes)
+        number, last_point = words.word_number(context.present_tether.nodes)
         if number is None:
             raise InputError(
-                f"state.tether: no word at {shown(where)}: a gap narrower than the cell of "
+                f"state.tether: no word at {shown(last_point)}: a gap narrower than the cell of "
                 f"{words.cells.cell:g} m; expected a smaller cell"
             )
         states.add(places.present, number, context.present_tether)
@@ -225,11 +225,11 @@ def find_first_states(
         lambda: context.search_words(False, root, effort.words, limit, flag)
     )
     for n in range(len(places)):
-        _take(states, n, found, anchor, 1 if clock.up else effort.words)
+        _add_states(states, n, found, anchor, 1 if clock.up else effort.words)
     return states
 
 
-def add_states_with_room(states: States, lacking: set[int], words: int, clock: Clock) -> None:
+def add_states_with_room(states: States, missing: set[int], words: int, clock: Clock) -> None:
     """More states, along the robot's own shortest ways from the start: where it does not fit
     through the gaps that the shortest tethers go through.
 
@@ -237,7 +237,7 @@ def add_states_with_room(states: States, lacking: set[int], words: int, clock: C
     ----------
     states : States
         Those so far; more are added.
-    lacking : set of int
+    missing : set of int
         Waypoints that these are for.
     words : int
         Shortest words of a waypoint that make states.
@@ -250,22 +250,22 @@ def add_states_with_room(states: States, lacking: set[int], words: int, clock: C
         return
     flag, limit = clock.flag, context.policy.states.max_robot_ratio * states.limit
     found = clock.interruptible(lambda: context.search_words(True, start, words, limit, flag))
-    for n in np.flatnonzero(np.isin(states.places.waypoint, list(lacking))):
-        _take(states, int(n), found, context.start_tether.nodes, 1 if clock.up else words)
+    for n in np.flatnonzero(np.isin(states.places.waypoint, list(missing))):
+        _add_states(states, int(n), found, context.start_tether.nodes, 1 if clock.up else words)
 
 
-def _take(states: States, n: int, found: WordSearch, begin: Floats, most: int) -> None:
+def _add_states(states: States, n: int, found: WordSearch, line: Floats, max_states: int) -> None:
     """States of a place by the shortest ways found to it, which go on from a line."""
     context, words, point = states.context, states.context.words, states.places.points[n]
     cell = words.visible_cell(point)
     if cell is None or n == states.places.present:
         return
-    for _, way in context.paths_to(found, cell)[:most]:
+    for _, path in context.paths_to(found, cell)[:max_states]:
         tether = context.model.relaxed(
-            np.vstack([begin, way, point]), context.policy.states.max_pull_rounds
+            np.vstack([line, path, point]), context.policy.states.max_pull_rounds
         )
         if tether.length > states.limit:
             continue
-        hangs = context.word_number(tether.nodes)
-        if hangs is not None and states.find(n, hangs, tether) is None:
-            states.add(n, hangs, tether)
+        hanging_word = context.word_number(tether.nodes)
+        if hanging_word is not None and states.find(n, hanging_word, tether) is None:
+            states.add(n, hanging_word, tether)

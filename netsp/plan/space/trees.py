@@ -30,7 +30,7 @@ def add_states_of_trees(states: States, robot_paths: RobotPaths, clock: Clock) -
     clock : Clock
         When it is up, trees are left as they are.
     """
-    most, trade_offs = states.max_per_place, states.context.policy.states.tree_trade_offs
+    max_per_place, trade_offs = states.max_per_place, states.context.policy.states.tree_trade_offs
     states.max_per_place += len(trade_offs)
     roots = [
         min(of, key=lambda s: states.entries[s].tether.length)
@@ -39,7 +39,7 @@ def add_states_of_trees(states: States, robot_paths: RobotPaths, clock: Clock) -
     ]
     for trade in trade_offs:
         _grow(states, robot_paths, clock, roots, trade)
-    states.max_per_place = most
+    states.max_per_place = max_per_place
 
 
 def _grow(

@@ -1,12 +1,12 @@
-"""Labels of a complex: which letters a path writes, cell by cell.
+"""Labels of a complex: the letters that a path writes, edge by edge.
 
-Every edge gets a word so that the product around every square is the empty word. Edges of a
-shortest-path tree of the root get the empty word; a square with one unknown edge gives it; when
-none has, the next unknown edge in the order of distance becomes a generator, and so do its
-neighbours beyond it: generators stand where shortest paths on either side of something meet. What
-is left of the squares are relations (compare Brendel, Dłotko, Ellis, Juda & Mrozek, "Computing
-fundamental groups from point clouds", arXiv 1507.03396). Two loops at the root are homotopic in the
-complex exactly when their words are equal in the group.
+Every edge gets a word such that the product around every square is the empty word. Edges of a
+shortest-path tree of the root get the empty word. A square with one unknown edge gives its word. If
+there is none, the next unknown edge in the order of distance becomes a generator, so generators lie
+where shortest paths on either side of a solid meet. The remaining squares are relations (compare
+Brendel, Dłotko, Ellis, Juda & Mrozek, "Computing fundamental groups from point clouds", arXiv
+1507.03396). Two loops at the root are homotopic in the complex if and only if their words are equal
+in the group.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ FAR = np.iinfo(np.int32).max
 
 STEPS = np.array([s for s in np.ndindex(3, 3, 3) if s != (1, 1, 1)], dtype=np.int64) - 1
 LENGTHS = np.round(100.0 * np.sqrt((STEPS**2).sum(1))).astype(np.int64)
-"""Of the 26 steps, in hundredths of a cell: whole numbers make buckets of equal lengths."""
+"""Lengths of the 26 steps in hundredths of a cell. Integers make buckets of equal lengths."""
 
 BUCKETS = int(LENGTHS.max()) + 1
 """Number of buckets of a queue by distance, one more than the longest step."""
@@ -40,7 +40,8 @@ BUCKETS = int(LENGTHS.max()) + 1
 
 @kernel
 def edge_flag(flags: Flags, i: int, j: int, k: int, axis: int, sign: int) -> bool:
-    """Whether the edge from a cell along an axis counts; cells outside of the box have none."""
+    """Return whether the edge from a cell along an axis counts; cells outside of the box have
+    none."""
     if sign < 0:
         i, j, k = i - (axis == 0), j - (axis == 1), k - (axis == 2)
         if i < 0 or j < 0 or k < 0:
@@ -50,7 +51,7 @@ def edge_flag(flags: Flags, i: int, j: int, k: int, axis: int, sign: int) -> boo
 
 @kernel
 def step_axes(step: int) -> tuple[int, int, int, int]:
-    """How many axes a step goes along, and which."""
+    """Return the number of axes that a step goes along, and the axes."""
     n, axes = 0, np.zeros(3, dtype=np.int64)
     for axis in range(3):
         if STEPS[step, axis] != 0:
@@ -61,9 +62,11 @@ def step_axes(step: int) -> tuple[int, int, int, int]:
 
 @kernel
 def staircase_order(flags: Flags, i: int, j: int, k: int, step: int) -> int:
-    """The order of axes, 0 … 5, in which a step can be taken along edges that count; -1 for none.
+    """Return the order of axes, 0 … 5, in which a step runs along edges that count; -1 if there is
+    none.
 
-    Order o takes the axes of the step from the o // 2-th on, upwards or (o odd) downwards."""
+    Order o takes the axes of the step from the o // 2-th on, upwards or (o odd) downwards.
+    """
     n, a, b, c = step_axes(step)
     for order in range(1 if n == 1 else 2 if n == 2 else 6):
         p, q, r = i, j, k
@@ -82,7 +85,7 @@ def staircase_order(flags: Flags, i: int, j: int, k: int, step: int) -> int:
 
 @kernel
 def nth_axis(n: int, a: int, b: int, c: int, order: int, m: int) -> int:
-    """The m-th axis of a step that goes along n axes a, b, c, taken in one of their orders."""
+    """Return the m-th axis of a step along n axes a, b, c, taken in one of their orders."""
     if n == 1:
         return a
     if n == 2:
@@ -95,16 +98,16 @@ def nth_axis(n: int, a: int, b: int, c: int, order: int, m: int) -> int:
 def cell_distances(
     flags: Flags, root: Ints, stop: Flag
 ) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
-    """Return how far all cells are from the root over 26 steps, and the cells in the order of that.
-    Ends early once `stop` is set.
+    """Return the distances of all cells from the root over 26 steps, and the cells by distance.
 
-    A step across counts where edges lead there one after the other: then the cell before its last
-    edge is nearer to the root than its end, and every cell has an edge to a nearer one.
+    A diagonal step counts if edges lead along it one after the other. Then the cell before its last
+    edge is nearer to the root than its end, so every cell has an edge to a nearer one. Ends early
+    once `stop` is set.
 
     Returns
     -------
     far
-        (n,) hundredths of a cell, FAR where no path leads.
+        (n,) hundredths of a cell, `FAR` for cells that no path reaches.
     order
         (m,) cells reached, nearest first.
     """
@@ -135,20 +138,20 @@ def cell_distances(
         order[count] = cell
         count += 1
         i, j, k = cell // (ny * nz), cell // nz % ny, cell % nz
-        open_ = flags[i, j, k] & OPEN_CELL != 0
+        is_open = flags[i, j, k] & OPEN_CELL != 0
         for s in range(26):
             p, q, r = i + STEPS[s, 0], j + STEPS[s, 1], k + STEPS[s, 2]
             if p < 0 or q < 0 or r < 0 or p >= nx or q >= ny or r >= nz:
                 continue
-            beside = (p * ny + q) * nz + r
-            there = now + LENGTHS[s]
-            if there >= far[beside]:
+            neighbour = (p * ny + q) * nz + r
+            new_distance = now + LENGTHS[s]
+            if new_distance >= far[neighbour]:
                 continue
             if not flags[p, q, r] & FREE_CELL or not (
-                open_ or staircase_order(flags, i, j, k, s) >= 0
+                is_open or staircase_order(flags, i, j, k, s) >= 0
             ):
                 continue
-            far[beside] = there
+            far[neighbour] = new_distance
             if spare >= 0:
                 new = spare
                 spare = waiting[new, 1]
@@ -157,8 +160,8 @@ def cell_distances(
                     waiting = more_int_rows(waiting)
                 new = entries
                 entries += 1
-            waiting[new, 0], waiting[new, 1] = beside, first[there % BUCKETS]
-            first[there % BUCKETS] = new
+            waiting[new, 0], waiting[new, 1] = neighbour, first[new_distance % BUCKETS]
+            first[new_distance % BUCKETS] = new
     return far, order[:count].copy()
 
 
@@ -172,38 +175,39 @@ def label_edges(
     max_generators: int,
     stop: Flag,
 ) -> tuple[Labels, Table, int]:
-    """Return a label for every edge between cells that are reached, and how many generators there
-    are. Ends early once `stop` is set.
+    """Return a label for every edge between cells that are reached, and the number of generators.
+
+    Ends early once `stop` is set.
 
     Returns
     -------
     labels
-        (3 n,) number of the word of edge 3 cell + axis, from its lower end; UNKNOWN elsewhere.
+        (3 n,) number of the word of edge 3 cell + axis, from its lower end; `UNKNOWN` elsewhere.
     table
-        With their words.
+        Table with the words.
     generators
-        Their number; more than `max_generators` if that is passed: not all labels are known then.
+        Number of generators; above `max_generators` the labels are incomplete.
     """
     nx, ny, nz = flags.shape
     labels = np.full(3 * nx * ny * nz, UNKNOWN, dtype=np.int32)
-    to_do, left, generators = np.empty(4096, dtype=np.int64), 0, 0
+    pending, left, generators = np.empty(4096, dtype=np.int64), 0, 0
     for cell in order:
         if far[cell] == 0:
             continue
         i, j, k = cell // (ny * nz), cell // nz % ny, cell % nz
-        least, best = far[cell], -1
+        min_distance, best = far[cell], -1
         for side in range(6):
             axis, sign = side // 2, 2 * (side % 2) - 1
             if not edge_flag(flags, i, j, k, axis, sign):
                 continue
             lower = lower_end(cell, axis, sign, ny, nz)
             other = lower if sign < 0 else upper_end(cell, axis, ny, nz)
-            if far[other] < least:
-                least, best = far[other], 3 * lower + axis
+            if far[other] < min_distance:
+                min_distance, best = far[other], 3 * lower + axis
         labels[best] = 0
-        if left == len(to_do):
-            to_do = doubled(to_do)
-        to_do[left] = best
+        if left == len(pending):
+            pending = doubled(pending)
+        pending[left] = best
         left += 1
     for cell in order:
         if stop[0] != 0:
@@ -212,14 +216,14 @@ def label_edges(
         for side in range(7):
             while left > 0 and stop[0] == 0:
                 left -= 1
-                edge = to_do[left]
+                edge = pending[left]
                 for n in range(4):
                     found, word, table = close_square(flags, labels, table, rules, edge, n)
                     if found >= 0:
                         labels[found] = word
-                        if left + 1 >= len(to_do):
-                            to_do = doubled(to_do)
-                        to_do[left] = found
+                        if left + 1 >= len(pending):
+                            pending = doubled(pending)
+                        pending[left] = found
                         left += 1
             if side == 6:
                 break
@@ -237,14 +241,14 @@ def label_edges(
                 return labels, table, generators
             word, table = times_letter(table, rules, 0, generators)
             labels[edge] = word
-            to_do[left] = edge
+            pending[left] = edge
             left += 1
     return labels, table, generators
 
 
 @kernel
 def lower_end(cell: int, axis: int, sign: int, ny: int, nz: int) -> int:
-    """The cell that the edge on one side of a cell belongs to."""
+    """Return the cell that the edge on one side of a cell belongs to."""
     if sign > 0:
         return cell
     return cell - (ny * nz if axis == 0 else nz if axis == 1 else 1)
@@ -252,13 +256,13 @@ def lower_end(cell: int, axis: int, sign: int, ny: int, nz: int) -> int:
 
 @kernel
 def upper_end(cell: int, axis: int, ny: int, nz: int) -> int:
-    """The cell that is next along an axis."""
+    """Return the next cell along an axis."""
     return cell + (ny * nz if axis == 0 else nz if axis == 1 else 1)
 
 
 @kernel
 def doubled(a: Ints) -> Ints:
-    """The same with room for twice as many."""
+    """Return an array with room for twice as many entries."""
     b = np.empty(2 * len(a), dtype=np.int64)
     write_ints(b, a, len(a))
     return b
@@ -266,10 +270,11 @@ def doubled(a: Ints) -> Ints:
 
 @kernel
 def square_of_edge(flags: Flags, edge: int, n: int) -> tuple[int, int, int, int, int]:
-    """The n-th of four squares beside an edge: (whether it counts, its four edges).
+    """Return the n-th of the four squares at an edge: whether it counts, and its four edges.
 
-    Edges in the order in which a walk along a, then b meets them: a below, b on the right, a above,
-    b on the left."""
+    The edges are in the order of a walk along a, then b: a below, b on the right, a above, b on the
+    left.
+    """
     _nx, ny, nz = flags.shape
     cell, axis = edge // 3, edge % 3
     other = (axis + 1 + n % 2) % 3
@@ -296,8 +301,8 @@ def square_of_edge(flags: Flags, edge: int, n: int) -> tuple[int, int, int, int,
 def close_square(
     flags: Flags, labels: Labels, table: Table, rules: Rules, edge: int, n: int
 ) -> tuple[int, int, Table]:
-    """(edge, word, table) of the one unknown edge of the n-th square beside a known edge; -1 where
-    there is no such."""
+    """Return the one unknown edge of the n-th square at a known edge, its word and the table; -1 if
+    the square does not count or has another number of unknown edges."""
     counts, low, right, top, left = square_of_edge(flags, edge, n)
     if counts == 0:
         return -1, 0, table
@@ -339,8 +344,10 @@ def square_relations(
     rules: Rules,
     stop: Flag,
 ) -> tuple[Ints, Table]:
-    """Return the numbers of the words around squares that are not the empty word, each once. Ends
-    early once `stop` is set."""
+    """Return the numbers of the words around squares other than the empty word, each once.
+
+    Ends early once `stop` is set.
+    """
     _nx, ny, nz = flags.shape
     seen: Bools = np.zeros(1024, dtype=np.bool_)
     out, count = np.empty(1024, dtype=np.int64), 0
@@ -362,10 +369,10 @@ def square_relations(
             if word == 0:
                 continue
             if word >= len(seen):
-                more = np.zeros(2 * word, dtype=np.bool_)
+                longer = np.zeros(2 * word, dtype=np.bool_)
                 for k in range(len(seen)):
-                    more[k] = seen[k]
-                seen = more
+                    longer[k] = seen[k]
+                seen = longer
             if not seen[word]:
                 seen[word] = True
                 if count == len(out):

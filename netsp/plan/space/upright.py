@@ -25,7 +25,11 @@ from netsp.world.mission.mission import Mission
 
 
 def bound_by_upright_solids(
-    mission: Mission, context: PlanningContext, some: list[int], places: Places, clock: Clock
+    mission: Mission,
+    context: PlanningContext,
+    place_numbers: list[int],
+    places: Places,
+    clock: Clock,
 ) -> float | None:
     """Return a bound on all tours from the scene's upright solids.
 
@@ -35,7 +39,7 @@ def bound_by_upright_solids(
         Mission with the tether.
     context : PlanningContext
         Scene, and tether at the start.
-    some : list of int
+    place_numbers : list of int
         Numbers of the places that tours visit.
     places : Places
         All places.
@@ -48,7 +52,9 @@ def bound_by_upright_solids(
         Lower bound, metres; None if there are no upright solids, the mission begins under way, a
         waypoint has alternatives, or there was no time.
     """
-    if places.present is not None or len(set(places.waypoint[some].tolist())) < len(some):
+    if places.present is not None or len(set(places.waypoint[place_numbers].tolist())) < len(
+        place_numbers
+    ):
         return None
     # the judge lets a path dip into solids a little, and a tether between its nodes a little more:
     # among obstacles shrunk by the larger depth both are free, and the taut tether is no longer
@@ -64,7 +70,7 @@ def bound_by_upright_solids(
     try:
         problem = Problem(
             base=mission.start,
-            goals=places.points[some].tolist(),
+            goals=places.points[place_numbers].tolist(),
             obstacles=tuple(obstacles),
             tether_length=max_length,
         )

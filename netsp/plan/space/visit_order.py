@@ -158,7 +158,7 @@ def waypoint_graph(
     near = np.argsort(np.linalg.norm(points[:, None] - points[None], axis=2), axis=1)[
         :, 1 : policy.going_on.n_neighbours + 1
     ]
-    direct: dict[tuple[int, int], float] = {}
+    straight_legs: dict[tuple[int, int], float] = {}
     v = 0
     while v < len(found.point):
         clock.check("driving straight legs")
@@ -167,24 +167,24 @@ def waypoint_graph(
             if not is_straight_clear(field, points[n], points[m], mission.clearance):
                 continue
             path = np.array([points[n], points[m]])
-            there, lengths = model.drive(
+            tether, lengths = model.drive(
                 found.tether[v], polylines.dense(path, drive_step(mission, policy.tether_share))
             )
             if lengths.max() > limit:
                 continue
-            w = found.find(int(m), there, mission.delta)
+            w = found.find(int(m), tether, mission.delta)
             if w is None and found.point.count(int(m)) < policy.going_on.max_classes:
                 w = len(found.point)
                 found.point.append(int(m))
-                found.tether.append(there)
+                found.tether.append(tether)
             if w is not None:
-                direct[v, w] = float(np.linalg.norm(path[1] - path[0]))
+                straight_legs[v, w] = float(np.linalg.norm(path[1] - path[0]))
         v += 1
     count = len(found.point)
-    reach = np.array([t.length for t in found.tether])
+    lengths = np.array([t.length for t in found.tether])
     costs = np.zeros((count + 1, count + 1))
-    costs[1:, 1:] = reach[:, None] + reach[None, :]
-    costs[0, 1:] = costs[1:, 0] = reach
+    costs[1:, 1:] = lengths[:, None] + lengths[None, :]
+    costs[0, 1:] = costs[1:, 0] = lengths
     neighbours = {(n, int(m)) for n in range(len(points)) for m in near[n]}
     for v in range(count):
         clock.check("pulling legs taut")
@@ -192,7 +192,7 @@ def waypoint_graph(
             pair = (found.point[v], found.point[w])
             if pair not in neighbours and pair[::-1] not in neighbours:
                 continue
-            leg = min(direct.get((v, w), np.inf), direct.get((w, v), np.inf))
+            leg = min(straight_legs.get((v, w), np.inf), straight_legs.get((w, v), np.inf))
             if not np.isfinite(leg):
                 line = np.vstack([found.tether[v].nodes[::-1], found.tether[w].nodes[1:]])
                 path = taut(field, line, mission.clearance, mission.delta)

@@ -128,16 +128,16 @@ def visible_cell(complex_: LabelledComplex, p: Floats) -> int:
     for axis in range(3):
         at[axis] = min(max(math.floor((p[axis] - low[axis]) / cell), 0), flags.shape[axis] - 1)
     number = (2 * reach + 1) ** 3
-    far, cells, count = np.empty(number), np.empty(number, dtype=np.int64), 0
+    squares, cells, count = np.empty(number), np.empty(number, dtype=np.int64), 0
     for i in range(max(at[0] - reach, 0), min(at[0] + reach + 1, nx)):
         for j in range(max(at[1] - reach, 0), min(at[1] + reach + 1, ny)):
             for k in range(max(at[2] - reach, 0), min(at[2] + reach + 1, nz)):
                 if flags[i, j, k] & FREE_CELL and complex_.known[i, j, k]:
                     c = cell_centre(complex_, i, j, k)
-                    far[count] = (p[0] - c[0]) ** 2 + (p[1] - c[1]) ** 2 + (p[2] - c[2]) ** 2
+                    squares[count] = (p[0] - c[0]) ** 2 + (p[1] - c[1]) ** 2 + (p[2] - c[2]) ** 2
                     cells[count] = (i * ny + j) * nz + k
                     count += 1
-    for n in order_of(far[:count]):
+    for n in order_of(squares[:count]):
         i, j, k = cells[n] // (ny * nz), cells[n] // nz % ny, cells[n] % nz
         c = cell_centre(complex_, i, j, k)
         if is_triangle_free(complex_.field, p, p, c, complex_.tolerance):
@@ -170,48 +170,48 @@ def moved_hold(
     for axis in range(3):
         middle[axis] = min(max(math.floor((p[axis] - low[axis]) / cell), 0), flags.shape[axis] - 1)
     number = (2 * reach + 1) ** 3
-    came = np.zeros(number, dtype=np.int64)  # 1 + index before; 0 if not reached yet
+    came_from = np.zeros(number, dtype=np.int64)  # 1 + index before; 0 if not reached yet
     edge_to = np.zeros(number, dtype=np.int64)
     queue, head, tail = np.empty(number, dtype=np.int64), 0, 1
     start = index_in_block(begin, middle, reach, ny, nz)
     if start < 0:
         return -1, np.empty(0, dtype=np.int64)
-    queue[0], came[start] = begin, -1
+    queue[0], came_from[start] = begin, -1
     found = -1
     while head < tail:
-        here = queue[head]
+        current = queue[head]
         head += 1
-        i, j, k = here // (ny * nz), here // nz % ny, here % nz
+        i, j, k = current // (ny * nz), current // nz % ny, current % nz
         c = cell_centre(complex_, i, j, k)
-        if here == end or (end < 0 and is_triangle_free(field, p, ahead, c, tolerance)):
-            found = here
+        if current == end or (end < 0 and is_triangle_free(field, p, ahead, c, tolerance)):
+            found = current
             break
         for side in range(6):
             axis, sign = side // 2, 2 * (side % 2) - 1
             if not edge_flag(flags, i, j, k, axis, sign):
                 continue
-            there = here + sign * (ny * nz if axis == 0 else nz if axis == 1 else 1)
-            edge = 3 * lower_end(here, axis, sign, ny, nz) + axis
+            next_cell = current + sign * (ny * nz if axis == 0 else nz if axis == 1 else 1)
+            edge = 3 * lower_end(current, axis, sign, ny, nz) + axis
             if labels[edge] == UNKNOWN:
                 continue
-            index = index_in_block(there, middle, reach, ny, nz)
-            if index < 0 or came[index] != 0:
+            index = index_in_block(next_cell, middle, reach, ny, nz)
+            if index < 0 or came_from[index] != 0:
                 continue
-            d = cell_centre(complex_, there // (ny * nz), there // nz % ny, there % nz)
+            d = cell_centre(complex_, next_cell // (ny * nz), next_cell // nz % ny, next_cell % nz)
             if not is_triangle_free(field, p, c, d, tolerance):
                 continue
-            came[index] = 1 + index_in_block(here, middle, reach, ny, nz)
+            came_from[index] = 1 + index_in_block(current, middle, reach, ny, nz)
             edge_to[index] = sign * (1 + edge)
-            queue[tail] = there
+            queue[tail] = next_cell
             tail += 1
     if found < 0:
         return -1, np.empty(0, dtype=np.int64)
     edges, count = np.empty(number, dtype=np.int64), 0
     index = index_in_block(found, middle, reach, ny, nz)
-    while came[index] > 0:
+    while came_from[index] > 0:
         edges[count] = edge_to[index]
         count += 1
-        index = came[index] - 1
+        index = came_from[index] - 1
     return found, edges[:count][::-1].copy()
 
 
@@ -251,14 +251,14 @@ def path_word(
             q = begin + (share + step) * (end - begin)
             c = centre_of_number(complex_, hold)
             if not is_triangle_free(complex_.field, p, q, c, tolerance):
-                there, edges = moved_hold(complex_, p, hold, -1, q)
-                if there < 0:
+                next_cell, edges = moved_hold(complex_, p, hold, -1, q)
+                if next_cell < 0:
                     if step * long < 0.25 * tolerance:
                         return -1, table, p
                     step *= 0.5
                     continue
                 word, table = with_edges(complex_.labels, table, rules, word, edges)
-                hold = there
+                hold = next_cell
             share += step
             p = q
             hold, word, table = nearest_hold(complex_, table, rules, p, hold, word)
@@ -266,8 +266,8 @@ def path_word(
     last = visible_cell(complex_, p)
     if last < 0:
         return -1, table, p
-    there, edges = moved_hold(complex_, p, hold, last, p)
-    if there < 0:
+    next_cell, edges = moved_hold(complex_, p, hold, last, p)
+    if next_cell < 0:
         return -1, table, p
     word, table = with_edges(complex_.labels, table, rules, word, edges)
     return word, table, p
@@ -289,14 +289,14 @@ def nearest_hold(
         hold = nearer
     # a solid may stand between the hold and nearer cells: go around it before the hold is too far
     c = centre_of_number(complex_, hold)
-    far = complex_.far_hold * complex_.cell
-    if max(abs(p[0] - c[0]), abs(p[1] - c[1]), abs(p[2] - c[2])) > far:
+    squares = complex_.far_hold * complex_.cell
+    if max(abs(p[0] - c[0]), abs(p[1] - c[1]), abs(p[2] - c[2])) > squares:
         near = visible_cell(complex_, p)
         if near >= 0:
-            there, edges = moved_hold(complex_, p, hold, near, p)
-            if there >= 0:
+            next_cell, edges = moved_hold(complex_, p, hold, near, p)
+            if next_cell >= 0:
                 word, table = with_edges(complex_.labels, table, rules, word, edges)
-                hold = there
+                hold = next_cell
     return hold, word, table
 
 
@@ -315,21 +315,21 @@ def nearer_neighbour(complex_: LabelledComplex, p: Floats, hold: int) -> tuple[i
     _nx, ny, nz = flags.shape
     i, j, k = hold // (ny * nz), hold // nz % ny, hold % nz
     c = cell_centre(complex_, i, j, k)
-    least = (p[0] - c[0]) ** 2 + (p[1] - c[1]) ** 2 + (p[2] - c[2]) ** 2 - 1e-9
-    nearest, by = -1, 0
+    min_square = (p[0] - c[0]) ** 2 + (p[1] - c[1]) ** 2 + (p[2] - c[2]) ** 2 - 1e-9
+    nearest, edge_to_nearest = -1, 0
     for side in range(6):
         axis, sign = side // 2, 2 * (side % 2) - 1
         if (p[axis] - c[axis]) * sign <= 0.0 or not edge_flag(flags, i, j, k, axis, sign):
             continue
-        there = hold + sign * (ny * nz if axis == 0 else nz if axis == 1 else 1)
+        next_cell = hold + sign * (ny * nz if axis == 0 else nz if axis == 1 else 1)
         edge = 3 * lower_end(hold, axis, sign, ny, nz) + axis
         if labels[edge] == UNKNOWN:
             continue
-        d = cell_centre(complex_, there // (ny * nz), there // nz % ny, there % nz)
-        far = (p[0] - d[0]) ** 2 + (p[1] - d[1]) ** 2 + (p[2] - d[2]) ** 2
-        if far < least and is_triangle_free(complex_.field, p, c, d, complex_.tolerance):
-            least, nearest, by = far, there, sign * (1 + edge)
-    return nearest, by
+        d = cell_centre(complex_, next_cell // (ny * nz), next_cell // nz % ny, next_cell % nz)
+        squares = (p[0] - d[0]) ** 2 + (p[1] - d[1]) ** 2 + (p[2] - d[2]) ** 2
+        if squares < min_square and is_triangle_free(complex_.field, p, c, d, complex_.tolerance):
+            min_square, nearest, edge_to_nearest = squares, next_cell, sign * (1 + edge)
+    return nearest, edge_to_nearest
 
 
 @kernel

@@ -1,9 +1,9 @@
-"""The shortest paths of several classes at once: a search over cells and words.
+"""Search for the shortest paths of several classes at once, over cells and words.
 
-Every cell keeps the few words that reach it soonest. Paths that go on from a word that a cell has
-no room for would be no better at any later cell: the few kept are exactly the shortest on the grid
-(as in the h-augmented graphs of Bhattacharya, Likhachev & Kumar 2012, with words in place of
-h-signatures, and the k best labels in place of all).
+Every cell keeps the few words with the shortest paths. A path that continues a word for which a
+cell has no slot left would be no better at any later cell, so the kept words are exactly those with
+the shortest paths on the grid. Compare the h-augmented graphs of Bhattacharya, Likhachev & Kumar
+(2012): words take the place of h-signatures, and the k best labels the place of all.
 """
 
 from __future__ import annotations
@@ -37,20 +37,20 @@ NO_WORD = -1
 
 
 class WordSearch(NamedTuple):
-    """What a search has found, slot by slot of the cells of its box.
+    """Result of a search, slot by slot of the cells of its box.
 
     Attributes
     ----------
     first
-        (3,) the cell of the box with the lowest numbers.
+        (3,) cell of the box with the lowest indices.
     word
-        (nx, ny, nz, k) number of the word, NO_WORD where there is none.
+        (nx, ny, nz, k) number of the word, `NO_WORD` in empty slots.
     far
-        (nx, ny, nz, k) hundredths of a cell.
+        (nx, ny, nz, k) length of the path, hundredths of a cell.
     step
-        (nx, ny, nz, k) the step that leads there, 26 where the search began.
+        (nx, ny, nz, k) last step of the path, 26 where the search began.
     slot
-        (nx, ny, nz, k) the slot of the cell before.
+        (nx, ny, nz, k) slot of the cell before.
     """
 
     first: Ints
@@ -63,59 +63,60 @@ class WordSearch(NamedTuple):
 @kernel
 def shortest_words(
     flags: Flags,
-    room: Bools,
-    open_: Bools,
+    passable: Bools,
+    open_cells: Bools,
     labels: Labels,
     table: Table,
     rules: Rules,
     root: Ints,
     first: Ints,
     last: Ints,
-    most: int,
+    max_words: int,
     targets: Ints,
     limits: Ints,
     stop: Ints,
 ) -> tuple[WordSearch, Table]:
-    """Return the `most` soonest words of the cells of a box that are on the way to some targets.
+    """Return the words with the shortest paths to the cells of a box that lead to some targets.
 
-    About an open cell everything is free and of one class, so only those steps are taken that lead
-    further on (`netsp.world.paths.tree`): the other cells beside it are reached as soon around it.
+    All neighbours of an open cell are free and of one class, so only the steps that lead further on
+    are taken from it (`netsp.world.paths.tree`): the other neighbours are reached as soon around
+    it.
 
     Parameters
     ----------
     flags, labels
-        Of the whole complex.
-    room
-        (nx, ny, nz) cells that may be passed.
-    open_
-        (nx, ny, nz) cells about which all 26 are free, may be passed, and are of one class.
+        Flags and labels of the whole complex.
+    passable
+        (nx, ny, nz) mask of the cells that paths may pass.
+    open_cells
+        (nx, ny, nz) mask of the cells whose 26 neighbours are free, passable and of one class.
     root
-        (3,) the cell to begin at.
+        (3,) cell where paths begin.
     first, last
-        (3,) corners of the box, both within it.
-    most
-        Words of a cell.
+        (3,) corners of the box, inclusive.
+    max_words
+        Maximum number of words of a cell.
     targets
-        (t, 3) cells; with none, all cells are sought.
+        (t, 3) target cells; if there are none, all cells are targets.
     limits
-        (t,) or, with no targets, (1,): hundredths of a cell; paths to each are no longer.
+        (t,) length of the longest paths to each target, hundredths of a cell; (1,) without targets.
     stop
-        Flag of a clock. From when it is set on, cells that have a word get no others: each cell
-        that can be reached has its soonest one all the same.
+        Flag of a clock. Once it is set, cells that have a word get no others; each cell that can be
+        reached still gets its first one.
     """
     _, ny, nz = flags.shape
     sx, sy, sz = last[0] - first[0] + 1, last[1] - first[1] + 1, last[2] - first[2] + 1
-    word = np.full((sx, sy, sz, most), NO_WORD, dtype=np.int32)
-    far = np.full((sx, sy, sz, most), np.iinfo(np.int32).max, dtype=np.int32)
-    step = np.full((sx, sy, sz, most), -1, dtype=np.int8)
-    slot = np.zeros((sx, sy, sz, most), dtype=np.int8)
-    done = np.zeros((sx, sy, sz, most), dtype=np.bool_)
+    word = np.full((sx, sy, sz, max_words), NO_WORD, dtype=np.int32)
+    far = np.full((sx, sy, sz, max_words), np.iinfo(np.int32).max, dtype=np.int32)
+    step = np.full((sx, sy, sz, max_words), -1, dtype=np.int8)
+    slot = np.zeros((sx, sy, sz, max_words), dtype=np.int8)
+    done = np.zeros((sx, sy, sz, max_words), dtype=np.bool_)
     # (slot of the box, length, next entry of its bucket)
     waiting, entries, spare = np.empty((4096, 3), dtype=np.int64), 1, -1
     bucket = np.full(BUCKETS, -1)
     i, j, k = root[0] - first[0], root[1] - first[1], root[2] - first[2]
     word[i, j, k, 0], far[i, j, k, 0], step[i, j, k, 0] = 0, 0, 26
-    waiting[0, 0], waiting[0, 1], waiting[0, 2] = ((i * sy + j) * sz + k) * most, 0, -1
+    waiting[0, 0], waiting[0, 1], waiting[0, 2] = ((i * sy + j) * sz + k) * max_words, 0, -1
     bucket[0], empty, now = 0, 0, 0
     longest = limits.max()
     while empty < BUCKETS and now <= longest:
@@ -129,58 +130,60 @@ def shortest_words(
         at = waiting[entry, 0]
         waiting[entry, 2] = spare
         spare = entry
-        n, cell = at % most, at // most
+        n, cell = at % max_words, at // max_words
         i, j, k = cell // (sy * sz), cell // sz % sy, cell % sz
         if done[i, j, k, n] or far[i, j, k, n] != now:
             continue
         if stop[0] != 0 and done[i, j, k].any():
             continue
         done[i, j, k, n] = True
-        here = word[i, j, k, n]
+        current_word = word[i, j, k, n]
         x, y, z = i + first[0], j + first[1], k + first[2]
-        on_the_way = len(targets) == 0
+        is_useful = len(targets) == 0
         for t in range(len(targets)):
-            far2 = (targets[t, 0] - x) ** 2 + (targets[t, 1] - y) ** 2 + (targets[t, 2] - z) ** 2
+            square = (targets[t, 0] - x) ** 2 + (targets[t, 1] - y) ** 2 + (targets[t, 2] - z) ** 2
             left = limits[t] - now
-            if left >= 0 and 10_000 * far2 <= left * left:
-                on_the_way = True
+            if left >= 0 and 10_000 * square <= left * left:
+                is_useful = True
                 break
-        if not on_the_way:
+        if not is_useful:
             continue
-        open_here = open_[x, y, z]
-        came = step[i, j, k, n]
+        is_open = open_cells[x, y, z]
+        arrival_step = step[i, j, k, n]
         inside = 0 < i < sx - 1 and 0 < j < sy - 1 and 0 < k < sz - 1
-        few = open_here and inside and came != 26
-        for nth in range(ONWARD[came, 0] if few else 26):
-            s = ONWARD[came, nth + 1] if few else nth
-            there = now + LENGTHS[s]
-            if there > longest:
+        can_prune = is_open and inside and arrival_step != 26
+        for nth in range(ONWARD[arrival_step, 0] if can_prune else 26):
+            s = ONWARD[arrival_step, nth + 1] if can_prune else nth
+            new_distance = now + LENGTHS[s]
+            if new_distance > longest:
                 continue
             p, q, r = i + STEPS[s, 0], j + STEPS[s, 1], k + STEPS[s, 2]
             if p < 0 or q < 0 or r < 0 or p >= sx or q >= sy or r >= sz:
                 continue
             u, v, w = p + first[0], q + first[1], r + first[2]
-            if not flags[u, v, w] & FREE_CELL or not room[u, v, w]:
+            if not flags[u, v, w] & FREE_CELL or not passable[u, v, w]:
                 continue
-            if far[p, q, r, most - 1] <= there and done[p, q, r, most - 1]:
+            if far[p, q, r, max_words - 1] <= new_distance and done[p, q, r, max_words - 1]:
                 continue
-            order = 0 if open_here else staircase_order(flags, x, y, z, s)
+            order = 0 if is_open else staircase_order(flags, x, y, z, s)
             if order < 0:
                 continue
-            new, table = word_after_step(labels, table, rules, here, x, y, z, ny, nz, s, order)
+            new, table = word_after_step(
+                labels, table, rules, current_word, x, y, z, ny, nz, s, order
+            )
             if new < 0:
                 continue
             # the slot of this word, else an empty one, else the farthest that is not done
-            to, worst = -1, there
-            for m in range(most):
+            to, worst = -1, new_distance
+            for m in range(max_words):
                 if word[p, q, r, m] == new:
-                    to = m if far[p, q, r, m] > there else -2
+                    to = m if far[p, q, r, m] > new_distance else -2
                     break
                 if far[p, q, r, m] > worst:
                     worst, to = far[p, q, r, m], m
             if to < 0 or done[p, q, r, to]:
                 continue
-            word[p, q, r, to], far[p, q, r, to] = new, there
+            word[p, q, r, to], far[p, q, r, to] = new, new_distance
             step[p, q, r, to], slot[p, q, r, to] = s, n
             if spare >= 0:
                 e = spare
@@ -190,13 +193,13 @@ def shortest_words(
                     waiting = more_int_rows(waiting)
                 e = entries
                 entries += 1
-            waiting[e, 0] = ((p * sy + q) * sz + r) * most + to
-            waiting[e, 1], waiting[e, 2] = there, bucket[there % BUCKETS]
-            bucket[there % BUCKETS] = e
+            waiting[e, 0] = ((p * sy + q) * sz + r) * max_words + to
+            waiting[e, 1], waiting[e, 2] = new_distance, bucket[new_distance % BUCKETS]
+            bucket[new_distance % BUCKETS] = e
     for a in range(sx):
         for b in range(sy):
             for c in range(sz):
-                for m in range(most):
+                for m in range(max_words):
                     if not done[a, b, c, m]:
                         word[a, b, c, m] = NO_WORD
     return WordSearch(first, word, far, step, slot), table
@@ -216,8 +219,8 @@ def word_after_step(
     step: int,
     order: int,
 ) -> tuple[int, Table]:
-    """Return the word after one step along edges in an order of
-    `staircase_order`; -1 if the     word of an edge is not known."""
+    """Return the word after one step along edges in an order of `staircase_order`; -1 if the word
+    of an edge is not known."""
     n, a, b, c = step_axes(step)
     cell = (i * ny + j) * nz + k
     for m in range(n):
@@ -237,7 +240,7 @@ def word_after_step(
 
 @kernel
 def path_to_slot(found: WordSearch, cell: Ints, slot: int) -> Ints:
-    """Cells (m, 3) from where a search began to one of its slots."""
+    """Return the cells (m, 3) of the path from the beginning of a search to one of its slots."""
     out, count = np.empty((64, 3), dtype=np.int64), 0
     i, j, k = cell[0] - found.first[0], cell[1] - found.first[1], cell[2] - found.first[2]
     n = slot
