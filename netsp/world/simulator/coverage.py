@@ -1,7 +1,7 @@
-"""What a camera has seen of a structure: patches of its surface, marked as they come into view.
+"""Coverage: the patches of a structure's surface that a camera has seen.
 
-As Amer et al. 2025 (section VI-A) count it, a patch is seen when its centre is within the camera's
-range, its surface faces the camera and it lies within the field of view. They do not ask whether
+As Amer et al. 2025 (section VI-A) count it, a patch is seen if its centre is within the camera's
+range, its surface faces the camera and it lies within the field of view. They do not check whether
 something stands in between; here both are counted, with and without.
 """
 
@@ -28,7 +28,7 @@ from netsp.world.simulator.environment_policy import CoveragePolicy
 
 @dataclass(frozen=True, eq=False)
 class Patches(ComparesArrays):
-    """A surface in pieces.
+    """Surface in pieces.
 
     Attributes
     ----------
@@ -55,14 +55,20 @@ def patches_of(
     inspect: tuple[str, ...] | None = None,
     policy: CoveragePolicy = CoveragePolicy(),
 ) -> Patches:
-    """The surface of a scene in triangles with sides of at most `size`, without what lies inside
-    another solid. places : (k, 3); what has no end is taken as far as they reach. inspect : names
-    of the solids to be seen; default all but half spaces and the sea floor.
+    """Return the surface of a scene in triangles with sides of at most `size`, without what lies
+    inside another solid.
+
+    Parameters
+    ----------
+    places : ndarray, shape (k, 3)
+        Positions that unbounded surfaces are cut to, metres.
+    inspect : tuple of str, optional
+        Names of the solids to be seen; by default all but half spaces and the sea floor.
 
     Raises
     ------
     InputError
-        `inspect` names no solid, or nothing is left to be seen.
+        `inspect` names no solid, or no surface is left to be seen.
     """
     low, high = extent(scene, places)
     solids = scene.all_solids()
@@ -114,8 +120,8 @@ def patches_of(
 
 
 def sides_of(field: DistanceField, points: Floats) -> tuple[Floats, Floats]:
-    """Points (n, 3) of a cloud on the surface, and on its other side: those of a sheet lie in its
-    middle."""
+    """Return points (n, 3) of a cloud moved to the surface, and to its other side: the points of a
+    sheet lie in its middle."""
     normals = field.gradient(points)
     out = []
     for sign in (1.0, -1.0):
@@ -128,7 +134,8 @@ def sides_of(field: DistanceField, points: Floats) -> tuple[Floats, Floats]:
 
 
 def divided(triangles: Floats, size: float, max_patches: int) -> Floats:
-    """Triangles (n, 3, 3) halved across their longest sides until none is longer than `size`."""
+    """Return triangles (n, 3, 3) halved across their longest sides until none is longer than
+    `size`."""
     done = []
     while len(triangles):
         sides = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
@@ -157,8 +164,21 @@ class Surface(NamedTuple):
 
 
 class View(NamedTuple):
-    """A camera at a place (3,), its heading and pitch (rad), the tangent of half the field of view,
-    which is a square pyramid, its range, and how far off a patch sight of it is asked for (m)."""
+    """View of a camera for the kernel.
+
+    Attributes
+    ----------
+    eye
+        (3,) position, metres.
+    yaw, pitch
+        Direction, rad.
+    half
+        Tangent of half the field of view, which is a square pyramid.
+    reach
+        Range, metres.
+    off
+        Distance from a patch at which sight of it is tested, metres.
+    """
 
     eye: Floats
     yaw: float
@@ -169,14 +189,14 @@ class View(NamedTuple):
 
 
 class Coverage:
-    """What has been seen so far.
+    """Coverage so far.
 
     Attributes
     ----------
     seen, seen_through
-        (n,) with and without regard to what stands in between.
+        (n,) whether each patch was seen, with and without regard to what stands in between.
     share, share_through
-        Of the area, the second as the paper counts.
+        Shares of the area; the second is the paper's.
     """
 
     def __init__(self, patches: Patches, field: DistanceField, camera: Camera) -> None:
@@ -188,8 +208,8 @@ class Coverage:
         self._latest: tuple[Floats, Floats] | None = None
 
     def look(self, eye: Floats, yaw: float) -> None:
-        """Mark what the camera sees from a place (3,) looking in a horizontal direction (rad), as
-        much up or down as its tilt allows to have the nearest patch in the middle."""
+        """Mark what the camera sees from a place (3,) looking in a horizontal direction (rad),
+        tilted towards the nearest patch as far as it can."""
         near = self._nearest(eye)
         most = math.radians(self.camera.tilt)
         pitch = min(max(math.atan2(near[2], math.hypot(near[0], near[1])), -most), most)
@@ -211,8 +231,8 @@ class Coverage:
             self.share_through = float(self._shares @ self.seen_through)
 
     def heading(self, eye: Floats, before: float) -> float:
-        """The horizontal direction (rad) of the nearest patch; `before` if it is straight above or
-        below."""
+        """Return the horizontal direction (rad) of the nearest patch; `before` if that is straight
+        above or below."""
         near = self._nearest(eye)
         if math.hypot(near[0], near[1]) < 0.2 * float(np.linalg.norm(near)):
             return before
@@ -229,7 +249,7 @@ class Coverage:
 
 @kernel
 def nearest(centres: Floats, eye: Floats) -> int:
-    """Which of some points (n, 3) is nearest."""
+    """Return the index of the nearest of some points (n, 3)."""
     best, at = math.inf, 0
     for i in range(len(centres)):
         d = (
@@ -257,8 +277,8 @@ def mark(
     seen_through: Bools,
     view: View,
 ) -> tuple[float, float]:
-    """Mark the patches that are in view. Returns the shares that were new, with and without regard
-    to what stands in between."""
+    """Mark the patches in view; return the shares that were new, with and without regard to what
+    stands in between."""
     centres, normals, shares = surface.centres, surface.normals, surface.shares
     eye, yaw, pitch, half = view.eye, view.yaw, view.pitch, view.half
     reach, off = view.reach, view.off

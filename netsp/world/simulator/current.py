@@ -1,4 +1,4 @@
-"""Moving water: a steady current, and gusts on top of it that come and go."""
+"""Moving water: a steady current, with gusts on top."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from netsp.world.simulator.environment_policy import GustPolicy
 
 
 class Water:
-    """Velocity over time; gusts are an Ornstein-Uhlenbeck process, the same for the same seed.
+    """Velocity of the water over time; gusts are an Ornstein-Uhlenbeck process that a seed
+    determines.
 
     Parameters
     ----------
     current
-        (3,) m/s.
+        Mean velocity (3,), m/s.
     gusts
-        m/s, standard deviation along each axis.
+        Standard deviation along each axis, m/s.
     """
 
     def __init__(
@@ -29,7 +30,7 @@ class Water:
         self._values = [gusts * self._rng.normal(size=3)]
 
     def __call__(self, now: float) -> Floats:
-        """(3,) m/s at a time in seconds."""
+        """Return the velocity (3,) at a time in seconds, m/s."""
         if self.gusts == 0.0:
             return self.current
         interval_s = self.policy.interval_s

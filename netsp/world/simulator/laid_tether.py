@@ -1,4 +1,4 @@
-"""How the tether lies when a mission begins: laid out at the start, or as it is by now."""
+"""The tether when a mission begins: laid out at the start, or as it is by now."""
 
 from __future__ import annotations
 
@@ -21,24 +21,8 @@ taut tether dip into surfaces by an eighth (docs/tether.md), and a file rounds t
 
 
 def first_tether(mission: Mission, field: DistanceField, model: Tethers, grid: Grid) -> Tether:
-    """The tether with the robot at the start: straight, or along the shortest path from the anchor
-    to a start that it does not see.
-
-    Parameters
-    ----------
-    mission : Mission
-        Its anchor and start count.
-    field : DistanceField
-        The scene's field.
-    model : TetherModel
-        The model of the tether.
-    grid : Grid
-        That paths are sought on.
-
-    Returns
-    -------
-    Tether
-        The tether.
+    """Return the tether with the robot at the start: straight, or along the shortest path from the
+    anchor to a start that it does not see.
 
     Raises
     ------
@@ -60,29 +44,13 @@ def first_tether(mission: Mission, field: DistanceField, model: Tethers, grid: G
 
 
 def present_tether(mission: Mission, field: DistanceField, model: Tethers, grid: Grid) -> Tether:
-    """The tether when the mission begins: `first_tether`, or that of its state, pulled taut as if
-    the robot had gone along the line that the state gives.
-
-    Parameters
-    ----------
-    mission : Mission
-        Its anchor, start and state count.
-    field : DistanceField
-        The scene's field.
-    model : TetherModel
-        The model of the tether.
-    grid : Grid
-        That paths are sought on.
-
-    Returns
-    -------
-    Tether
-        The tether.
+    """Return the tether when the mission begins: `first_tether`, or that of its state, pulled taut
+    as if the robot had travelled along the line of the state.
 
     Raises
     ------
     InputError
-        As of `first_tether`; a state inside a solid, or whose tether passes through one, or is
+        See `first_tether`; also a state inside a solid, or whose tether passes through one or is
         longer than the limit.
     """
     if mission.state is None:

@@ -1,4 +1,4 @@
-"""Runs a mission: planner, vehicle and tether, step by step, with a log that tells all."""
+"""Simulates a mission: planner, vehicle and tether, step by step, with a log."""
 
 from __future__ import annotations
 
@@ -40,26 +40,13 @@ from netsp.world.vehicle.kinematic import turned
 def grid_of(
     mission: Mission, scene: Scene, field: DistanceField, policy: PathPolicy = PathPolicy()
 ) -> Grid:
-    """The grid that paths are sought on: the scene's bounds, or all there is and some room.
-
-    Parameters
-    ----------
-    mission : Mission
-        Its cell, waypoints and clearance count.
-    scene : Scene
-        Its bounds count.
-    field : DistanceField
-        The scene's field.
-
-    Returns
-    -------
-    Grid
-        The grid.
+    """Return the grid on which paths are searched: the scene's bounds, or all of the scene with a
+    margin.
 
     Raises
     ------
     InputError
-        It would take too much memory; says which cell would not. A cell larger than the site.
+        A grid that takes too much memory, or cells larger than the site.
     """
     low, high, cell = grid_box(mission, scene, policy)
     return Grid(field, low, high, cell, mission.clearance, policy)
@@ -68,26 +55,12 @@ def grid_of(
 def grid_box(
     mission: Mission, scene: Scene, policy: PathPolicy = PathPolicy()
 ) -> tuple[Floats, Floats, float]:
-    """Return the box of the grid for paths, and the size of its cells.
-
-    Parameters
-    ----------
-    mission : Mission
-        Mission with cell, waypoints and clearance.
-    scene : Scene
-        Scene with bounds.
-
-    Returns
-    -------
-    low, high : ndarray, shape (3,)
-        Corners of the box, metres.
-    cell : float
-        Cell size, metres.
+    """Return low and high corner (3,) of the box of that grid, and its cell size, metres.
 
     Raises
     ------
     InputError
-        A cell larger than the site.
+        Cells larger than the site.
     """
     cell = mission.cell or policy.cell
     if scene.bounds is not None:
@@ -121,49 +94,39 @@ def simulate(
     on_step: Callable[[LogRow, Planner], None] | None = None,
     policy: SimulationPolicy = SimulationPolicy(),
 ) -> Run:
-    """Run a mission.
+    """Simulate a mission.
 
     Parameters
     ----------
-    mission : Mission
-        What is flown.
     planner : str or callable
-        A name (`netsp.world.planner.PLANNERS`), or a callable that makes one, such as a class
-        derived from `Planner`.
+        Name (`netsp.world.planner.PLANNERS`) or factory of a planner, such as a class derived from
+        `Planner`.
     vehicle : str
-        A name (`netsp.world.vehicle.VEHICLES`).
+        Name of a vehicle (`netsp.world.vehicle.VEHICLES`).
     tether : str or callable
-        The model that the planner believes: `geodesic`, `react`, or a callable that makes a
-        `netsp.world.tether.TetherModel` of a field and a resolution; what is logged is the
-        geodesic one.
+        The planner's tether model: `geodesic`, `react`, or a callable that makes a
+        `netsp.world.tether.TetherModel` of a field and a resolution. The log has the geodesic one.
     options : PlannerOptions, optional
-        How the planner finds paths.
-    scene : Scene, optional
-        When it is at hand.
-    field : DistanceField, optional
-        When it is at hand.
+        Options of path search.
+    scene, field : Scene, DistanceField, optional
+        The scene and its field, if they are loaded.
     snap : bool
-        Move waypoints out of solids.
+        Whether waypoints inside solids are moved out.
     surprises : SceneSurprises, optional
-        In what the water differs from the map, and when.
+        Differences between water and map, and events.
     seed : int
-        Of the gusts, and of the sensors' noise.
+        Seed of the gusts and of the sensors' noise.
     on_step : callable, optional
-        Called with every row and the planner; a KeyboardInterrupt ends the run, and what was done
-        till then is returned.
+        Called with every row and the planner. A KeyboardInterrupt in it ends the run, which is
+        returned as far as it came.
     policy : SimulationPolicy
         Steps and thresholds of the simulation.
-
-    Returns
-    -------
-    Run
-        What came of it.
 
     Raises
     ------
     InputError
         Before the first step: unknown names, waypoints inside solids, anchor and start in different
-        parts of the water, a tether that is shorter than the path between them.
+        parts of the water, or a tether that is shorter than the path between them.
     """
     check_names(planner, vehicle, tether)
     check_size(mission, policy)
@@ -268,16 +231,7 @@ def stay(
 ) -> None:
     """Turn to a waypoint's heading, for at most `max_turn_s`, then stay as long as it asks.
 
-    Parameters
-    ----------
-    world : Simulation
-        It is moved on.
-    planner : Planner
-        Already on its way to what is next.
-    waypoint : MissionWaypoint
-        The waypoint.
-    on_step : callable, optional
-        As of `simulate`.
+    The planner is already on its way to the next waypoint.
     """
     heading = None if waypoint.heading is None else math.radians(waypoint.heading)
     if heading is None and waypoint.dwell == 0.0:

@@ -1,4 +1,4 @@
-"""What a range sensor sees: where rays in a cone first meet something."""
+"""Range sensor: where rays in a cone first meet a solid."""
 
 from __future__ import annotations
 
@@ -18,21 +18,17 @@ RAY_TOLERANCE = 1e-3
 
 
 def fan(field_of_view: float, ahead: Floats, turn: float, ray_count: int) -> Floats:
-    """Rays that share a cone evenly: a spiral of Fibonacci on the cap of the sphere.
+    """Return unit vectors (n, 3) that share a cone evenly: a Fibonacci spiral on the cap of a
+    sphere.
 
     Parameters
     ----------
     field_of_view : float
         Full angle of the cone, degrees.
     ahead : ndarray, shape (3,)
-        Its axis, of any length.
+        Axis of the cone, of any length.
     turn : float
-        Radians by which the spiral is turned about it.
-
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        Unit vectors.
+        Angle by which the spiral is turned about the axis, rad.
     """
     k = np.arange(ray_count) + 0.5
     cosine = 1.0 - (1.0 - math.cos(math.radians(0.5 * field_of_view))) * k / ray_count
@@ -48,15 +44,7 @@ def fan(field_of_view: float, ahead: Floats, turn: float, ray_count: int) -> Flo
 
 
 class Ranging:
-    """Looks of a range sensor.
-
-    Parameters
-    ----------
-    sensor : RangeSensor
-        Its range, cone and noise.
-    seed : int
-        Of the noise.
-    """
+    """Simulated range sensor, whose noise a seed determines."""
 
     def __init__(
         self, sensor: RangeSensor, seed: int, policy: RangingPolicy = RangingPolicy()
@@ -67,26 +55,16 @@ class Ranging:
     def look(
         self, field: DistanceField, place: Floats, ahead: Floats
     ) -> tuple[Floats, Floats, Floats]:
-        """One look.
-
-        Parameters
-        ----------
-        field : DistanceField
-            What is there.
-        place : ndarray, shape (3,)
-            Of the sensor, metres.
-        ahead : ndarray, shape (3,)
-            Where it looks, of any length.
+        """Return one look from a place (3,) along a direction (3,) of any length.
 
         Returns
         -------
         rays : ndarray, shape (n, 3)
             Unit vectors.
         ranges : ndarray, shape (n,)
-            Metres to what each meets first, as measured; inf where that is nothing within the
-            range.
+            Measured distance to what each ray meets first, metres; inf beyond the range.
         off : ndarray, shape (n,)
-            Metres by which these are wrong.
+            Errors of these, metres.
         """
         turn = self._rng.uniform(0.0, 2.0 * math.pi)
         rays = fan(self.sensor.field_of_view, ahead, turn, self.policy.ray_count)
@@ -97,7 +75,8 @@ class Ranging:
 
 @kernel
 def cast(field: Field, place: Floats, rays: Floats, most: float) -> Floats:
-    """(n,) how far along each ray (n, 3) something is; inf beyond `most` (sphere tracing)."""
+    """Return (n,) the distance at which each ray (n, 3) meets a solid; inf beyond `most` (sphere
+    tracing)."""
     out = np.full(len(rays), math.inf)
     for n in range(len(rays)):
         s = 0.0

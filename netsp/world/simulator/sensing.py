@@ -1,4 +1,4 @@
-"""What the planner is told of the robot's position: late, and not quite right."""
+"""Measured position of the robot: late, with noise, filtered."""
 
 from __future__ import annotations
 
@@ -11,23 +11,16 @@ from netsp.world.simulator.simulation_policy import SimulationPolicy
 
 
 class Positions:
-    """Positions measured one step after the other, filtered; never inside a solid.
+    """Positions measured one step after another and filtered; never inside a solid.
 
     An alpha-beta filter (Bar-Shalom, Li & Kirubarajan, "Estimation with Applications to Tracking
     and Navigation", 2001, section 6.5), with the gain of the velocity that is critically damped.
+    The estimated velocity makes up for the age of the positions.
 
     Parameters
     ----------
-    sensor : PositionSensor
-        Its noise and delay.
-    field : DistanceField
-        The map.
     place : ndarray, shape (3,)
-        Where the robot starts, which is known, metres.
-    step : float
-        Seconds between two positions.
-    seed : int
-        Of the noise.
+        First position, which is known, metres.
     """
 
     def __init__(
@@ -50,18 +43,7 @@ class Positions:
         return self.sensor.noise == 0.0 and self._late == 0
 
     def __call__(self, place: Floats) -> Floats:
-        """What is thought of where the robot is.
-
-        Parameters
-        ----------
-        place : ndarray, shape (3,)
-            Where it is, metres.
-
-        Returns
-        -------
-        ndarray, shape (3,)
-            Metres.
-        """
+        """Return the estimated position (3,) of a robot at a place (3,), metres."""
         if self.exact:
             return place
         self._true.append(np.array(place, dtype=float))

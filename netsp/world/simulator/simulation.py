@@ -1,4 +1,4 @@
-"""A robot on a tether in a scene, moved on step by step."""
+"""State of a simulated robot on a tether in a scene."""
 
 from __future__ import annotations
 
@@ -26,42 +26,42 @@ from netsp.world.vehicle import Vehicle
 
 @dataclass
 class Simulation:
-    """A robot on a tether in a scene, moved on step by step.
+    """Robot on a tether in a scene, moved step by step.
 
     Parameters
     ----------
     mission : Mission
-        What is flown.
+        The mission.
     scene : DistanceField
-        The map.
+        The scene as it is.
     vehicle : Vehicle
         The robot.
     tethers : GeodesicTether
-        The model of the taut tether.
+        Model of the taut tether.
     tether : Tether
-        The taut tether, by the geodesic model.
+        The taut tether.
     water : callable
         Velocity of the water (3,), m/s, at a time in seconds.
     coverage : Coverage, optional
         What the camera has seen.
     model : TetherModel, optional
-        Another model, that the planner believes in.
+        Another model, in which the planner believes.
     believed : Tether, optional
-        Its tether.
+        The tether of that model.
     positions : Positions, optional
-        What the planner is told of the robot's position.
+        Sensor of the robot's position.
     thought : ndarray, shape (3,), optional
-        Where it thinks that the robot is, metres.
+        Estimated position of the robot, metres.
     track : Track, optional
-        Where the anchor goes.
+        Track of the anchor.
     now : float
         Seconds since the start.
-    tethers_seen : list of (int, Tether)
-        Row of the log and tether now and then, where the scene changes; else empty.
     contacts : int
-        How often the robot has met a solid.
+        Number of contacts of the robot with solids.
     shortening : bool
         Whether the limit was lowered below the tether, which is being shortened.
+    tethers_seen : list of (int, Tether)
+        Rows of the log with their tethers, at intervals, if the scene changes; else empty.
     log : list of LogRow
         One row per step.
     policy : SimulationPolicy
@@ -89,7 +89,8 @@ class Simulation:
     _was: Floats | None = None
 
     def _course(self, path: Floats, yaw: float) -> float:
-        """Heading (rad) along the way through the water: a vehicle is fastest ahead."""
+        """Return the heading (rad) along the way through the water, because a vehicle is fastest
+        ahead."""
         leg = path[0] - self.vehicle.position
         far = float(np.linalg.norm(leg))
         if far < 1e-6:
@@ -98,7 +99,7 @@ class Simulation:
         return math.atan2(y, x) if math.hypot(x, y) > self.policy.min_course_speed else yaw
 
     def _pull(self) -> dict[str, Floats]:
-        """The tether's force on a vehicle that is to feel it."""
+        """Return the tether's force on a vehicle, if the mission asks for it."""
         physics = self.mission.tether
         if not physics.pulls_vehicle:
             return {}
@@ -108,24 +109,11 @@ class Simulation:
 
     @property
     def load(self) -> Load:
-        """What acts on the tether now."""
+        """Load on the tether now."""
         return self.mission.tether.load(self.water(self.now))
 
     def note(self, planner: Planner, command: Command) -> LogRow:
-        """Write down where things are.
-
-        Parameters
-        ----------
-        planner : Planner
-            Its waypoint and mode are logged.
-        command : Command
-            What it asked for.
-
-        Returns
-        -------
-        LogRow
-            The row.
-        """
+        """Log the present state, with the planner's waypoint and the mode of its command."""
         x, y, z = (float(v) for v in self.vehicle.position)
         seen = self.coverage
         if (
@@ -160,14 +148,14 @@ class Simulation:
         fresh : bool
             Whether the path does not continue the one before.
         homeward : bool
-            Whether the inspection is over: the camera then no longer asks for a heading.
+            Whether the inspection is over, so that the camera no longer determines the heading.
         heading : float, optional
-            To turn to, radians, whatever the camera asks for.
+            Heading to turn to, rad, whatever the camera asks for.
 
         Returns
         -------
         count : int
-            How many points of the path are behind the robot.
+            Number of points of the path that the robot has passed.
         moved : bool
             Whether the vehicle could move.
         """
@@ -200,7 +188,8 @@ class Simulation:
         return passed, moved
 
     def _believed_after(self, point: Floats, anchor: Floats | None) -> Tether:
-        """Another model's tether; anchors move in the geodesic one only."""
+        """Return the tether of the planner's model after a step; only the geodesic one has moving
+        anchors."""
         assert self.model is not None
         assert self.believed is not None
         if isinstance(self.model, GeodesicTether):
@@ -211,5 +200,5 @@ class Simulation:
 
     @property
     def robot(self) -> Floats:
-        """(3,) where the planner thinks that the robot is."""
+        """Position (3,) at which the planner believes the robot."""
         return self.vehicle.position if self.thought is None else self.thought

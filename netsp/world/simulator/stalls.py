@@ -1,4 +1,4 @@
-"""Does the robot get on? In a strong current it may not."""
+"""Detection of a robot that makes no progress, as in a strong current."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from netsp.world.simulator.simulation import Simulation
 
 @dataclass
 class Stalls:
-    """Watches whether the robot gets on: in a strong current it may not.
+    """Stalls of a robot, which makes no progress along its path.
 
     Parameters
     ----------
     found : list of dict
         Time (s), waypoint and place of each stall.
     reason : str
-        Of the last one, in a line.
+        Reason of the last one, in a line.
     """
 
     found: list[dict[str, Any]] = field(default_factory=list)
@@ -33,22 +33,8 @@ class Stalls:
     _since: float = 0.0
 
     def seen(self, world: Simulation, planner: Planner, command: Command) -> bool:
-        """Whether what is left of the path has not become shorter for the policy's `stall_s`.
-
-        Parameters
-        ----------
-        world : Simulation
-            As it is.
-        planner : Planner
-            Its waypoint counts.
-        command : Command
-            Its path counts; a path that has been planned anew starts the clock again.
-
-        Returns
-        -------
-        bool
-            Whether the robot has stalled; it is then noted.
-        """
+        """Return whether the rest of the path has not become shorter for the policy's `stall_s`; a
+        stall is recorded. A path that has been planned anew starts the time again."""
         here = world.vehicle.position
         left = polylines.length(np.vstack([here, command.path]))
         # home may move away as fast as the robot comes after it

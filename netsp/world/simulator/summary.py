@@ -1,4 +1,4 @@
-"""The numbers of a run."""
+"""Numbers of a mission run."""
 
 from __future__ import annotations
 
@@ -20,37 +20,25 @@ from netsp.world.simulator.simulation import Simulation
 def summarise(
     mission: Mission, planner: Planner, world: Simulation, wall: float, interrupted: bool
 ) -> dict[str, Any]:
-    """The numbers of a run, as the papers give them.
+    """Return the numbers of a run, as the papers give them.
 
-    `exceedance_s` is the time in which more tether must be out than there is: the taut length and
-    what slack and sag add to it (`longest_payout`); after the limit itself was lowered below that,
-    the time until it fits is `shortening_s`. `waited_s` is the
-    time in which the robot waited for a moving anchor. `stops` tells of each waypoint visited, with
-    the sum of turning angles and the factor e^(mu theta) that friction multiplies the tension by.
-    `contacts` counts how often the robot met a solid.
+    `exceedance_s` is the time in which more tether must be out than there is: the taut length with
+    slack and sag (`longest_payout`). After the limit itself was lowered below that, the time until
+    it fits is `shortening_s`. `waited_s` is the time in which the robot waited for a moving anchor.
+    `stops` has each waypoint visited, with the sum of turning angles and the factor e^(mu theta) by
+    which friction multiplies the tension. `contacts` counts contacts of the robot with solids.
     `recovery_s` is the time to come back to the anchor afterwards, by retracing the tether, or the
-    whole path (the paper does not say which). Both, `path` and what was seen are of the inspection;
-    `home` tells of the leg back to the start that follows it: whether it was `reached` with the
-    tether free, how much longer the tether is there than when the mission began (`left`, m), and
-    how long it took.
+    whole path (the paper does not say which). Both, `path` and coverage are those of the
+    inspection; `home` describes the way back to the start that follows it: whether it was `reached`
+    with the tether free, how much longer the tether is there than when the mission began (`left`,
+    m), and how long it took.
 
     Parameters
     ----------
-    mission : Mission
-        What was flown.
-    planner : Planner
-        As it is at the end.
-    world : Simulation
-        As it is at the end.
+    planner, world : Planner, Simulation
+        Their states at the end.
     wall : float
-        Seconds that the run took.
-    interrupted : bool
-        Whether it was stopped.
-
-    Returns
-    -------
-    dict
-        The numbers by name.
+        Wall-clock time of the run, s.
     """
     log = world.log
     # the inspection ends with the row in which the last waypoint is behind the robot
@@ -107,7 +95,7 @@ def _over(row: LogRow) -> bool:
 
 
 def _home(planner: Planner, world: Simulation, since: float) -> dict[str, Any]:
-    """How the mission ended: `left` is asked once the tether has come to rest."""
+    """Return how the mission ended; `left` is measured once the tether has come to rest."""
     model, delta = world.tethers, world.tethers.delta
     as_laid = model.refine(model.update(planner.laid_now, world.vehicle.position)).length
     left = max(0.0, model.refine(world.tether).length - as_laid)
@@ -121,7 +109,7 @@ def _home(planner: Planner, world: Simulation, since: float) -> dict[str, Any]:
 
 
 def _stops(mission: Mission, planner: Planner, log: list[LogRow]) -> list[dict[str, Any]]:
-    """The tether at each waypoint visited."""
+    """Return the tether at each waypoint visited."""
     arrival: dict[int, LogRow] = {}
     passed, visited = 0, set(planner.reached)
     for row in log:
@@ -143,7 +131,7 @@ def _stops(mission: Mission, planner: Planner, log: list[LogRow]) -> list[dict[s
 
 
 def _friction(mission: Mission, turnings: Floats, step_s: float) -> dict[str, float] | None:
-    """Turning and tension ratio where they were greatest, and seconds over the limit; None without
+    """Return the greatest turning and tension ratio, and the time over the limit; None without
     friction."""
     physics = mission.tether
     if physics.friction == 0.0:

@@ -1,4 +1,4 @@
-"""What may change in a scene while a robot is under way: the surprise file of a mission."""
+"""Surprise file of a mission: what changes in a scene while a robot is under way."""
 
 from __future__ import annotations
 
@@ -19,38 +19,21 @@ from netsp.world.scene.scene import Scene, Solid
 KINDS = (
     "appear", "vanish", "move", "add_waypoint", "cancel_waypoint", "push", "tether_length",
 )  # fmt: skip
-"""What may happen."""
+"""Fields of an event, of which it has one."""
 
 
 class SolidMove(Model):
-    """A solid is somewhere else from now on."""
+    """Move of a solid."""
 
     solid: Annotated[Name, Field(description="its name")]
     by: Annotated[Point3, Field(description="(x, y, z) to move it by, m")]
 
 
 class SceneEvent(Model):
-    """Something that happens at a time after the start; one of the other fields says what.
+    """Event at a time after the start; one of the other fields says what happens.
 
-    Attributes
-    ----------
-    time : float
-        Seconds since the start; what happens at 0 was there, or not, from the beginning.
-    appear : Solid or None
-        A solid that is not on the map.
-    vanish : str or None
-        Name of a solid that is not there after all.
-    move : SolidMove or None
-        A solid that moves.
-    add_waypoint : MissionWaypoint or None
-        One more to visit.
-    cancel_waypoint : int or None
-        Number of one that need not be visited, in the order of the mission file; those that were
-        added come after all others.
-    push : (x, y, z) or None
-        How far the robot is carried off, metres.
-    tether_length : float or None
-        What the tether may be from now on, metres.
+    What happens at 0 s was so from the beginning. Waypoints are numbered as in the mission file;
+    added ones come after all others.
     """
 
     time: Annotated[NonNegative, Field(description="seconds after the start")]
@@ -87,7 +70,7 @@ class SceneEvent(Model):
 
 
 class SceneSurprises(FileModel):
-    """The surprise file of a mission.
+    """Surprise file of a mission.
 
     >>> text = '{"schema_version": 1, "events": [{"time": 60, "vanish": "pile 3"}]}'
     >>> SceneSurprises.from_json(text).events[0].vanish
@@ -102,32 +85,20 @@ class SceneSurprises(FileModel):
     events: Annotated[tuple[SceneEvent, ...], Field(description="in any order")]
 
     def in_order(self) -> list[SceneEvent]:
-        """The events by time.
-
-        Returns
-        -------
-        list of SceneEvent
-            Those of one time as in the file.
-        """
+        """Return the events by time; those of one time as in the file."""
         return sorted(self.events, key=lambda e: e.time)
 
     def check(self, scene: Scene, source: str = "", waypoints: int | None = None) -> None:
-        """Refuse events that a scene or a mission cannot have.
+        """Raise InputError for events that a scene or a mission cannot have.
+
+        These name a solid or waypoint that is not there when the event comes, or give a name twice.
 
         Parameters
         ----------
-        scene : Scene
-            The map.
         source : str
-            What messages call these surprises; nothing if it is empty.
+            Name of these surprises in messages; nothing if it is empty.
         waypoints : int, optional
-            How many the mission has.
-
-        Raises
-        ------
-        InputError
-            A solid or waypoint that is not there when the event comes, or a name that two would
-            have.
+            Number of waypoints in the mission.
         """
         solids = scene.all_solids()
         for k, event in sorted(enumerate(self.events), key=lambda e: e[1].time):
@@ -147,24 +118,15 @@ class SceneSurprises(FileModel):
     def check_places(
         self, mission: Mission, scene: Scene, field: DistanceField, source: str = ""
     ) -> None:
-        """Refuse waypoints that a mission file could not have either, and pushes farther than a
-        tether.
+        """Raise InputError for waypoints that a mission file could not have either, and for pushes
+        of more than twice the tether.
 
         Parameters
         ----------
-        mission : Mission
-            What is flown.
         scene : Scene
             The map; what has appeared by then does not count.
-        field : DistanceField
-            The scene's field.
         source : str
-            What messages call these surprises; nothing if it is empty.
-
-        Raises
-        ------
-        InputError
-            A waypoint in a solid or out of bounds; a push of more than twice the tether.
+            Name of these surprises in messages; nothing if it is empty.
         """
         for k, event in enumerate(self.events):
             where = f"{source}: events[{k}]" if source else f"events[{k}]"
@@ -185,24 +147,12 @@ class SceneSurprises(FileModel):
 
 
 def changed(solids: tuple[Solid, ...], event: SceneEvent) -> tuple[Solid, ...]:
-    """The solids after an event.
-
-    Parameters
-    ----------
-    solids : tuple of Solid
-        Before.
-    event : SceneEvent
-        What happens.
-
-    Returns
-    -------
-    tuple of Solid
-        After.
+    """Return the solids after an event.
 
     Raises
     ------
     InputError
-        It names a solid that is not there, or one appears by a name that is taken.
+        The event names a solid that is not there, or one appears by a name that is taken.
     """
     if not event.of_scene:
         return solids
@@ -222,20 +172,7 @@ def changed(solids: tuple[Solid, ...], event: SceneEvent) -> tuple[Solid, ...]:
 
 
 def moved(solid: Solid, by: Point3) -> Solid:
-    """A solid somewhere else.
-
-    Parameters
-    ----------
-    solid : Solid
-        The solid.
-    by : (x, y, z)
-        To move it by, metres.
-
-    Returns
-    -------
-    Solid
-        The same solid there.
-    """
+    """Return a solid moved by (x, y, z), metres."""
     kind = next(k for k in type(solid).model_fields if getattr(solid, k) is solid.shape)
     shape = solid.shape.model_dump()
     update: dict[str, Any] = {

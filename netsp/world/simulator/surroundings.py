@@ -1,8 +1,8 @@
-"""What is in the water, and what the planner knows of it: a map that is wrong, and is mended.
+"""Solids that are there, and the planner's map of them, which may be wrong and is corrected.
 
 The map begins as the scene's file. A solid that is not on it is put there once rays of the range
-sensor have met it, where the mean of what they measured says; a solid that rays pass through comes
-off. Where a mission has no sensor, the planner is told of every change.
+sensor have met it, where the mean of their measurements says; a solid that rays pass through is
+removed. Without a range sensor, the planner is told of every change.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ from netsp.world.tether import GeodesicTether, Tether
 from netsp.world.tether.load import payout
 
 UNBOUNDED_EXTENT = 1e6
-"""Sentinel extent of solids without end, metres."""
+"""Sentinel extent of unbounded solids, metres."""
 
 FAR_OFF = Solid.model_validate({"sphere": {"center": [0.0, 0.0, -1e6], "radius": 1.0}})
 
 
 @dataclass
 class Sighting:
-    """What the sensor has found out about a solid.
+    """Measurements of a solid by the range sensor.
 
     Parameters
     ----------
     solid : Solid
-        As it is.
+        The solid as it is.
     count : int
-        Rays that have met it.
+        Number of rays that have met it.
     off : ndarray, shape (3,)
-        Sum of the errors of what they measured, metres.
+        Sum of their errors, metres.
     mapped : Solid or None
-        As it is on the map.
+        The solid as it is on the map.
     placed_by : int
-        Rays that its place on the map is the mean of.
+        Number of rays whose mean is its place on the map.
     """
 
     solid: Solid
@@ -65,22 +65,18 @@ class Sighting:
 
 
 class Surroundings:
-    """The scene as it is, and as it is known.
+    """Scene as it is, and as it is known.
 
     Parameters
     ----------
-    mission : Mission
-        Its range sensor, delta and clearance count.
     scene : Scene
         The map at the beginning.
     voxels : VoxelGrid or None
-        Of the scene.
-    surprises : SceneSurprises
-        In what the water differs from the map.
+        Voxels of the scene.
     places : ndarray, shape (k, 3)
         The tether when the mission begins, metres.
     seed : int
-        Of the sensor's noise.
+        Seed of the sensor's noise.
     """
 
     def __init__(
@@ -109,15 +105,7 @@ class Surroundings:
         self._steps = 0
 
     def go_on(self, world: Simulation, planner: Planner) -> None:
-        """Let happen what is due, look, and let the planner know.
-
-        Parameters
-        ----------
-        world : Simulation
-            Its scene and tether become those of the changed water.
-        planner : Planner
-            Its map becomes what is known of it.
-        """
+        """Let events happen that are due, look, and update the planner's map."""
         here = world.vehicle.position
         self._leave_trail(here)
         before = self.mapped
@@ -142,7 +130,7 @@ class Surroundings:
             planner.hear_of_payout(max(0.0, more), self.trail)
 
     def _leave_trail(self, here: Floats) -> None:
-        """Lengthen the trail, or take up what the robot goes back along."""
+        """Lengthen the trail, or shorten it where the robot goes back along it."""
         spacing = self.policy.trail_spacing
         back = self.policy.retrace_share * spacing
         while len(self.trail) > 2 and np.linalg.norm(here - self.trail[-2]) < back:
@@ -151,9 +139,11 @@ class Surroundings:
             self.trail = np.vstack([self.trail, here])
 
     def _happen(self, world: Simulation, planner: Planner) -> bool:
-        """What is due happens, but for solids that would stand on the tether, on home or in the
-        anchor's way, or nearer to the robot than its clearance and a second of its way: these wait
-        until there is room."""
+        """Let events happen that are due; return whether the scene has changed.
+
+        Solids wait that would stand on the tether, at home or in the anchor's way, or nearer to the
+        robot than its clearance and the way of one second.
+        """
         waiting, before = [], self.solids
         for event in self.due:
             if not event.of_scene and event.time <= world.now:
@@ -177,8 +167,8 @@ class Surroundings:
         return True
 
     def _tell_of(self, event: SceneEvent, world: Simulation, planner: Planner) -> None:
-        """What does not change the scene: other waypoints, or a robot that is carried off, as far
-        as there is water and its tether reaches."""
+        """Let an event happen that does not change the scene: other waypoints, another limit, or a
+        push, as far as there is water and the tether reaches."""
         if event.add_waypoint is not None:
             planner.add_waypoint(event.add_waypoint)
         elif event.cancel_waypoint is not None:
@@ -233,7 +223,7 @@ class Surroundings:
         return self.scene.field_with(solids, self.voxels)
 
     def _look(self, world: Simulation, planner: Planner) -> bool:
-        """Look along the path; whether anything is other than on the map."""
+        """Look along the path; return whether the map has changed."""
         assert self.ranging is not None
         here = world.vehicle.position
         onward = polylines.part(np.vstack([here, planner.path]), 0.0, 1.0)[-1] - here
@@ -244,7 +234,7 @@ class Surroundings:
         return self._put_on(world, rays, ranges, off) or gone
 
     def _put_on(self, world: Simulation, rays: Floats, ranges: Floats, off: Floats) -> bool:
-        """Solids that rays have met and that are not on the map."""
+        """Put solids on the map that rays have met; return whether there were any."""
         met = np.isfinite(ranges)
         points = world.vehicle.position + rays[met] * (ranges - off)[met, None]
         which = world.scene.nearest(points)
@@ -273,7 +263,7 @@ class Surroundings:
         return found
 
     def _take_off(self, known: DistanceField, here: Floats, rays: Floats, ranges: Floats) -> bool:
-        """Solids of the map that rays pass through."""
+        """Remove solids from the map that rays pass through; return whether there were any."""
         assert self.ranging is not None
         sensor = self.ranging.sensor
         expected = cast(known.arrays, here, rays, sensor.range)
@@ -291,7 +281,7 @@ class Surroundings:
         return bool(off)
 
     def _other(self, before: tuple[Solid, ...]) -> Floats:
-        """(2, 3) box of all in which the map differs from the one before."""
+        """Return the box (2, 3) of all differences between the map and the one before."""
         boxes: list[list[list[float]]] = []
         everywhere = [[-UNBOUNDED_EXTENT] * 3, [UNBOUNDED_EXTENT] * 3]
         for some, others in ((before, self.mapped), (self.mapped, before)):
@@ -302,19 +292,20 @@ class Surroundings:
         return np.array([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
 
     def _tell(self, world: Simulation, planner: Planner, box: Floats) -> None:
-        """The planner's map, and the tether in it."""
+        """Give the planner its map, and the tether in it."""
         known = self._field(self.mapped)
         world.model = GeodesicTether(known, self.mission.delta)
         world.believed = self._laid_again(world, world.model)
         planner.take_map(known, world.model, box, world.vehicle.position, world.believed)
 
     def _laid_again(self, world: Simulation, model: GeodesicTether) -> Tether:
-        """The tether in another map, on the side of everything new that explains what is out.
+        """Return the tether in another map, on that side of every new solid which explains the
+        payout.
 
         What was there from the beginning lies on the side that the trail says. What has appeared
-        since lies on the side that the tether was on then, and when that was is not known: of the
-        tethers at earlier moments, each taken on along the trail since, the one is believed whose
-        payout is nearest to the one measured; the earliest where several are as near.
+        since lies on the side of the tether at that time, which is unknown. So the tethers at
+        earlier moments are each taken on along the trail since; the one whose payout is nearest to
+        the measured one is believed, and the earliest of several.
         """
         out = payout(world.tether, world.load)
         best, least, tolerance = None, np.inf, self.policy.payout_tolerance
@@ -336,7 +327,7 @@ class Surroundings:
         return best
 
     def _anchors_way(self, world: Simulation, n: int) -> Floats:
-        """Back from a moving anchor to where it was at a moment."""
+        """Return the way of a moving anchor back to its position at a moment."""
         if world.track is None:
             return self.trail[:0]
         since = self._since if n == 0 else self.times[n - 1]
@@ -344,18 +335,12 @@ class Surroundings:
 
     @property
     def scene_now(self) -> Scene:
-        """The scene with the solids that are there now."""
+        """Scene with the solids that are there now."""
         return self.scene.model_copy(update={"solids": self.solids, "problem": None})
 
     def told(self) -> dict[str, int]:
-        """What a summary says of it.
-
-        Returns
-        -------
-        dict
-            How many events happened, how many never had room, and how many solids the sensor put on
-            the map.
-        """
+        """Return the number of events that happened, of those that never had room, and of solids
+        that the sensor put on the map."""
         return {
             "happened": len(self.happened),
             "held_back": len(self.due),

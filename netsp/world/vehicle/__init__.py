@@ -23,25 +23,11 @@ VEHICLES: Registry[Callable[[npt.NDArray[np.float64], float], Vehicle]] = Regist
     {"kinematic": KinematicVehicle, "bluerov2": _bluerov2},
     later,
 )
-"""Name → what makes a vehicle of a place (3,) and a speed."""
+"""Factories of vehicles by name, each called with a place (3,) and a speed."""
 
 
 def make_vehicle(name: str, place: npt.NDArray[np.float64], speed: float) -> Vehicle:
-    """A vehicle by name, at rest.
-
-    Parameters
-    ----------
-    name : str
-        One of `VEHICLES`.
-    place : ndarray, shape (3,)
-        Where it is, metres.
-    speed : float
-        That it is to go at, m/s.
-
-    Returns
-    -------
-    Vehicle
-        The vehicle.
+    """Make a vehicle by name, at rest at a place (3,), for a speed in m/s.
 
     Raises
     ------

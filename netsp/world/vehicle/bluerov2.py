@@ -1,4 +1,4 @@
-"""A BlueROV2 that follows a path by model-predictive control."""
+"""BlueROV2 that follows a path by model-predictive control."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TOP_SPEED = 1.5
 
 
 class BlueRov2:
-    """The vehicle, its controller, and what it thinks of the current.
+    """BlueROV2, its controller, and its estimate of the current.
 
     The controller does not know the water's motion: it infers it from its drift.
     """
@@ -41,19 +41,19 @@ class BlueRov2:
 
     @property
     def position(self) -> Floats:
-        """(3,) m."""
+        """Position (3,), metres."""
         return self.state[:3].copy()
 
     @property
     def yaw(self) -> float:
-        """rad."""
+        """Heading, rad."""
         return float(self.state[3])
 
     def go(
         self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool,
         pull: Floats | None = None,
     ) -> tuple[list[Floats], int]:  # fmt: skip
-        """See `netsp.world.vehicle.Vehicle`. Control steps take 0.1 s."""
+        """See `netsp.world.vehicle.Vehicle`."""
         points, behind, policy, step_s = [], 0, self.policy, self.policy.control.step_s
         if fresh:
             self._carrot = self.position
@@ -78,7 +78,7 @@ class BlueRov2:
         return points, behind
 
     def _in_frame(self, pull: Floats) -> Floats:
-        """A force (3,) of the world as an input (4,) of the vehicle."""
+        """Return a force (3,) of the world as an input (4,) of the vehicle."""
         c, s = math.cos(self.state[3]), math.sin(self.state[3])
         return np.array([c * pull[0] + s * pull[1], -s * pull[0] + c * pull[1], pull[2], 0.0])
 
@@ -89,7 +89,7 @@ class BlueRov2:
         self._carrot = np.array(place)
 
     def _aims(self, path: Floats, yaw: float) -> Floats:
-        """(horizon, 8): where the followed point will be, and how fast, with the heading."""
+        """Return (horizon, 8) the places and velocities of the followed point, with the heading."""
         horizon, step_s = self.policy.control.horizon, self.policy.control.step_s
         aims = np.zeros((horizon, 8))
         heading = self.state[3] + turned(yaw - self.state[3])

@@ -2,12 +2,11 @@
 
 Diehl, Bock and Schloeder, "A real-time iteration scheme for nonlinear optimization in optimal
 feedback control", SIAM J. Control Optim. 43(5), 2005: the model is linearised along the last
-solution, moved on by one step, and the quadratic program that comes of it is solved once. States
-are eliminated; what is left are 100 thrusts between bounds, and Bertsekas' projected Newton method
+solution, moved on by one step, and the resulting quadratic program is solved once. States are
+eliminated; 100 thrusts between bounds remain. A few steps of Bertsekas' projected Newton method
 ("Projected Newton methods for optimization problems with simple constraints", SIAM J. Control
-Optim. 20(2), 1982) is done in a few steps. Compiled whole, it takes a third of a millisecond; OSQP
-took two and its library crashed beside that of HiGHS. Matrices are multiplied by plain loops: for
-products this small BLAS starts threads that wait for one another, on a busy machine milliseconds.
+Optim. 20(2), 1982) solve it. Matrices are multiplied by plain loops, because BLAS starts threads
+for products this small, which wait for one another.
 """
 
 from __future__ import annotations
@@ -123,8 +122,8 @@ def improved(
 
 @kernel
 def _answer(by_state: Floats, by_force: Floats, allocation: Floats) -> Floats:
-    """(8 n, m n) how the states answer to changes of the thrusts: row block k is the state after
-    step k."""
+    """Return (8 n, m n) the derivatives of the states by the thrusts; row block k is the state
+    after step k."""
     n, m = len(by_state), allocation.shape[1]
     out = np.zeros((8 * n, m * n))
     for k in range(n):
@@ -140,7 +139,7 @@ def _answer(by_state: Floats, by_force: Floats, allocation: Floats) -> Floats:
 
 @kernel
 def _add(share: float, row: Floats, to: Floats) -> None:
-    """Add so much of a row to the beginning of another."""
+    """Add a multiple of a row to the beginning of another."""
     if share != 0.0:
         for j in range(len(row)):
             to[j] += share * row[j]
@@ -148,7 +147,8 @@ def _add(share: float, row: Floats, to: Floats) -> None:
 
 @kernel
 def within(hessian: Floats, slope: Floats, low: Floats, high: Floats, steps: int) -> Floats:
-    """The minimum of x H x / 2 + g x between bounds, H positive definite: projected Newton."""
+    """Return the minimum of x H x / 2 + g x between bounds, H positive definite (projected
+    Newton)."""
     n = len(slope)
     x = np.minimum(np.maximum(np.zeros(n), low), high)
     down, value = _slope_and_value(hessian, slope, x)
@@ -193,7 +193,7 @@ def within(hessian: Floats, slope: Floats, low: Floats, high: Floats, steps: int
 
 @kernel
 def _slope_and_value(hessian: Floats, slope: Floats, x: Floats) -> tuple[Floats, float]:
-    """H x + g, and x H x / 2 + g x."""
+    """Return H x + g, and x H x / 2 + g x."""
     down, value = slope.copy(), 0.0
     for j in range(len(x)):
         _add(x[j], hessian[j], down)
@@ -205,7 +205,7 @@ def _slope_and_value(hessian: Floats, slope: Floats, x: Floats) -> tuple[Floats,
 @kernel
 def solve_positive(matrix: Floats, right: Floats) -> None:
     """Solve a system of equations with a positive definite matrix, of which the upper half counts,
-    in place: U^T D U by rows. BLAS would start threads for it, which takes longer than the sums."""
+    in place: U^T D U by rows."""
     n = len(right)
     for k in range(n):
         for i in range(k + 1, n):

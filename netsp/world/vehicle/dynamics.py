@@ -1,4 +1,4 @@
-"""The BlueROV2 in four degrees of freedom: surge, sway, heave and yaw. Compiled.
+"""Dynamics of the BlueROV2 in four degrees of freedom: surge, sway, heave and yaw. Compiled.
 
 Parameters: von Benzon et al., "An Open-Source Benchmark Simulator: Control of a BlueROV2 Underwater
 Robot", J. Mar. Sci. Eng. 10(12), 1898, 2022. Roll and pitch are left out: the vehicle is upright by
@@ -33,13 +33,13 @@ WATER_DENSITY = 1000.0
 """Physical constant: density of the water in which the vehicle was measured, kg/m³."""
 
 INERTIA = np.array([13.5 + 6.36, 13.5 + 7.12, 13.5 + 18.68, 0.37 + 0.222])
-"""Mass and added mass: kg, kg, kg, kg m^2."""
+"""Physical constant: mass and added mass, kg, kg, kg and kg m²."""
 
 LINEAR = np.array([13.7, 0.0, 33.0, 0.0])
 QUADRATIC = np.array([41.1, 217.0, 190.0, 1.5])
-"""Damping. Of von Benzon et al. all but the quadratic damping in surge: their 141 kg/m, found at
-low speed, would let four thrusters push the vehicle to 0.85 m/s. Blue Robotics states 1.5 m/s for
-it, which is what 41.1 kg/m gives."""
+"""Physical constant: quadratic damping. All damping is that of von Benzon et al. except the
+quadratic one in surge: their 141 kg/m, found at low speed, would let four thrusters push the
+vehicle to 0.85 m/s. 41.1 kg/m gives the 1.5 m/s that Blue Robotics states."""
 
 MAX_THRUST = 40.0
 """Physical constant: largest thrust of a T200 in either direction, N. At 16 V, Blue Robotics states
@@ -54,20 +54,14 @@ ALLOCATION = np.array(
         [_ARM, -_ARM, _ARM, -_ARM, 0.0],
     ]
 )
-"""Input (4,) of thrusts (5,): front right, front left, back right and back left at 45 degrees,
-0.156 m before or behind and 0.111 m beside the middle (von Benzon et al.), and the vertical two,
-which push alike in a vehicle that stays upright."""
+"""Physical constant: input (4,) of thrusts (5,), front right, front left, back right and back left
+at 45 degrees, 0.156 m before or behind and 0.111 m beside the middle (von Benzon et al.), and the
+vertical two, which push alike in a vehicle that stays upright."""
 
 
 @kernel
 def derivative(state: Floats, force: Floats, water: Floats, out: Floats) -> None:
-    """d state / dt into `out` (8,).
-
-    Parameters
-    ----------
-    water
-        (3,) m/s.
-    """
+    """Write d state / dt into `out` (8,) for a velocity of the water (3,), m/s."""
     c, s = math.cos(state[3]), math.sin(state[3])
     u, v, w, r = state[4], state[5], state[6], state[7]
     out[0] = c * u - s * v + water[0]
@@ -86,7 +80,7 @@ def derivative(state: Floats, force: Floats, water: Floats, out: Floats) -> None
 
 @kernel
 def step(state: Floats, force: Floats, water: Floats, seconds: float) -> Floats:
-    """The state after one step of the classical Runge-Kutta method."""
+    """Return the state after one step of the classical Runge-Kutta method."""
     out = np.empty(8)
     step_into(out, state, force, water, seconds, np.empty((5, 8)))
     return out
@@ -96,7 +90,7 @@ def step(state: Floats, force: Floats, water: Floats, seconds: float) -> Floats:
 def step_into(
     out: Floats, state: Floats, force: Floats, water: Floats, seconds: float, room: Floats
 ) -> None:
-    """As `step`, into `out` (8,); `room` (5, 8) may hold anything."""
+    """Write the result of `step` into `out` (8,); `room` (5, 8) is scratch space."""
     k1, k2, k3, k4, at = room[0], room[1], room[2], room[3], room[4]
     derivative(state, force, water, k1)
     for i in range(8):
@@ -116,8 +110,9 @@ def step_into(
 def linearised(
     states: Floats, forces: Floats, water: Floats, seconds: float
 ) -> tuple[Floats, Floats]:
-    """Along a trajectory (n + 1, 8), (n, 4): the steps' Jacobians by state (n, 8, 8) and by input
-    (n, 8, 4), by central differences. Where the vehicle is makes no difference to how it moves."""
+    """Return the Jacobians of the steps along a trajectory (n + 1, 8), (n, 4), by central
+    differences: by state (n, 8, 8) and by input (n, 8, 4). The position does not change how the
+    vehicle moves."""
     n = len(forces)
     by_state, by_force = np.zeros((n, 8, 8)), np.empty((n, 8, 4))
     ahead, behind, room = np.empty(8), np.empty(8), np.empty((5, 8))

@@ -1,4 +1,4 @@
-"""What a vehicle is to the simulation, and the one that goes exactly where it is told."""
+"""Protocol of vehicles in the simulation, and the kinematic one, which follows paths exactly."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from netsp.world.vehicle.vehicle_policy import VehiclePolicy
 
 
 class Vehicle(Protocol):
-    """A robot that can be told a path.
+    """Robot that follows paths.
 
     Attributes
     ----------
     position : ndarray, shape (3,)
         Metres.
     yaw : float
-        Heading, radians.
+        Heading, rad.
     control_s : list of float
-        Seconds of computing that each control step took.
+        Computing time of each control step, s.
     """
 
     control_s: list[float]
 
     @property
     def position(self) -> Floats:
-        """(3,) m."""
+        """Position (3,), metres."""
 
     @property
     def yaw(self) -> float:
-        """rad."""
+        """Heading, rad."""
 
     def go(
         self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool,
@@ -44,45 +44,29 @@ class Vehicle(Protocol):
         ----------
         path : ndarray, shape (k, 3)
             Points to pass, metres.
-        seconds : float
-            How long.
         yaw : float
-            Heading, radians.
+            Heading, rad.
         water : ndarray, shape (3,)
             Velocity of the water, m/s.
         fresh : bool
             Whether the path does not continue the one before.
         pull : ndarray, shape (3,), optional
-            Force of the tether, N; only missions that ask for it hand it over.
+            Force of the tether, N; only passed if the mission asks for it.
 
         Returns
         -------
         points : list of ndarray
-            Points passed on straight lines, the last one its new position.
+            Points passed on straight lines, the last one the new position.
         count : int
-            How many points of the path are behind it.
+            Number of points of the path that are behind the vehicle.
         """
 
     def stop_at(self, place: Floats) -> None:
-        """Be at rest at a place.
-
-        Parameters
-        ----------
-        place : ndarray, shape (3,)
-            Metres.
-        """
+        """Be at rest at a place (3,), metres."""
 
 
 class KinematicVehicle:
-    """Goes along the path at its speed, whatever the water does.
-
-    Parameters
-    ----------
-    place : ndarray, shape (3,)
-        Where it is, metres.
-    speed : float
-        m/s.
-    """
+    """Vehicle that follows a path at its speed (m/s), whatever the water does."""
 
     def __init__(
         self, place: Floats, speed: float, policy: VehiclePolicy = VehiclePolicy()
@@ -97,30 +81,7 @@ class KinematicVehicle:
         self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool,
         pull: Floats | None = None,
     ) -> tuple[list[Floats], int]:  # fmt: skip
-        """Follow a path for some seconds; see `Vehicle.go`.
-
-        Parameters
-        ----------
-        path : ndarray, shape (k, 3)
-            Points to pass, metres.
-        seconds : float
-            How long.
-        yaw : float
-            Heading, radians, taken at once.
-        water : ndarray, shape (3,)
-            Velocity of the water, m/s; it has no effect.
-        fresh : bool
-            Whether the path does not continue the one before.
-        pull : ndarray, shape (3,), optional
-            Force of the tether, N; it has no effect.
-
-        Returns
-        -------
-        points : list of ndarray
-            Points passed on straight lines, the last one its new position.
-        count : int
-            How many points of the path are behind it.
-        """
+        """Follow a path for some seconds; see `Vehicle.go`. Water and pull have no effect."""
         del water, fresh, pull
         most = math.radians(self.policy.max_turn_rate_deg) * seconds
         self.yaw += float(np.clip(turned(yaw - self.yaw), -most, most))
@@ -129,24 +90,18 @@ class KinematicVehicle:
         return points, passed
 
     def stop_at(self, place: Floats) -> None:
-        """Be at rest at a place.
-
-        Parameters
-        ----------
-        place : ndarray, shape (3,)
-            Metres.
-        """
+        """See `Vehicle`."""
         self.position = np.array(place)
 
 
 def turned(angle: float) -> float:
-    """The same angle between -pi and pi."""
+    """Return an angle between -pi and pi."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 def advance(robot: Floats, path: Floats, step: float) -> tuple[list[Floats], int]:
-    """The corners that a robot passes on its next `step` metres of a path, where it ends, and how
-    many points of the path it has passed."""
+    """Return the corners that a robot passes on its next `step` metres of a path, its end, and the
+    number of points of the path that it has passed."""
     points: list[Floats] = []
     here, left = robot, step
     for passed, point in enumerate(path):
