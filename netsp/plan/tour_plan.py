@@ -1,4 +1,4 @@
-"""A tour as it is carried out: a leg for every goal that is left, and the leg home."""
+"""Tour as it is carried out: a leg for every goal that is left, and the leg home."""
 
 from __future__ import annotations
 
@@ -19,18 +19,16 @@ HOME = -1
 
 @dataclass(frozen=True, eq=False)
 class Leg(ComparesArrays):
-    """The path to one goal.
+    """Path to one goal.
 
     Attributes
     ----------
     goal
-        Its number in the problem that is carried out, HOME for the base.
+        Number of the goal in the problem, HOME for the base.
     path
-        (k, 3), the first point where the leg before ends.
-    word
-        Of the tether there.
-    tether
-        Its length there.
+        (k, 3); the first point is the end of the leg before.
+    word, tether
+        Word and length of the tether at the goal.
     """
 
     goal: int
@@ -40,22 +38,22 @@ class Leg(ComparesArrays):
 
     @property
     def length(self) -> float:
-        """Metres."""
+        """Length of the path."""
         return polylines.length(self.path)
 
 
 def legs_of(problem: Problem, solution: Solution, numbers: list[int] | None = None) -> list[Leg]:
-    """A solution's path cut at its goals.
+    """Return a solution's path, cut at its goals.
 
     Parameters
     ----------
     numbers
-        Of the problem's goals in a larger problem.
+        Numbers of the problem's goals in a larger problem.
 
     Raises
     ------
     InputError
-        The path does not come by a goal in its turn.
+        The path does not pass the goals in order.
     """
     path = np.array(solution.path)
     rays = problem.representative_points

@@ -1,5 +1,5 @@
-"""Carries out a tour online: follows it with the tether model, and repairs it when the world is not
-as it was planned for."""
+"""Execution of a tour: follow it with the tether model, and repair it when the world is not as
+planned."""
 
 from netsp.online.execute.events import Event, Surprises
 from netsp.online.execute.execution_log import Execution, ExecutionOptions

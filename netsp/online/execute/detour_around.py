@@ -1,4 +1,4 @@
-"""Where a tether goes when an obstacle comes to stand on it: round it, on the shorter side."""
+"""Detour of a tether around an obstacle that appears on it, on the shorter side."""
 
 from __future__ import annotations
 
@@ -11,9 +11,12 @@ from netsp.model.problem import Problem
 
 
 def aside(problem: Problem, nodes: Floats, by: float) -> Floats:
-    """The tether's nodes (k, 3) with every stretch inside obstacles replaced by the shorter part of
-    their outline, `by` outside of it. A robot inside one is taken back along the tether to where it
-    leaves the obstacle. Heights stay as they are along it."""
+    """Return the tether's nodes (k, 3) with every stretch inside obstacles replaced by the shorter
+    part of their outline, `by` outside of it.
+
+    A robot inside an obstacle is taken back along the tether to where it leaves the obstacle.
+    Heights stay as they are along the tether.
+    """
     line = np.array(nodes)
     solids = shapely.union_all([o.shape(problem.clearance) for o in problem.obstacles])
     base = shapely.Point(line[0, :2])
@@ -46,8 +49,8 @@ def aside(problem: Problem, nodes: Floats, by: float) -> Floats:
 
 
 def _round(line: Floats, rim: shapely.Polygon, start: float, end: float | None) -> Floats:
-    """A line with its stretch from `start` to `end` (lengths in the plan) along a rim; without an
-    end, cut off at the start."""
+    """Return a line with its stretch from `start` to `end` (lengths in the plan) along a rim;
+    without an end, cut off at the start."""
     s = np.r_[0.0, np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))]
 
     def at(u: float) -> Floats:

@@ -1,4 +1,5 @@
-"""What may happen during a run: the surprise file, and what each event does to the problem."""
+"""Surprise file of a tour: what may happen during a run, and what each event does to the
+problem."""
 
 from __future__ import annotations
 
@@ -28,38 +29,18 @@ def _which(value: Any) -> Any:
 
 
 Which = Annotated[Annotated[int, Field(ge=0)] | str, BeforeValidator(_which)]
-"""An obstacle or goal: its index, or its name; where it has none, `#index` as messages say."""
+"""Index or name of an obstacle or goal; without a name, `#index` as in messages."""
 
 
 class Move(Model):
-    """An obstacle is somewhere else from now on."""
+    """Move of an obstacle."""
 
     obstacle: Annotated[Which, Field(description="name or index from 0")]
     by: Annotated[Point2, Field(description="(x, y) to move it by, in the problem's units")]
 
 
 class Event(Model):
-    """Something that happens at a time after the start; one of the other fields says what.
-
-    Attributes
-    ----------
-    time : float
-        Seconds since the start.
-    appear : Circle, Polygon or None
-        An obstacle that is not on the map.
-    vanish : int, str or None
-        An obstacle that is not there after all.
-    move : Move or None
-        An obstacle that moves.
-    add_goal : Goal or None
-        Another goal.
-    cancel_goal : int, str or None
-        A goal that need not be visited any more.
-    push : (x, y, z) or None
-        How far the robot is carried off, in the problem's units.
-    tether_length : float or None
-        A new limit.
-    """
+    """Event at a time after the start; one of the other fields says what happens."""
 
     time: Annotated[NonNegative, Field(description="seconds after the start")]
     appear: Annotated[
@@ -93,14 +74,14 @@ class Event(Model):
 
     @property
     def kind(self) -> str:
-        """Which of them it is."""
+        """Name of the field that says what happens."""
         return next(
             k for k in type(self).model_fields if k != "time" and getattr(self, k) is not None
         )
 
 
 class Surprises(FileModel):
-    """The surprise file.
+    """Surprise file of a tour.
 
     >>> text = '{"schema_version": 1, "events": [{"time": 60, "tether_length": 40}]}'
     >>> Surprises.from_json(text).events[0].kind
@@ -115,20 +96,15 @@ class Surprises(FileModel):
     events: Annotated[tuple[Event, ...], Field(description="in any order")]
 
     def check(self, problem: Problem, source: str = "") -> None:
-        """Refuse events that a problem cannot have.
+        """Raise InputError for events that a problem cannot have.
+
+        These name an obstacle or goal that does not exist when the event comes, or put an obstacle
+        onto the base.
 
         Parameters
         ----------
-        problem : Problem
-            What is carried out.
         source : str
-            What messages call these surprises; nothing if it is empty.
-
-        Raises
-        ------
-        InputError
-            An obstacle or goal that does not exist when the event comes, or an obstacle that would
-            stand on the base or move onto it.
+            Name of these surprises in messages; nothing if it is empty.
         """
         for k, event in sorted(enumerate(self.events), key=lambda e: e[1].time):
             try:
@@ -139,13 +115,15 @@ class Surprises(FileModel):
 
 
 def changed(problem: Problem, event: Event, policy: ExecutePolicy = ExecutePolicy()) -> Problem:
-    """The problem after an event; goals keep their numbers, cancelled ones too, and so do the
-    obstacles but for those that vanish. Goals inside obstacles are left to the caller.
+    """Return the problem after an event.
+
+    Goals keep their numbers, also cancelled ones, and so do obstacles, except after one vanishes.
+    Goals inside obstacles are left to the caller.
 
     Raises
     ------
     InputError
-        It names something that is not there, or puts an obstacle onto the base.
+        The event names something that is not there, or puts an obstacle onto the base.
     """
     obstacles, goals = list(problem.obstacles), list(problem.goals)
     update: dict[str, object] = {}
@@ -190,7 +168,7 @@ def changed(problem: Problem, event: Event, policy: ExecutePolicy = ExecutePolic
 
 
 def moved(obstacle: Circle | Polygon, by: tuple[float, float]) -> Circle | Polygon:
-    """An obstacle elsewhere."""
+    """Return an obstacle moved by (x, y)."""
     try:
         if isinstance(obstacle, Circle):
             x, y = obstacle.center
@@ -203,7 +181,8 @@ def moved(obstacle: Circle | Polygon, by: tuple[float, float]) -> Circle | Polyg
 
 
 def index_of(which: int | str, things: list, field: str) -> int:  # type: ignore[type-arg]
-    """Which of some named things is meant; InputError if none is."""
+    """Return the index of the obstacle or goal that an event names; raise InputError if there is
+    none."""
     if isinstance(which, str):
         found = [k for k, thing in enumerate(things) if thing.name == which]
         if len(found) == 1:

@@ -1,4 +1,4 @@
-"""The files of a tour that was carried out."""
+"""Files of an execution."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from netsp.online.execute.execution_log import Execution
 
 
 def write_execution(done: Execution, folder: str | Path) -> None:
-    """log.csv, visits.csv, events.csv, tethers.json, summary.json, the problem at the end and the
-    solution; maps.json, the problem from some seconds on, where it changed."""
+    """Write log.csv, visits.csv, events.csv, tethers.json, summary.json, and problem and solution
+    at the end; also maps.json, the problem at each change, if it changed."""
     place = make_folder(folder)
     write_text(place / "log.csv", _table([asdict(r) for r in done.rows]))
     visits = [

@@ -1,4 +1,4 @@
-"""What is known of a tour that is carried out: rows, arrivals, events and the summary."""
+"""Log of an execution: rows, arrivals, events and the summary."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ExecutionOptions:
-    """How a tour is carried out.
+    """Options of an execution.
 
     Parameters
     ----------
     speed : float
-        Of the vehicle, length units per second.
+        Speed of the vehicle, length units per second.
     vehicle : str
-        One of `netsp.world.vehicle.VEHICLES`.
+        Name of a vehicle (`netsp.world.vehicle.VEHICLES`).
     reach : float
-        A goal this near counts as visited by a vehicle with dynamics.
+        Distance at which a vehicle with dynamics has visited a goal.
     delta : float, optional
         Resolution of the tether; by default from the problem.
     repair : bool
@@ -51,11 +51,11 @@ class ExecutionOptions:
     current : tuple of float
         Velocity of the water, (x, y, z).
     gusts : float
-        Standard deviation of what comes and goes on top.
+        Standard deviation of the velocity about the current.
     seed : int
-        Of the gusts and of the solver.
+        Seed of the gusts and of the solver.
     reserve_policy : ReservePolicy
-        How much tether repairs keep in reserve.
+        Policy of the tether that repairs keep in reserve.
     policy : ExecutePolicy
         Steps and thresholds.
     """
@@ -81,20 +81,16 @@ class ExecutionRow:
     ----------
     time : float
         Seconds since the start.
-    x : float
-        Position.
-    y : float
-        Position.
-    z : float
-        Position, up.
+    x, y, z : float
+        Position, z up.
     goal : int
-        The goal that is next, -1 for the base.
+        Next goal, -1 for the base.
     mode : {"tour", "shorten", "hold"}
         What the robot is doing.
     tether : float
         Length of the taut tether.
     limit : float
-        Length that it may have.
+        Maximum length of the tether.
     shortening : bool
         Whether the limit was lowered below the tether, which is being shortened.
     over : bool
@@ -115,7 +111,7 @@ class ExecutionRow:
 
 @dataclass(frozen=True)
 class Arrival:
-    """A goal, or the base, was reached.
+    """Arrival at a goal or the base.
 
     Parameters
     ----------
@@ -123,14 +119,10 @@ class Arrival:
         Seconds since the start.
     goal : int
         The goal, -1 for the base.
-    word : Word
-        Of the online tether there.
-    planned : Word
-        Of the planned one.
-    tether : float
-        Length of the online tether.
-    planned_tether : float
-        Length of the planned one.
+    word, planned : Word
+        Words of the tether and of the planned one.
+    tether, planned_tether : float
+        Their lengths.
     """
 
     time: float
@@ -142,26 +134,22 @@ class Arrival:
 
     @property
     def as_planned(self) -> bool:
-        """Whether the tether is in the class that the plan says."""
+        """Whether the tether is in the planned class."""
         return self.word == self.planned
 
 
 @dataclass(frozen=True)
 class Entry:
-    """Something happened, and what was done about it.
+    """Event, and the response to it.
 
     Parameters
     ----------
     time : float
         Seconds since the start.
-    event : str
-        What happened.
-    response : str
-        What was done about it.
-    reason : str
-        Why.
+    event, response, reason : str
+        What happened, what was done about it, and why.
     planning_s : float
-        Seconds of planning.
+        Time of planning, s.
     """
 
     time: float
@@ -173,40 +161,40 @@ class Entry:
 
 @dataclass
 class Execution(Drawn):
-    """What came of carrying a tour out.
+    """Result of an execution.
 
     Parameters
     ----------
     problem : Problem
-        As it is at the end.
+        The problem at the end.
     solution : Solution
         The plan at the start.
     options : ExecutionOptions
-        How it was carried out.
+        Options of the execution.
     rows : list of ExecutionRow
         One per step.
     arrivals : list of Arrival
         Goals reached.
     entries : list of Entry
-        What happened, and what was done about it.
+        Events and responses.
     left_out : dict
         Goals left out, with the reason.
     cancelled : dict
-        Goals that were cancelled, with the time, seconds since the start.
+        Cancelled goals, with the time, seconds since the start.
     tethers : list of (float, ndarray)
-        Time and nodes of the tether now and then, for pictures.
+        Times and nodes of the tether at intervals, for pictures.
     free : bool
         Whether the tether is free at the end.
     walked : float
         Length of the path travelled.
     interrupted : bool
-        Whether it was stopped.
+        Whether it was interrupted.
     wall_s : float
-        Seconds that the run took.
+        Wall-clock time of the run, s.
     stopped : str
         Why a vehicle that is not simulated had to stop; empty if it had not.
     maps : list of (float, Problem)
-        The problem as it was from some seconds on; the first from 0.
+        Problem from each of some times on; the first from 0.
     reserve : float
         Length of tether that repairs keep where they can, in the problem's units.
     """
@@ -233,11 +221,6 @@ class Execution(Drawn):
     def to_frame(self) -> pandas.DataFrame:
         """Return the steps as a pandas DataFrame, a column per field of `ExecutionRow`.
 
-        Returns
-        -------
-        pandas.DataFrame
-            In the order of time.
-
         Raises
         ------
         InputError
@@ -246,7 +229,7 @@ class Execution(Drawn):
         return frame_of(self.rows)
 
     def __repr__(self) -> str:
-        """In a line."""
+        """Return problem and results in one line."""
         s = self.summary
         tethers = ", then ".join(f"{p.longest:.4g} of {p.limit:g}" for p in self.limit_periods)
         return (
@@ -256,7 +239,7 @@ class Execution(Drawn):
 
     @property
     def limit_periods(self) -> list[LimitPeriod]:
-        """The tether beside each limit that it had in turn."""
+        """Tether beside each limit that it had in turn."""
         t, tether, limit, _ = self._lengths
         return limit_periods(t, tether, limit)
 
@@ -276,11 +259,11 @@ class Execution(Drawn):
 
     @property
     def summary(self) -> dict[str, Any]:
-        """The numbers.
+        """Numbers of the execution.
 
         `limits` has the tether beside each limit that it had in turn, `over_limit` every time in
-        which it was longer: `exceedance_s` is their sum, and `shortening_s` of those after the
-        limit was lowered below it, until it fits.
+        which it was longer: `exceedance_s` is their sum, except for those after the limit was
+        lowered below the tether, until it fits, whose sum is `shortening_s`.
         """
         over = self.overruns
         goals = [a for a in self.arrivals if a.goal != HOME]
@@ -312,18 +295,7 @@ class Execution(Drawn):
 
 
 def describe_execution(done: Execution) -> str:
-    """A run in a few lines.
-
-    Parameters
-    ----------
-    done : Execution
-        The run.
-
-    Returns
-    -------
-    str
-        The lines.
-    """
+    """Return an execution in a few lines."""
     s, units = done.summary, done.problem.units
     planned = s["planned_path"] or 0.0
     has_resumed = any(e.event == "resumed" for e in done.entries)
@@ -352,7 +324,7 @@ def describe_execution(done: Execution) -> str:
 
 
 def _class_of(arrivals: list[Arrival]) -> str:
-    """In how many of the arrivals, home among them, the tether was as planned."""
+    """Return words for the number of arrivals, home among them, in another class than planned."""
     others = sum(not a.as_planned for a in arrivals)
     if not others:
         return ", the tether always in the class of the plan in force"
@@ -360,7 +332,7 @@ def _class_of(arrivals: list[Arrival]) -> str:
 
 
 def _beside(ratio: float) -> str:
-    """A path beside the planned one."""
+    """Return words for the ratio of a path to the planned one."""
     if abs(ratio - 1.0) < 1e-4:
         return "as planned"
     return f"{100 * abs(ratio - 1.0):.2f} % {'longer' if ratio > 1.0 else 'shorter'} than planned"

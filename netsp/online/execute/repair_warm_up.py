@@ -1,4 +1,4 @@
-"""What a repair needs, compiled before there is one: in it that would take time from planning."""
+"""Warm-up of repairs: compiles what they need, which would otherwise take planning time."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from netsp.plan.solve_problem import solve_graph
 from netsp.roadmap.from_state import graph_from_state
 
 _SOLVERS = (("dp", None), ("mip", None), ("lns", 200), ("auto", 30))
-"""Between them, with these iteration limits, they call all that a new order may take."""
+"""Solvers with iteration limits, which together call everything that a new order may need."""
 
 
 def should_make_ready() -> bool:
-    """Return whether to call `make_ready` before a simulated tour: only where kernels are on disk.
+    """Return whether to warm up before a simulated tour: only where kernels are on disk.
 
     On a machine that has compiled nothing yet, `make_ready` would take a minute, so a simulated
     tour runs interpreted until compiling pays. Flights always call `make_ready`.
@@ -32,12 +32,12 @@ def should_make_ready() -> bool:
 
 @cache
 def make_ready() -> None:
-    """Have everything loaded that a repair needs, and compiled on a machine that never did.
+    """Load everything that a repair needs, and compile it on a machine that never did.
 
     Raises
     ------
     KeyboardInterrupt
-        Ctrl-C, which solvers take for the wish to have what there is.
+        Ctrl-C, which solvers alone would take for the wish to have what there is.
     """
     if not compiles():
         return

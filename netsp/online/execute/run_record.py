@@ -1,7 +1,7 @@
-"""Record of a run that is written while it goes on, so that it outlives the process.
+"""Record of a run that is written during the run, so that it outlives the process.
 
-The log gets its rows as they come, and the state that a run can be resumed from is replaced after
-every second.
+Rows are appended to the log as they come; the state from which the run can be resumed is replaced
+at intervals.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from netsp.online.execute.execute_policy import ExecutePolicy
 from netsp.online.execute.execution_log import ExecutionRow
 
 LOG, STATE, PROBLEM, SOLUTION = "log.csv", "state.json", "problem.json", "solution.json"
-"""Files of a run that are written while it goes on."""
+"""Names of the files of a run that are written during the run."""
 
 
 GoalIndex = Annotated[Integer, Field(ge=0)]
@@ -84,19 +84,12 @@ class RunState(FileModel):
     ] = ()  # fmt: skip
 
     def check(self, problem: Problem, source: str) -> None:
-        """Refuse the state of another problem.
+        """Raise InputError for the state of another problem.
 
         Parameters
         ----------
-        problem : Problem
-            Problem of the run.
         source : str
             Name of the state in messages.
-
-        Raises
-        ------
-        InputError
-            A goal that the problem does not have, or a tether that begins elsewhere.
         """
         if self.problem_sha256 and problem.sha256 not in self.problem_sha256:
             raise InputError(
@@ -132,7 +125,7 @@ class Begun:
     tether
         (k, 3) the tether from the base to the robot, in its class.
     left
-        Goals still to be visited, in their order.
+        Goals still to be visited, in order.
     why
         Reason for a new plan, for the log.
     left_out
@@ -152,12 +145,10 @@ class Begun:
 
 
 class RunRecord:
-    """Writes log and state of a run into a folder while it goes on.
+    """Writer of log and state of a run into a folder; its log is replaced at the first row.
 
     Parameters
     ----------
-    folder : str or Path
-        The folder; a log that is there is replaced at the first row.
     solution : Solution
         The plan at the start.
     """
@@ -175,16 +166,14 @@ class RunRecord:
         self._due = -np.inf
 
     def take(self, row: ExecutionRow, problem: Problem, state: Callable[[], RunState]) -> None:
-        """Write a row, and the state if a second has gone by since the last one.
+        """Write a row, and the state if it is due.
 
         Parameters
         ----------
-        row : ExecutionRow
-            The row.
         problem : Problem
             The problem as it is now.
         state : callable
-            Returns the state now.
+            Returns the present state.
         """
         cells = [round(v, 6) if isinstance(v, float) else v for v in asdict(row).values()]
         if self._problem is None:
@@ -198,15 +187,7 @@ class RunRecord:
             self.keep(problem, state())
 
     def keep(self, problem: Problem, state: RunState) -> None:
-        """Write the state now, regardless of when the last one was written.
-
-        Parameters
-        ----------
-        problem : Problem
-            The problem as it is now.
-        state : RunState
-            The state now.
-        """
+        """Write the state now, regardless of when the last one was written."""
         if problem is not self._problem:
             before, self._sha256 = self._sha256, problem.sha256
             if self._state is not None:  # a run that is killed before the new state is written

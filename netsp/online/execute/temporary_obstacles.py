@@ -1,4 +1,4 @@
-"""Obstacles that stood there for a time only."""
+"""Obstacles that stood in a problem for a time only."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from dataclasses import dataclass
 from netsp.model.problem import Obstacle, Problem
 
 Maps = Sequence[tuple[float, Problem]]
-"""A problem as it was from some seconds on; the first from 0."""
+"""Problem from each of some times (s) on; the first from 0."""
 
 
 @dataclass(frozen=True)
 class Passing:
-    """One of them.
+    """Obstacle that stood for a time only.
 
     Parameters
     ----------
     obstacle : Circle or Polygon
-        What stood there.
+        The obstacle.
     name : str
-        Of it.
+        Its name.
     begin : float
-        Seconds; 0 for what was there at first.
+        Seconds; 0 for one that was there at first.
     end : float or None
-        Seconds; None for what is there at the end.
+        Seconds; None for one that is there at the end.
     """
 
     obstacle: Obstacle
@@ -34,25 +34,14 @@ class Passing:
 
     @property
     def when(self) -> str:
-        """From when until when, in words."""
+        """Begin and end in words."""
         if self.end is None:
             return f"from {self.begin:.0f} s"
         return f"{self.begin:.0f} to {self.end:.0f} s" if self.begin else f"until {self.end:.0f} s"
 
 
 def lasting(maps: Maps) -> Problem:
-    """The first problem, with those of its obstacles that stand there all the time.
-
-    Parameters
-    ----------
-    maps : sequence of (float, Problem)
-        One at least.
-
-    Returns
-    -------
-    Problem
-        That one.
-    """
+    """Return the first problem with only those obstacles that stand there all the time."""
     first = maps[0][1]
     every = [p.obstacles for _, p in maps]
     kept = tuple(o for o in first.obstacles if all(o in obstacles for obstacles in every))
@@ -60,18 +49,7 @@ def lasting(maps: Maps) -> Problem:
 
 
 def passing(maps: Maps) -> list[Passing]:
-    """The others, of any of the problems.
-
-    Parameters
-    ----------
-    maps : sequence of (float, Problem)
-        One at least.
-
-    Returns
-    -------
-    list of Passing
-        By when they came.
-    """
+    """Return the other obstacles of all problems, in the order in which they came."""
     found: list[Passing] = []
     always = lasting(maps).obstacles
     for k, (time, problem) in enumerate(maps):

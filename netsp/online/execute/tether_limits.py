@@ -69,12 +69,8 @@ def limit_periods(t: Floats, tether: Floats, limit: Floats) -> list[LimitPeriod]
 
     Parameters
     ----------
-    t : ndarray, shape (n,)
-        Times of the rows of a log, seconds.
-    tether : ndarray, shape (n,)
-        Length of the taut tether.
-    limit : ndarray, shape (n,)
-        Length that it may have.
+    t, tether, limit : ndarray, shape (n,)
+        Times (s) of the rows of a log, lengths of the taut tether, and limits.
     """
     found = []
     for begin, end in _runs(limit):
@@ -88,8 +84,8 @@ def overruns(t: Floats, tether: Floats, limit: Floats, shortening: Bools) -> lis
 
     Parameters
     ----------
-    t, tether, limit
-        Log, as of `limit_periods`.
+    t, tether, limit : ndarray, shape (n,)
+        See `limit_periods`.
     shortening : ndarray of bool, shape (n,)
         Whether the limit was lowered below the tether, which is being shortened.
     """
@@ -111,17 +107,7 @@ def overruns(t: Floats, tether: Floats, limit: Floats, shortening: Bools) -> lis
 
 
 def describe_limits(periods: Sequence[LimitPeriod], over: Sequence[Overrun], units: str) -> str:
-    """Return words for the tether beside its limits, and for when it was over.
-
-    Parameters
-    ----------
-    periods : sequence of LimitPeriod
-        The limits.
-    over : sequence of Overrun
-        Times over the limit.
-    units : str
-        Units of lengths.
-    """
+    """Return words for the tether beside its limits, and for the times over them."""
     if not periods:
         return "never out"
     first, *later = periods

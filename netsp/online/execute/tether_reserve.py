@@ -1,5 +1,4 @@
-"""Reserve of tether that repairs keep, because flown paths are not exactly the planned ones: a plan
-without a reserve exceeds its limit wherever the vehicle leaves its path."""
+"""Reserve of tether that repairs keep, because flown paths are not exactly the planned ones."""
 
 from __future__ import annotations
 
@@ -34,20 +33,7 @@ class ReservePolicy:
         checked_argument("max_share", self.max_share, 0.0, 1.0)
 
     def of_plan(self, problem: Problem, solution: Solution) -> float:
-        """Return the reserve that repairs of a plan keep, in the problem's units.
-
-        Parameters
-        ----------
-        problem : Problem
-            The problem that was solved.
-        solution : Solution
-            The plan.
-
-        Returns
-        -------
-        float
-            0 or more.
-        """
+        """Return the reserve that repairs of a plan keep, in the problem's units."""
         if self.reserve is not None:
             return self.reserve
         limit = problem.tether_length
@@ -64,13 +50,11 @@ class ReservedLimit:
     Attributes
     ----------
     length
-        The limit less the reserve that can be kept, in the problem's units.
-    reserve
-        Length that is kept in reserve.
-    wanted
-        Length that should be kept.
+        Limit less the reserve that can be kept, in the problem's units.
+    reserve, wanted
+        Lengths that are kept, and that should be kept.
     goal
-        Number of the goal that needs the tether in which less than that is kept; None if all is.
+        Number of the goal whose tether leaves less than that; None if all is kept.
     """
 
     length: float
@@ -79,13 +63,7 @@ class ReservedLimit:
     goal: int | None = None
 
     def describe(self, problem: Problem) -> str:
-        """Return words for what is kept in reserve, empty if nothing was to be.
-
-        Parameters
-        ----------
-        problem : Problem
-            Problem whose goal has a name.
-        """
+        """Return words for what is kept in reserve, empty if nothing was to be."""
         units = problem.units
         if self.wanted <= 0.0:
             return ""

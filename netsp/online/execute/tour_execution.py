@@ -1,4 +1,4 @@
-"""Carries out a solution step by step: vehicle, tether, events and repairs, with a log of all."""
+"""Execution of a solution step by step: vehicle, tether, events and repairs, with a log of all."""
 
 from __future__ import annotations
 
@@ -42,13 +42,7 @@ from netsp.world.vehicle import Vehicle, make_vehicle
 
 
 class StopsFlightError(Exception):
-    """What a vehicle raises when a run must not go on.
-
-    Parameters
-    ----------
-    reason : str
-        Why.
-    """
+    """Error of a vehicle whose run must not go on, with the reason."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason)
@@ -56,7 +50,7 @@ class StopsFlightError(Exception):
 
 
 class LiveVehicle(Vehicle, Protocol):
-    """A vehicle with a clock of its own, which goes on while we plan.
+    """Vehicle with a clock of its own, which goes on during planning.
 
     Attributes
     ----------
@@ -66,23 +60,22 @@ class LiveVehicle(Vehicle, Protocol):
 
     @property
     def time(self) -> float:
-        """s."""
+        """Seconds since the run began."""
 
     def hold(self) -> None:
-        """Stay where it is, until it is told to go on."""
+        """Stay in place until the next path."""
 
 
 @dataclass(frozen=True)
 class _Retreat:
-    """Way back along the tether, because more is out than there may be, and what is planned
-    afterwards.
+    """Way back along the tether, because more is out than allowed, and the plan afterwards.
 
     Attributes
     ----------
     length
         Length of tether at which the retreat ends.
     why, left, event
-        Reason for a new plan, the goals in it and what happened, as of `_Run._mend`.
+        Reason for a new plan, its goals, and what happened; see `_Run._mend`.
     """
 
     length: float
@@ -92,7 +85,7 @@ class _Retreat:
 
 
 class _Run:
-    """A run in progress."""
+    """Run in progress."""
 
     def __init__(
         self, problem: Problem, solution: Solution, options: ExecutionOptions,
@@ -135,14 +128,14 @@ class _Run:
         self.path = self.legs[0].path if self.legs else np.array([self.vehicle.position])
 
     def _enter(self, problem: Problem) -> None:
-        """The scene of a problem."""
+        """Enter the scene of a problem."""
         self.problem = self.out.problem = problem
         self.out.maps.append((round(self.now, 6), problem))
         self.scene: DistanceField = scene_of(problem).field()
         self.model = GeodesicTether(self.scene, self.delta)
 
     def resume(self, begun: Begun) -> None:
-        """Plan what is left of a run from where the robot is."""
+        """Plan the rest of a run from where the robot is."""
         self.out.left_out |= begun.left_out
         self.out.cancelled |= dict.fromkeys(begun.cancelled, 0.0)
         self._mend_within_limit(begun.why, list(begun.left), "resumed")
@@ -160,6 +153,7 @@ class _Run:
     # a step
 
     def note(self) -> ExecutionRow:
+        """Log the present state."""
         x, y, z = (float(v) for v in self.vehicle.position)
         goal = self.left[0] if self.left else HOME
         limit = self.problem.tether_length
@@ -177,7 +171,7 @@ class _Run:
         return row
 
     def go(self) -> None:
-        """One step along the path; arrives where the leg ends."""
+        """Take one step along the path; arrive where the leg ends."""
         points, passed = self.vehicle.go(
             self.path, self.step, self.vehicle.yaw, self.water(self.now), self.fresh
         )
@@ -206,7 +200,7 @@ class _Run:
             self._leave_out(self.legs[0].goal, "not reached in time")
 
     def _follow(self, points: Iterable[Floats]) -> None:
-        """The tether goes where the robot has been."""
+        """Move the tether along the points that the robot has passed."""
         for point in points:
             if float(self.scene.distance(point)) < -0.2 * self.delta:
                 point = pushed_out(self.scene, point, 0.0)[0]
@@ -247,7 +241,7 @@ class _Run:
 
     @property
     def left(self) -> list[int]:
-        """Goals that are planned, in their order."""
+        """Goals that are planned, in order."""
         if self.retreat is not None:
             return list(self.retreat.left)
         return [leg.goal for leg in self.legs if leg.goal != HOME]
@@ -255,7 +249,7 @@ class _Run:
     # events
 
     def happen(self, event: Event) -> None:
-        """Let an event come about, and mend what it breaks."""
+        """Let an event happen, and repair what it breaks."""
         left, must = self.left, None if self.retreat is None else self.retreat.why
         if event.kind == "push":
             assert event.push is not None
@@ -304,7 +298,7 @@ class _Run:
             self._mend_within_limit(must, left, event.kind)
 
     def asked(self, event: Event) -> None:
-        """An event that nobody could check before."""
+        """Let an event happen that nobody could check before."""
         try:
             if event.kind == "push" and self.live is not None:
                 raise InputError("push: a real vehicle says itself where it is")
@@ -316,14 +310,14 @@ class _Run:
             self.happen(event)
 
     def _in_reach_again(self) -> list[int]:
-        """Goals that no tether reached, and one does now."""
+        """Return the goals that no tether reached, and one does now."""
         away = [g for g in self.unreachable if g in self.out.left_out]
         back = reachable(self.problem, away)[0] if away else []
         self.unreachable -= set(back)
         return back
 
     def too_late(self, event: Event) -> None:
-        """An event after the end."""
+        """Log an event after the end."""
         self._enter_log(event.kind, "ignored", f"came at {event.time:g} s, after the end", 0.0)
         if event.add_goal is not None:
             problem = changed(self.problem, event, self.policy)
@@ -336,8 +330,11 @@ class _Run:
         return [Leg(first.goal, path, first.word, first.tether), *self.legs[1:]]
 
     def _enter_changed(self, event: Event) -> None:
-        """The world after an event: what has come to stand on the tether or the robot has pushed
-        them aside, to the nearer side; what is gone lets the tether go."""
+        """Enter the world after an event.
+
+        An obstacle that appears on the tether or the robot pushes them aside, to the nearer side;
+        one that vanishes lets the tether go.
+        """
         problem = changed(self.problem, event, self.policy)
         self._enter(problem)
         if event.kind not in ("appear", "vanish", "move"):
@@ -448,8 +445,8 @@ class _Run:
         self._next()
 
     def _hold(self, seconds: float) -> None:
-        """Stay where the robot is while a plan is made: until the plan is due, however soon it was
-        ready, so that the same seed gives the same run."""
+        """Stay in place until a plan is due, however soon it was ready, so that a seed determines
+        the run."""
         if self.live is not None:
             self.now = max(self.now, self.live.time)  # it has held its place meanwhile
             return
@@ -478,40 +475,29 @@ def execute(
 ) -> Execution:
     """Carry out a solution in the scene of its problem.
 
-    The obstacles stand from the sea floor to the surface, the tether is anchored at the base.
+    The obstacles stand from the sea floor to the surface; the tether is anchored at the base.
 
     Parameters
     ----------
-    problem : Problem
-        What was solved.
-    solution : Solution
-        The plan.
-    options : ExecutionOptions, optional
-        How it is carried out.
     surprises : Surprises, optional
-        What happens on the way.
+        Events on the way.
     on_step : callable, optional
-        Called with every row; a KeyboardInterrupt ends the run, and what was done till then is
-        returned.
+        Called with every row. A KeyboardInterrupt in it ends the run, which is returned as far as
+        it came.
     vehicle : LiveVehicle, optional
-        One that is not simulated; `StopsFlightError` of it ends the run as well.
+        Vehicle that is not simulated; its `StopsFlightError` ends the run, too.
     incoming : callable, optional
-        Asked at every step for events that have come since.
+        Called at every step; returns the events that have come since.
     record : RunRecord, optional
-        Takes every row, and the state, as the run goes on.
+        Record of rows and state during the run.
     begun : Begun, optional
-        Beginning elsewhere than at the start of the solution: what is left is planned from there.
-
-    Returns
-    -------
-    Execution
-        What came of it.
+        Beginning elsewhere than at the start of the solution; the rest is planned from there.
 
     Raises
     ------
     InputError
         The solution does not belong to the problem, fails its checks or is a baseline's that
-        entangles; bad options or surprises.
+        entangles; or bad options or surprises.
     """
     options = options or ExecutionOptions()
     surprises = surprises or Surprises(events=())
@@ -591,6 +577,6 @@ def execute(
 
 
 def tether_is_free(tether: Tether, delta: float) -> bool:
-    """Whether a tether can be recovered: straight to the robot, resting on nothing."""
+    """Return whether a tether can be recovered: straight to the robot, resting on nothing."""
     straight = float(np.linalg.norm(tether.robot - tether.anchor))
     return len(tether.nodes) == 2 and tether.length - straight <= 1e-6 * delta

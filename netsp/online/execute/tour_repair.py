@@ -1,10 +1,10 @@
-"""What is broken of a plan, and how it is mended.
+"""Check and repair of a plan.
 
-The robot is at a state of the covering space: its position and the word of its tether. What is left
-of the plan is whole if its paths are free, its tethers fit and the tether comes home free;
-otherwise the remaining NE-TSP is solved from that state. First the order of the goals is kept and
-only their classes are chosen afresh (a local repair, exact for that order and quick); the tour is
-planned anew when that promises to save more time than planning takes.
+The robot is at a state of the covering space: its position and the word of its tether. The rest of
+the plan holds if its paths are free, its tethers fit and the tether comes home free; otherwise the
+remaining NE-TSP is solved from that state. First the order of the goals is kept and only their
+classes are chosen again (a local repair, exact for that order and quick); the tour is planned anew
+if that promises to save more time than planning takes.
 """
 
 from __future__ import annotations
@@ -36,22 +36,22 @@ from netsp.roadmap.roadmap_policy import RoadmapPolicy
 
 @dataclass(frozen=True)
 class Repair:
-    """A new plan.
+    """New plan.
 
     Attributes
     ----------
     kind
-        Kept, local, replan or home.
+        Response: kept, local, replan or home.
     reason
-        For the log.
+        Reason, for the log.
     left_out
-        Goals that cannot be reached any more, with the reason.
+        Goals that can no longer be reached, with the reason.
     length
-        Metres to go.
+        Length of the rest of the tour.
     planning_s
-        What it took.
+        Time of planning, s.
     limit
-        Length of tether that the plan may use at its goals; None where it visits none.
+        Length of tether that the plan may use at its goals; None if it visits none.
     """
 
     kind: str
@@ -66,14 +66,15 @@ class Repair:
 def broken(
     problem: Problem, tether: Floats, legs: list[Leg], limit: ReservedLimit | None = None
 ) -> tuple[str | None, list[Leg]]:
-    """What is wrong with what is left of a plan, None if nothing is; and the legs with the words
-    and tethers that they have among the obstacles that there are now.
+    """Return what is wrong with the rest of a plan, None if nothing is, and its legs with the words
+    and tethers that they have among the present obstacles.
 
     Parameters
     ----------
     tether
-        (k, 3) the taut tether now. The paths of the legs follow on each other, the first starts at
-        the robot.
+        (k, 3) the present taut tether.
+    legs
+        Rest of the plan; its first path starts at the robot.
     limit
         Length of tether that the plan may use; by default all there is.
     """
@@ -117,7 +118,7 @@ def _label(problem: Problem, leg: Leg) -> str:
 
 
 def _in_the_way(problem: Problem, path: Floats) -> int | None:
-    """An obstacle, grown by the clearance, that a path enters."""
+    """Return an obstacle, grown by the clearance, that a path enters; None if there is none."""
     line = shapely.LineString(path[:, :2]) if len(path) > 1 else shapely.Point(path[0, :2])
     place = 1e-6 * problem.scale
     for i, o in enumerate(problem.obstacles):
@@ -146,20 +147,20 @@ def repair(
     policy: RepairPolicy = RepairPolicy(),
 ) -> Repair:
     """Return a plan from the present state through the goals `left` (numbers in the problem, in
-    their order) and home. Goals that cannot be reached are left out, with the reason.
+    order) and home. Goals that cannot be reached are left out, with the reason.
 
     Parameters
     ----------
     limit
-        Seconds that all of it may take.
+        Time limit of the repair, s.
     reserve
-        Length of tether to keep in reserve. No goal is left out for it: where one needs more, less
-        is kept.
+        Length of tether to keep in reserve. No goal is left out for it: if one needs more, less is
+        kept.
 
     Raises
     ------
     KeyboardInterrupt
-        Ctrl-C, which solvers take for the wish to have what there is.
+        Ctrl-C, which solvers alone would take for the wish to have what there is.
     """
     with until_interrupt(limit) as clock:
         try:
@@ -236,17 +237,13 @@ def _repaired(
 
 
 def reserved_limit(problem: Problem, goals: list[int], reserve: float) -> ReservedLimit:
-    """Return the length of tether that a plan may use which keeps a reserve, or as much of it as it
-    can without leaving out a goal.
+    """Return the length of tether that a plan may use which keeps a reserve, or as much of it as
+    possible without leaving out a goal.
 
     Parameters
     ----------
-    problem
-        The problem.
     goals
         Goals to be visited; those that no tether reaches do not count.
-    reserve
-        Length to be kept in reserve.
     """
     all_of_it = ReservedLimit(problem.tether_length, 0.0, reserve)
     if reserve <= 0.0:
@@ -268,7 +265,7 @@ def reserved_limit(problem: Problem, goals: list[int], reserve: float) -> Reserv
 
 def _shortest_tethers(problem: Problem, goals: list[int]) -> tuple[TautPaths, Floats]:
     """Return the paths of a problem with some of its goals, and the length of the shortest tether
-    to each, inf where there is none."""
+    to each, inf if there is none."""
     chosen = tuple(problem.goals[g] for g in goals)
     plain = problem.model_copy(update={"goals": chosen, "state": None})
     paths = TautPaths(plain)
@@ -277,7 +274,7 @@ def _shortest_tethers(problem: Problem, goals: list[int]) -> tuple[TautPaths, Fl
 
 
 def reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple[int, str]]]:
-    """The goals that a taut tether within the limit reaches, in their order, and the others with
+    """Return the goals that a taut tether within the limit reaches, in order, and the others with
     the reason."""
     order, left_out = _in_free_water(problem, left)
     if not order:
@@ -292,7 +289,8 @@ def reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple[
 
 
 def outside(problem: Problem, robot: Floats) -> tuple[float, float, float]:
-    """The robot's place, moved out of what the tether model's resolution has let it enter."""
+    """Return the robot's place, moved out of obstacles that the tether model's resolution has let
+    it enter."""
     place = np.array(robot, dtype=float)
     for _ in range(10):
         depth = [problem.clearance - float(o.signed_distance(place[:2])) for o in problem.obstacles]
@@ -321,7 +319,7 @@ def _rest(problem: Problem, order: list[int], state: State, limit: float) -> Pro
 
 
 def _in_free_water(problem: Problem, order: list[int]) -> tuple[list[int], list[tuple[int, str]]]:
-    """Goals that no obstacle has come to stand on, and those that one has."""
+    """Return the goals in free water, and those on which an obstacle stands."""
     kept: list[int] = []
     gone: list[tuple[int, str]] = []
     for g in order:
@@ -340,7 +338,7 @@ def _in_free_water(problem: Problem, order: list[int]) -> tuple[list[int], list[
 def _home(problem: Problem, state: State, tether: Floats, why: str) -> tuple[Leg, str]:
     """Return the leg back along the taut tether to the base, and the reason for the log.
 
-    Where the taut path is not found, the leg follows the tether as it lies.
+    If the taut path is not found, the leg follows the tether as it lies.
     """
     placed = problem.model_copy(update={"goals": (Goal(position=state.position),), "state": None})
     longest = RoadmapPolicy().max_state_ratio * max(problem.tether_length, polylines.length(tether))
@@ -353,8 +351,11 @@ def _home(problem: Problem, state: State, tether: Floats, why: str) -> tuple[Leg
 
 
 def _keeping_order(graph: GraphFromState, goals: int) -> Result:
-    """The shortest path through the goals in their order: classes by dynamic programming. When the
-    time is up, the other goals are taken in the class of least tether."""
+    """Return the shortest path through the goals in their order, with classes by dynamic
+    programming.
+
+    When the time is up, the other goals keep the class of the shortest tether.
+    """
     start = graph.start
     assert start is not None
     at = np.array([start])
@@ -392,8 +393,8 @@ def _keeping_order(graph: GraphFromState, goals: int) -> Result:
 
 
 def _least(graph: GraphFromState, goals: int, clock: Clock) -> float:
-    """A quick lower bound on every path: half the two cheapest legs at each goal, and one at each
-    end; 0 if the time does not suffice."""
+    """Return a quick lower bound on every path: half the two cheapest legs at each goal, and one at
+    each end; 0 if there is no time."""
     vertices = np.arange(len(graph))
     try:
         with graph.within.on_clock(clock):
