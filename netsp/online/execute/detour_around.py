@@ -64,9 +64,11 @@ def _round(line: Floats, rim: shapely.Polygon, start: float, end: float | None) 
     low, high = min(a, b), max(a, b)
     one = np.array(substring(ring, low, high).coords)
     other = np.vstack(
-        [np.array(substring(ring, high, ring.length).coords),
-         np.array(substring(ring, 0.0, low).coords)]
-    )  # fmt: skip
+        [
+            np.array(substring(ring, high, ring.length).coords),
+            np.array(substring(ring, 0.0, low).coords),
+        ]
+    )
     one = one if a <= b else one[::-1]
     other = other[::-1] if a <= b else other
     arc = min((one, other), key=lambda w: float(np.hypot(*np.diff(w, axis=0).T).sum()))

@@ -190,8 +190,9 @@ def index_of(which: int | str, things: list, field: str) -> int:  # type: ignore
         unnamed = [k for k, thing in enumerate(things) if thing.name is None]
         if not found and which in (f"#{k}" for k in unnamed):
             return int(which[1:])
-        raise InputError(f"{field}: expected the name of one, got {which!r}, of which there are "
-                         f"{len(found)}")  # fmt: skip
+        raise InputError(
+            f"{field}: expected the name of one, got {which!r}, of which there are {len(found)}"
+        )
     if not is_index(which, len(things)):
         raise InputError(f"{field}: expected a number below {len(things)}, got {which!r}")
     return int(which)

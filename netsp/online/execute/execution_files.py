@@ -20,15 +20,20 @@ def write_execution(done: Execution, folder: str | Path) -> None:
     place = make_folder(folder)
     write_text(place / "log.csv", _table([asdict(r) for r in done.rows]))
     visits = [
-        {**asdict(a), "word": " ".join(map(str, a.word)), "planned": " ".join(map(str, a.planned)),
-         "as_planned": a.as_planned}
+        {
+            **asdict(a),
+            "word": " ".join(map(str, a.word)),
+            "planned": " ".join(map(str, a.planned)),
+            "as_planned": a.as_planned,
+        }
         for a in done.arrivals
-    ]  # fmt: skip
+    ]
     write_text(place / "visits.csv", _table(visits))
     write_text(place / "events.csv", _table([asdict(e) for e in done.entries]))
     write_text(place / "summary.json", json.dumps(done.summary, indent=1, allow_nan=False) + "\n")
-    frames = [{"time": t, "nodes": [[round(float(v), 4) for v in p] for p in n]}
-              for t, n in done.tethers]  # fmt: skip
+    frames = [
+        {"time": t, "nodes": [[round(float(v), 4) for v in p] for p in n]} for t, n in done.tethers
+    ]
     write_text(place / "tethers.json", json.dumps(frames, allow_nan=False) + "\n")
     if len(done.maps) > 1:
         maps = [{"time": t, "problem": json.loads(p.to_json())} for t, p in done.maps]

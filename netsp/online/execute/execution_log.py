@@ -134,7 +134,7 @@ class Arrival:
 
     @property
     def as_planned(self) -> bool:
-        """Whether the tether is in the planned class."""
+        """True if the tether is in the planned class."""
         return self.word == self.planned
 
 
@@ -252,10 +252,11 @@ class Execution(Drawn):
     def _lengths(self) -> tuple[Floats, Floats, Floats, Bools]:
         """Time, tether, limit, and whether it is being shortened, by rows."""
         return (
-            np.array([r.time for r in self.rows]), np.array([r.tether for r in self.rows]),
+            np.array([r.time for r in self.rows]),
+            np.array([r.tether for r in self.rows]),
             np.array([r.limit for r in self.rows]),
             np.array([r.shortening for r in self.rows], dtype=bool),
-        )  # fmt: skip
+        )
 
     @property
     def summary(self) -> dict[str, Any]:

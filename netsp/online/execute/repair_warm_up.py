@@ -46,14 +46,19 @@ def make_ready() -> None:
         goals=(Goal(position=(4.0, 0.0, 0.0)), Goal(position=(4.0, 3.0, 0.0))),
         tether_length=9.0,
         obstacles=(Circle(center=(2.0, 1.0), radius=0.5), Circle(center=(3.0, 2.0), radius=0.5)),
-    )  # fmt: skip
+    )
     world = random_world(1, goals=9, tether_length=450.0)
     begun = State(position=world.goals[0].position, signature=())
     with interrupts_remembered() as check, everything_compiled():
         repair(
-            tiny, np.array([4.0, 0.0, 0.0]), np.array([[0.0, 0, 0], [4, 0, 0]]), [0, 1], 1.0, "",
+            tiny,
+            np.array([4.0, 0.0, 0.0]),
+            np.array([[0.0, 0, 0], [4, 0, 0]]),
+            [0, 1],
+            1.0,
+            "",
             limit=math.inf,
-        )  # fmt: skip
+        )
         graph = graph_from_state(world.model_copy(update={"state": begun}))
         for solver, iterations in _SOLVERS:
             check()

@@ -57,9 +57,10 @@ class RunState(FileModel):
         Field(
             description="(x, y, z) along the taut tether, from the base to the robot, in the "
             "problem's units",
-            min_length=2, max_length=100_000,
+            min_length=2,
+            max_length=100_000,
         ),
-    ]  # fmt: skip
+    ]
     left: Annotated[
         tuple[GoalIndex, ...],
         Field(description="indices from 0 of the goals still to be visited, in the planned order"),
@@ -81,7 +82,7 @@ class RunState(FileModel):
             "while the problem is replaced; none in states of earlier versions",
             max_length=2,
         ),
-    ] = ()  # fmt: skip
+    ] = ()
 
     def check(self, problem: Problem, source: str) -> None:
         """Raise InputError for the state of another problem.

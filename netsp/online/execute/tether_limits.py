@@ -99,10 +99,13 @@ def overruns(t: Floats, tether: Floats, limit: Floats, shortening: Bools) -> lis
             longest = float(tether[begin:end].max())
             found.append(
                 Overrun(
-                    float(t[begin]), float(ends[end - 1]), longest, float(limit[begin]),
+                    float(t[begin]),
+                    float(ends[end - 1]),
+                    longest,
+                    float(limit[begin]),
                     bool(shortening[begin]),
                 )
-            )  # fmt: skip
+            )
     return found
 
 

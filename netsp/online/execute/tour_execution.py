@@ -88,9 +88,13 @@ class _Run:
     """Run in progress."""
 
     def __init__(
-        self, problem: Problem, solution: Solution, options: ExecutionOptions,
-        live: LiveVehicle | None = None, begun: Begun | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        problem: Problem,
+        solution: Solution,
+        options: ExecutionOptions,
+        live: LiveVehicle | None = None,
+        begun: Begun | None = None,
+    ) -> None:
         self.out = Execution(problem, solution, options)
         self.problem, self.options = problem, options
         self.legs: list[Leg] = [] if begun is not None else legs_of(problem, solution)
@@ -144,11 +148,13 @@ class _Run:
     def state(self) -> RunState:
         """State that the run can be resumed from."""
         return RunState(
-            time=max(self.now, 0.0), tether=tuple(map(tuple, self.tether.nodes.tolist())),
-            left=tuple(self.left), cancelled=tuple(sorted(self.out.cancelled)),
+            time=max(self.now, 0.0),
+            tether=tuple(map(tuple, self.tether.nodes.tolist())),
+            left=tuple(self.left),
+            cancelled=tuple(sorted(self.out.cancelled)),
             left_out=tuple(LeftOut(goal=g, reason=why) for g, why in self.out.left_out.items()),
             reserve=self.reserve,
-        )  # fmt: skip
+        )
 
     # a step
 
@@ -162,9 +168,17 @@ class _Run:
         goes_back = self.shorten or self.retreat is not None
         mode = "shorten" if goes_back and self.mode != "hold" else self.mode
         row = ExecutionRow(
-            round(self.now, 6), x, y, z, goal, mode, self.tether.length, limit, self.shorten,
+            round(self.now, 6),
+            x,
+            y,
+            z,
+            goal,
+            mode,
+            self.tether.length,
+            limit,
+            self.shorten,
             self._is_over_limit,
-        )  # fmt: skip
+        )
         if len(self.out.rows) % self.policy.tether_rows == 0:
             self.out.tethers.append((row.time, self.tether.nodes.copy()))
         self.out.rows.append(row)
@@ -397,10 +411,12 @@ class _Run:
         self.path, self.fresh, self.leg_s = back[1:], True, 0.0
         units = self.problem.units
         self._enter_log(
-            event, "shorten",
+            event,
+            "shorten",
             f"{out:.4g} of {self.problem.tether_length:g} {units} of tether are out: back along it "
-            f"to {length:.4g} {units}", 0.0,
-        )  # fmt: skip
+            f"to {length:.4g} {units}",
+            0.0,
+        )
 
     def _mend(self, why: str, left: list[int], event: str = "left out") -> None:
         if self.live is not None:

@@ -237,7 +237,7 @@ def _repaired(
 
 
 def reserved_limit(problem: Problem, goals: list[int], reserve: float) -> ReservedLimit:
-    """Return the length of tether that a plan may use which keeps a reserve, or as much of it as
+    """Return the length of tether that a plan may use so that a reserve is kept, as far as
     possible without leaving out a goal.
 
     Parameters
@@ -325,9 +325,10 @@ def _in_free_water(problem: Problem, order: list[int]) -> tuple[list[int], list[
     for g in order:
         xy = np.array(problem.goals[g].position[:2])
         on = [
-            i for i, o in enumerate(problem.obstacles)
+            i
+            for i, o in enumerate(problem.obstacles)
             if float(o.signed_distance(xy)) < problem.clearance - problem.tolerance
-        ]  # fmt: skip
+        ]
         if on:
             gone.append((g, f"{problem.obstacle_label(on[0])} stands on it"))
         else:

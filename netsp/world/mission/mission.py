@@ -99,9 +99,11 @@ class MissionWaypoint(Model):
         rest[choice - 1] = own
         return self.model_copy(
             update={
-                "position": chosen.position, "heading": chosen.heading, "alternatives": tuple(rest)
+                "position": chosen.position,
+                "heading": chosen.heading,
+                "alternatives": tuple(rest),
             }
-        )  # fmt: skip
+        )
 
 
 def _waypoint(value: Any) -> Any:
@@ -128,11 +130,16 @@ WaypointLike = Annotated[
                             "description": "to turn to there, degrees from the x axis towards y",
                         },
                         "dwell": {
-                            "type": "number", "minimum": 0, "maximum": MAX_DWELL_S, "default": 0,
+                            "type": "number",
+                            "minimum": 0,
+                            "maximum": MAX_DWELL_S,
+                            "default": 0,
                             "description": "seconds to stay there, at that heading",
                         },
                         "alternatives": {
-                            "type": "array", "items": Viewpoint.model_json_schema(), "default": [],
+                            "type": "array",
+                            "items": Viewpoint.model_json_schema(),
+                            "default": [],
                             "description": "other places that would do as well",
                         },
                     },
@@ -142,7 +149,7 @@ WaypointLike = Annotated[
             ]
         }
     ),
-]  # fmt: skip
+]
 
 
 class Mission(FileModel):
@@ -249,8 +256,9 @@ class Mission(FileModel):
             raise ValueError("state: is for a fixed anchor; expected no track beside it")
         line = self.state.tether
         for name, end, place in (
-            ("begins", line[0], self.anchor), ("ends", line[-1], self.state.position)
-        ):  # fmt: skip
+            ("begins", line[0], self.anchor),
+            ("ends", line[-1], self.state.position),
+        ):
             off = float(np.linalg.norm(np.array(end) - place))
             if off > self.reach:
                 raise ValueError(
@@ -287,10 +295,14 @@ class Mission(FileModel):
         line = () if self.state is None else self.state.tether
         return np.vstack(
             [
-                self.anchor, self.start, self.places, np.array(others).reshape(-1, 3), track,
+                self.anchor,
+                self.start,
+                self.places,
+                np.array(others).reshape(-1, 3),
+                track,
                 np.array(line).reshape(-1, 3),
             ]
-        )  # fmt: skip
+        )
 
     def checked_waypoints(self, field: DistanceField, *, snap: bool = False) -> Self:
         """Return the mission with every waypoint outside of solids.

@@ -136,10 +136,13 @@ class PlannedTour(Model):
         return self.model_copy(
             update={
                 "length": float(sum(polylines.length(np.array(leg)) for leg in legs)),
-                "status": Status.FEASIBLE, "lower_bound": None, "gap": None,
-                "bound_of_all": None, "gap_to_all": None,
+                "status": Status.FEASIBLE,
+                "lower_bound": None,
+                "gap": None,
+                "bound_of_all": None,
+                "gap_to_all": None,
             }
-        )  # fmt: skip
+        )
 
     def against(self, begin: Point3, start: Point3, places: Floats, tolerance: float) -> str | None:
         """Return what does not match the mission that the tour is part of, in one line; None if all

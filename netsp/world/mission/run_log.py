@@ -223,9 +223,11 @@ def _yes(text: str) -> bool:
 
 
 _KINDS: dict[str, Callable[[str], Any]] = {
-    **dict.fromkeys(LogRow.__dataclass_fields__, float), "waypoint": int, "mode": str,
+    **dict.fromkeys(LogRow.__dataclass_fields__, float),
+    "waypoint": int,
+    "mode": str,
     "shortening": _yes,
-}  # fmt: skip
+}
 """Types of the columns of log.csv."""
 
 
@@ -276,9 +278,11 @@ def describe_run(run: Run, units: str) -> str:
         )
     for r in s.get("repairs", ()):
         done = {
-            "kept": "kept", "local": "mended", "replan": "the rest planned anew",
+            "kept": "kept",
+            "local": "mended",
+            "replan": "the rest planned anew",
             "legs": "left to be found leg by leg",
-        }  # fmt: skip
+        }
         lines.append(
             f"repair   at {r['time']:.1f} s: {done[r['response']]} in {r['planning_s']:.2f} s, "
             f"{r['reason']}"

@@ -1,4 +1,4 @@
-"""Paths made safer and smoother before they are followed.
+"""Refinement of paths, which makes them safer and smoother before they are followed.
 
 `paper`: the three steps of Amer et al. 2025, section V-B, repeated until the path is free.
 `gradient`: ours; it moves points up the distance field only, so no point's clearance gets smaller,
@@ -74,9 +74,13 @@ class RefineParams:
 
 
 def refined(
-    name: str, field: DistanceField, path: Floats, clearance: float, rng: np.random.Generator,
+    name: str,
+    field: DistanceField,
+    path: Floats,
+    clearance: float,
+    rng: np.random.Generator,
     params: RefineParams | None = None,
-) -> Floats:  # fmt: skip
+) -> Floats:
     """Return a path (k, 3) refined, or unchanged if the refined path is not free."""
     params = params or RefineParams()
     if name == "none" or len(path) < 3:
@@ -96,9 +100,12 @@ def refined(
 
 
 def stepped(
-    field: DistanceField, path: Floats, clearance: float, rng: np.random.Generator,
+    field: DistanceField,
+    path: Floats,
+    clearance: float,
+    rng: np.random.Generator,
     params: RefineParams,
-) -> Floats:  # fmt: skip
+) -> Floats:
     """Return a path after one round of the paper's three steps; it need not be free."""
     moved = offset(path, clearance)
     moved = perturbed(field, moved, params.step_share * clearance, rng, params)

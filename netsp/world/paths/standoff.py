@@ -63,7 +63,7 @@ def sees(field: Field, a: Floats, b: Floats, depth: float) -> Bools:
     for k in range(len(a)):
         low, _ = lowest_along(
             field, a[k, 0], a[k, 1], a[k, 2], b[k, 0], b[k, 1], b[k, 2], 0.5 * depth
-        )  # fmt: skip
+        )
         out[k] = low > -depth
     return out
 

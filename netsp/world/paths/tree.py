@@ -213,9 +213,13 @@ BLOCKED, FREE, OPEN = range(3)
 
 @kernel
 def free_cells(
-    field: Field, low: Floats, cell: float, shape: tuple[int, int, int], clearance: float,
+    field: Field,
+    low: Floats,
+    cell: float,
+    shape: tuple[int, int, int],
+    clearance: float,
     stop: Flag,
-) -> Bools:  # fmt: skip
+) -> Bools:
     """Return the mask of the cells of a grid whose centre is at least the clearance from all
     solids. Ends early once `stop` is set."""
     out = np.zeros(shape, dtype=np.bool_)
@@ -226,19 +230,25 @@ def free_cells(
             for k in range(shape[2]):
                 out[i, j, k] = (
                     distance(
-                        field, low[0] + (i + 0.5) * cell, low[1] + (j + 0.5) * cell,
+                        field,
+                        low[0] + (i + 0.5) * cell,
+                        low[1] + (j + 0.5) * cell,
                         low[2] + (k + 0.5) * cell,
                     )
                     >= clearance
-                )  # fmt: skip
+                )
     return out
 
 
 @interprets(free_cells)
 def _free_cells_in_numpy(
-    field: Field, low: Floats, cell: float, shape: tuple[int, int, int], clearance: float,
+    field: Field,
+    low: Floats,
+    cell: float,
+    shape: tuple[int, int, int],
+    clearance: float,
     stop: Flag,
-) -> Bools:  # fmt: skip
+) -> Bools:
     """Vectorise `free_cells` over blocks of layers of cells."""
     out = np.zeros(shape, dtype=np.bool_)
     x, y, z = (low[axis] + (np.arange(shape[axis]) + 0.5) * cell for axis in range(3))
@@ -544,9 +554,15 @@ def shortcut(field: Field, path: Floats, tolerance: float) -> Floats:
         j = i + 1
         while j + 1 < len(path):
             low, _ = lowest_along(
-                field, path[i, 0], path[i, 1], path[i, 2],
-                path[j + 1, 0], path[j + 1, 1], path[j + 1, 2], tolerance,
-            )  # fmt: skip
+                field,
+                path[i, 0],
+                path[i, 1],
+                path[i, 2],
+                path[j + 1, 0],
+                path[j + 1, 1],
+                path[j + 1, 2],
+                tolerance,
+            )
             if low < -tolerance:
                 break
             j += 1
@@ -577,9 +593,7 @@ def _shares(path: Floats, k: int) -> Floats:
 def all_see(field: Field, a: Floats, b: Floats, step: float) -> bool:
     """Return whether all points a[k] and b[k] (n, 3) see one another, in steps of `step`."""
     for k in range(len(a)):
-        low, _ = lowest_along(
-            field, a[k, 0], a[k, 1], a[k, 2], b[k, 0], b[k, 1], b[k, 2], step
-        )  # fmt: skip
+        low, _ = lowest_along(field, a[k, 0], a[k, 1], a[k, 2], b[k, 0], b[k, 1], b[k, 2], step)
         if low < 0.0:
             return False
     return True

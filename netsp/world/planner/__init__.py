@@ -35,9 +35,13 @@ PLANNERS: Registry[Callable[..., Planner]] = Registry(
 
 
 def make_planner(
-    name: str | Callable[..., Planner], mission: Mission, scene: DistanceField, tethers: Tethers,
-    grid: Grid, options: PlannerOptions | None = None,
-) -> Planner:  # fmt: skip
+    name: str | Callable[..., Planner],
+    mission: Mission,
+    scene: DistanceField,
+    tethers: Tethers,
+    grid: Grid,
+    options: PlannerOptions | None = None,
+) -> Planner:
     """Make a planner by name, or by calling a factory such as a class derived from `Planner`.
 
     Raises

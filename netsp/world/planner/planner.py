@@ -29,9 +29,14 @@ from netsp.world.tether.tether_policy import THINNEST
 
 Tethers = GeodesicTether | ReactTether
 
-NORMAL, RECOVERY, WAIT, DWELL, HOME, HOLD, DONE = (
-    "normal", "recovery", "wait", "dwell", "home", "hold", "done",
-)  # fmt: skip
+# modes of a planner
+NORMAL = "normal"
+RECOVERY = "recovery"
+WAIT = "wait"
+DWELL = "dwell"
+HOME = "home"
+HOLD = "hold"
+DONE = "done"
 
 
 @dataclass(frozen=True)
@@ -187,7 +192,7 @@ class Planner:
 
     @property
     def loaded(self) -> bool:
-        """Whether the tether needs more than its taut length, or has a limit of turning."""
+        """True if the tether needs more than its taut length, or has a limit of turning."""
         physics = self.mission.tether
         return physics.slack > 0.0 or physics.diameter > 0.0 or math.isfinite(physics.max_turning)
 
@@ -262,7 +267,7 @@ class Planner:
 
     @property
     def anchor_moves(self) -> bool:
-        """Whether the anchor still moves."""
+        """True if the anchor still moves."""
         return self.track is not None and self.now < self.track.end
 
     @property
@@ -288,12 +293,12 @@ class Planner:
 
     @property
     def homeward(self) -> bool:
-        """Whether all waypoints are visited or left out, so that only the way home remains."""
+        """True if all waypoints are visited or left out, so that only the way home remains."""
         return self.index >= len(self.mission.waypoints)
 
     @property
     def done(self) -> bool:
-        """Whether the robot is home, or has given up getting there."""
+        """True if the robot is home, or has given up getting there."""
         return self.index > len(self.mission.waypoints)
 
     def step(self, robot: Floats, tether: Tether) -> Command:

@@ -322,7 +322,7 @@ class PredictivePlanner(Planner):
         onward = {int(i): tree.path(n) for n, i in enumerate(pivots)}
 
         def taken_back(i: int) -> Floats:
-            """The tether when the robot has followed it back to point i."""
+            """Return the tether after the robot has followed it back to point i."""
             passed = int(np.searchsorted(along, places[i] - 1e-9, side="right"))
             return np.vstack([tether.nodes[: max(1, len(nodes) - passed)], back[i]])
 
@@ -379,8 +379,11 @@ class PredictivePlanner(Planner):
 
     @property
     def _looked_enough(self) -> bool:
-        """Whether the best path so far is taken. Simulations and their metres are counted, not
-        seconds, so that a plan is the same on every machine."""
+        """True if enough was simulated to take the best path so far.
+
+        Simulations and metres are counted, not seconds, so that a plan is the same on every
+        machine.
+        """
         return self._looks >= self.options.looks or self._looked >= self.options.metres
 
     def _tautest(

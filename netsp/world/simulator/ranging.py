@@ -82,9 +82,11 @@ def cast(field: Field, place: Floats, rays: Floats, most: float) -> Floats:
         s = 0.0
         while s <= most:
             d = distance(
-                field, place[0] + s * rays[n, 0], place[1] + s * rays[n, 1],
+                field,
+                place[0] + s * rays[n, 0],
+                place[1] + s * rays[n, 1],
                 place[2] + s * rays[n, 2],
-            )  # fmt: skip
+            )
             if d < RAY_TOLERANCE:
                 out[n] = s
                 break

@@ -39,7 +39,7 @@ class Positions:
 
     @property
     def exact(self) -> bool:
-        """Whether positions are known exactly and at once."""
+        """True if positions are known exactly and at once."""
         return self.sensor.noise == 0.0 and self._late == 0
 
     def __call__(self, place: Floats) -> Floats:

@@ -125,12 +125,22 @@ class Simulation:
         limit, out = self.mission.tether_length, payout(self.tether, self.load)
         self.shortening = self.shortening and out > limit
         row = LogRow(
-            round(self.now, 6), x, y, z, self.vehicle.yaw, planner.index, command.mode,
-            self.tether.length, out,
+            round(self.now, 6),
+            x,
+            y,
+            z,
+            self.vehicle.yaw,
+            planner.index,
+            command.mode,
+            self.tether.length,
+            out,
             turning(self.tether, self.tethers.delta),
-            seen.share if seen else 0.0, seen.share_through if seen else 0.0,
-            command.replan_s, limit, self.shortening,
-        )  # fmt: skip
+            seen.share if seen else 0.0,
+            seen.share_through if seen else 0.0,
+            command.replan_s,
+            limit,
+            self.shortening,
+        )
         if self.tethers_seen and len(self.log) % self.policy.tether_steps == 0:
             self.tethers_seen.append((len(self.log), self.tether))
         self.log.append(row)

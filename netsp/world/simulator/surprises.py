@@ -17,8 +17,14 @@ from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene, Solid
 
 KINDS = (
-    "appear", "vanish", "move", "add_waypoint", "cancel_waypoint", "push", "tether_length",
-)  # fmt: skip
+    "appear",
+    "vanish",
+    "move",
+    "add_waypoint",
+    "cancel_waypoint",
+    "push",
+    "tether_length",
+)
 """Fields of an event, of which it has one."""
 
 
@@ -56,7 +62,7 @@ class SceneEvent(Model):
 
     @property
     def of_scene(self) -> bool:
-        """Whether a solid appears, vanishes or moves."""
+        """True if a solid appears, vanishes or moves."""
         return any(v is not None for v in (self.appear, self.vanish, self.move))
 
     @model_validator(mode="after")

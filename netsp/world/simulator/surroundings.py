@@ -339,7 +339,7 @@ class Surroundings:
         return self.scene.model_copy(update={"solids": self.solids, "problem": None})
 
     def told(self) -> dict[str, int]:
-        """Return the number of events that happened, of those that never had room, and of solids
+        """Return the number of events that happened, of events that never had room, and of solids
         that the sensor put on the map."""
         return {
             "happened": len(self.happened),

@@ -50,9 +50,14 @@ class BlueRov2:
         return float(self.state[3])
 
     def go(
-        self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool,
+        self,
+        path: Floats,
+        seconds: float,
+        yaw: float,
+        water: Floats,
+        fresh: bool,
         pull: Floats | None = None,
-    ) -> tuple[list[Floats], int]:  # fmt: skip
+    ) -> tuple[list[Floats], int]:
         """See `netsp.world.vehicle.Vehicle`."""
         points, behind, policy, step_s = [], 0, self.policy, self.policy.control.step_s
         if fresh:

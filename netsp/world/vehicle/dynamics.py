@@ -73,9 +73,7 @@ def derivative(state: Floats, force: Floats, water: Floats, out: Floats) -> None
     out[5] = (-m[0] * u * r - (LINEAR[1] + QUADRATIC[1] * abs(v)) * v + force[1]) / m[1]
     lift = (WATER_DENSITY * VOLUME - MASS) * GRAVITY
     out[6] = (lift - (LINEAR[2] + QUADRATIC[2] * abs(w)) * w + force[2]) / m[2]
-    out[7] = (
-        (m[0] - m[1]) * u * v - (LINEAR[3] + QUADRATIC[3] * abs(r)) * r + force[3]
-    ) / m[3]  # fmt: skip
+    out[7] = ((m[0] - m[1]) * u * v - (LINEAR[3] + QUADRATIC[3] * abs(r)) * r + force[3]) / m[3]
 
 
 @kernel

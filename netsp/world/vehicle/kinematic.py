@@ -35,9 +35,14 @@ class Vehicle(Protocol):
         """Heading, rad."""
 
     def go(
-        self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool,
+        self,
+        path: Floats,
+        seconds: float,
+        yaw: float,
+        water: Floats,
+        fresh: bool,
         pull: Floats | None = None,
-    ) -> tuple[list[Floats], int]:  # fmt: skip
+    ) -> tuple[list[Floats], int]:
         """Follow a path for some seconds, turning to a heading, in moving water.
 
         Parameters
@@ -78,9 +83,14 @@ class KinematicVehicle:
         self.control_s: list[float] = []
 
     def go(
-        self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool,
+        self,
+        path: Floats,
+        seconds: float,
+        yaw: float,
+        water: Floats,
+        fresh: bool,
         pull: Floats | None = None,
-    ) -> tuple[list[Floats], int]:  # fmt: skip
+    ) -> tuple[list[Floats], int]:
         """Follow a path for some seconds; see `Vehicle.go`. Water and pull have no effect."""
         del water, fresh, pull
         most = math.radians(self.policy.max_turn_rate_deg) * seconds
