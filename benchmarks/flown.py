@@ -17,8 +17,9 @@ import numpy as np
 from table import ROOT, head, heading, row
 
 from netsp import Problem, Solution
+from netsp.exchange.missions.export_policy import DEFAULT_EXPORT
 from netsp.exchange.missions.leg_times import leg_times, target_times
-from netsp.exchange.missions.mission_files import HOLD, altitude, start_of
+from netsp.exchange.missions.mission_files import altitude, start_of
 from netsp.exchange.missions.waypoints import waypoints_of
 from netsp.plan.tour_plan import HOME, legs_of
 from tests.autopilot import Earth
@@ -56,7 +57,9 @@ def mission(name: str) -> Flight:
     # these missions began with the way to the first goal, without a held start
     places = [start_of(problem, solution).position]
     places += [(*p.position[:2], altitude(p.position[2])) for p in points]
-    holds = [0.0] + [1.0 if p.goal in (None, HOME) else HOLD for p in points]
+    holds = [0.0] + [
+        1.0 if p.goal in (None, HOME) else DEFAULT_EXPORT.default_hold_s for p in points
+    ]
     return _flight(name, places, holds, times)
 
 

@@ -11,7 +11,7 @@ from netsp.base.errors import InputError
 from netsp.command.main import main
 from netsp.exchange.missions import Projection
 from netsp.exchange.missions.mission_export import export_mission
-from netsp.exchange.missions.mission_files import Settings
+from netsp.exchange.missions.mission_files import ExportSettings
 from netsp.plan.space.space_plan import plan
 from netsp.world.mission.mission import Mission
 
@@ -141,4 +141,6 @@ def test_bad_input_is_told_in_one_line(file, name, flags, expected, monkeypatch,
 
 def test_settings_are_checked(file, tmp_path):
     with pytest.raises(InputError, match="hold: expected whole seconds"):
-        export_mission(Mission.load(file), tmp_path / "m.csv", "csv", settings=Settings(hold=-1))
+        export_mission(
+            Mission.load(file), tmp_path / "m.csv", "csv", settings=ExportSettings(goal_hold_s=-1)
+        )

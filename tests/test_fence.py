@@ -16,7 +16,7 @@ from netsp.exchange.maps.qgc_plan import read_plan
 from netsp.exchange.missions import Projection, export
 from netsp.exchange.missions.export_notes import fence_warnings
 from netsp.exchange.missions.fence import FencePolicy, fence_of
-from netsp.exchange.missions.mission_files import Settings
+from netsp.exchange.missions.mission_files import ExportSettings
 from tests.plan_loaders import RefusedError, load_cockpit, load_fence, load_plan, stored_bytes
 
 pytest.importorskip("pyproj")
@@ -160,7 +160,7 @@ def test_plans_are_what_ground_stations_load(plan, tmp_path):
     assert data["netsp"]["fence"] == {"simplified": ["#2"], "left_out": []}
     (note,) = read_plan(tmp_path / "n.plan").notes  # else the plan would pass for the problem
     assert note.startswith("the fence has 1 obstacle ('#2') simplified")
-    export(many, plan, tmp_path / "n.plan", "plan", PROJECTION, settings=Settings(
+    export(many, plan, tmp_path / "n.plan", "plan", PROJECTION, settings=ExportSettings(
         fence=FencePolicy(max_bytes=18)))  # fmt: skip
     assert any("lacks 2 obstacles" in line for line in read_plan(tmp_path / "n.plan").notes)
 
@@ -197,7 +197,7 @@ def test_a_mission_of_cockpit_uploads_the_waypoints_of_a_plan(plan, tmp_path):
         assert item["z"] == pytest.approx(min(p.position[2], -0.1), abs=1e-3)
         assert item["params"][0] == (5 if p.goal is not None and p.goal >= 0 else 1)
     again = tmp_path / "again.cmp"
-    export(SITE, plan, again, "cockpit", PROJECTION, settings=Settings(speed=None))
+    export(SITE, plan, again, "cockpit", PROJECTION, settings=ExportSettings(speed=None))
     assert len(load_cockpit(json.loads(again.read_text()))) == len(points)
 
 

@@ -19,7 +19,7 @@ from netsp.base.files import cell, read_gzip, write_text
 from netsp.command.main import main
 from netsp.exchange.maps.read_map import read_site
 from netsp.exchange.missions import Projection, export
-from netsp.exchange.missions.mission_files import Settings
+from netsp.exchange.missions.mission_files import ExportSettings
 from netsp.online.execute import ExecutionOptions, Surprises, execute
 from netsp.online.execute.events import changed
 from netsp.view.pictures import style
@@ -382,7 +382,7 @@ BAD_CALLS = {
         lambda t, s: export(t, s, "x.csv", "csv", acceptance="x"), "acceptance: expected a number",
     ),
     "hold as text": (
-        lambda t, s: export(t, s, "x.csv", "csv", settings=Settings(hold="a")),
+        lambda t, s: export(t, s, "x.csv", "csv", settings=ExportSettings(goal_hold_s="a")),
         "hold: expected whole",
     ),
     "latitude of nothing": (lambda t, s: Projection(None, 0), "latitude: expected a number"),
@@ -423,7 +423,9 @@ def test_numbers_and_arrays_of_numpy_are_as_good_as_those_of_python(tmp_path):
         speed=np.float64(1), current=np.zeros(3), gusts=np.float32(0), seed=np.int64(3)
     )
     assert execute(problem, solution, options).summary["visited"] == 1
-    settings = Settings(hold=np.int64(5), bend=np.int64(1), speed=np.float64(0.5))
+    settings = ExportSettings(
+        goal_hold_s=np.int64(5), bend_hold_s=np.int64(1), speed=np.float64(0.5)
+    )
     export(problem, solution, tmp_path / "x.csv", "csv", settings=settings)
     assert (tmp_path / "x.csv").exists()
 

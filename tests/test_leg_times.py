@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from netsp import Problem, Solution
 from netsp.base.errors import InputError
 from netsp.exchange.missions.leg_times import SmoothMove, VehicleMotion, leg_times, target_times
-from netsp.exchange.missions.mission_files import Settings, altitude, predicted_s, start_of
+from netsp.exchange.missions.mission_files import ExportSettings, altitude, predicted_s, start_of
 from netsp.exchange.missions.waypoints import Waypoint, waypoints_of
 from netsp.online.execute.execution_log import ExecutionRow
 from netsp.online.fly.flight_time import FlightClock, FlightTime, predicted_flight
@@ -105,8 +105,8 @@ def test_two_legs_in_line_are_never_faster_than_one(a, b, speed, slope):
 def test_a_hold_is_added_to_the_leg_before_it():
     """Holds add their seconds, and a mission begins with the hold at its first waypoint."""
     points = [Waypoint((0, 0, -1), None, start=True), Waypoint((0, 0, -1), None)]
-    assert predicted_s(points, Settings(bend=9)) == pytest.approx(9 + 9, abs=0.5)
-    assert predicted_s(points, Settings(speed=None)) is None
+    assert predicted_s(points, ExportSettings(bend_hold_s=9)) == pytest.approx(9 + 9, abs=0.5)
+    assert predicted_s(points, ExportSettings(speed=None)) is None
 
 
 @pytest.mark.parametrize("speed", [1e-3, 0.05, 20.0])

@@ -20,7 +20,7 @@ from netsp.exchange.maps.options import SiteOptions
 from netsp.exchange.maps.projection import Projection
 from netsp.exchange.maps.read_map import import_site
 from netsp.exchange.missions import export
-from netsp.exchange.missions.mission_files import Settings
+from netsp.exchange.missions.mission_files import ExportSettings
 from netsp.model.problem import Goal
 
 pytest.importorskip("pyproj")
@@ -241,7 +241,14 @@ SITE = Problem(
 def test_what_export_writes_comes_back_as_the_same_goals(tmp_path, kind, heading, hold):
     tour, file = solve(SITE), tmp_path / f"m.{kind}"
     form = "wpl" if kind == "waypoints" else kind
-    export(SITE, tour, file, form, Projection(LAT, LON, heading), settings=Settings(hold=hold))
+    export(
+        SITE,
+        tour,
+        file,
+        form,
+        Projection(LAT, LON, heading),
+        settings=ExportSettings(goal_hold_s=hold),
+    )
     base = Projection(LAT, LON, heading) if kind == "waypoints" else None
     again = import_site(file, base, options=TETHER).problem
     mine = sorted(tuple(np.round(g.position, 3).tolist()) for g in again.goals)
@@ -257,7 +264,7 @@ def test_what_export_writes_comes_back_as_the_same_goals(tmp_path, kind, heading
 def test_a_plan_that_a_ground_station_saved_keeps_its_goals(tmp_path, hold):
     """Ground stations drop members that they do not know, as `netsp`."""
     tour, file = solve(SITE), tmp_path / "m.plan"
-    points = export(SITE, tour, file, "plan", HERE, settings=Settings(hold=hold))
+    points = export(SITE, tour, file, "plan", HERE, settings=ExportSettings(goal_hold_s=hold))
     data = json.loads(file.read_text())
     holds = [i["params"][0] for i in data["mission"]["items"] if i["command"] == 16]
     stops = [p.goal is not None and p.goal >= 0 for p in points]

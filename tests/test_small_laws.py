@@ -29,7 +29,7 @@ from netsp.exchange.missions.export_margins import warnings
 from netsp.exchange.missions.leg_times import SmoothMove, VehicleMotion, leg_times
 from netsp.exchange.missions.mission_export import pursued
 from netsp.exchange.missions.mission_files import (
-    Settings,
+    ExportSettings,
     _counter_clockwise,
     _hold,
     altitude,
@@ -328,10 +328,10 @@ def test_no_altitude_is_above_a_decimetre_below_the_surface(z, told):
 
 def test_a_vehicle_stays_at_goals_and_shortly_at_bends():
     goal, bend, home = Waypoint((0, 0, 0), 2), Waypoint((0, 0, 0), None), Waypoint((0, 0, 0), HOME)
-    plain = Settings()
+    plain = ExportSettings()
     assert [_hold(p, plain) for p in (goal, bend, home)] == [5, 1, 1]
     assert _hold(Waypoint((0, 0, 0), 0, stay=9), plain) == 9
-    assert _hold(Waypoint((0, 0, 0), 0, stay=9), Settings(hold=3)) == 3
+    assert _hold(Waypoint((0, 0, 0), 0, stay=9), ExportSettings(goal_hold_s=3)) == 3
 
 
 def test_predicted_seconds_are_those_of_legs_stops_and_holds():
@@ -341,8 +341,10 @@ def test_predicted_seconds_are_those_of_legs_stops_and_holds():
         places = [(0.0, 0.0, altitude(0.0)), (length, 0.0, altitude(0.0))]
         moving = leg_times(places, [0.0, 0.0], 0.5)[0]
         assert moving > SmoothMove(length, 0.0, 0.5, VehicleMotion()).duration_s > length / 0.5
-        assert predicted_s(points, Settings(speed=0.5)) == pytest.approx(moving + 1 + 5, abs=0.1)
-    assert predicted_s(points, Settings(speed=None)) is None
+        assert predicted_s(points, ExportSettings(speed=0.5)) == pytest.approx(
+            moving + 1 + 5, abs=0.1
+        )
+    assert predicted_s(points, ExportSettings(speed=None)) is None
 
 
 def test_rings_run_counter_clockwise():
@@ -888,7 +890,7 @@ def test_a_plan_file_is_json_with_every_obstacle_fenced_out(posts, tmp_path):
     square = Polygon(polygon=[(9, 9), (10, 9), (10, 10)])
     problem = posts.model_copy(update={"obstacles": (*posts.obstacles, square)})
     points = [Waypoint((0, 0, 0), None, start=True), Waypoint((6, 1, -2), 0)]
-    plan = json.loads(FORMATS["plan"](problem, points, Projection(50.0, 8.0), Settings()))
+    plan = json.loads(FORMATS["plan"](problem, points, Projection(50.0, 8.0), ExportSettings()))
     fences = plan["geoFence"]
     assert [c["circle"]["radius"] for c in fences["circles"]] == [1.0, 0.5]
     assert len(fences["polygons"][0]["polygon"]) == 3

@@ -303,9 +303,9 @@ def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str,
         An unknown kind, no origin; as of `netsp.exchange.missions.mission_files.export`.
     """
     from netsp.exchange.maps.goal_depths import surface_warning
-    from netsp.exchange.missions.export_margins import LEAST_CLEARANCE, LEAST_SLACK, warnings
+    from netsp.exchange.missions.export_margins import warnings
     from netsp.exchange.missions.export_notes import export_notes
-    from netsp.exchange.missions.mission_files import Settings, export
+    from netsp.exchange.missions.mission_files import ExportSettings, export
 
     if kind not in EXPORTS:
         raise InputError(f"export: expected one of {', '.join(EXPORTS)}, got {kind!r}")
@@ -317,11 +317,18 @@ def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str,
     with tempfile.TemporaryDirectory(prefix="netsp-") as folder:
         file = Path(folder) / EXPORTS[kind]
         points = export(problem, solution, file, kind)
-        said = export_notes(problem, points, kind, Settings())
+        settings = ExportSettings()
+        said = export_notes(problem, points, kind, settings)
         surface = surface_warning(problem, "set one depth for all in the panel")
         notes = [
             *([surface] if surface is not None else []),
-            *warnings(problem, solution, points, LEAST_SLACK, LEAST_CLEARANCE),
+            *warnings(
+                problem,
+                solution,
+                points,
+                settings.policy.min_slack,
+                settings.policy.min_clearance,
+            ),
             *said.warnings, *said.notes,
         ]  # fmt: skip
         return file.name, file.read_text(encoding="utf-8"), notes

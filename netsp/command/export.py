@@ -99,10 +99,10 @@ def run(args: argparse.Namespace) -> int:
     from netsp.exchange.missions.common_depth import at_depth
     from netsp.exchange.missions.export_margins import warnings
     from netsp.exchange.missions.export_notes import export_notes
-    from netsp.exchange.missions.fence import MIN_FENCE_BYTES, FencePolicy
+    from netsp.exchange.missions.fence import FencePolicy
     from netsp.exchange.missions.mission_files import (
         FOR_VEHICLES,
-        Settings,
+        ExportSettings,
         export,
         format_of,
         predicted_s,
@@ -121,16 +121,15 @@ def run(args: argparse.Namespace) -> int:
     elif (text := surface_warning(problem)) is not None:
         messages.warning(text)
     kind = format_of(args.output, args.format)
-    if args.fence_bytes < MIN_FENCE_BYTES:
-        raise InputError(
-            f"--fence-bytes: expected {MIN_FENCE_BYTES} or more, got {args.fence_bytes}"
-        )
+    min_bytes = FencePolicy().min_bytes
+    if args.fence_bytes < min_bytes:
+        raise InputError(f"--fence-bytes: expected {min_bytes} or more, got {args.fence_bytes}")
     slack, clearance = margins(args.margin)
     projection = None
     if args.origin:
         projection = Projection.parse(args.origin, problem.base[:2], "--origin")
-    settings = Settings(
-        hold=args.hold, speed=SPEED if args.speed is None else args.speed,
+    settings = ExportSettings(
+        goal_hold_s=args.hold, speed=SPEED if args.speed is None else args.speed,
         max_waypoints=args.max_waypoints, fence=FencePolicy(max_bytes=args.fence_bytes),
     )  # fmt: skip
     points = export(
@@ -175,8 +174,7 @@ def _mission(args: argparse.Namespace) -> int:
     from netsp.exchange.missions.mission_export import export_mission
     from netsp.exchange.missions.mission_files import (
         FOR_VEHICLES,
-        SHALLOWEST,
-        Settings,
+        ExportSettings,
         format_of,
         predicted_s,
     )
@@ -188,8 +186,8 @@ def _mission(args: argparse.Namespace) -> int:
     projection = None
     if args.origin:
         projection = Projection.parse(args.origin, mission.start[:2], "--origin")
-    settings = Settings(
-        hold=args.hold, speed=mission.speed if args.speed is None else args.speed,
+    settings = ExportSettings(
+        goal_hold_s=args.hold, speed=mission.speed if args.speed is None else args.speed,
         max_waypoints=args.max_waypoints,
     )  # fmt: skip
     done = until_interrupted(
@@ -225,10 +223,11 @@ def _mission(args: argparse.Namespace) -> int:
         )
     if kind in FOR_VEHICLES:
         warn_of_clearance(args.position_error, args.current, mission.clearance, "m")
-        shallow = sum(p.position[2] > -SHALLOWEST for p in done.points)
+        min_depth = settings.policy.min_depth
+        shallow = sum(p.position[2] > -min_depth for p in done.points)
         if shallow:
             messages.note(
-                f"{counted(shallow, 'waypoint')} shallower than {SHALLOWEST} m moved to that depth"
+                f"{counted(shallow, 'waypoint')} shallower than {min_depth} m moved to that depth"
             )
         if (text := bend_note(done.points, settings)) is not None:
             messages.note(text)

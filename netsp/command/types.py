@@ -155,7 +155,7 @@ def vector(text: str, name: str) -> tuple[float, float, float]:
 
 def margins(text: str) -> tuple[float, float]:
     """Least tether slack and clearance, from ``SLACK`` or ``SLACK,CLEARANCE``."""
-    from netsp.exchange.missions.export_margins import LEAST_CLEARANCE
+    from netsp.exchange.missions.export_policy import DEFAULT_EXPORT
 
     try:
         numbers = [float(v) for v in text.split(",")]
@@ -163,7 +163,7 @@ def margins(text: str) -> tuple[float, float]:
         numbers = []
     if len(numbers) not in (1, 2) or not all(0.0 <= v < float("inf") for v in numbers):
         raise InputError(f"--margin: expected SLACK or SLACK,CLEARANCE from 0 on, got {text!r}")
-    return numbers[0], numbers[-1] if len(numbers) == 2 else LEAST_CLEARANCE
+    return numbers[0], numbers[-1] if len(numbers) == 2 else DEFAULT_EXPORT.min_clearance
 
 
 def check_writable(*paths: str | None, inputs: Sequence[str | None] = ()) -> None:

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from netsp.exchange.maps.projection import Projection
+from netsp.exchange.missions.export_policy import DEFAULT_EXPORT, ExportPolicy
 from netsp.exchange.missions.waypoints import Waypoint
 
 NAMESPACE = uuid.UUID("bf7570c1-32a1-54d7-ba10-af9107bb67c8")
@@ -24,14 +25,14 @@ DESCRIPTION = (
     "will be wrapped around something."
 )
 
-MAP_PIXELS = 600.0
-"""Width of the map view that shows all waypoints when the mission is opened, pixels."""
-
 EARTH_PIXEL_M = 156_543.0
-"""Size of a pixel of a web map at zoom 0 on the equator, metres."""
+"""Format of web maps: size of a pixel at zoom 0 on the equator, metres."""
 
-MIN_ZOOM, MAX_ZOOM = 2, 19
-"""Range of the zoom levels of web maps."""
+MIN_ZOOM = 2
+"""Format of web maps: lowest zoom level."""
+
+MAX_ZOOM = 19
+"""Format of web maps: highest zoom level."""
 
 
 def cockpit_mission(
@@ -41,6 +42,7 @@ def cockpit_mission(
     altitudes: Sequence[float],
     projection: Projection,
     speed: float | None,
+    policy: ExportPolicy = DEFAULT_EXPORT,
 ) -> str:
     """Return the text of a Cockpit mission file.
 
@@ -94,7 +96,7 @@ def cockpit_mission(
                 "updatedAt": 0,
                 "settings": {
                     "mapCenter": [round(0.5 * (south + north), 9), round(0.5 * (west + east), 9)],
-                    "zoom": _zoom(points, 0.5 * (south + north)),
+                    "zoom": _zoom(points, 0.5 * (south + north), policy.map_pixels),
                     "currentWaypointAltitude": altitudes[0],
                     "currentWaypointAltitudeRefType": "Relative to home",
                     "defaultCruiseSpeed": 0 if speed is None else speed,
@@ -115,7 +117,7 @@ def _command(name: str, *params: float) -> dict[str, Any]:
     return {"type": "MAVLINK_NAV_COMMAND", "command": name, **numbered}
 
 
-def _zoom(points: Sequence[Waypoint], latitude: float) -> int:
+def _zoom(points: Sequence[Waypoint], latitude: float, map_pixels: float) -> int:
     """Return the largest integer zoom level at which all waypoints are on the map."""
     extent = max(
         max(p.position[k] for p in points) - min(p.position[k] for p in points) for k in (0, 1)
@@ -123,5 +125,5 @@ def _zoom(points: Sequence[Waypoint], latitude: float) -> int:
     if extent <= 0.0:
         return MAX_ZOOM
     pixel = EARTH_PIXEL_M * math.cos(math.radians(latitude))
-    zoom = math.floor(math.log2(pixel * MAP_PIXELS / extent))
+    zoom = math.floor(math.log2(pixel * map_pixels / extent))
     return max(MIN_ZOOM, min(MAX_ZOOM, zoom))

@@ -6,10 +6,6 @@ from netsp.exchange.missions.waypoints import Waypoint, clearance_of
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
 
-LEAST_SLACK, LEAST_CLEARANCE = 0.3, 0.2
-"""Metres: a vehicle that flew exported missions lost 0.13 m of clearance and took up to 0.16 m more
-tether than planned."""
-
 
 def warnings(
     problem: Problem, solution: Solution, points: list[Waypoint], slack: float, clearance: float

@@ -10,8 +10,7 @@ from netsp.exchange.maps.goal_depths import height_warning
 from netsp.exchange.missions.fence import Fence
 from netsp.exchange.missions.mission_files import (
     FOR_VEHICLES,
-    SHALLOWEST,
-    Settings,
+    ExportSettings,
     fence_of_points,
     not_written,
     told_apart,
@@ -37,7 +36,7 @@ class ExportNotes:
 
 
 def export_notes(
-    problem: Problem, points: list[Waypoint], kind: str, settings: Settings
+    problem: Problem, points: list[Waypoint], kind: str, settings: ExportSettings
 ) -> ExportNotes:
     """Return the notes and warnings on an exported tour.
 
@@ -49,8 +48,8 @@ def export_notes(
         Waypoints that were written.
     kind : str
         One of `netsp.exchange.missions.FORMATS`.
-    settings : Settings
-        Settings of the file.
+    settings : ExportSettings
+        ExportSettings of the file.
     """
     warnings, notes = [], []
     if kind != "csv" and (text := not_written(problem, kind)):
@@ -58,37 +57,39 @@ def export_notes(
     if kind in FOR_VEHICLES and (text := bend_note(points, settings)):
         notes.append(text)
     if kind in FOR_VEHICLES:
+        min_depth = settings.policy.min_depth
         if kind == "plan":
             warnings += fence_warnings(problem, fence_of_points(problem, points, settings))
-        remedy = f"heights are negative below it; moved to {SHALLOWEST} m of depth"
+        remedy = f"heights are negative below it; moved to {min_depth} m of depth"
         if (text := height_warning(problem, remedy)) is not None:
             warnings.append(text)
         high = sum(p.goal is not None and p.goal >= 0 and p.position[2] > 0.0 for p in points)
-        shallow = sum(p.position[2] > -SHALLOWEST for p in points) - high
+        shallow = sum(p.position[2] > -min_depth for p in points) - high
         if shallow:
             notes.append(
-                f"{counted(shallow, 'waypoint')} shallower than {SHALLOWEST} m moved to that depth"
+                f"{counted(shallow, 'waypoint')} shallower than {min_depth} m moved to that depth"
             )
         notes.append("home is assumed to be at the surface above the base; do not set it by hand")
     return ExportNotes(tuple(warnings), tuple(notes))
 
 
-def bend_note(points: list[Waypoint], settings: Settings) -> str | None:
+def bend_note(points: list[Waypoint], settings: ExportSettings) -> str | None:
     """Return a note if the vehicle holds longer at bends than the settings say; None otherwise.
 
     Parameters
     ----------
     points : list of Waypoint
         Waypoints that were written.
-    settings : Settings
-        Settings of the file.
+    settings : ExportSettings
+        ExportSettings of the file.
     """
-    seconds = told_apart(points, settings).bend
-    if seconds <= settings.bend:
+    seconds = told_apart(points, settings).bend_hold_s
+    if seconds <= settings.bend_hold_s:
         return None
     return (
-        f"the vehicle holds {seconds} s at bends instead of {settings.bend} s, because it holds "
-        f"{settings.bend} s at a goal: netsp import tells goals from bends by these times"
+        f"the vehicle holds {seconds} s at bends instead of {settings.bend_hold_s} s, because it "
+        f"holds {settings.bend_hold_s} s at a goal: netsp import tells goals from bends by these "
+        "times"
     )
 
 

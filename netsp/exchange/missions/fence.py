@@ -19,21 +19,6 @@ from netsp.base.errors import InputError
 from netsp.base.field_types import Point2
 from netsp.model.problem import Circle, Polygon, Problem
 
-GROWTH_STEPS = 8
-"""Number of growth limits up to the largest one; zones grow by the smallest limit that makes the
-fence fit."""
-
-MIN_FENCE_BYTES = 18
-"""Bytes of the smallest fence with a zone: header, end mark and one circle."""
-
-QUARTER_SEGMENTS = 16
-"""Segments per quarter circle of the region that a zone may fill; they cut its growth limit by up
-to 0.12 %."""
-
-ROUNDING = 2e-3
-"""Distance, m, below which a path counts as touching a zone: plan files round radii up to 1 mm and
-coordinates to 0.1 mm."""
-
 
 @dataclass(frozen=True)
 class FencePolicy:
@@ -57,6 +42,18 @@ class FencePolicy:
     max_growth
         Share of the clearance by which a simplified zone may reach beyond its obstacle, from 0 to
         less than 1. The path keeps the whole clearance; the rest is room for the vehicle's errors.
+    growth_steps
+        Number of growth limits up to the largest; zones grow by the smallest limit at which the
+        fence fits.
+    offset_shares
+        Shares of the growth limit by which an obstacle is offset before its outline is simplified
+        with the rest of the limit.
+    quarter_segments
+        Number of segments of a quarter circle of the region that a zone may fill; 16 segments cut
+        its growth limit by up to 0.12 %.
+    touch_distance
+        Distance below which a path touches a zone, m: plan files round radii up to 1 mm and
+        coordinates to 0.1 mm.
     """
 
     max_bytes: int = 672
@@ -66,15 +63,23 @@ class FencePolicy:
     corner_bytes: int = 8
     max_corners: int = 255
     max_growth: float = 0.5
+    growth_steps: int = 8
+    offset_shares: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75)
+    quarter_segments: int = 16
+    touch_distance: float = 2e-3
 
     def __post_init__(self) -> None:
-        if not self.max_bytes >= self.head_bytes + self.circle_bytes:
+        if not self.max_bytes >= self.min_bytes:
             raise InputError(
-                f"max_bytes: expected {self.head_bytes + self.circle_bytes} or more, got "
-                f"{self.max_bytes!r}"
+                f"max_bytes: expected {self.min_bytes} or more, got {self.max_bytes!r}"
             )
         if not 0.0 <= self.max_growth < 1.0:
             raise InputError(f"max_growth: expected 0 to less than 1, got {self.max_growth!r}")
+
+    @property
+    def min_bytes(self) -> int:
+        """Size of the smallest fence with a zone: one circle."""
+        return self.head_bytes + self.circle_bytes
 
     def size(self, zones: Sequence[Zone]) -> int:
         """Return the number of bytes of a fence.
@@ -164,8 +169,8 @@ def fence_of(
     If the exact obstacles take too many bytes, polygons are simplified: a polygon with fewer
     corners, or a circle, replaces each. A simplified zone contains its obstacle, reaches beyond it
     by a share of the clearance at most, and does not touch the path. The share is the smallest of
-    `GROWTH_STEPS` shares at which the fence fits. If none fits, the fence takes obstacles by their
-    distance from the path, the nearest first, and leaves out those that do not fit any more.
+    `policy.growth_steps` shares at which the fence fits. If none fits, the fence takes obstacles by
+    their distance from the path, the nearest first, and leaves out those that do not fit any more.
 
     Parameters
     ----------
@@ -200,7 +205,7 @@ def fence_of(
     kept.sort(key=lambda z: z.obstacle)
     held = {z.obstacle for z in kept}
     out = tuple(k for k in range(len(problem.obstacles)) if k not in held)
-    touched = tuple(z.obstacle for z in kept if _distance(z.shape, line) <= ROUNDING)
+    touched = tuple(z.obstacle for z in kept if _distance(z.shape, line) <= policy.touch_distance)
     return Fence(tuple(kept), out, policy.size(kept), touched)
 
 
@@ -209,7 +214,7 @@ def _fitting_zones(problem: Problem, line: shapely.LineString, policy: FencePoli
     fit."""
 
     def grown(step: int) -> list[Zone]:
-        most = policy.max_growth * problem.clearance * step / GROWTH_STEPS
+        most = policy.max_growth * problem.clearance * step / policy.growth_steps
         return [_simplified(z, problem.obstacles[z.obstacle], most, line, policy) for z in exact]
 
     def fits(zones: list[Zone]) -> bool:
@@ -220,7 +225,7 @@ def _fitting_zones(problem: Problem, line: shapely.LineString, policy: FencePoli
     exact = [Zone(k, o) for k, o in enumerate(problem.obstacles)]
     if fits(exact):
         return exact
-    too_small, step = 0, GROWTH_STEPS
+    too_small, step = 0, policy.growth_steps
     zones = grown(step)
     if not fits(zones):
         return zones
@@ -257,14 +262,14 @@ def _simplified(
     if isinstance(obstacle, Circle) or most <= 0.0:
         return zone
     body = shapely.Polygon(obstacle.polygon)
-    limit = body.buffer(most, quad_segs=QUARTER_SEGMENTS)
+    limit = body.buffer(most, quad_segs=policy.quarter_segments)
     best = zone
-    for share in (0.0, 0.25, 0.5, 0.75):
+    for share in policy.offset_shares:
         wide = body.buffer(share * most, join_style="mitre") if share else body
         for shape in (wide.simplify((1.0 - share) * most), wide.convex_hull.simplify(0.5 * most)):
             if shape.geom_type != "Polygon" or shape.interiors or len(shape.exterior.coords) < 4:
                 continue
-            is_clear = shape.distance(line) > ROUNDING
+            is_clear = shape.distance(line) > policy.touch_distance
             if not (is_clear and shape.covers(body) and limit.covers(shape)):
                 continue
             corners = tuple((float(x), float(y)) for x, y in shape.exterior.coords[:-1])
@@ -272,12 +277,14 @@ def _simplified(
             if policy.size_of(tried) < policy.size_of(best):
                 best = tried
     circle = _circle_about(obstacle)
-    outside = circle.radius / np.cos(np.pi / (4.0 * QUARTER_SEGMENTS))  # of a polygon around it
-    disc = shapely.Point(circle.center).buffer(outside, quad_segs=QUARTER_SEGMENTS)
+    outside = circle.radius / np.cos(
+        np.pi / (4.0 * policy.quarter_segments)
+    )  # of a polygon around it
+    disc = shapely.Point(circle.center).buffer(outside, quad_segs=policy.quarter_segments)
     round_zone = Zone(zone.obstacle, circle, most)
     if (
         limit.covers(disc)
-        and _distance(circle, line) > ROUNDING
+        and _distance(circle, line) > policy.touch_distance
         and policy.size_of(round_zone) < policy.size_of(best)
     ):
         best = round_zone

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape, quoteattr
 
 from netsp.base.errors import InputError
+from netsp.exchange.missions.export_policy import DEFAULT_EXPORT, ExportPolicy
 from netsp.model.problem import Circle, Problem
 from netsp.plan.tour_plan import HOME
 
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
     from netsp.base.arrays import Floats
     from netsp.exchange.maps.projection import Projection
     from netsp.exchange.missions.waypoints import Waypoint
-
-CIRCLE_CORNERS = 64
-"""Corners of the polygon, on the circle, that stands for a round obstacle; KML has no circle."""
 
 STYLES = {
     "base": "<IconStyle><scale>1.2</scale><Icon><href>"
@@ -39,7 +37,12 @@ STYLES = {
 """Style of each kind of placemark; colours are alpha, blue, green, red."""
 
 
-def kml_of(problem: Problem, points: Sequence[Waypoint], projection: Projection) -> str:
+def kml_of(
+    problem: Problem,
+    points: Sequence[Waypoint],
+    projection: Projection,
+    policy: ExportPolicy = DEFAULT_EXPORT,
+) -> str:
     """Return a tour as a KML document.
 
     Parameters
@@ -81,7 +84,7 @@ def kml_of(problem: Problem, points: Sequence[Waypoint], projection: Projection)
             page.placemark("goal", page.point(goal.position), name=goal.name, said=said, data=data)
         )
     obstacles = [
-        page.placemark("obstacle", page.polygon(_outline(o)), name=o.name)
+        page.placemark("obstacle", page.polygon(_outline(o, policy.circle_corners)), name=o.name)
         for o in problem.obstacles
     ]
     path = page.placemark("path", page.line([p.position for p in points]), name="tour")
@@ -143,11 +146,11 @@ def _text(text: object) -> str:
     return escape(str(text))
 
 
-def _outline(obstacle: Any) -> list[tuple[float, float]]:
+def _outline(obstacle: Any, n_corners: int) -> list[tuple[float, float]]:
     if not isinstance(obstacle, Circle):
         return [(float(x), float(y)) for x, y in obstacle.polygon]
     (x, y), r = obstacle.center, obstacle.radius
-    turns = (2.0 * math.pi * k / CIRCLE_CORNERS for k in range(CIRCLE_CORNERS))
+    turns = (2.0 * math.pi * k / n_corners for k in range(n_corners))
     return [(x + r * math.cos(a), y + r * math.sin(a)) for a in turns]
 
 

@@ -22,13 +22,13 @@ from netsp.base.errors import InputError
 from netsp.base.field_types import Point3
 
 GRAVITY = 9.80665
-"""Acceleration of gravity, m/s²; ArduPilot states horizontal acceleration as an angle of lean."""
+"""Physical constant: standard gravity, m/s²."""
 
-HALVINGS = 40
-"""Bisection steps for peak speed and acceleration: their error is below 1e-12 of their limit."""
+BISECTIONS = 40
+"""Tolerance of bisections, as their number: the error is below 1e-12 of the upper limit."""
 
 COINCIDENT = 1e-6
-"""Distance below which two waypoints are one, m: a leg without a direction."""
+"""Tolerance of rounding: nearer waypoints are one, m, because their leg has no direction."""
 
 
 @dataclass(frozen=True)
@@ -383,7 +383,7 @@ def _over(limit: float, share: float) -> float:
 def _bisected(is_below: Callable[[float], bool], high: float) -> float:
     """Return the largest number up to a bound for which a monotone condition holds."""
     low = 0.0
-    for _ in range(HALVINGS):
+    for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if is_below(middle) else (low, middle)
     return low

@@ -23,21 +23,18 @@ from netsp.exchange.maps.projection import Projection
 from netsp.exchange.missions.mission_files import (
     FOR_VEHICLES,
     FORMATS,
-    Settings,
+    ExportSettings,
     check_settings,
     told_apart,
     write_page,
 )
-from netsp.exchange.missions.waypoints import STRAIGHT, Waypoint, turn
+from netsp.exchange.missions.waypoints import TURN_TOLERANCE, Waypoint, turn
 from netsp.model.problem import Goal, Problem
 from netsp.plan.space.planning_context import PlanningContext
 from netsp.plan.tour_plan import HOME
 from netsp.world.mission.mission import Mission
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
-
-SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Of the acceptance radius: a vehicle cuts corners by as much as that, or by less."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +63,7 @@ def export_mission(
     projection: Projection | None = None,
     *,
     acceptance: float = 0.0,
-    settings: Settings | None = None,
+    settings: ExportSettings | None = None,
     surface: float = 0.0,
     scene: Scene | None = None,
 ) -> Exported:
@@ -84,7 +81,7 @@ def export_mission(
         From (x, y) to degrees; needed by all but csv.
     acceptance : float
         The vehicle's acceptance radius, metres.
-    settings : Settings, optional
+    settings : ExportSettings, optional
         Speed, seconds at waypoints and more of the format.
     surface : float
         z of the water's surface, metres.
@@ -106,7 +103,7 @@ def export_mission(
         raise InputError("tour: the mission has none; expected one that `netsp solve` has planned")
     if mission.track:
         raise InputError("track: a ground station knows no moving anchor; expected none")
-    settings = settings or Settings()
+    settings = settings or ExportSettings()
     acceptance = checked_argument("acceptance", acceptance, 0.0)
     check_settings(kind, settings)
     if projection is None and kind != "csv":
@@ -128,7 +125,7 @@ def export_mission(
     context = PlanningContext.for_mission(mission, scene, field)
     line = np.array([p.position for p in points])
     longest = 0.0
-    for share in SHARES if acceptance else SHARES[:1]:
+    for share in settings.policy.corner_shares if acceptance else (0.0,):
         way = pursued(line, share * acceptance) if share else line
         _check_free(field, way, share * acceptance)
         longest = max(longest, _checked(context, points, way, share == 0.0))
@@ -169,7 +166,7 @@ def _bends(path: tuple[Point3, ...]) -> list[Waypoint]:
     return [
         Waypoint(tuple(b.tolist()), None)
         for a, b, c in zip(line, line[1:], line[2:], strict=False)
-        if turn(a, b, c) > STRAIGHT
+        if turn(a, b, c) > TURN_TOLERANCE
     ]
 
 

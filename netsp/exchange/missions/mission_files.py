@@ -29,6 +29,7 @@ from netsp.base.field_types import checked_argument, checked_instance
 from netsp.base.files import cell, write_bytes, write_text
 from netsp.exchange.maps.projection import Projection
 from netsp.exchange.missions.cockpit_mission import cockpit_mission
+from netsp.exchange.missions.export_policy import DEFAULT_EXPORT, ExportPolicy
 from netsp.exchange.missions.fence import Fence, FencePolicy, fence_of
 from netsp.exchange.missions.kml import kml_of, kmz_of
 from netsp.exchange.missions.leg_times import VehicleMotion, leg_times
@@ -37,26 +38,33 @@ from netsp.model.problem import Circle, Problem
 from netsp.model.solution import Solution
 from netsp.plan.tour_plan import HOME
 
-SHALLOWEST = 0.1
-"""Metres of depth that the least altitude stands for."""
+NAV_WAYPOINT = 16
+"""Code of MAVLink's command NAV_WAYPOINT."""
 
-HOLD = 5
-"""Seconds at every goal, where nothing else is said."""
+DO_CHANGE_SPEED = 178
+"""Code of MAVLink's command DO_CHANGE_SPEED."""
 
-MOST_ITEMS = 650
-"""Mission items: MAVLink counts to 65,535, but ArduSub takes 655 with home and the speed."""
+FRAME_RELATIVE_ALTITUDE = 3
+"""Code of the frame of latitude, longitude and altitude above home."""
 
-FASTEST = 20.0
-"""Metres per second that no underwater vehicle reaches."""
+FRAME_MISSION = 2
+"""Code of the frame of commands without a place."""
 
-NAV_WAYPOINT, CHANGE_SPEED, RELATIVE_ALTITUDE, MISSION_FRAME = 16, 178, 3, 2
-GROUND_SPEED, KEEP_THROTTLE = 1, -1
+GROUND_SPEED = 1
+"""Code of the speed over ground in DO_CHANGE_SPEED."""
 
-ARDUPILOT, SUBMARINE = 3, 12
+KEEP_THROTTLE = -1
+"""Sentinel for an unchanged throttle in DO_CHANGE_SPEED."""
+
+AUTOPILOT_ARDUPILOT = 3
+"""Code of ArduPilot in MAV_AUTOPILOT."""
+
+VEHICLE_SUBMARINE = 12
+"""Code of a submarine in MAV_TYPE."""
 
 
 @dataclass(frozen=True)
-class Settings:
+class ExportSettings:
     """What a mission file is to say.
 
     Attributes
@@ -74,11 +82,12 @@ class Settings:
         Policy of what the fence of a plan may take.
     """
 
-    hold: int | None = None
-    bend: int = 1
+    goal_hold_s: int | None = None
+    bend_hold_s: int = 1
     speed: float | None = 0.5
-    max_waypoints: int = MOST_ITEMS
+    max_waypoints: int = 650
     fence: FencePolicy = field(default_factory=FencePolicy)
+    policy: ExportPolicy = DEFAULT_EXPORT
 
 
 def export(
@@ -89,7 +98,7 @@ def export(
     projection: Projection | None = None,
     *,
     acceptance: float = 0.0,
-    settings: Settings | None = None,
+    settings: ExportSettings | None = None,
 ) -> list[Waypoint]:
     """Write a solution as a mission file.
 
@@ -107,7 +116,7 @@ def export(
         From the plane to degrees; by default that of the problem's origin. Needed by all but csv.
     acceptance : float
         The vehicle's acceptance radius, metres.
-    settings : Settings, optional
+    settings : ExportSettings, optional
         Speed, dwell and more of the format.
 
     Returns
@@ -132,7 +141,7 @@ def export(
             f"units: format {kind!r} is in metres; expected a problem in m, got {problem.units!r}"
         )
     acceptance = checked_argument("acceptance", acceptance, 0.0)
-    settings = settings or Settings()
+    settings = settings or ExportSettings()
     check_settings(kind, settings)
     projection = projection or Projection.of(problem)
     if projection is None and kind != "csv":
@@ -140,7 +149,8 @@ def export(
             f"origin: format {kind!r} needs latitude and longitude of the base; expected --origin "
             "LAT,LON, or the field origin in the problem"
         )
-    points = [start_of(problem, solution), *waypoints_of(problem, solution, acceptance)]
+    path = waypoints_of(problem, solution, acceptance, settings.policy)
+    points = [start_of(problem, solution), *path]
     settings = told_apart(points, settings)
     if len(points) > settings.max_waypoints and kind in FOR_VEHICLES:
         raise InputError(
@@ -174,14 +184,14 @@ def write_page(file: str | Path, kind: str, text: str) -> None:
         write_text(file, text)
 
 
-def check_settings(kind: str, settings: Settings) -> None:
+def check_settings(kind: str, settings: ExportSettings) -> None:
     """What a mission file is to say, asked before anything is written.
 
     Parameters
     ----------
     kind : str
         One of `FORMATS`.
-    settings : Settings
+    settings : ExportSettings
         Of the file.
 
     Raises
@@ -191,15 +201,17 @@ def check_settings(kind: str, settings: Settings) -> None:
     """
     if not isinstance(kind, str) or kind not in FORMATS:
         raise InputError(f"format: expected {', '.join(FORMATS)}, got {kind!r}")
-    if settings.speed is not None and not checked_argument("speed", settings.speed, 0.0, FASTEST):
+    speed, policy = settings.speed, settings.policy
+    if speed is not None and not checked_argument("speed", speed, 0.0, policy.max_speed):
         raise InputError("speed: expected more than 0, got 0")
-    for name, least in (("hold", 0), ("bend", 1)):
-        seconds = getattr(settings, name)
-        if name == "hold" and seconds is None:
-            continue
-        if not isinstance(seconds, int | np.integer) or not least <= seconds <= 3600:
+    holds = [("bend", settings.bend_hold_s, 1)]
+    if settings.goal_hold_s is not None:
+        holds.insert(0, ("hold", settings.goal_hold_s, 0))
+    for name, hold_s, min_s in holds:
+        if not isinstance(hold_s, int | np.integer) or not min_s <= hold_s <= policy.max_hold_s:
             raise InputError(
-                f"{name}: expected whole seconds from {least} to 3600, got {seconds!r}"
+                f"{name}: expected whole seconds from {min_s} to {policy.max_hold_s}, got "
+                f"{hold_s!r}"
             )
     checked_argument("max_waypoints", settings.max_waypoints, 1)
 
@@ -211,7 +223,7 @@ def start_of(problem: Problem, solution: Solution) -> Waypoint:
 
 
 def predicted_s(
-    points: list[Waypoint], settings: Settings, motion: VehicleMotion | None = None
+    points: list[Waypoint], settings: ExportSettings, motion: VehicleMotion | None = None
 ) -> float | None:
     """Return the seconds that a mission takes from its first waypoint on; None without a speed.
 
@@ -219,7 +231,7 @@ def predicted_s(
     ----------
     points : list of Waypoint
         Waypoints of the mission, the start first.
-    settings : Settings
+    settings : ExportSettings
         Speed and holds.
     motion : VehicleMotion, optional
         Motion of the vehicle; by default that of ArduSub as it comes.
@@ -228,11 +240,11 @@ def predicted_s(
         return None
     told = told_apart(points, settings)
     holds = [_hold(p, told) for p in points]
-    places = [(*p.position[:2], altitude(p.position[2])) for p in points]
+    places = [(*p.position[:2], altitude(p.position[2], settings.policy)) for p in points]
     return holds[0] + sum(leg_times(places, holds, settings.speed, motion))
 
 
-def fence_of_points(problem: Problem, points: list[Waypoint], settings: Settings) -> Fence:
+def fence_of_points(problem: Problem, points: list[Waypoint], settings: ExportSettings) -> Fence:
     """Return the fence that a plan of these waypoints has."""
     return fence_of(problem, [p.position[:2] for p in points], settings.fence)
 
@@ -259,12 +271,12 @@ def not_written(problem: Problem, kind: str) -> str | None:
     return f"not written in this format: {', '.join(lost)}" if lost else None
 
 
-def altitude(z: float) -> float:
+def altitude(z: float, policy: ExportPolicy = DEFAULT_EXPORT) -> float:
     """The relative altitude that stands for a height."""
-    return round(min(z, -SHALLOWEST), 3)
+    return round(min(z, -policy.min_depth), 3)
 
 
-def told_apart(points: Sequence[Waypoint], settings: Settings) -> Settings:
+def told_apart(points: Sequence[Waypoint], settings: ExportSettings) -> ExportSettings:
     """Return the settings with a hold at bends that differs from the hold at every goal.
 
     An import tells goals from bends by these times, because a ground station keeps no other mark of
@@ -274,24 +286,31 @@ def told_apart(points: Sequence[Waypoint], settings: Settings) -> Settings:
     ----------
     points : sequence of Waypoint
         Waypoints that are written.
-    settings : Settings
-        Settings of the file; their hold at bends is the minimum.
+    settings : ExportSettings
+        ExportSettings of the file; their hold at bends is the minimum.
     """
     holds = {_hold(p, settings) for p in points if p.goal not in (None, HOME)}
-    free = (s for s in range(settings.bend, settings.bend + len(holds) + 1) if s not in holds)
-    return replace(settings, bend=next(free))
+    free = (
+        s
+        for s in range(settings.bend_hold_s, settings.bend_hold_s + len(holds) + 1)
+        if s not in holds
+    )
+    return replace(settings, bend_hold_s=next(free))
 
 
-def _hold(point: Waypoint, settings: Settings) -> int:
+def _hold(point: Waypoint, settings: ExportSettings) -> int:
     if point.goal in (None, HOME):
-        return settings.bend
-    if settings.hold is not None:
-        return settings.hold
-    return HOLD if point.stay is None else point.stay
+        return settings.bend_hold_s
+    if settings.goal_hold_s is not None:
+        return settings.goal_hold_s
+    return settings.policy.default_hold_s if point.stay is None else point.stay
 
 
 def _plan(
-    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+    problem: Problem,
+    points: list[Waypoint],
+    projection: Projection | None,
+    settings: ExportSettings,
 ) -> str:
     assert projection is not None
     places = projection.to_earth([p.position[:2] for p in points])
@@ -299,10 +318,10 @@ def _plan(
         {
             "type": "SimpleItem",
             "command": NAV_WAYPOINT,
-            "frame": RELATIVE_ALTITUDE,
+            "frame": FRAME_RELATIVE_ALTITUDE,
             "autoContinue": True,
             "AltitudeMode": 1,
-            "Altitude": altitude(p.position[2]),
+            "Altitude": altitude(p.position[2], settings.policy),
             "AMSLAltAboveTerrain": None,
             "params": [
                 _hold(p, settings),
@@ -311,7 +330,7 @@ def _plan(
                 p.heading,
                 _degrees(lat),
                 _degrees(lon),
-                altitude(p.position[2]),
+                altitude(p.position[2], settings.policy),
             ],
         }
         for p, (lat, lon) in zip(points, places, strict=True)
@@ -321,8 +340,8 @@ def _plan(
     if settings.speed is not None:
         change: dict[str, Any] = {
             "type": "SimpleItem",
-            "command": CHANGE_SPEED,
-            "frame": MISSION_FRAME,
+            "command": DO_CHANGE_SPEED,
+            "frame": FRAME_MISSION,
             "autoContinue": True,
             "params": [GROUND_SPEED, settings.speed, KEEP_THROTTLE, 0, 0, 0, 0],
         }
@@ -359,8 +378,8 @@ def _plan(
         "rallyPoints": {"version": 2, "points": []},
         "mission": {
             "version": 2,
-            "firmwareType": ARDUPILOT,
-            "vehicleType": SUBMARINE,
+            "firmwareType": AUTOPILOT_ARDUPILOT,
+            "vehicleType": VEHICLE_SUBMARINE,
             "globalPlanAltitudeMode": 1,
             "cruiseSpeed": settings.speed or 0.5,
             "hoverSpeed": settings.speed or 0.5,
@@ -384,7 +403,10 @@ def _mark(problem: Problem, point: Waypoint) -> dict[str, Any]:
 
 
 def _wpl(
-    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+    problem: Problem,
+    points: list[Waypoint],
+    projection: Projection | None,
+    settings: ExportSettings,
 ) -> str:
     del problem
     assert projection is not None
@@ -397,7 +419,7 @@ def _wpl(
             [
                 len(rows),
                 0,
-                RELATIVE_ALTITUDE,
+                FRAME_RELATIVE_ALTITUDE,
                 NAV_WAYPOINT,
                 _hold(p, settings),
                 0,
@@ -405,7 +427,7 @@ def _wpl(
                 p.heading or 0,
                 _degrees(lat),
                 _degrees(lon),
-                altitude(p.position[2]),
+                altitude(p.position[2], settings.policy),
                 1,
             ]
         )
@@ -414,8 +436,8 @@ def _wpl(
                 [
                     2,
                     0,
-                    MISSION_FRAME,
-                    CHANGE_SPEED,
+                    FRAME_MISSION,
+                    DO_CHANGE_SPEED,
                     GROUND_SPEED,
                     settings.speed,
                     KEEP_THROTTLE,
@@ -430,12 +452,17 @@ def _wpl(
 
 
 def _cockpit(
-    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+    problem: Problem,
+    points: list[Waypoint],
+    projection: Projection | None,
+    settings: ExportSettings,
 ) -> str:
     assert projection is not None
     holds = [_hold(p, settings) for p in points]
-    depths = [altitude(p.position[2]) for p in points]
-    return cockpit_mission(problem.name, points, holds, depths, projection, settings.speed)
+    depths = [altitude(p.position[2], settings.policy) for p in points]
+    return cockpit_mission(
+        problem.name, points, holds, depths, projection, settings.speed, settings.policy
+    )
 
 
 def _cell(value: Any) -> str:
@@ -448,7 +475,10 @@ def _degrees(value: float) -> float:
 
 
 def _geojson(
-    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+    problem: Problem,
+    points: list[Waypoint],
+    projection: Projection | None,
+    settings: ExportSettings,
 ) -> str:
     del settings
     assert projection is not None
@@ -511,7 +541,10 @@ def _counter_clockwise(corners: Any) -> Any:
 
 
 def _csv(
-    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+    problem: Problem,
+    points: list[Waypoint],
+    projection: Projection | None,
+    settings: ExportSettings,
 ) -> str:
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
@@ -532,14 +565,16 @@ def _csv(
 
 
 def _kml(
-    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+    problem: Problem,
+    points: list[Waypoint],
+    projection: Projection | None,
+    settings: ExportSettings,
 ) -> str:
-    del settings
     assert projection is not None
-    return kml_of(problem, points, projection)
+    return kml_of(problem, points, projection, settings.policy)
 
 
-FORMATS: dict[str, Callable[[Problem, list[Waypoint], Projection | None, Settings], str]] = {
+FORMATS: dict[str, Callable[[Problem, list[Waypoint], Projection | None, ExportSettings], str]] = {
     "plan": _plan,
     "wpl": _wpl,
     "cockpit": _cockpit,
@@ -551,9 +586,6 @@ FORMATS: dict[str, Callable[[Problem, list[Waypoint], Projection | None, Setting
 
 FOR_VEHICLES = ("plan", "wpl", "cockpit")
 """Formats that are uploaded to a vehicle, with its limits and depths."""
-
-__all__ = ["FORMATS", "FOR_VEHICLES", "Settings", "altitude", "export"]
-
 
 EXTENSIONS = {
     ".plan": "plan",

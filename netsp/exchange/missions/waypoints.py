@@ -16,6 +16,7 @@ import shapely
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
+from netsp.exchange.missions.export_policy import DEFAULT_EXPORT, ExportPolicy
 from netsp.hsignature import Word, concatenate, crossings, signature
 from netsp.model.problem import Circle, Problem
 from netsp.model.solution import Solution
@@ -24,14 +25,8 @@ from netsp.plan.tour_plan import HOME, legs_of
 Mark = tuple[int | None, Word, float]
 """Goal, word and tether of a waypoint, as in `Waypoint`."""
 
-STRAIGHT = 1e-6
-"""Bends of fewer radians are none."""
-
-COARSE = np.radians(30.0)
-"""Bends of an arc are joined up to this turn: 3.5 % of its radius farther out."""
-
-OUTWARD = (1.0, 2.0, 4.0)
-"""A bend is moved outward by so many acceptance radii, the least that helps."""
+TURN_TOLERANCE = 1e-6
+"""Tolerance of rounding: a smaller turn is no bend, radians."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +60,12 @@ class Waypoint:
     stay: int | None = None
 
 
-def waypoints_of(problem: Problem, solution: Solution, radius: float = 0.0) -> list[Waypoint]:
+def waypoints_of(
+    problem: Problem,
+    solution: Solution,
+    radius: float = 0.0,
+    policy: ExportPolicy = DEFAULT_EXPORT,
+) -> list[Waypoint]:
     """The waypoints of a solution, without the start.
 
     Parameters
@@ -107,14 +107,19 @@ def waypoints_of(problem: Problem, solution: Solution, radius: float = 0.0) -> l
         if (
             k + 1 < len(points)
             and kinds[k][0] is None
-            and turn(here, points[k], points[k + 1]) < STRAIGHT
+            and turn(here, points[k], points[k + 1]) < TURN_TOLERANCE
         ):
             continue
         keep.append(k)
     line = np.array([points[k] for k in keep])
     marks = [kinds[k] for k in keep]
-    line, marks = _coarsened(line, marks, [o.shape(problem.clearance) for o in problem.obstacles])
-    line = _widened(line, marks, solids, radius)
+    line, marks = _coarsened(
+        line,
+        marks,
+        [o.shape(problem.clearance) for o in problem.obstacles],
+        policy.max_arc_turn,
+    )
+    line = _widened(line, marks, solids, radius, policy.bend_shifts)
     _check_class(problem, solution, line, marks)
     return [
         Waypoint((float(x), float(y), float(z)), *mark)
@@ -137,10 +142,13 @@ def clearance_of(problem: Problem, points: list[Waypoint]) -> float:
 
 
 def _coarsened(
-    line: Floats, marks: list[Mark], grown: list[shapely.Polygon]
+    line: Floats, marks: list[Mark], grown: list[shapely.Polygon], max_turn: float
 ) -> tuple[Floats, list[Mark]]:
-    """Arcs with fewer bends: those in a row that turn one way by `COARSE` or less in all become the
-    one where the line before them meets the line after them, farther out, if that is free."""
+    """Return a path with fewer bends along its arcs.
+
+    Consecutive bends that turn one way by `max_turn` or less in all become the one where the line
+    before them meets the line after them, farther out, if that is free.
+    """
     slim = [g.buffer(-1e-6 * float(np.ptp(line[:, :2]))) for g in grown]
     tree = shapely.STRtree(slim) if slim else None
     out, kept, k = [line[0]], [marks[0]], 1
@@ -150,7 +158,7 @@ def _coarsened(
         total = 0.0
         while m + 1 < len(line) and marks[m][0] is None:
             total += _side(out[-1] if m == k else line[m - 1], line[m], line[m + 1])
-            if abs(total) > COARSE:
+            if abs(total) > max_turn:
                 break
             corner = _meeting(out[-1], line[k], line[m], line[m + 1]) if m > k else line[k]
             if corner is not None:
@@ -216,7 +224,11 @@ def turn(a: Floats, b: Floats, c: Floats) -> float:
 
 
 def _widened(
-    line: Floats, marks: list[Mark], solids: list[shapely.Polygon], radius: float
+    line: Floats,
+    marks: list[Mark],
+    solids: list[shapely.Polygon],
+    radius: float,
+    shifts: tuple[float, ...],
 ) -> Floats:
     """The bends moved outward where a vehicle could cut through something."""
     if radius <= 0.0 or not solids:
@@ -231,7 +243,7 @@ def _widened(
         far = float(np.linalg.norm(away))
         if far == 0.0:
             continue
-        for times in OUTWARD:
+        for times in shifts:
             tried = out.copy()
             tried[k, :2] += away / far * times * radius
             free = not any(
