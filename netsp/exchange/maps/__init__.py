@@ -1,4 +1,4 @@
-"""Real places: maps become problems, and what is planned is told in latitude and longitude."""
+"""Import of maps as problems, and the projection between a problem's plane and the earth."""
 
 from netsp.exchange.maps.projection import Projection
 from netsp.exchange.maps.read_map import read_site

@@ -98,7 +98,7 @@ FLOATING = frozenset(_GROUPS[MOORED].split())
 """Classes of buoys and lightships."""
 
 REASONS = {layer: reason for reason, layers in _GROUPS.items() for layer in layers.split()}
-"""Why features of a class are left out."""
+"""Reasons to leave features out, by their class."""
 
 UNKNOWN = "an object class that is not in the catalogue of S-57"
 """Reason to leave out a feature whose class is in no group."""
@@ -121,18 +121,7 @@ class ChartDecision:
 
 
 def chart_kind(feature: Feature) -> ChartDecision:
-    """Decide by object class and attributes what a feature of a chart is.
-
-    Parameters
-    ----------
-    feature : Feature
-        The feature.
-
-    Returns
-    -------
-    ChartDecision
-        Its kind, or the reason to leave it out.
-    """
+    """Return the kind of a chart's feature by its object class and attributes."""
     layer = feature.layer.upper()
     if layer in BEACONS and _code(feature, "bcnshp") == BUOYANT_BEACON:
         return ChartDecision("ignore", "a beacon that floats")
@@ -150,17 +139,9 @@ def chart_kind(feature: Feature) -> ChartDecision:
 
 
 def lone_equipment(features: Sequence[Feature], policy: ImportPolicy = DEFAULT_IMPORT) -> set[str]:
-    """Return the equipment that no feature of a chart carries, so that something must stand there.
+    """Return the names (`Feature.where`) of a chart's equipment that no other feature carries.
 
-    Parameters
-    ----------
-    features : sequence of Feature
-        Those of the chart.
-
-    Returns
-    -------
-    set of str
-        Where they are (`Feature.where`).
+    Something that the chart does not show must stand there.
     """
     import shapely
 
@@ -185,18 +166,9 @@ def lone_equipment(features: Sequence[Feature], policy: ImportPolicy = DEFAULT_I
 
 
 def chart_radius(feature: Feature) -> float | None:
-    """Return the radius of a point of a chart from its length and width (`HORLEN`, `HORWID`).
+    """Return the radius of a circle that holds a point feature in any direction, metres.
 
-    Parameters
-    ----------
-    feature : Feature
-        The feature.
-
-    Returns
-    -------
-    float or None
-        Half the diagonal, which holds it in whatever direction it lies, metres; None where the
-        chart gives neither.
+    Half the diagonal of length and width (`HORLEN`, `HORWID`); None if the chart gives neither.
     """
     sides = [s for s in (_size(feature, "horlen"), _size(feature, "horwid")) if s is not None]
     if not sides:
@@ -205,39 +177,17 @@ def chart_radius(feature: Feature) -> float | None:
 
 
 def chart_width(feature: Feature) -> float | None:
-    """Return the width of a line of a chart (`HORWID`).
-
-    Parameters
-    ----------
-    feature : Feature
-        The feature.
-
-    Returns
-    -------
-    float or None
-        Metres; None where the chart does not give it.
-    """
+    """Return the width of a line (`HORWID`), metres; None if the chart does not give it."""
     return _size(feature, "horwid")
 
 
 def depth_range(feature: Feature) -> tuple[float | None, float | None]:
-    """Return the least and the greatest depth of an area (`DRVAL1`, `DRVAL2`).
-
-    Parameters
-    ----------
-    feature : Feature
-        An area of `DEPTH_AREAS`.
-
-    Returns
-    -------
-    tuple of float or None
-        Depths downwards; None where the chart does not give one.
-    """
+    """Return the least and the greatest depth of an area, downwards; None for what is not given."""
     return _number(feature, "drval1"), _number(feature, "drval2")
 
 
 def contour_depth(feature: Feature) -> float | None:
-    """Return the depth of a contour (`VALDCO`), None where the chart does not give it."""
+    """Return the depth of a contour; None if the chart does not give it."""
     return _number(feature, "valdco")
 
 
@@ -247,7 +197,7 @@ def is_covered(feature: Feature) -> bool:
 
 
 def sounding_depth(feature: Feature) -> float | None:
-    """Return the depth of the top of a danger (`VALSOU`), None where the chart does not give it."""
+    """Return the depth of the top of a danger; None if the chart does not give it."""
     return _number(feature, "valsou")
 
 

@@ -33,20 +33,10 @@ if TYPE_CHECKING:
 
 
 def shallow_areas(features: Sequence[Feature], draught: float) -> list[Feature]:
-    """Return the areas of a chart that may be shallower than a draught.
+    """Return the areas of a chart that may be shallower than a draught (metres).
 
-    Parameters
-    ----------
-    features : sequence of Feature
-        Those of the chart.
-    draught : float
-        Depth that is needed, metres.
-
-    Returns
-    -------
-    list of Feature
-        Depth areas and dredged areas whose least depth is less or not given, and areas that nobody
-        has surveyed.
+    These are depth areas and dredged areas whose least depth is smaller or unknown, and unsurveyed
+    areas.
     """
     out = []
     for feature in features:
@@ -62,14 +52,10 @@ def shallow_areas(features: Sequence[Feature], draught: float) -> list[Feature]:
 def shoal_soundings(
     features: Sequence[Feature], draught: float, shallow: Sequence[Feature]
 ) -> list[Feature]:
-    """Return the soundings of a chart that are shallower than a draught.
+    """Return the soundings of a chart that are shallower than a draught (metres).
 
     Parameters
     ----------
-    features : sequence of Feature
-        Those of the chart.
-    draught : float
-        Depth that is needed, metres.
     shallow : sequence of Feature
         Areas that are obstacles already; soundings within them are skipped.
 
@@ -97,21 +83,17 @@ def shoal_soundings(
 def uncharted_share(
     features: Sequence[Feature], plane: Callable[[shapely.Geometry], Any], window: CropWindow
 ) -> float:
-    """Return the share of a window that the chart does not cover.
+    """Return the share of a window, from 0 to 1, that the chart does not cover.
 
     Parameters
     ----------
-    features : sequence of Feature
-        Those of the chart.
     plane : callable
         Projects a shape to the problem's plane.
-    window : CropWindow
-        What the tether reaches.
 
     Returns
     -------
     float
-        Between 0 and 1; 0 where the chart does not say what it covers.
+        0 if the chart does not state what it covers.
     """
     covered = [plane(feature.shape) for feature in features if is_covered(feature)]
     return _share_beyond(covered, window) if covered else 0.0
@@ -120,21 +102,12 @@ def uncharted_share(
 def depthless_share(
     features: Sequence[Feature], plane: Callable[[shapely.Geometry], Any], window: CropWindow
 ) -> float:
-    """Return the share of a window without land, depth area, dredged or unsurveyed area.
+    """Return the share of a window, from 0 to 1, without land, depth, dredged or unsurveyed area.
 
     Parameters
     ----------
-    features : sequence of Feature
-        Those of the chart.
     plane : callable
         Projects a shape to the problem's plane.
-    window : CropWindow
-        What the tether reaches.
-
-    Returns
-    -------
-    float
-        Between 0 and 1.
     """
     classes = (*DEPTH_AREAS, LAND, UNSURVEYED)
     areas = [
@@ -179,30 +152,21 @@ def chart_floor(
     cell: float | None,
     policy: ImportPolicy = DEFAULT_IMPORT,
 ) -> tuple[SeaFloor, FloorFeatures]:
-    """Return the sea floor of a chart, and the features that it is made of.
+    """Return the sea floor of a chart, and the features that shape it.
 
     Parameters
     ----------
-    features : sequence of Feature
-        Those of the chart.
     plane : callable
         Projects a shape to the problem's plane.
     window : CropWindow or None
-        What the floor is to hold; None holds all depth areas.
+        Extent of the floor; None stands for the extent of all depth areas.
     cell : float or None
-        Side of its cells, metres; None takes `policy.floor_cells` along the longer side.
-
-    Returns
-    -------
-    floor : SeaFloor
-        Heights below the chart's datum.
-    found : FloorFeatures
-        What it is made of.
+        Side of its cells, metres; None for `policy.floor_cells` along the longer side.
 
     Raises
     ------
     InputError
-        The chart gives no depth there, or the cells are too small.
+        The chart gives no depth within the window, or the floor would have too many cells.
     """
     found = FloorFeatures()
     areas: list[DepthArea] = []
@@ -260,7 +224,7 @@ def chart_floor(
 
 
 def _depths(feature: Feature, shape: shapely.Geometry) -> Floats | None:
-    """Return x, y and depth of a feature's soundings or corners; None where it gives no depth."""
+    """Return x, y and depth of a feature's soundings or corners; None if it gives no depth."""
     import shapely
 
     places = shapely.get_coordinates(shape)

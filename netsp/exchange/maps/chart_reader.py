@@ -1,4 +1,4 @@
-"""S-57 charts as maps: a cell with its updates, in metres, and the datum of its depths."""
+"""Reader of S-57 charts: a cell with its updates, in metres, and the datum of its depths."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from netsp.exchange.maps.word_tables import words
 from netsp.model.import_record import MAX_NAMED
 
 NUMBERED = re.compile(r"\.(\d{3})$")
-"""Extension of the files of a chart: 000 of a cell, 001 and more of its updates."""
+"""Extension of a chart's files: 000 of a cell, 001 and more of its updates."""
 
 CELL = ".000"
 """Extension of cells."""
@@ -42,10 +42,10 @@ WGS_84 = 2
 GDAL_OPTIONS = {
     "OGR_S57_OPTIONS": "UPDATES=APPLY,SPLIT_MULTIPOINT=OFF,ADD_SOUNDG_DEPTH=OFF,RECODE_BY_DSSI=ON"
 }
-"""Options of GDAL's reader, whatever the environment says."""
+"""Options of GDAL's reader, which override those of the environment."""
 
 DEPTH_UNITS = {1: "m", 3: "ft", 4: "fathom"}
-"""Units of depths by DUNI; 2 is fathoms and feet in one number, which is ambiguous."""
+"""Units of depths by DUNI; 2 (fathoms and feet in one number) is ambiguous and not read."""
 
 HEIGHT_UNITS = {1: "m", 2: "ft"}
 """Units of heights and of lengths by HUNI."""
@@ -72,14 +72,12 @@ DATUMS = dict(enumerate((
 
 @dataclass(frozen=True)
 class CellIdentity:
-    """Edition and update number of a file of a chart.
+    """Edition and update number of a chart's file.
 
     Attributes
     ----------
     purpose
-        EXPP: 1 of a cell, 2 of an update.
-    edition
-        EDTN.
+        EXPP: 1 for a cell, 2 for an update.
     update
         UPDN: number of the last update that the file holds.
     """
@@ -92,15 +90,7 @@ class CellIdentity:
 def is_chart(file: str | Path, policy: ReadPolicy = DEFAULT_READ) -> bool:
     """Return whether a file is a chart, an update or a catalogue of charts, by name or content.
 
-    Parameters
-    ----------
-    file : str or Path
-        Any file, folder or archive.
-
-    Returns
-    -------
-    bool
-        Also True for folders and archives that hold cells, which `read_chart` refuses.
+    True for folders and archives with cells as well, so that `read_chart` can refuse them.
     """
     path = Path(file)
     if NUMBERED.search(path.name):
@@ -118,29 +108,21 @@ def is_chart(file: str | Path, policy: ReadPolicy = DEFAULT_READ) -> bool:
 def read_chart(
     file: str | Path, crs: str | None, units: str | None, policy: ReadPolicy = DEFAULT_READ
 ) -> Map:
-    """Return a chart as a map, with the updates that lie beside it.
+    """Return a chart with the updates beside it as a map in degrees.
 
-    Depths and lengths are in metres, and soundings have heights: their z is negative.
+    Depths and lengths are in metres; the z of soundings is a height, so negative.
 
     Parameters
     ----------
-    file : str or Path
-        A cell.
     crs : str, optional
-        Refused, since charts are in degrees.
+        Refused, because charts are always in degrees.
     units : str, optional
-        Unit of depths from the user, also for lengths if the chart's unit is unknown; None takes
-        the chart's units.
-
-    Returns
-    -------
-    Map
-        In degrees.
+        Unit of depths that the user states, also of lengths if the chart's unit is unknown.
 
     Raises
     ------
     InputError
-        Not a cell, in a unit that is not known, or not readable.
+        The file is no cell or cannot be read, or its unit is unknown.
     """
     _refuse_containers(Path(file), policy)
     check_file(file)
@@ -217,7 +199,7 @@ def _refuse_containers(path: Path, policy: ReadPolicy) -> None:
 
 
 def _cells_in(folder: Path) -> list[str]:
-    """Return the cells in a folder and in those below it, two levels deep as exchange sets are."""
+    """Return the cells in a folder and two levels below it, the depth of an exchange set."""
     patterns = (f"*{CELL}", f"*/*{CELL}", f"*/*/*{CELL}")
     found = [path for pattern in patterns for path in sorted(folder.glob(pattern))]
     return [path.relative_to(folder).as_posix() for path in found]
@@ -245,12 +227,12 @@ def _is_exchange_file(head: bytes) -> bool:
 
 
 def _identity(file: str | Path, policy: ReadPolicy) -> CellIdentity:
-    """Return the identity of a chart file, from its first record (field DSID).
+    """Return the identity of a chart file from its first record (field DSID).
 
     Raises
     ------
     InputError
-        Not a cell of S-57.
+        The file is no cell of S-57.
     """
     head = _head(file, policy)
     if b"INT.IHO.S-1" in head:
@@ -271,7 +253,7 @@ def _identity(file: str | Path, policy: ReadPolicy) -> CellIdentity:
 
 
 def _first_field(head: bytes, tag: bytes) -> bytes | None:
-    """Return a field of the first record behind the description, None without it."""
+    """Return a field of the first record after the description; None if it is missing."""
     try:
         start = int(head[:5])
         leader = head[start : start + LEADER_BYTES]
@@ -324,7 +306,7 @@ def _updates(file: Path, cell: CellIdentity, policy: ReadPolicy) -> tuple[list[P
 
 
 def _update_edition(path: Path, policy: ReadPolicy) -> str | None:
-    """Return the edition that an update belongs to, None where it is none."""
+    """Return the edition of an update's file; None if the file is no update."""
     head = _head(path, policy)
     found = _first_field(head, b"DSID") if _is_exchange_file(head) else None
     texts = found[7:].split(b"\x1f") if found is not None else []
@@ -348,7 +330,7 @@ def _check_coordinates(file: str | Path, head: Mapping[str, Any]) -> None:
 def _units(
     file: str | Path, head: Mapping[str, Any], found: Map, said: str | None
 ) -> tuple[str, str]:
-    """Return the units of depths and of lengths; refuse those that are not known."""
+    """Return the units of depths and of lengths; refuse units that are unknown."""
     wrong: list[str] = []
 
     def known(table: Mapping[int, str], ours: str, theirs: str, what: str) -> str:
@@ -375,7 +357,7 @@ def _units(
 
 
 def _code(value: Any) -> int | None:
-    """Return a code of a list of S-57; None where there is none."""
+    """Return the number of a code of S-57; None without a code."""
     try:
         return int(float(value)) or None
     except (TypeError, ValueError, OverflowError):
@@ -389,7 +371,7 @@ def _datum(code: int | None) -> str:
 
 
 def _other_datums(found: Map, head: Mapping[str, Any]) -> list[str]:
-    """Return a note on depths that count from another datum than the chart's."""
+    """Return notes on depths below another datum than the chart's."""
     groups: dict[str, list[str]] = {}
     for feature in found.features:
         layer, code = feature.layer.upper(), _code(feature.get("verdat"))

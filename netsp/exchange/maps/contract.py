@@ -1,7 +1,7 @@
-"""Contract of docs/sites.md: what each feature of a map is.
+"""Contract of docs/sites.md: the kind of each feature of a map.
 
-The first rule that matches decides: the user (`--map`), a property `kind`, the name of the layer,
-object classes of charts and tags of OpenStreetMap, the shape.
+The first rule that matches decides: the user's `--map`, a property `kind`, the layer's name, object
+classes of charts or tags of OpenStreetMap, the shape.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ SHAPES = {
     "bounds": ("Polygon", "MultiPolygon", "LineString", "MultiLineString"),
     "path": ("LineString", "MultiLineString", "GeometryCollection"),
 }
-"""Shapes that a kind may have; lines of bounds are closed, open ones of obstacles have a width.
+"""Shapes of each kind. Lines of bounds must be closed; open lines of obstacles need a width.
 
 A `GeometryCollection` is a block of a drawing.
 """
@@ -74,7 +74,7 @@ WORDS = {
     **dict.fromkeys(("path", "paths", "cables"), "path"),
     "ignore": "ignore",
 }
-"""Names of layers, lower case."""
+"""Kinds by names of layers, in lower case."""
 
 
 STANDING_POINTS = tags("""
@@ -130,7 +130,7 @@ WATER_AREAS = tags("""
 """Tags of OpenStreetMap's areas of open water: key to values."""
 
 LAYER_SUFFIX = re.compile(r"(\s*\(#\d+\)|\.(kml|kmz|dxf|shp|gpkg|geojson|csv|tab|mif|gml|fgb))+$")
-"""Ends of layers' names that say nothing of their kind: GDAL's numbers, extensions of files."""
+"""Endings of layers' names that do not count: numbers that GDAL adds, extensions of files."""
 
 RADIUS = ("radius_m", "radius")
 WIDTH = ("width_m", "width")
@@ -146,28 +146,28 @@ FIELDS = {
     "clearance": ("clearance",),
     "heading": ("heading",),
 }
-"""Properties of the contract, and the names that they have in files; `--map` adds others."""
+"""Properties of the contract with their names in files; `--map` adds other names."""
 
 
 def words_of(maps: Sequence[tuple[str, str]]) -> tuple[dict[str, str], dict[str, str]]:
-    """What the user says of layers and of properties.
+    """Return the kinds of layers and the names of properties that the user states.
 
     Parameters
     ----------
     maps : sequence of (str, str)
-        As ``("obstacle", "TURBINES")`` or ``("name", "TURB_ID")``.
+        Pairs such as ``("obstacle", "TURBINES")`` or ``("name", "TURB_ID")``.
 
     Returns
     -------
     kinds : dict
-        Layer, lower case, to kind.
+        Layers, in lower case, with their kinds.
     fields : dict
-        Our property to theirs, lower case.
+        Properties of the contract with their names in the file, in lower case.
 
     Raises
     ------
     InputError
-        Neither a kind nor a property.
+        The first of a pair is neither a kind nor a property.
     """
     kinds: dict[str, str] = {}
     fields: dict[str, str] = {}
@@ -184,19 +184,17 @@ def words_of(maps: Sequence[tuple[str, str]]) -> tuple[dict[str, str], dict[str,
 
 
 SHAPE_LAYERS = {"points": "Point", "lines": "Line", "polygons": "Polygon"}
-"""Words that stand for all features of a shape in ``--map``, where no layer has that name."""
+"""Words of ``--map`` for all features of a shape, unless a layer has that name."""
 
 
 @dataclass(frozen=True)
 class Decision:
-    """Kind of a feature, and for one that is left out the reason.
+    """Kind of a feature, and the reason if it is left out.
 
     Attributes
     ----------
     kind
         One of `KINDS`; ``ignore`` for a feature that is left out.
-    reason
-        Why it is left out; empty for the other kinds.
     """
 
     kind: str
@@ -211,29 +209,26 @@ def kind_of(
     layers: Container[str] = (),
     policy: ImportPolicy = DEFAULT_IMPORT,
 ) -> Decision:
-    """Decide what a feature is.
+    """Return the kind of a feature.
 
     Parameters
     ----------
-    feature : Feature
-        The feature.
     kinds : mapping
-        Layer or a word of `SHAPE_LAYERS`, lower case, to kind, as the user says.
+        Kinds that the user states, by layer or word of `SHAPE_LAYERS`, in lower case.
     chart : bool
-        Whether the map is an S-57 chart, of which only known object classes count.
+        Whether the map is an S-57 chart, whose object classes decide.
     layers : container of str
-        Names of the map's layers, lower case: a word of `SHAPE_LAYERS` among them is that layer
-        only.
+        Names of the map's layers, in lower case; a word of `SHAPE_LAYERS` among them is a layer.
 
     Returns
     -------
     Decision
-        Kind or reason. An open line may be an obstacle: it needs a width.
+        Kind or reason. An open line may be an obstacle; it needs a width.
 
     Raises
     ------
     InputError
-        No kind fits, or one that cannot have its shape.
+        No kind fits, or a feature of this kind cannot have its shape.
     """
     shape = feature.shape.geom_type
     said = feature.get("kind")
@@ -263,7 +258,7 @@ def kind_of(
         of_chart = chart_kind(feature)
         decision = Decision(of_chart.kind, of_chart.reason)
     else:
-        decision = _bytags(feature, shape) or _by_shape(feature, shape)
+        decision = _by_tags(feature, shape) or _by_shape(feature, shape)
     kind = decision.kind
     if kind == "ignore":
         return decision
@@ -288,18 +283,12 @@ def is_coastline(feature: Feature) -> bool:
 
 
 def words_in(name: str) -> tuple[str, ...]:
-    """Return the words of a layer's name that may say its kind, the nearest folder first.
+    """Return the words of a layer's name that may state its kind, the innermost folder first.
 
     Parameters
     ----------
     name : str
-        Name in lower case, as ``piles (#2)``: GDAL's name for a second layer ``piles``; or a path
-        of folders, as ``piles/north``.
-
-    Returns
-    -------
-    tuple of str
-        Words.
+        Name in lower case; GDAL calls a second layer ``piles (#2)``, and slashes separate folders.
 
     Examples
     --------
@@ -316,8 +305,8 @@ def _bare_name(name: str) -> str:
     return LAYER_SUFFIX.sub("", name.strip())
 
 
-def _bytags(feature: Feature, shape: str) -> Decision | None:
-    """Decide by tags of OpenStreetMap; None where none of them is known."""
+def _by_tags(feature: Feature, shape: str) -> Decision | None:
+    """Return the decision by tags of OpenStreetMap; None if no tag is known."""
 
     def has(table: Mapping[str, frozenset[str]]) -> bool:
         return any(str(feature.get(key)).lower() in values for key, values in table.items())
@@ -332,7 +321,7 @@ def _bytags(feature: Feature, shape: str) -> Decision | None:
 
 
 def _by_shape(feature: Feature, shape: str) -> Decision:
-    """Decide by the shape: polygons and lines are obstacles, points goals without a radius."""
+    """Return the decision by shape: points without a radius are goals, the rest obstacles."""
     if "Point" not in shape:
         return Decision("obstacle")
     return Decision("obstacle" if feature.get(*RADIUS) is not None else "goal")

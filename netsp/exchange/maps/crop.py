@@ -1,4 +1,4 @@
-"""Cropping of a map to what a tether can reach."""
+"""Cropping of a map to the reach of a tether."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ AREA_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class CropWindow:
-    """Circle that holds all that a tether reaches, and a polygon about it.
+    """Circle that holds the reach of a tether, and a polygon around it.
 
-    A tether that stays within the circle is in the same classes with obstacles cut to the polygon
-    as with the whole ones: a loop about one part alone would leave the circle.
+    Obstacles cut to the polygon give a tether within the circle the same homotopy classes as whole
+    ones, because a loop around one part of a cut obstacle would leave the circle.
 
     Attributes
     ----------
     center
         (x, y) of the circle, metres.
     radius
-        Of the circle, metres.
+        Radius of the circle, metres.
     n_corners
         Number of corners of the polygon.
     """
@@ -48,21 +48,16 @@ class CropWindow:
         margin: float,
         policy: OutlinePolicy = DEFAULT_OUTLINES,
     ) -> CropWindow:
-        """Return the window that holds the reach of a tether from each of some bases.
+        """Return the window that holds the reach of a tether from each base.
 
         Parameters
         ----------
         bases : sequence of (x, y)
-            Where the tether may be fixed.
+            Places where the tether may be fixed.
         reach : float
-            How far it reaches, metres.
+            Reach of the tether, metres.
         margin : float
             Share of the radius by which the circle is larger.
-
-        Returns
-        -------
-        CropWindow
-            About a single base where there is one.
         """
         import shapely
 
@@ -75,7 +70,7 @@ class CropWindow:
 
     @cached_property
     def polygon(self) -> shapely.Polygon:
-        """Polygon of `CROP_CORNERS` corners that holds the circle."""
+        """Polygon with `n_corners` corners that holds the circle."""
         import shapely
 
         outer = self.radius / math.cos(math.pi / self.n_corners)
@@ -87,20 +82,7 @@ class CropWindow:
         return made
 
     def is_beyond(self, shape: shapely.Geometry, grown: float = 0.0) -> bool:
-        """Return whether a shape, grown by a width, has nothing within the circle.
-
-        Parameters
-        ----------
-        shape : shapely.Geometry
-            In the plane.
-        grown : float
-            Width, metres.
-
-        Returns
-        -------
-        bool
-            Whether it can be left out.
-        """
+        """Return whether a shape, grown by a width (metres), lies outside the circle."""
         import shapely
 
         west, south, east, north = shape.bounds
@@ -111,19 +93,12 @@ class CropWindow:
         return bool(shape.distance(shapely.Point(self.center)) - grown > self.radius)
 
     def cut(self, shape: shapely.Geometry) -> tuple[shapely.Geometry, bool]:
-        """Return the part of an area within the polygon, and whether that is less than all of it.
+        """Return the part of an area within the polygon, and whether something was cut off.
 
         Parameters
         ----------
         shape : shapely.Geometry
-            A polygon or several, in the plane; one that crosses itself is returned as it is.
-
-        Returns
-        -------
-        part : shapely.Geometry
-            Polygons.
-        is_cut : bool
-            Whether something was cut off.
+            One or several polygons in the plane; an invalid shape is returned whole.
         """
         if self.polygon.contains(shape) or not shape.is_valid:
             return shape, False
@@ -136,23 +111,21 @@ class CropWindow:
 def cropped(
     obstacles: list[dict[str, Any]], window: CropWindow
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]], list[dict[str, Any]]]:
-    """Leave out obstacles beyond a window, and cut off the parts of others beyond it.
+    """Return obstacles without those beyond a window, and cut where they cross it.
 
     Parameters
     ----------
     obstacles : list of dict
-        Circles and polygons as a problem file has them.
-    window : CropWindow
-        What the tether reaches.
+        Circles and polygons as in a problem file.
 
     Returns
     -------
     kept : list of dict
         Obstacles within the window, cut where they cross it.
     dropped : list of dict
-        Obstacles beyond it.
+        Obstacles beyond the window.
     cut_off : list of dict
-        Obstacles that were cut.
+        Obstacles that were cut, whole.
     """
     import shapely
 

@@ -1,4 +1,4 @@
-"""Places from a table."""
+"""Reader of places from a table."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ def from_table(
     projection: Projection | None = None,
     on_note: Callable[[str], None] | None = None,
 ) -> tuple[Floats, list[str | None]]:
-    """Read places and their names from a table.
+    """Return places and their names from a table.
 
     Parameters
     ----------
     file : str or Path
-        Table whose first line names its columns in any order (`netsp.base.axes`): x, y (without a
-        projection easting, northing, too; with one lat, lon), and perhaps z or depth, and name.
+        Table whose first line names its columns in any order (`netsp.base.axes`): x, y (easting,
+        northing without a projection; lat, lon with one), and perhaps z or depth, and name.
     projection : Projection, optional
         Projection of latitudes and longitudes into the plane.
     on_note : callable, optional
@@ -41,7 +41,7 @@ def from_table(
     Raises
     ------
     InputError
-        Not such a table, or degrees without a projection.
+        The table has no such columns, or degrees without a projection.
     """
     table = read_table(file)
     # coordinates of a map are not those of a plane about a base

@@ -1,7 +1,7 @@
-"""DXF drawings as maps: GDAL reads the shapes, this module what is no shape of the site.
+"""Reader of DXF drawings: GDAL reads the shapes, this module decides what belongs to the site.
 
-Annotations, paper space and layers that are off or frozen are left out and named; blocks keep the
-layers of what they hold. An entity of which GDAL gives nothing is named by its type.
+Annotations, paper space and layers that are off or frozen are left out and named; what a block
+holds keeps its layers. An entity of which GDAL gives nothing is named by its type.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ INSUNITS = {
 }  # fmt: skip
 """Units of the header's $INSUNITS: name and metres (Autodesk's DXF reference).
 
-Units of astronomy (17 to 20) are none of a site.
+The units of astronomy (17 to 20) are missing, because no site has them.
 """
 
 SHAPES = words(
@@ -93,7 +93,7 @@ EXTERNAL_BLOCK = 4
 
 PAPER = "*paper_space"
 DIMENSION_LAYER = "defpoints"
-"""Layer that CAD programs keep for the points of dimensions, which is never printed."""
+"""Layer that CAD programs keep for the points of dimensions, which they never print."""
 
 LABELLED = ("POINT", "CIRCLE", "INSERT")
 """Types of entities that stand for one place, and take the name of a text beside it."""
@@ -105,28 +105,21 @@ def read_dxf(
     units: str | None = None,
     policy: ImportPolicy = DEFAULT_IMPORT,
 ) -> Map:
-    """Return a DXF drawing as a map.
+    """Return a DXF drawing as a map with one feature for each entity.
 
     Parameters
     ----------
     file : str or Path
-        The drawing, text or binary.
+        Drawing, text or binary.
     crs : str, optional
-        Its coordinate system; default: a plane of its own.
+        Coordinate system of the drawing; default: a local plane.
     units : str, optional
-        Unit that the user says, one of `netsp.base.axes.UNITS`; default: the header's.
-    labels : LabelRule, optional
-        Which texts are names.
-
-    Returns
-    -------
-    Map
-        One feature for each entity.
+        Unit that the user states, one of `netsp.base.axes.UNITS`; default: the header's.
 
     Raises
     ------
     InputError
-        Not a drawing, too large, or its unit is unknown.
+        The file is no drawing or too large, or its unit is unknown.
     """
     check_file(file)
     drawing = read_drawing(file, read_bytes(file))
@@ -164,7 +157,7 @@ def _unit(file: str | Path, drawing: Drawing, asked: str | None) -> tuple[float 
 
 @dataclass
 class _Entity:
-    """Entity of the drawing on its way to a feature."""
+    """Entity of the drawing that becomes a feature."""
 
     record: Record
     where: str
@@ -198,7 +191,7 @@ class _Reader:
         self.widths: dict[str, float] = {}
 
     def map(self, metres: float | None, note: str) -> Map:
-        """Return the map."""
+        """Return the map of the drawing."""
         kept = [e for e in map(self.entity, self.drawing.entities) if e is not None]
         if sum(self.layers.values()) > self.policy.read.max_features:
             raise InputError(
@@ -229,7 +222,7 @@ class _Reader:
     # What is no shape of the site
 
     def entity(self, record: Record) -> _Entity | None:
-        """Return an entity that is to be read; others go to the features that are left out."""
+        """Return an entity that is to be read; others are added to the features left out."""
         layer = self.text(record.get(8, "0")) or "0"
         number = self.layers.get(layer, 0)
         self.layers[layer] = number + 1
@@ -256,7 +249,7 @@ class _Reader:
         return not is_paper and layer.lower() not in self.hidden and record.get(60) != "1"
 
     def reason(self, record: Record, layer: str) -> str:
-        """Return why an entity is no shape of the site; empty for one that is."""
+        """Return why an entity is no shape of the site; empty for a shape of the site."""
         kind = record.type
         if record.get(67, "0") not in ("", "0"):
             return "in paper space"
@@ -293,7 +286,7 @@ class _Reader:
         return self.drawing.block_records[self.blocks[block]]
 
     def damage(self, record: Record) -> str:
-        """Return what is wrong with an entity or the blocks in it; empty where nothing is."""
+        """Return what is wrong with an entity or the blocks in it; empty if nothing is."""
         own = record.damage() or shape_damage(record)
         if own or record.type != "INSERT":
             return own
@@ -313,7 +306,7 @@ class _Reader:
         return ""
 
     def holds_itself(self, block: str, above: tuple[str, ...] = ()) -> bool:
-        """Return whether a block refers to itself, perhaps through others."""
+        """Return whether a block refers to itself, directly or through others."""
         name = block.lower()
         if name in above or len(above) >= self.policy.read.max_geometry_depth:
             return True
@@ -326,7 +319,7 @@ class _Reader:
         return self.cyclic[name]
 
     def size(self, record: Record) -> int:
-        """Return the number of shapes that an entity gives: for a block that of its entities."""
+        """Return the number of shapes of an entity; of a block, the number of its entities."""
         if record.type != "INSERT":
             return len(simple_entities(record)) if record.type == "MLINE" else 1
         name = record.get(2).lower()
@@ -357,7 +350,7 @@ class _Reader:
     # Shapes
 
     def shapes(self, entities: list[_Entity]) -> None:
-        """Give entities the shapes that GDAL reads, by handles that are made for that."""
+        """Give entities the shapes that GDAL reads, matched by handles made for that."""
         if not entities:
             return
         total = sum(self.size(entity.record) for entity in entities)
@@ -404,7 +397,7 @@ class _Reader:
             entity.pieces += [(inner, part) for part in long]
 
     def from_gdal(self, by_handle: dict[str, _Entity]) -> GdalLayer:
-        """Return what GDAL reads of some entities."""
+        """Return the layer that GDAL reads of some entities."""
         options = {
             "DXF_MERGE_BLOCK_GEOMETRIES": "FALSE",
             "DXF_INLINE_BLOCKS": "TRUE",
@@ -438,7 +431,7 @@ class _Reader:
         )
 
     def plain(self, by_handle: dict[str, _Entity]) -> Iterator[Tag]:
-        """Yield the drawing with nothing but what is to be read, each with a handle of its own."""
+        """Yield the drawing with only the entities to be read, each with a handle of its own."""
         version = self.drawing.header.get("$ACADVER", "AC1009")
         page = self.drawing.header.get("$DWGCODEPAGE", "ANSI_1252")
         yield from ((0, "SECTION"), (2, "HEADER"), (9, "$ACADVER"), (1, version))
@@ -462,7 +455,7 @@ class _Reader:
         yield from ((0, "ENDSEC"), (0, "EOF"))
 
     def simple(self, record: Record) -> list[Record]:
-        """Return an entity as GDAL reads it; names of blocks in the case of the block itself."""
+        """Return an entity as GDAL reads it, with names of blocks spelt like the block itself."""
         if record.type != "INSERT":
             return simple_entities(record)
         name = self.blocks[record.get(2).lower()]
@@ -470,7 +463,7 @@ class _Reader:
         return [Record(record.type, tags, record.followers)]
 
     def features(self, entity: _Entity) -> list[Feature]:
-        """Return the feature of an entity; of a block with several layers one for each."""
+        """Return the feature of an entity; of a block with several layers, one for each."""
 
         record, layer = entity.record, entity.layer
         if record.type == "INSERT" and entity.pieces:
@@ -568,7 +561,7 @@ class _Reader:
         return spots[0] if len(spots) == 1 else shapely.MultiPoint(spots)
 
     def lost_in(self, block: str) -> list[str]:
-        """Return what of a block, and of those in it, is not read, one line for each reason."""
+        """Return one line for each reason why records in a block are not read."""
         lost: Counter[str] = Counter()
         for name in self.blocks_in(block):
             for record in self.drawing.blocks[self.blocks[name]]:
@@ -583,7 +576,7 @@ class _Reader:
     # Fillings and names
 
     def without_fillings(self, features: list[Feature], entities: list[_Entity]) -> list[Feature]:
-        """Leave out hatches that fill an outline that is read itself."""
+        """Leave out hatches that fill an outline that is read."""
         hatches = {e.where for e in entities if e.record.type == "HATCH"}
         if not hatches:
             return features
@@ -601,7 +594,7 @@ class _Reader:
         return out
 
     def named(self, features: list[Feature], entities: list[_Entity]) -> list[Feature]:
-        """Give places the texts beside them as names, and leave the texts out."""
+        """Name places after the texts beside them, and leave the texts out."""
         from dataclasses import replace
 
         import shapely
@@ -670,19 +663,14 @@ def _array(record: Record) -> tuple[int, int]:
 
 
 def _in_world(places: Floats, normal: Floats) -> Floats:
-    """Return places of an entity's own system in that of the drawing (arbitrary axis algorithm).
+    """Return places of an entity's coordinate system in the drawing's (arbitrary axis algorithm).
 
     Parameters
     ----------
     places : ndarray, shape (n, 3)
-        As the entity has them.
+        Places as the entity has them.
     normal : ndarray, shape (3,)
-        Its direction of extrusion, not zero.
-
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        Right-handed; x of the entity lies in the drawing's plane of x and y.
+        Direction of extrusion of the entity, not zero.
     """
     up = normal / (float(np.linalg.norm(normal)) or 1.0)
     # Autodesk's bound: normals nearer to the axis z take y for it
@@ -696,7 +684,7 @@ CHANGING_WIDTH = "a width that changes: taken as the largest"
 WIDTH_OF_BLOCK = "lines in its block are as wide as the widest polyline there"
 
 NO_LOSS = re.compile(r"GDAL: (Block .* does not exist|Non closed ring detected)")
-"""Warnings of GDAL without a loss: a block without records, and each 3DFACE."""
+"""Warnings of GDAL that report no loss: of a block without records, and of each 3DFACE."""
 
 UNICODE = re.compile(r"\\U\+([0-9A-Fa-f]{4})")
 """A character as drawings escape it."""
@@ -749,7 +737,7 @@ def _areas(shape: shapely.Geometry) -> list[shapely.Polygon]:
 
 
 def _alike(a: shapely.Polygon, b: shapely.Polygon) -> bool:
-    """Return whether two outlines are one, but for the steps along their arcs."""
+    """Return whether two outlines are equal but for the steps along their arcs."""
     if not np.allclose(a.bounds, b.bounds, atol=0.01 * math.sqrt(a.area or 1.0)):
         return False
     if not a.is_valid or not b.is_valid:

@@ -1,4 +1,4 @@
-"""Polygons of maps as obstacles: simple, without holes, circles where they are circles."""
+"""Polygons of maps as obstacles: simple, without holes, and circles where they draw circles."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ SIDE_TOLERANCE = 1e-6
 def circle_of(
     ring: Floats, policy: OutlinePolicy = DEFAULT_OUTLINES
 ) -> tuple[tuple[float, float], float] | None:
-    """The circle that a ring of corners stands for: drawings and buffers have no other way to say
-    it. The circle is through the corners, so that it holds the ring.
+    """Return the circle that a ring of corners draws; it holds the ring.
+
+    Drawings and buffers have no other form for a circle.
 
     Parameters
     ----------
@@ -45,21 +46,21 @@ def circle_of(
 
 
 def simple_polygons(shape: shapely.Geometry, inner: Any) -> tuple[list[shapely.Polygon], list[str]]:
-    """Return a polygon of a map as simple polygons without holes.
+    """Return an area as simple polygons without holes.
 
     Parameters
     ----------
     shape : shapely.Geometry
         Polygon, multipolygon or closed line, in the plane.
     inner : callable
-        ``inner(polygon)``: whether something that must stay free lies in it.
+        ``inner(polygon)`` returns whether a place that must stay free lies in it.
 
     Returns
     -------
     polygons : list of shapely.Polygon
-        The parts; they touch where a hole was cut open.
+        Parts; they touch where a hole was cut open.
     notes : list of str
-        What was changed.
+        Changes to the shape.
     """
     import shapely
 
@@ -96,12 +97,7 @@ def simple_polygons(shape: shapely.Geometry, inner: Any) -> tuple[list[shapely.P
 def outline_of(
     polygon: shapely.Polygon, policy: OutlinePolicy = DEFAULT_OUTLINES
 ) -> dict[str, Any]:
-    """Return a polygon without holes as an obstacle of a problem file: a circle where it is one.
-
-    Parameters
-    ----------
-    polygon : shapely.Polygon
-        In the plane, metres.
+    """Return a polygon without holes as an obstacle of a problem file: a circle if it draws one.
 
     Returns
     -------
@@ -126,9 +122,9 @@ def spurs_of(
     Parameters
     ----------
     shape : shapely.Geometry
-        Polygon, multipolygon or closed line, as it was drawn, in the plane.
+        Polygon, multipolygon or closed line, as drawn, in the plane.
     polygons : list of shapely.Polygon
-        What `simple_polygons` made of it.
+        Polygons that `simple_polygons` made of it.
     tolerance : float
         Shorter parts are rounding, metres.
 
@@ -158,7 +154,7 @@ def spurs_of(
 
 
 def _halves(piece: shapely.Polygon) -> list[shapely.Polygon]:
-    """A polygon cut by a vertical line through its first hole."""
+    """Return a polygon cut by a vertical line through its first hole."""
     import shapely
 
     x = piece.interiors[0].centroid.x

@@ -20,17 +20,12 @@ CLOSED_MULTILINE = 2
 
 
 def simple_entities(record: Record) -> list[Record]:
-    """Return meshes and multilines as entities that GDAL reads; others as they are.
+    """Return a mesh or a multiline as faces or lines that GDAL reads; other entities unchanged.
 
     Parameters
     ----------
     record : Record
         An entity without damage (`Record.damage`).
-
-    Returns
-    -------
-    list of Record
-        Faces or lines; none for a multiline without vertices.
 
     Raises
     ------
@@ -52,8 +47,8 @@ def simple_entities(record: Record) -> list[Record]:
 def _of_multiline(record: Record) -> list[Record]:
     """Return the walls of an MLINE: a face between its outermost lines for each segment.
 
-    Each vertex (11, 21, 31) has a direction of its mitre (13, 23, 33), and for each line its
-    distance along that (the first 41 after each 74).
+    Each vertex (11, 21, 31) has the direction of its mitre (13, 23, 33) and, for each line, a
+    distance along it (the first 41 after each 74).
     """
     places: dict[int, list[float]] = {code: [] for code in (11, 21, 31, 13, 23, 33)}
     sides: list[list[float]] = []
@@ -92,7 +87,7 @@ def _of_multiline(record: Record) -> list[Record]:
 
 
 def shape_damage(record: Record) -> str:
-    """Return what is wrong with a mesh or a multiline; empty where nothing is.
+    """Return what is wrong with a mesh or a multiline; empty if nothing is.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ Tag = tuple[int, str]
 """Group code and value; text is Latin-1, one character for each byte of the file."""
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
-"""A number as drawings write it; GDAL reads other text as 0, or up to the first odd character."""
+"""Number as drawings write it; GDAL reads other text as 0, or up to the first odd character."""
 
 NUMERIC_CODES = frozenset({*range(10, 60), *range(60, 80), *range(90, 100), *range(210, 240)})
 """Group codes of places, lengths, angles, flags and counts."""
@@ -43,22 +43,22 @@ BINARY_TYPES = (
     (range(420, 430), "i"), (range(440, 460), "i"), (range(1071, 1072), "i"),
     (range(160, 170), "q"), (range(290, 300), "b"),
 )  # fmt: skip
-"""Types of values of a binary drawing by their group codes; the others are text or bytes."""
+"""Types of the values of a binary drawing by group code; other values are text or bytes."""
 
 BINARY_CHUNKS = (*range(310, 320), 1004)
-"""Group codes of bytes with their number before them."""
+"""Group codes of bytes that follow their count."""
 
 
 @dataclass
 class Record:
-    """Entity, or another record, with those that follow and belong to it.
+    """Entity or other record, with the records that belong to it.
 
     Attributes
     ----------
     type
-        As ``LINE``.
+        Type such as ``LINE``.
     tags
-        All of its group codes after the type.
+        All group codes after the type.
     followers
         Vertices of a polyline, attributes of a block reference, and their end.
     """
@@ -68,37 +68,18 @@ class Record:
     followers: list[Record] = field(default_factory=list)
 
     def get(self, code: int, default: str = "") -> str:
-        """Return the first value of a group code.
-
-        Parameters
-        ----------
-        code : int
-            The group code.
-        default : str
-            Value where there is none.
-
-        Returns
-        -------
-        str
-            Without spaces around it.
-        """
+        """Return the first value of a group code, without spaces around it."""
         return next((value.strip() for c, value in self.tags if c == code), default)
 
     def number(self, code: int, default: float = 0.0) -> float:
-        """Return the first value of a group code as a number; the default where it is none."""
+        """Return the first value of a group code as a number; the default if it is no number."""
         try:
             return float(self.get(code))
         except ValueError:
             return default
 
     def damage(self) -> str:
-        """Return what is wrong with the numbers of the record; empty where nothing is.
-
-        Returns
-        -------
-        str
-            As "group code 10: expected a number, got 'abc'".
-        """
+        """Return what is wrong with the numbers of the record; empty if nothing is."""
         for code, value in self.tags:
             if code in NUMERIC_CODES:
                 text = value.strip()
@@ -137,7 +118,7 @@ class Record:
         )
 
     def all_tags(self) -> Iterator[Tag]:
-        """Yield the record as it is written, with its followers."""
+        """Yield the group codes of the record and of its followers, as in a file."""
         yield 0, self.type
         yield from self.tags
         for follower in self.followers:
@@ -146,20 +127,20 @@ class Record:
 
 @dataclass(frozen=True)
 class Drawing:
-    """Sections of a drawing that say what is drawn.
+    """Sections of a drawing that describe shapes.
 
     Attributes
     ----------
     header
-        Variable, as ``$INSUNITS``, to its first value.
+        Variables such as ``$INSUNITS`` with their first values.
     tables
         Group codes of the section TABLES.
     layers
         Records of the table of layers.
     blocks
-        Name of each block to its records.
+        Records of each block, by its name.
     block_records
-        Record BLOCK of each block.
+        Record BLOCK of each block, by its name.
     entities
         Records of the section ENTITIES.
     """
@@ -178,19 +159,12 @@ def read_drawing(file: str | Path, data: bytes) -> Drawing:
     Parameters
     ----------
     file : str or Path
-        For messages.
-    data : bytes
-        Contents.
-
-    Returns
-    -------
-    Drawing
-        Its records.
+        Name in messages.
 
     Raises
     ------
     InputError
-        Not DXF, or without a section ENTITIES.
+        The data are not DXF, or have no section ENTITIES.
     """
     if data[:4] == b"AC10" and data[:6].isalnum():
         raise InputError(
@@ -230,18 +204,7 @@ def read_drawing(file: str | Path, data: bytes) -> Drawing:
 
 
 def written(tags: Iterator[Tag]) -> str:
-    """Return group codes as the text of a drawing.
-
-    Parameters
-    ----------
-    tags : iterator of (int, str)
-        Group codes and values.
-
-    Returns
-    -------
-    str
-        Two lines for each.
-    """
+    """Return group codes as the text of a drawing, two lines for each."""
     return "".join(f"{code:3d}\n{value}\n" for code, value in tags)
 
 
@@ -267,7 +230,7 @@ def _text_tags(file: str | Path, data: bytes) -> list[Tag]:
 
 
 def _binary_tags(file: str | Path, data: bytes) -> list[Tag]:
-    """Read group codes of two bytes (since Release 13), or of one (Release 12)."""
+    """Return the group codes of a binary drawing, of two bytes (since Release 13) or of one."""
     at = len(BINARY)
     wide = data[at : at + 2] == b"\0\0"
     out: list[Tag] = []
@@ -315,7 +278,7 @@ def _records(tags: list[Tag]) -> list[Record]:
 
 
 def _grouped(records: list[Record]) -> list[Record]:
-    """Put vertices and attributes to the records that they belong to."""
+    """Move vertices and attributes to the records that they belong to."""
     out: list[Record] = []
     holder: Record | None = None
     for record in records:

@@ -1,4 +1,4 @@
-"""Features of a map, whatever its format is."""
+"""Features of a map of any format."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HSTORE_PAIR = re.compile(r'"((?:[^"\\]|\\.)*)"=>"((?:[^"\\]|\\.)*)"')
 """Key and value in PostgreSQL's hstore text."""
 
 NO_NAMES = ("", "<null>", "null", "none", "nan", "n/a", "unnamed")
-"""Texts, in lower case, that programs write where there is no value."""
+"""Texts, in lower case, that programs write for a missing value."""
 
 
 @dataclass(frozen=True)
@@ -30,26 +30,24 @@ class Feature:
     Attributes
     ----------
     where
-        What messages call it: layer and number, as ``features[3]`` or ``turbines[0]``.
+        Name in messages: layer and number, such as ``features[3]`` or ``turbines[0]``.
     layer
-        Its layer, folder or object class; empty where the format has none.
+        Its layer, folder or object class; empty if the format has none.
     identity
         Identifier in the file, if it has more than a number.
-    properties
-        Name to value.
     shape
-        Longitudes and latitudes in degrees, or metres where the map has no place on the earth; z in
+        Longitudes and latitudes in degrees, or metres if the map has no place on the earth; z in
         the file's units.
     folders
-        Names of the folders or layers that it lies in, the nearest first, where these are more
-        than its layer: the first that the contract knows decides its kind.
+        Names of the folders or layers around it, the innermost first, if it has more than its
+        layer; the first that the contract knows decides its kind.
     marker
-        Place that a symbol of a drawing marks, or places of an array of symbols: a goal drawn as a
-        circle or a block is there.
+        Place that a symbol of a drawing marks, or places of an array of symbols: the position of a
+        goal that is drawn as a circle or a block.
     is_above_floor
         Whether z counts from the sea floor, which the map does not have.
     kind
-        What the format itself says that it is, as ``path`` of a recorded track; empty for most.
+        Kind that the format itself implies, such as ``path`` for a recorded track; empty for most.
     """
 
     where: str
@@ -63,17 +61,12 @@ class Feature:
     kind: str = ""
 
     def get(self, *names: str) -> Any:
-        """Return the first of some properties, whatever their case, that has a value.
+        """Return the value of the first of some properties that has one; None if none has.
 
         Parameters
         ----------
         *names : str
-            Lower case.
-
-        Returns
-        -------
-        object
-            Its value, None without one.
+            Names in lower case; the case of the feature's own names does not matter.
         """
         own = {str(k).lower(): v for k, v in self.properties.items()}
         for name in names:
@@ -93,13 +86,11 @@ class Unread:
     Attributes
     ----------
     where
-        What messages call it, as of a `Feature`.
-    layer
-        Its layer.
+        Name in messages, as of a `Feature`.
     reason
-        Why it cannot be used, as "has no geometry".
+        Reason such as "has no geometry".
     shape
-        What is known of its shape, for the picture.
+        Known part of its shape, for the picture.
     """
 
     where: str
@@ -115,11 +106,9 @@ class Change:
     Attributes
     ----------
     where
-        What messages call the feature.
-    layer
-        Its layer.
+        Name of the feature in messages.
     text
-        Text of the note, as "a ring is not closed: closed by its first corner".
+        Text of the note, such as "a ring is not closed: closed by its first corner".
     """
 
     where: str
@@ -129,16 +118,6 @@ class Change:
 
 def change_notes(changes: Iterable[Change]) -> list[str]:
     """Return one line for each layer and change, with the first features.
-
-    Parameters
-    ----------
-    changes : iterable of Change
-        In the order of the map.
-
-    Returns
-    -------
-    list of str
-        Notes.
 
     Examples
     --------
@@ -162,16 +141,8 @@ def change_notes(changes: Iterable[Change]) -> list[str]:
 def with_tags(properties: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return properties with the tags of OpenStreetMap that programs put into one of them.
 
-    Parameters
-    ----------
-    properties : mapping
-        As a file has them: Overpass has ``tags`` or ``@tags`` (an object), GDAL ``other_tags``
-        (text as ``"key"=>"value"``).
-
-    Returns
-    -------
-    mapping
-        With the tags beside the others; a property of the same name stays.
+    Overpass writes ``tags`` or ``@tags`` (an object), GDAL ``other_tags`` (text
+    ``"key"=>"value"``). A property of the same name as a tag stays.
 
     Examples
     --------
@@ -194,24 +165,24 @@ def _unescaped(text: str) -> str:
 
 @dataclass(frozen=True)
 class Map:
-    """Map: features, and those that could not be read.
+    """Map: features that were read, and features that could not be read.
 
     Attributes
     ----------
     features
-        In the order of the file.
+        Features in the order of the file.
     geographic
         Whether shapes are in degrees.
     layers
-        Their names, with the number of features of each, read or not.
+        Number of features of each layer, read or not.
     complaints
-        Reasons not to go on, one line each.
+        Reasons to refuse the map, one line each.
     notes
-        What was assumed or changed, one line each.
+        Assumptions and changes, one line each.
     unread
         Features that cannot be used.
     metres
-        Metres per unit of its plane as the file states it, if it does.
+        Metres per unit of its plane, if the file states the unit.
     is_chart
         Whether it is an S-57 chart, whose object classes decide kinds.
     """
@@ -227,6 +198,6 @@ class Map:
 
     @property
     def layer_names(self) -> set[str]:
-        """Names of layers and of folders, lower case, that a user may give a kind."""
+        """Names of layers and of folders, in lower case, to which a user may give a kind."""
         names = {name.lower() for name in self.layers}
         return names | {folder.lower() for f in self.features for folder in f.folders}

@@ -20,23 +20,15 @@ if TYPE_CHECKING:
 
 
 def read_fence_list(file: str | Path, policy: ImportPolicy = DEFAULT_IMPORT) -> Map:
-    """Read a fence as a map: bounds.
+    """Return a fence as a map in degrees, with the fence as bounds.
 
-    Parameters
-    ----------
-    file : str or Path
-        List of Mission Planner: where the vehicle goes after a breach, then the corners, of which
-        the last may repeat the first; or a waypoint list with a fence.
-
-    Returns
-    -------
-    Map
-        In degrees.
+    The file is a list of Mission Planner, with the place to return to after a breach and then the
+    corners, or a waypoint list with a fence.
 
     Raises
     ------
     InputError
-        No such list.
+        The file is no such list.
     """
     if is_waypoint_list(file):
         return read_waypoint_list(file, policy)
@@ -60,22 +52,14 @@ def read_fence_list(file: str | Path, policy: ImportPolicy = DEFAULT_IMPORT) -> 
 
 
 def read_rally_list(file: str | Path, policy: ImportPolicy = DEFAULT_IMPORT) -> Map:
-    """Read rally points as a map: places for emergencies, which are left out.
+    """Return rally points as a map in degrees; they are for emergencies and left out.
 
-    Parameters
-    ----------
-    file : str or Path
-        List of Mission Planner, with the word RALLY at the begin of each line; or a waypoint list.
-
-    Returns
-    -------
-    Map
-        In degrees.
+    The file is a list of Mission Planner, whose lines begin with RALLY, or a waypoint list.
 
     Raises
     ------
     InputError
-        No such list.
+        The file is no such list.
     """
     if is_waypoint_list(file):
         return read_waypoint_list(file, policy)
@@ -92,7 +76,7 @@ def read_rally_list(file: str | Path, policy: ImportPolicy = DEFAULT_IMPORT) -> 
 
 
 def _rows(file: str | Path) -> list[tuple[str, list[str]]]:
-    """Return the cells of each line that is no comment, with its place in the file."""
+    """Return the cells of each line that is no comment, with the line's name in messages."""
     lines = decode_text(read_bytes(file), str(file)).splitlines()
     return [
         (f"{file}: line {k}", [c for c in re.split(r"[\s,;]+", line.strip()) if c])

@@ -1,4 +1,4 @@
-"""GeoJSON (RFC 7946), read without any other library, so that every complaint names its feature."""
+"""Reader of GeoJSON (RFC 7946) that names the feature in every complaint."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SHAPES = {
     "Polygon": 2,
     "MultiPolygon": 3,
 }
-"""How deep the positions lie in the lists of coordinates."""
+"""Depth of the positions in the lists of coordinates, by type of geometry."""
 
 COLLECTION = "GeometryCollection"
 
@@ -34,24 +34,17 @@ RECORD_SEPARATOR = "\x1e"
 
 
 def read_geojson(file: str | Path, crs: str | None, policy: ReadPolicy = DEFAULT_READ) -> Map:
-    """A GeoJSON file as a map.
+    """Return a GeoJSON file as a map in degrees, unless the user states another system.
 
     Parameters
     ----------
-    file : str or Path
-        The file.
     crs : str, optional
-        Coordinate system given by the user; None takes degrees, as RFC 7946 has it.
-
-    Returns
-    -------
-    Map
-        In degrees, unless the user says otherwise.
+        Coordinate system that the user states; None for degrees, as in RFC 7946.
 
     Raises
     ------
     InputError
-        Not GeoJSON, or it names another coordinate system than WGS 84.
+        The file is not GeoJSON, or names another coordinate system than WGS 84.
     """
     return _map(file, _checked_features(read_text(file), str(file), crs), crs, policy)
 
@@ -59,25 +52,17 @@ def read_geojson(file: str | Path, crs: str | None, policy: ReadPolicy = DEFAULT
 def read_geojson_sequence(
     file: str | Path, crs: str | None, policy: ReadPolicy = DEFAULT_READ
 ) -> Map:
-    """Return a sequence of GeoJSON texts as a map.
+    """Return a sequence of GeoJSON texts as a map, as `read_geojson`.
 
     Parameters
     ----------
     file : str or Path
-        Texts after record separators (RFC 8142), or one a line.
-    crs : str, optional
-        Coordinate system given by the user; None takes degrees, as RFC 7946 has it.
-
-    Returns
-    -------
-    Map
-        In degrees, unless the user says otherwise.
+        Texts after record separators (RFC 8142), or one in each line.
 
     Raises
     ------
     InputError
-        A text is not GeoJSON: the message names it, because a text that is lost may be an
-        obstacle.
+        A text is not GeoJSON. It is not skipped, because it may be an obstacle.
     """
     text = read_text(file)
     is_separated = RECORD_SEPARATOR in text
@@ -125,11 +110,11 @@ def _map(file: str | Path, features: list[Any], crs: str | None, policy: ReadPol
 
 
 class _NowhereError(Exception):
-    """A feature that is nowhere, which RFC 7946 allows; the text is the reason."""
+    """Feature without a place, which RFC 7946 allows; the text is the reason."""
 
 
 def _features_of(data: dict[str, Any]) -> list[Any] | None:
-    """Return the features of a GeoJSON object of any type; None if it is none."""
+    """Return the features of a GeoJSON object of any type; None if it is no GeoJSON."""
     kind = data.get("type")
     if kind == "FeatureCollection":
         features = data.get("features")
@@ -175,7 +160,7 @@ def _feature(data: Any, where: str, policy: ReadPolicy, *, degrees: bool) -> lis
 def _parts(
     geometry: dict[str, Any], where: str, max_depth: int, depth: int = 0
 ) -> Iterator[tuple[str, Any]]:
-    """Yield the geometries of a collection, with what messages call them."""
+    """Yield the geometries of a collection with their names in messages."""
     if geometry.get("type") != COLLECTION:
         yield where, geometry
         return
@@ -220,7 +205,7 @@ def _shape(geometry: dict[str, Any], where: str, *, degrees: bool) -> shapely.Ge
 
 
 def _check(coordinates: Any, depth: int, kind: str, where: str, *, degrees: bool) -> None:
-    """Lists as deep as the kind has them, with positions at their ends."""
+    """Check that lists are as deep as the kind has them, with positions at their ends."""
     if depth:
         if not isinstance(coordinates, list) or not coordinates:
             what = "a polygon with an outer ring" if kind.endswith("Polygon") else f"a {kind}"
@@ -246,9 +231,10 @@ def _check(coordinates: Any, depth: int, kind: str, where: str, *, degrees: bool
 
 
 def _same_size(coordinates: Any, kind: str) -> Any:
-    """Return positions of two or of three numbers, all alike, as shapely wants them.
+    """Return positions with two or three numbers, all alike, because Shapely requires that.
 
-    Points keep their heights, and those without get NaN; heights of lines and areas are ignored.
+    Points keep their heights, with NaN where some have none; heights of lines and areas are
+    ignored.
     """
     sizes: set[int] = set()
 

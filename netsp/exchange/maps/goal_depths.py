@@ -1,4 +1,4 @@
-"""One depth for all goals of a problem."""
+"""Depths of a problem's goals: one depth for all, and warnings about heights."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from netsp.base.field_types import checked_argument
 from netsp.model.problem import Problem
 
 HEIGHTS_REMEDY = "give depths as positive numbers, or z as negative ones"
-"""What to do about goals of a map that are above the water."""
+"""Remedy for goals of a map that are above the water."""
 
 
 def with_depth(problem: Problem, depth: float) -> Problem:
@@ -15,15 +15,13 @@ def with_depth(problem: Problem, depth: float) -> Problem:
 
     Parameters
     ----------
-    problem : Problem
-        Problem whose goals keep their x and y.
     depth : float
         Distance below z = 0, in the problem's units; 0 or more.
 
     Raises
     ------
     InputError
-        A negative depth.
+        The depth is negative.
     """
     z = 0.0 - checked_argument("depth", depth, 0.0)
     goals = tuple(
@@ -35,15 +33,12 @@ def with_depth(problem: Problem, depth: float) -> Problem:
 def surface_warning(
     problem: Problem, remedy: str = "give one depth for all with --depth D"
 ) -> str | None:
-    """Return a warning where all goals are at depth 0, as tables and maps without heights have
-    them; None otherwise.
+    """Return a warning if all goals are at depth 0, as in files without heights; None otherwise.
 
     Parameters
     ----------
-    problem : Problem
-        Problem that was imported or is to be exported.
     remedy : str
-        What to do if the goals are deeper.
+        Advice for goals that are deeper.
     """
     if not problem.goals or any(g.position[2] != 0.0 for g in problem.goals):
         return None
@@ -51,14 +46,12 @@ def surface_warning(
 
 
 def height_warning(problem: Problem, remedy: str, max_named: int = 3) -> str | None:
-    """Return a warning where goals are above the water; None otherwise.
+    """Return a warning if goals are above the water, else None.
 
     Parameters
     ----------
-    problem : Problem
-        Problem that was imported or is to be exported.
     remedy : str
-        What to do, or what is done.
+        Advice, or what is done about it.
     max_named : int
         Maximum number of goals that the warning names.
     """

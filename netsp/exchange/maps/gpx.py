@@ -1,4 +1,4 @@
-"""GPX files (1.0 and 1.1), read without any other library: waypoints, tracks and routes."""
+"""Reader of GPX files (1.0 and 1.1): waypoints, tracks and routes."""
 
 from __future__ import annotations
 
@@ -24,16 +24,12 @@ FORBIDDEN = (b"<!DOCTYPE", b"<!ENTITY")
 
 @dataclass(frozen=True)
 class GpxPoint:
-    """Point of a track or a route.
+    """Point of a track or a route, in degrees and metres.
 
-    Parameters
+    Attributes
     ----------
-    latitude, longitude : float
-        Position, degrees.
-    height : float, optional
-        Height, metres.
-    time_s : float, optional
-        Time, seconds since 1970.
+    time_s
+        Seconds since 1970.
     """
 
     latitude: float
@@ -44,14 +40,12 @@ class GpxPoint:
 
 @dataclass(frozen=True)
 class GpxLine:
-    """Track, with its segments joined, or route.
+    """Route, or track with its segments joined; two points or more.
 
-    Parameters
+    Attributes
     ----------
-    name : str
+    name
         Name; empty if it has none.
-    points : tuple of GpxPoint
-        Two points or more.
     """
 
     name: str
@@ -63,24 +57,17 @@ def read_gpx(
     on_note: Callable[[str], None] | None = None,
     policy: ReadPolicy = DEFAULT_READ,
 ) -> list[GpxLine]:
-    """Read the tracks and routes of a GPX file.
+    """Return the tracks and routes of a GPX file, in its order.
 
     Parameters
     ----------
-    file : str or Path
-        The file.
     on_note : callable, optional
-        Called with one line each for what is left out, and for segments that are joined.
-
-    Returns
-    -------
-    list of GpxLine
-        In the order of the file.
+        Called with one line for each part left out and for segments that are joined.
 
     Raises
     ------
     InputError
-        Not GPX, a point without a position, or neither a track nor a route of two points.
+        The file is not GPX, a point has no position, or no track or route has two points.
     """
     say = on_note or (lambda _: None)
     lines: list[GpxLine] = []
@@ -129,23 +116,15 @@ def _root(file: str | Path) -> ElementTree.Element:
 
 
 def read_gpx_map(file: str | Path, policy: ImportPolicy = DEFAULT_IMPORT) -> Map:
-    """Read a GPX file as a map: waypoints are goals, tracks and routes paths.
+    """Return a GPX file as a map in degrees: waypoints are goals, tracks and routes paths.
 
-    Parameters
-    ----------
-    file : str or Path
-        The file.
-
-    Returns
-    -------
-    Map
-        In degrees; heights of waypoints are z. Texts and extensions of waypoints are properties, so
-        that a `depth` of a dive computer counts.
+    Heights of waypoints are z. Texts and extensions of waypoints are properties, so that the
+    `depth` of a dive computer counts.
 
     Raises
     ------
     InputError
-        Not GPX.
+        The file is not GPX.
     """
     import shapely
 
@@ -200,7 +179,7 @@ def _parts(element: ElementTree.Element) -> list[tuple[str, list[ElementTree.Ele
 
 
 def _properties(element: ElementTree.Element, kind: str) -> dict[str, str]:
-    """Return the texts of an element and of its extensions, by their names; the kind is ours."""
+    """Return the texts of an element and of its extensions by name, with the kind."""
     found: dict[str, str] = {}
     points = ("trkseg", "trkpt", "rtept")
     for child in element:

@@ -1,4 +1,4 @@
-"""Ledger of an import: what became of each feature, so that none is dropped in silence."""
+"""Ledger of an import: the use of each feature, or the reason to leave it out."""
 
 from __future__ import annotations
 
@@ -31,34 +31,18 @@ class Ledger:
 
     @property
     def left_out_shapes(self) -> list[shapely.Geometry]:
-        """Return the shapes of the features that are left out."""
+        """Shapes of the features that are left out."""
         return list(self._shapes.values())
 
     def use(self, feature: Feature, kind: UsedAs) -> None:
-        """Note that a feature is used as a kind.
-
-        Parameters
-        ----------
-        feature : Feature
-            The feature.
-        kind : str
-            What it is used as.
-        """
+        """Record that a feature is used as a kind; this replaces an earlier entry."""
         self._layer_of[feature.where] = feature.layer
         self._kind[feature.where] = kind
         self._reason.pop(feature.where, None)
         self._shapes.pop(feature.where, None)
 
     def leave_out(self, feature: Feature | Unread, reason: str) -> None:
-        """Note that a feature is left out; this replaces an earlier use.
-
-        Parameters
-        ----------
-        feature : Feature or Unread
-            The feature.
-        reason : str
-            Why, as "beyond the reach of the tether".
-        """
+        """Record that a feature is left out for a reason; this replaces an earlier entry."""
         self._layer_of[feature.where] = feature.layer
         self._kind.pop(feature.where, None)
         self._reason[feature.where] = reason
@@ -66,19 +50,12 @@ class Ledger:
             self._shapes[feature.where] = feature.shape
 
     def add_layer(self, layer: str, size: int) -> str:
-        """Add a table that was given besides the map, and return the name of its layer.
+        """Add a table given beside the map, and return its name, with a number if the name exists.
 
         Parameters
         ----------
-        layer : str
-            Its name.
         size : int
-            Number of its rows.
-
-        Returns
-        -------
-        str
-            Name of the layer, with a number if another layer has the same name.
+            Number of rows.
         """
         number = 1
         name = layer
@@ -89,27 +66,11 @@ class Ledger:
         return name
 
     def is_left_out(self, feature: Feature) -> bool:
-        """Return whether a feature is left out so far.
-
-        Parameters
-        ----------
-        feature : Feature
-            The feature.
-
-        Returns
-        -------
-        bool
-            False for a feature that is used, or that has no entry yet.
-        """
+        """Return whether a feature is left out so far; False for one that has no entry yet."""
         return feature.where in self._reason
 
     def records(self) -> tuple[LayerRecord, ...]:
         """Return the record of every layer, in the order of the map.
-
-        Returns
-        -------
-        tuple of LayerRecord
-            Their numbers add up to all features.
 
         Raises
         ------

@@ -17,18 +17,7 @@ if TYPE_CHECKING:
 
 
 def lines_of(shape: shapely.Geometry) -> list[shapely.LineString]:
-    """Return the lines of a LineString or MultiLineString, without those of no length.
-
-    Parameters
-    ----------
-    shape : shapely.Geometry
-        The lines.
-
-    Returns
-    -------
-    list of shapely.LineString
-        In 2D.
-    """
+    """Return the lines of a LineString or MultiLineString, in 2D, without those of no length."""
     import shapely
 
     flat = shapely.force_2d(shape)
@@ -45,14 +34,14 @@ def outlines(
     lines : sequence of shapely.LineString
         Pieces of outlines, in the plane.
     tolerance : float
-        Ends that are no farther apart are one corner, metres.
+        Largest distance of ends that are one corner, metres.
 
     Returns
     -------
     areas : list of (shapely.Polygon, list of int)
-        Each area, with the lines that it is made of.
+        Each area, with the indices of its lines.
     open_lines : list of int
-        Lines that are part of no area.
+        Indices of the lines that are part of no area.
 
     Examples
     --------
@@ -90,19 +79,17 @@ def outlines(
 
 
 def is_land(line: shapely.LineString, area: shapely.Polygon | None = None) -> bool:
-    """Return whether a coastline has its area on the left, where the land is.
+    """Return whether a coastline has its area on the left, where OpenStreetMap has the land.
 
     Parameters
     ----------
-    line : shapely.LineString
-        A coastline as OpenStreetMap has it.
     area : shapely.Polygon, optional
-        Area that it bounds; default: what the line itself encloses.
+        Area that the line bounds; default: the area that it encloses.
 
     Returns
     -------
     bool
-        True for an island, False for a shore about water.
+        True for an island, False for a shore around water.
 
     Examples
     --------
@@ -126,19 +113,9 @@ def is_land(line: shapely.LineString, area: shapely.Polygon | None = None) -> bo
 def widened(
     line: shapely.LineString, width: float, policy: OutlinePolicy = DEFAULT_OUTLINES
 ) -> shapely.Geometry:
-    """Return the area within half a width of a line, with square ends.
+    """Return the area within half a width (metres) of a line, with square ends.
 
-    Parameters
-    ----------
-    line : shapely.LineString
-        The line, in the plane.
-    width : float
-        Width, metres.
-
-    Returns
-    -------
-    shapely.Geometry
-        A polygon with few corners that holds every point within half the width.
+    The area is a polygon with few corners that holds every point within half the width.
     """
     import shapely
 
@@ -163,7 +140,7 @@ def widened(
 def _simple_parts(points: Floats) -> list[shapely.LineString]:
     """Return a polyline in parts that do not meet themselves.
 
-    GEOS may lose a piece of the buffer of a line that runs over itself.
+    GEOS may lose a piece of the buffer of a line that crosses itself.
     """
     import shapely
 
@@ -200,7 +177,7 @@ def _groups(labels: Ints) -> list[list[int]]:
 
 
 def _snapped(line: shapely.LineString, start: Floats, end: Floats) -> shapely.LineString | None:
-    """Return a line with its ends moved to their corners; None if nothing is left of it."""
+    """Return a line with its ends moved to their corners; None if no length is left."""
     import shapely
 
     points = np.array(line.coords)

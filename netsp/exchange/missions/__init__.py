@@ -1,4 +1,4 @@
-"""Hands a tour to a vehicle's ground station or a map."""
+"""Export of tours to ground stations of vehicles and to maps."""
 
 from netsp.exchange.maps.projection import Projection
 from netsp.exchange.missions.mission_files import FORMATS, export
