@@ -87,14 +87,18 @@ class Cursor:
         word = concatenate((), crossings(walked[:, :2], self.problem.representative_points))
         found = self.tethers.to(float(place[0]), float(place[1]), word, float(place[2]))
         told = {
-            "x": float(place[0]), "y": float(place[1]), "z": float(place[2]), "share": share,
+            "x": float(place[0]),
+            "y": float(place[1]),
+            "z": float(place[2]),
+            "share": share,
             "base_z": float(self.problem.base[2]),
-        }  # fmt: skip
+        }
         return told | (_told(found) if found else {"length": None})
 
 
 def _told(tether: TautTether) -> dict[str, Any]:
     return {
-        "length": tether.length, "word": list(tether.word),
+        "length": tether.length,
+        "word": list(tether.word),
         "path": [[float(x), float(y)] for x, y in tether.path[:, :2]],
-    }  # fmt: skip
+    }

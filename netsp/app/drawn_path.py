@@ -72,19 +72,30 @@ def drawn_figures(problem: Problem, points: list[list[float]]) -> dict[str, Any]
     m = measure_path(problem, line)
     through = sorted({k for s in m.stretches if s.kind == "obstacle" for k in s.obstacles})
     return {
-        "length": m.length, "time_s": m.duration_s, "speed": m.speed, "radius": m.radius,
+        "length": m.length,
+        "time_s": m.duration_s,
+        "speed": m.speed,
+        "radius": m.radius,
         "visits": [
             {"goal": v.goal, "first": v.is_first, "tether": v.tether, "word": list(v.word)}
             for v in m.visits
         ],
-        "order": list(m.order), "missing": list(m.missing), "revisits": list(m.revisits),
-        "longest_tether": m.longest_tether, "longest_place": list(m.longest_place),
-        "fits": m.fits, "end_tether": m.end_tether, "end_z": float(m.points[-1, 2]),
+        "order": list(m.order),
+        "missing": list(m.missing),
+        "revisits": list(m.revisits),
+        "longest_tether": m.longest_tether,
+        "longest_place": list(m.longest_place),
+        "fits": m.fits,
+        "end_tether": m.end_tether,
+        "end_z": float(m.points[-1, 2]),
         "end_word": list(m.end_word),
-        "word": list(m.word), "entangled": list(m.entangled), "comes_home": m.is_closed,
-        "free": m.is_free, "through": through,
+        "word": list(m.word),
+        "entangled": list(m.entangled),
+        "comes_home": m.is_closed,
+        "free": m.is_free,
+        "through": through,
         "out_of_bounds": any(s.kind == "bounds" for s in m.stretches),
-    }  # fmt: skip
+    }
 
 
 def end_tether(
@@ -132,9 +143,11 @@ def worth_of_order(problem: Problem, value: object) -> dict[str, Any]:
         The value is no such list.
     """
     good = isinstance(value, list) and len(set(map(str, value))) == len(value)
-    if not isinstance(value, list) or not good or not all(
-        is_index(g, len(problem.goals)) for g in value
-    ):  # fmt: skip
+    if (
+        not isinstance(value, list)
+        or not good
+        or not all(is_index(g, len(problem.goals)) for g in value)
+    ):
         raise InputError(f"order: expected numbers of goals, none twice, got {shown(value)}")
     length, note = order_length(problem, tuple(value), time_limit=ORDER_LIMIT_S)
     return {"order": value, "length": length, "note": note}

@@ -59,9 +59,11 @@ def facts(
         except InputError:  # found with limits of its own; the judge says more
             found = None
     return {
-        "sufficient": shortest_sufficient(problem), "margins": found, "profile": rows,
+        "sufficient": shortest_sufficient(problem),
+        "margins": found,
+        "profile": rows,
         "visits": visited,
-    }  # fmt: skip
+    }
 
 
 def shortest_sufficient(problem: Problem) -> float | None:

@@ -23,15 +23,29 @@ MOST_BYTES = 64 * 2**20
 """Of a file that comes in."""
 
 MAPS = (
-    ".geojson", ".kml", ".kmz", ".gpkg", ".dxf", ".000", ".gpx", ".plan", ".waypoints", ".wpl",
-    ".fen", ".ral",
-)  # fmt: skip
+    ".geojson",
+    ".kml",
+    ".kmz",
+    ".gpkg",
+    ".dxf",
+    ".000",
+    ".gpx",
+    ".plan",
+    ".waypoints",
+    ".wpl",
+    ".fen",
+    ".ral",
+)
 """Sites in one file; shapefiles come in several, and images with a YAML beside them."""
 
 EXPORTS = {
-    "plan": "mission.plan", "wpl": "mission.waypoints", "cockpit": "mission.cmp",
-    "geojson": "tour.geojson", "kml": "tour.kml", "csv": "tour.csv",
-}  # fmt: skip
+    "plan": "mission.plan",
+    "wpl": "mission.waypoints",
+    "cockpit": "mission.cmp",
+    "geojson": "tour.geojson",
+    "kml": "tour.kml",
+    "csv": "tour.csv",
+}
 """What a tour can be written as, and the name that it is offered under."""
 
 
@@ -120,11 +134,15 @@ class ImportAnswers:
         if viewpoints is not None and viewpoints != int(viewpoints):
             raise InputError(f"viewpoints: expected a whole number, got {viewpoints:g}")
         return cls(
-            base=said.get("base"), crs=said.get("crs"), units=said.get("units"),
+            base=said.get("base"),
+            crs=said.get("crs"),
+            units=said.get("units"),
             viewpoints=None if viewpoints is None else int(viewpoints),
-            tether=_positive(said, "tether"), radius=_positive(said, "radius"),
-            line_width=_positive(said, "line_width"), standoff=_positive(said, "standoff"),
-        )  # fmt: skip
+            tether=_positive(said, "tether"),
+            radius=_positive(said, "radius"),
+            line_width=_positive(said, "line_width"),
+            standoff=_positive(said, "standoff"),
+        )
 
 
 def without_options(text: str) -> str:
@@ -237,9 +255,13 @@ def _site(
     asked = answers.viewpoints is not None and answers.standoff is not None
     looking = Looking(answers.viewpoints or 1, answers.standoff or 0.0) if asked else None
     options = SiteOptions(
-        tether=answers.tether, radius=answers.radius, line_width=answers.line_width,
-        crs=answers.crs, units=answers.units, looking=looking,
-    )  # fmt: skip
+        tether=answers.tether,
+        radius=answers.radius,
+        line_width=answers.line_width,
+        crs=answers.crs,
+        units=answers.units,
+        looking=looking,
+    )
     try:
         found = import_site(file, about, options=options)
     except UnansweredError as error:
@@ -329,8 +351,9 @@ def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str,
                 settings.policy.min_slack,
                 settings.policy.min_clearance,
             ),
-            *said.warnings, *said.notes,
-        ]  # fmt: skip
+            *said.warnings,
+            *said.notes,
+        ]
         return file.name, file.read_text(encoding="utf-8"), notes
 
 

@@ -80,9 +80,12 @@ class Session:
     """
 
     def __init__(
-        self, document: Document, time_limit: float = 60.0, shown: Shown | None = None,
+        self,
+        document: Document,
+        time_limit: float = 60.0,
+        shown: Shown | None = None,
         notes: Sequence[str] = (),
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.document, self.shown = document, shown
         self._notes = {_source(document.data): list(notes)}
         self.pages: set[asyncio.Queue[str]] = set()
@@ -266,9 +269,11 @@ class Session:
         if self.shown is not None:
             nodes = told.get("path") or []
             return figure(
-                self.shown.scene, self.shown.data, self.shown.answer["path"],
+                self.shown.scene,
+                self.shown.data,
+                self.shown.answer["path"],
                 nodes if self.shown.frames else _in_space(told),
-            )  # fmt: skip
+            )
         from netsp.world.scene.scene import scene_of
 
         path = (self.answer or {}).get("path", [])
@@ -289,16 +294,22 @@ class Session:
         notes = list(self._notes.get(_source(document.data), []))
         if self.shown is None and wrong is None:
             notes += import_warnings(document.problem())
-        return {"state": {
-            "version": document.version, "data": document.data, "error": wrong,
-            "undo": document.can_undo, "redo": document.can_redo,
-            "notes": notes,
-            "saved": document.saved, "file": document.file.name if document.file else None,
-            "shown": self.shown is not None,
-            "events": self.shown.events if self.shown is not None else [],
-            "run": self.shown is not None and bool(self.shown.frames),
-            "plan": self.shown is None or self.shown.solution is not None,
-        }}  # fmt: skip
+        return {
+            "state": {
+                "version": document.version,
+                "data": document.data,
+                "error": wrong,
+                "undo": document.can_undo,
+                "redo": document.can_redo,
+                "notes": notes,
+                "saved": document.saved,
+                "file": document.file.name if document.file else None,
+                "shown": self.shown is not None,
+                "events": self.shown.events if self.shown is not None else [],
+                "run": self.shown is not None and bool(self.shown.frames),
+                "plan": self.shown is None or self.shown.solution is not None,
+            }
+        }
 
     def _changed(self) -> None:
         """After every edit: the pages are told, and the solver begins again."""
@@ -403,10 +414,12 @@ def application(session: Session, token: str, port: int) -> Any:
                 raise InputError("this page only shows: nothing can be edited on it")
             tether = session.document.data.get("tether_length")
             data, notes = await asyncio.to_thread(
-                imported, request.query_params.get("name", ""), content,
+                imported,
+                request.query_params.get("name", ""),
+                content,
                 tether if isinstance(tether, int | float) else None,
                 ImportAnswers.parse(request.query_params),
-            )  # fmt: skip
+            )
             notes += session.take_in(data, notes)
         except UnansweredError as error:  # the page asks for what is missing
             if error.asks:
@@ -500,11 +513,12 @@ def application(session: Session, token: str, port: int) -> Any:
             async def stamped(message: Any) -> None:
                 if message["type"] == "http.response.start":
                     message["headers"] = [
-                        *message["headers"], (b"content-security-policy", POLICY.encode()),
+                        *message["headers"],
+                        (b"content-security-policy", POLICY.encode()),
                         (b"x-content-type-options", b"nosniff"),
                         (b"referrer-policy", b"no-referrer"),
                         (b"cache-control", b"no-store"),
-                    ]  # fmt: skip
+                    ]
                 await send(message)
 
             await app(scope, receive, stamped)
@@ -555,10 +569,7 @@ def _download(session: Session, name: str) -> Any:
     try:
         if session.shown is not None and session.shown.solution is None:
             return PlainTextResponse("netsp: a run has no such file", status_code=404)
-        problem = (
-            session.document.problem() if session.shown is None
-            else session.shown.problem()
-        )  # fmt: skip
+        problem = session.document.problem() if session.shown is None else session.shown.problem()
         if name == "problem.json":
             text, kind = problem.to_json(), "application/json"
         elif name == "drawn.geojson":
@@ -581,12 +592,13 @@ def _download(session: Session, name: str) -> Any:
     except InputError as error:
         return PlainTextResponse(f"netsp: {without_options(str(error))}", status_code=409)
     return Response(
-        text, media_type=kind,
+        text,
+        media_type=kind,
         headers={
             "content-disposition": f'attachment; filename="{name}"',
             "x-notes": quote("\n".join(map(without_options, notes))),
         },
-    )  # fmt: skip
+    )
 
 
 def _source(data: Mapping[str, Any]) -> str:

@@ -134,12 +134,17 @@ def _of_plan(problem: Problem, solution: Solution, source: str) -> Shown:
 
 def _answer(problem: Problem, solution: Solution) -> dict[str, Any]:
     return {
-        "version": 0, "stage": "done", "status": solution.status.value, "length": solution.length,
+        "version": 0,
+        "stage": "done",
+        "status": solution.status.value,
+        "length": solution.length,
         **told_bound(solution.status, solution.length, solution.bound),
         "path": [list(p) for p in solution.path],
-        "visits": [{"goal": v.goal, "tether": v.tether_length, "word": list(v.signature)}
-                   for v in solution.tour],
-    }  # fmt: skip
+        "visits": [
+            {"goal": v.goal, "tether": v.tether_length, "word": list(v.signature)}
+            for v in solution.tour
+        ],
+    }
 
 
 def _of_execution(place: Path, problem: Problem, solution: Solution) -> Shown:
@@ -154,13 +159,18 @@ def _of_execution(place: Path, problem: Problem, solution: Solution) -> Shown:
         k = min(int(np.searchsorted(stamps, frame["time"])), len(rows) - 1)
         frames.append(_frame(np.array(frame["nodes"], dtype=float), rows[k]))
     answer = {
-        "version": 0, "stage": "run", "length": polylines.length(np.array(solution.path)),
+        "version": 0,
+        "stage": "run",
+        "length": polylines.length(np.array(solution.path)),
         "path": [[float(r[k]) for k in "xyz"] for r in rows],
         "planned": [list(p) for p in solution.path],
-        "visits": [{"goal": v.goal, "tether": v.tether_length} for v in solution.tour
-                   if v.goal < len(problem.goals)],
+        "visits": [
+            {"goal": v.goal, "tether": v.tether_length}
+            for v in solution.tour
+            if v.goal < len(problem.goals)
+        ],
         "summary": parse_json_object(read_text(place / "summary.json"), "summary.json"),
-    }  # fmt: skip
+    }
     events = [
         {"time": r["time"], "event": r["event"], "text": f"{r['response']}: {r['reason']}"}
         for r in _rows(place / "events.csv", ("time", "event", "response", "reason"), least=0)
@@ -191,24 +201,37 @@ def _of_mission(place: Path) -> Shown:
         if k % every == 0 or k == len(rows) - 1:
             frames.append(_frame(state.nodes, row))
     data = {
-        "schema_version": 1, "name": mission.name, "units": scene.units,
-        "base": list(mission.anchor), "tether_length": mission.tether_length,
-        "clearance": mission.clearance, "obstacles": [],
+        "schema_version": 1,
+        "name": mission.name,
+        "units": scene.units,
+        "base": list(mission.anchor),
+        "tether_length": mission.tether_length,
+        "clearance": mission.clearance,
+        "obstacles": [],
         "goals": [{"position": [float(v) for v in p]} for p in mission.places],
-    }  # fmt: skip
+    }
     answer = {
-        "version": 0, "stage": "run", "length": polylines.length(path), "path": path.tolist(),
-        "visits": [], "summary": summary,
-    }  # fmt: skip
+        "version": 0,
+        "stage": "run",
+        "length": polylines.length(path),
+        "path": path.tolist(),
+        "visits": [],
+        "summary": summary,
+    }
     return Shown(data, answer, scene, None, frames)
 
 
 def _frame(nodes: Any, row: dict[str, str]) -> dict[str, Any]:
     return {
-        "x": float(row["x"]), "y": float(row["y"]), "z": float(row["z"]),
-        "time": float(row["time"]), "length": float(row["tether"]), "mode": row["mode"],
-        "path": np.round(nodes, 3).tolist(), "word": [],
-    }  # fmt: skip
+        "x": float(row["x"]),
+        "y": float(row["y"]),
+        "z": float(row["z"]),
+        "time": float(row["time"]),
+        "length": float(row["tether"]),
+        "mode": row["mode"],
+        "path": np.round(nodes, 3).tolist(),
+        "word": [],
+    }
 
 
 def _rows(file: Path, columns: tuple[str, ...], least: int = 1) -> list[dict[str, str]]:

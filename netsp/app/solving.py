@@ -87,8 +87,13 @@ class Worker:
         with self._lock:  # it died: whoever asked last is served by the next
             if not self._closed and connection is self._ours and self._latest is not None:
                 version, _ = self._latest
-                self.told({"version": version, "stage": "failed",
-                           "error": "the solver's process died; it is started again"})  # fmt: skip
+                self.told(
+                    {
+                        "version": version,
+                        "stage": "failed",
+                        "error": "the solver's process died; it is started again",
+                    }
+                )
                 self._latest = None
                 self._start()
 
@@ -154,10 +159,15 @@ def _solve(
         said = told_bound(Status.FEASIBLE, row.incumbent, row.bound)
         if not said["lower_bound"]:
             said["proof"] = "searching"  # a bound may still come
-        connection.send({
-            "version": version, "stage": "searching", "length": row.incumbent,
-            **said, **drawn(graph, row.tour),
-        })  # fmt: skip
+        connection.send(
+            {
+                "version": version,
+                "stage": "searching",
+                "length": row.incumbent,
+                **said,
+                **drawn(graph, row.tour),
+            }
+        )
 
     start: Solution | None = None
     clock = Clock(time_limit, should_stop=connection.poll)
@@ -169,29 +179,45 @@ def _solve(
                 old_tour(problem, before)
                 start = before  # else nothing is left of it
         graph, result = solve_over(
-            problem, graph, SOLVER, clock, warm_start=start, on_progress=tell,
+            problem,
+            graph,
+            SOLVER,
+            clock,
+            warm_start=start,
+            on_progress=tell,
             on_graph=graphs.append,
-        )  # fmt: skip
+        )
         if clock.stopped:
             return None
         if result.tour is None:
             connection.send({"version": version, "stage": "done", "error": result.status.value})
             return None
         found = checked(problem, to_solution(problem, graph, result, SOLVER, 0))
-        connection.send({
-            "version": version, "stage": "done", "status": result.status.value,
-            "length": result.length, **told_bound(result.status, result.length, result.bound),
-            "solution": found.to_json(), **drawn(graph, result.tour),
-        })  # fmt: skip
+        connection.send(
+            {
+                "version": version,
+                "stage": "done",
+                "status": result.status.value,
+                "length": result.length,
+                **told_bound(result.status, result.length, result.bound),
+                "solution": found.to_json(),
+                **drawn(graph, result.tour),
+            }
+        )
         known = facts(problem, found, connection.poll)
         if known is not None:
             connection.send({"version": version, "facts": known})
         return found
     except InfeasibleError as error:
-        connection.send({
-            "version": version, "stage": "done", "error": str(error),
-            "enclosing": list(error.enclosing), **_out_of_reach(problem),
-        })  # fmt: skip
+        connection.send(
+            {
+                "version": version,
+                "stage": "done",
+                "error": str(error),
+                "enclosing": list(error.enclosing),
+                **_out_of_reach(problem),
+            }
+        )
     except NetspError as error:
         if not clock.stopped:
             connection.send({"version": version, "stage": "done", "error": str(error)})

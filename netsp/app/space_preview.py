@@ -77,14 +77,28 @@ def figure(
         drawn.add_trace(trace)
     names = [_name(g, k) for k, g in enumerate(data["goals"])]
     x, y, z = places.T
-    drawn.add_trace(go.Scatter3d(
-        x=x, y=y, z=z, mode="markers", name="goals", text=names, hoverinfo="text",
-        marker={"size": 4, "color": style.PATH},
-    ))  # fmt: skip
-    drawn.add_trace(go.Scatter3d(
-        x=base[:1], y=base[1:2], z=base[2:], mode="markers", name="base",
-        marker={"size": 6, "color": style.BASE, "symbol": "diamond"},
-    ))  # fmt: skip
+    drawn.add_trace(
+        go.Scatter3d(
+            x=x,
+            y=y,
+            z=z,
+            mode="markers",
+            name="goals",
+            text=names,
+            hoverinfo="text",
+            marker={"size": 4, "color": style.PATH},
+        )
+    )
+    drawn.add_trace(
+        go.Scatter3d(
+            x=base[:1],
+            y=base[1:2],
+            z=base[2:],
+            mode="markers",
+            name="base",
+            marker={"size": 6, "color": style.BASE, "symbol": "diamond"},
+        )
+    )
     drawn.add_trace(line_trace("path", flown, style.PATH, 3))
     drawn.add_trace(line_trace("tether", nodes, style.TETHER, 6))
     drawn.update_layout(**layout("", str(data.get("units", "m"))))

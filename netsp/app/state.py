@@ -19,9 +19,15 @@ from netsp.base.validated import parse_json_object, read_model, shown
 from netsp.model.problem import Problem
 
 EMPTY: dict[str, Any] = {
-    "schema_version": 1, "name": "new", "base": [0.0, 0.0, 0.0], "goals": [], "obstacles": [],
-    "tether_length": 50.0, "clearance": 0.3, "units": "m",
-}  # fmt: skip
+    "schema_version": 1,
+    "name": "new",
+    "base": [0.0, 0.0, 0.0],
+    "goals": [],
+    "obstacles": [],
+    "tether_length": 50.0,
+    "clearance": 0.3,
+    "units": "m",
+}
 """A map with nothing on it but the base."""
 
 LISTS = ("goals", "obstacles")

@@ -58,8 +58,9 @@ class Frame:
             self.file = Path(problem)
         self._server = subprocess.Popen(
             [sys.executable, "-m", "netsp", "app", str(self.file), "--no-browser"],
-            stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         said = []
         assert self._server.stderr is not None
         for line in self._server.stderr:
@@ -94,9 +95,11 @@ class Frame:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None,
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
         trace: TracebackType | None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.close()
 
     def __del__(self) -> None:

@@ -20,10 +20,12 @@ EXAMPLE = "netsp animate tour.json --problem problems/wharf.json -o tour.gif"
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument(
-        "source", metavar="SOURCE", nargs="+",
+        "source",
+        metavar="SOURCE",
+        nargs="+",
         help="a solution, a planned mission, or the folder of a run of `netsp execute` or "
         "`netsp simulate`; several stand side by side",
-    )  # fmt: skip
+    )
     p.add_argument("--problem", metavar="FILE", help="the problem of solution files")
     p.add_argument(
         "-o",
@@ -54,8 +56,9 @@ def run(args: argparse.Namespace) -> int:
     if Path(args.output).suffix.lower() not in kinds:
         raise InputError(f"{args.output}: expected a name ending in {', '.join(kinds)}")
     for name, value, most in (
-        ("--seconds", args.seconds, MOST_SECONDS), ("--fps", args.fps, MOST_FPS)
-    ):  # fmt: skip
+        ("--seconds", args.seconds, MOST_SECONDS),
+        ("--fps", args.fps, MOST_FPS),
+    ):
         if value > most:
             raise InputError(f"{name}: expected at most {most}, got {value}")
     if len(args.source) > MOST_SIDE_BY_SIDE:

@@ -24,23 +24,33 @@ EXAMPLE = "netsp app problems/wharf.json"
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument(
-        "problem", metavar="PROBLEM", nargs="?",
+        "problem",
+        metavar="PROBLEM",
+        nargs="?",
         help="problem file (JSON), made if there is none, or a map of a site (docs/sites.md); "
         "default: an empty map without a file; with --show a solution file, or the folder of a run",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--show", action="store_true",
+        "--show",
+        action="store_true",
         help="only look: at a solution (with --problem), or a run of `netsp execute` or `simulate`",
-    )  # fmt: skip
-    p.add_argument("--problem", metavar="FILE", dest="problem_file",
-                   help="with --show: the problem of a solution file")  # fmt: skip
+    )
+    p.add_argument(
+        "--problem",
+        metavar="FILE",
+        dest="problem_file",
+        help="with --show: the problem of a solution file",
+    )
     p.add_argument(
         "--port", type=int, default=0, metavar="N", help="port to listen on; default: a free one"
     )
     p.add_argument(
-        "--time-limit", type=positive, default=60, metavar="S",
+        "--time-limit",
+        type=positive,
+        default=60,
+        metavar="S",
         help="seconds of solving for each version; default 60",
-    )  # fmt: skip
+    )
     p.add_argument("--no-browser", action="store_true", help="only print the address")
 
 
@@ -113,9 +123,12 @@ def run(args: argparse.Namespace) -> int:
         if not args.no_browser:
             threading.Timer(0.5, webbrowser.open, [address]).start()
         config = uvicorn.Config(
-            application(session, token, port), log_level="warning", ws_max_size=MOST_BYTES,
-            access_log=False, server_header=False,
-        )  # fmt: skip
+            application(session, token, port),
+            log_level="warning",
+            ws_max_size=MOST_BYTES,
+            access_log=False,
+            server_header=False,
+        )
         try:
             uvicorn.Server(config).run(sockets=[listening])
         finally:

@@ -38,10 +38,13 @@ def begin(command: str) -> None:
     with contextlib.suppress(OSError):
         process = subprocess.Popen(
             [sys.executable, "-m", "netsp", "warm-up", "--quiet", "--after", command],
-            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            cwd=Path(__file__).resolve().parents[2], start_new_session=True,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            cwd=Path(__file__).resolve().parents[2],
+            start_new_session=True,
             env={**os.environ, SWITCH_VARIABLE: "0"},
-        )  # fmt: skip
+        )
         process.returncode = 0  # keeps Popen from warning that the process still runs
 
 

@@ -33,9 +33,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--top", type=positive, default=10, metavar="N", help="places printed; default 10"
     )
     p.add_argument(
-        "--time-limit", type=seconds, metavar="S",
+        "--time-limit",
+        type=seconds,
+        metavar="S",
         help="seconds; the best known by then is written; default none",
-    )  # fmt: skip
+    )
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="default 0")
     p.add_argument(
         "-o", "--output", metavar="FILE", help="write the ranking: a table (.csv) or JSON"
@@ -77,9 +79,14 @@ def run(args: argparse.Namespace) -> int:
         print(f"{candidate.name}: {found}; {left} may be better", file=sys.stderr)
 
     search = best_base(
-        problem, places, names=names, every=args.every, time_limit=clock,
-        seed=args.seed, on_candidate=None if args.quiet else tell,
-    )  # fmt: skip
+        problem,
+        places,
+        names=names,
+        every=args.every,
+        time_limit=clock,
+        seed=args.seed,
+        on_candidate=None if args.quiet else tell,
+    )
     print(f"{'rank':>4}  {'place':<12} {'x':>10} {'y':>10} {'tether':>10} {'tour':>12}  status")
     for k, c in enumerate(search.candidates[: args.top], 1):
         tour = f">= {c.bound.length:.6g}" if c.length is None else f"{c.length:.6g}"

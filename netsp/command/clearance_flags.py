@@ -17,13 +17,19 @@ if TYPE_CHECKING:
 def clearance_flags(p: argparse.ArgumentParser) -> None:
     """Add the flags to a command."""
     p.add_argument(
-        "--position-error", type=length, default=0.0, metavar="M",
+        "--position-error",
+        type=length,
+        default=0.0,
+        metavar="M",
         help="error of the vehicle's position (m): the clearance should be larger; default 0",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--current", type=length, default=0.0, metavar="V",
+        "--current",
+        type=length,
+        default=0.0,
+        metavar="V",
         help="speed of the current (m/s), which pushes the vehicle off its path; default 0",
-    )  # fmt: skip
+    )
 
 
 def warn_of_problem(args: argparse.Namespace, problem: Problem, margin: float) -> None:
@@ -48,9 +54,13 @@ def warn_of_problem(args: argparse.Namespace, problem: Problem, margin: float) -
 
 
 def warn_of_clearance(
-    position_error: float, current: float, clearance: float, units: str, margin: float = 0.0,
+    position_error: float,
+    current: float,
+    clearance: float,
+    units: str,
+    margin: float = 0.0,
     room: ClearanceRoom | None = None,
-) -> None:  # fmt: skip
+) -> None:
     """Warn if the clearance of a plan among obstacles is too small to be flown."""
     from netsp.base.axes import metres_per_unit
     from netsp.plan.sizing.clearance_advice import ClearancePolicy, clearance_advice

@@ -103,10 +103,15 @@ def run(args: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     if args.json:
-        json_output.tell({
-            "trials": tally.total, "done": tally.done, "new": tally.done - tally.begun,
-            "failed": tally.failed, "results": args.output,
-        })  # fmt: skip
+        json_output.tell(
+            {
+                "trials": tally.total,
+                "done": tally.done,
+                "new": tally.done - tally.begun,
+                "failed": tally.failed,
+                "results": args.output,
+            }
+        )
     return 0
 
 

@@ -27,48 +27,63 @@ TABLES = (".csv", ".json")
 def arguments(p: argparse.ArgumentParser) -> None:
     """Add the arguments of the command line."""
     p.add_argument(
-        "problem", metavar="PROBLEM",
+        "problem",
+        metavar="PROBLEM",
         help="problem file (JSON), or a study of paths (.toml), which names problem and paths",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "paths", metavar="PATH", nargs="*",
+        "paths",
+        metavar="PATH",
+        nargs="*",
         help="a path: table (.csv; columns x, y[, z] or lon, lat[, depth], and t), GeoJSON, GPX, a "
         "recorded flight (.csv.gz, .tlog, .bin) or a solution",
-    )  # fmt: skip
+    )
     p.add_argument(
         "--solution", metavar="FILE", help="the planned tour; default: solved on the spot"
     )
     p.add_argument(
-        "--radius", type=length, metavar="R",
+        "--radius",
+        type=length,
+        metavar="R",
         help="distance at which a goal counts as visited, in the problem's units; default 2 %% of "
         "the problem's size",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--speed", type=length, metavar="V",
+        "--speed",
+        type=length,
+        metavar="V",
         help="speed of the tour and of paths without time stamps, in the problem's units per "
         "second; default 0.5",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--noise", type=length, metavar="M", default=0.0,
+        "--noise",
+        type=length,
+        metavar="M",
+        default=0.0,
         help="straighten paths by up to M, the error of their positions; default 0",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--frame", metavar="NAME",
+        "--frame",
+        metavar="NAME",
         help="local (the problem's plane) or global (degrees), for recordings and GeoJSON; default "
         "global where the problem has an origin",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--system", type=natural, metavar="N",
+        "--system",
+        type=natural,
+        metavar="N",
         help="the vehicle's system id in a .tlog; default: the only one with positions",
-    )  # fmt: skip
+    )
     p.add_argument(
         "--time-limit", type=seconds, metavar="S", help="seconds for the tour; default no limit"
     )
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
     p.add_argument(
-        "-o", "--output", metavar="FILE",
+        "-o",
+        "--output",
+        metavar="FILE",
         help="write a row for the tour and each path: a table (.csv; - is standard output) or JSON",
-    )  # fmt: skip
+    )
     p.add_argument("--plot", metavar="FILE", help="draw paths and tour (png, svg or pdf)")
     p.add_argument("--html", metavar="FILE", help="write a page with pictures and tables")
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
@@ -104,10 +119,15 @@ def run(args: argparse.Namespace) -> int:
         if not args.quiet:
             stage = stack.enter_context(Stages(sys.stderr, args.time_limit))
         found = compare_paths(
-            problem, paths, solution, speed=args.speed or SPEED,
-            policy=PathPolicy(radius=args.radius), time_limit=args.time_limit, seed=args.seed,
+            problem,
+            paths,
+            solution,
+            speed=args.speed or SPEED,
+            policy=PathPolicy(radius=args.radius),
+            time_limit=args.time_limit,
+            seed=args.seed,
             on_stage=stage or (lambda text: None),
-        )  # fmt: skip
+        )
     if args.json:
         json_output.tell(found.to_dict())
     elif args.output == STANDARD:
@@ -191,12 +211,17 @@ def describe(found: PathComparison) -> str:
     if tour is not None and tour.length is not None:
         names = " → ".join(problem.goal_name(v.goal) for v in tour.tour)
         longest = max((v.tether_length for v in tour.tour), default=0.0)
-        parts.append("planned tour\n" + aligned([
-            ("length", f"{tour.length:.6g} {u}, {found.proof}"),
-            ("time", f"{tour.length / found.speed:.5g} s at {found.speed:.3g} {u}/s"),
-            ("order", names),
-            ("longest tether", f"{longest:.6g} of {problem.tether_length:g} {u}"),
-        ]))  # fmt: skip
+        parts.append(
+            "planned tour\n"
+            + aligned(
+                [
+                    ("length", f"{tour.length:.6g} {u}, {found.proof}"),
+                    ("time", f"{tour.length / found.speed:.5g} s at {found.speed:.3g} {u}/s"),
+                    ("order", names),
+                    ("longest tether", f"{longest:.6g} of {problem.tether_length:g} {u}"),
+                ]
+            )
+        )
     for path in found.paths:
         text = f"path {path.name}\n{aligned(figures_of(found, path))}"
         parts.append(text + (f"\n{visit_table(path.measures)}" if path.measures.visits else ""))

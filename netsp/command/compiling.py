@@ -238,8 +238,9 @@ class Preparation:
             left_s = max(self._expected_s - self._done_s, 1.0)
             print(
                 f"preparing {self._subject}, {so_far_s:.0f} s so far, about {left_s:.0f} s left",
-                file=self._stream, flush=True,
-            )  # fmt: skip
+                file=self._stream,
+                flush=True,
+            )
         else:
             return
         self._printed_at = now

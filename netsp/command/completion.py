@@ -19,14 +19,22 @@ def _names(command: str) -> dict[str, list[str]]:
 
     planners = list(PLANNERS) if command == "simulate" else ["repair", "none"]
     return {
-        "--solver": list(SOLVERS), "--solvers": list(SOLVERS), "--roadmap": list(ROADMAPS),
-        "--roadmaps": list(ROADMAPS), "--format": list(FORMATS), "--planner": planners,
-        "--compare": list(PLANNERS), "--vehicle": list(VEHICLES), "--tether-model": list(TETHERS),
-        "--family": list(FAMILIES), "--classes": ["taut", "non-looping"],
-        "--mip-backend": ["highs", "cbc"], "--frame": ["local", "global"],
+        "--solver": list(SOLVERS),
+        "--solvers": list(SOLVERS),
+        "--roadmap": list(ROADMAPS),
+        "--roadmaps": list(ROADMAPS),
+        "--format": list(FORMATS),
+        "--planner": planners,
+        "--compare": list(PLANNERS),
+        "--vehicle": list(VEHICLES),
+        "--tether-model": list(TETHERS),
+        "--family": list(FAMILIES),
+        "--classes": ["taut", "non-looping"],
+        "--mip-backend": ["highs", "cbc"],
+        "--frame": ["local", "global"],
         "--paths": ["tree", "bitstar", "rrtstar", "prmstar"],
         "--refine": ["none", "paper", "gradient"],
-    }  # fmt: skip
+    }
 
 
 SHELLS = ("bash", "zsh", "tcsh")

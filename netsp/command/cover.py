@@ -28,42 +28,64 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--anchor", required=True, metavar="X,Y,Z", help="where the tether is fixed (m)")
     p.add_argument("--start", metavar="X,Y,Z", help="where the robot starts; default the anchor")
     p.add_argument(
-        "--tether", type=length, metavar="L",
+        "--tether",
+        type=length,
+        metavar="L",
         help="tether length (m); default a tenth more than the waypoints need",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--standoff", type=length, metavar="D",
+        "--standoff",
+        type=length,
+        metavar="D",
         help="distance from the surface (m); default half the camera's range",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--camera", metavar="RANGE[,FIELD[,TILT]]", default="2",
+        "--camera",
+        metavar="RANGE[,FIELD[,TILT]]",
+        default="2",
         help="range of sight (m), full angle of the field of view and maximum tilt (degrees); "
         "default 2,70,90",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--patch", type=length, default=0.2, metavar="S",
+        "--patch",
+        type=length,
+        default=0.2,
+        metavar="S",
         help="edge of the patches of surface that are counted (m); default 0.2",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--clearance", type=length, default=0.3, metavar="R",
+        "--clearance",
+        type=length,
+        default=0.3,
+        metavar="R",
         help="kept from all solids (m); default 0.3",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--share", type=length, default=0.99, metavar="S",
+        "--share",
+        type=length,
+        default=0.99,
+        metavar="S",
         help="to be seen of what can be seen at all; default 0.99",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--incidence", type=length, default=75.0, metavar="DEG",
+        "--incidence",
+        type=length,
+        default=75.0,
+        metavar="DEG",
         help="most that a line of sight may be off the normal (degrees); default 75",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--farthest", type=length, metavar="D",
+        "--farthest",
+        type=length,
+        metavar="D",
         help="most that a patch may be away (m); default the camera's range",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--inspect", action="append", metavar="NAME",
+        "--inspect",
+        action="append",
+        metavar="NAME",
         help="only this solid (or mesh, cloud, floor); may be repeated",
-    )  # fmt: skip
+    )
     p.add_argument(
         "--time-limit", type=seconds, default=60.0, metavar="S", help="seconds for all; default 60"
     )
@@ -100,12 +122,21 @@ def run(args: argparse.Namespace) -> int:
     stages = None if args.quiet else Stages(sys.stderr, clock.left)
     with stages or contextlib.nullcontext():
         found = cover(
-            scene, anchor=anchor, start=start, camera=camera, standoff=args.standoff,
-            tether_length=args.tether, clearance=args.clearance, share=args.share,
-            incidence=args.incidence, farthest=args.farthest,
+            scene,
+            anchor=anchor,
+            start=start,
+            camera=camera,
+            standoff=args.standoff,
+            tether_length=args.tether,
+            clearance=args.clearance,
+            share=args.share,
+            incidence=args.incidence,
+            farthest=args.farthest,
             inspect=tuple(args.inspect) if args.inspect else None,
-            time_limit=clock, seed=args.seed, on_progress=stages,
-        )  # fmt: skip
+            time_limit=clock,
+            seed=args.seed,
+            on_progress=stages,
+        )
     placed = args.scene
     if args.output is not None:
         placed = Path(os.path.relpath(args.scene, Path(args.output).parent)).as_posix()
@@ -123,11 +154,17 @@ def run(args: argparse.Namespace) -> int:
     if not args.quiet:
         print(_summary(found, scene.units, args.output, args.plot), file=sys.stderr)
     if args.json:
-        told.tell({
-            "waypoints": len(found.viewpoints), "fewest_possible": found.bound,
-            "seen": found.seen, "visible": found.visible, "candidates": found.candidates,
-            "tether_length": mission.tether_length, "units": scene.units,
-        })  # fmt: skip
+        told.tell(
+            {
+                "waypoints": len(found.viewpoints),
+                "fewest_possible": found.bound,
+                "seen": found.seen,
+                "visible": found.visible,
+                "candidates": found.candidates,
+                "tether_length": mission.tether_length,
+                "units": scene.units,
+            }
+        )
     return 0
 
 

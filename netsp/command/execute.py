@@ -51,20 +51,26 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--current", metavar="X,Y,Z", help="current (m/s); default none")
     p.add_argument("--gusts", type=length, metavar="S", help="gusts added to the current (m/s)")
     p.add_argument(
-        "--planner", default="repair", metavar="NAME",
+        "--planner",
+        default="repair",
+        metavar="NAME",
         help="repair (default), or none: keep to the plan whatever happens; in space, find a way "
         "to one waypoint after the other",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--planning-limit", type=seconds, metavar="S",
+        "--planning-limit",
+        type=seconds,
+        metavar="S",
         help="seconds that a repair may take, while the robot holds its position; default 2, in "
         "space 10",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--reserve", type=length, metavar="R",
+        "--reserve",
+        type=length,
+        metavar="R",
         help="tether that repairs keep in reserve, in the problem's units; default: as the plan "
         "does, at most a tenth of the limit",
-    )  # fmt: skip
+    )
     p.add_argument(
         "--delta",
         type=length,
@@ -100,8 +106,12 @@ def _mission(args: argparse.Namespace) -> int:
     from netsp.world.planner import PlannerOptions
     from netsp.world.simulator.surprises import SceneSurprises
 
-    for name, flag in (("solution", "SOLUTION"), ("speed", "--speed"), ("delta", "--delta"),
-                       ("reserve", "--reserve")):  # fmt: skip
+    for name, flag in (
+        ("solution", "SOLUTION"),
+        ("speed", "--speed"),
+        ("delta", "--delta"),
+        ("reserve", "--reserve"),
+    ):
         if getattr(args, name) is not None:
             raise InputError(
                 f"{flag}: is for problems, and {args.problem} is a mission, which has its own; "
@@ -120,10 +130,19 @@ def _mission(args: argparse.Namespace) -> int:
     if args.planning_limit is not None:
         options = replace(options, planning_limit=args.planning_limit)
     (run,) = fly(
-        mission, [planner], output=args.output, quiet=args.quiet, as_json=args.json,
-        surprises=surprises, source=args.surprise, check=True, inputs=(args.problem, args.surprise),
-        vehicle=args.vehicle, options=options, seed=args.seed,
-    )  # fmt: skip
+        mission,
+        [planner],
+        output=args.output,
+        quiet=args.quiet,
+        as_json=args.json,
+        surprises=surprises,
+        source=args.surprise,
+        check=True,
+        inputs=(args.problem, args.surprise),
+        vehicle=args.vehicle,
+        options=options,
+        seed=args.seed,
+    )
     s = run.summary
     if s["defects"]:
         return EXIT_DEFECT
@@ -158,13 +177,16 @@ def _problem(args: argparse.Namespace) -> int:
     if planning_limit is None:
         planning_limit = RepairPolicy.time_limit_s
     options = ExecutionOptions(
-        speed=SPEED if args.speed is None else args.speed, vehicle=args.vehicle,
-        delta=args.delta, repair=args.planner == "repair",
+        speed=SPEED if args.speed is None else args.speed,
+        vehicle=args.vehicle,
+        delta=args.delta,
+        repair=args.planner == "repair",
         current=vector(args.current, "--current") if args.current else (0.0, 0.0, 0.0),
-        gusts=args.gusts or 0.0, seed=args.seed,
+        gusts=args.gusts or 0.0,
+        seed=args.seed,
         planning_limit=planning_limit,
         reserve_policy=ReservePolicy(args.reserve),
-    )  # fmt: skip
+    )
     show = not args.quiet and sys.stderr.isatty()
     on_step = show_execution(problem) if show else None
     with output_folder(args.output):
@@ -210,7 +232,9 @@ def show_execution(
             print(
                 f"\r{row.time:8.1f}{of} s  to {name:<9} tether {row.tether:8.2f} of {row.limit:g} "
                 f"{problem.units}   ",
-                end="", file=sys.stderr, flush=True,
-            )  # fmt: skip
+                end="",
+                file=sys.stderr,
+                flush=True,
+            )
 
     return on_step

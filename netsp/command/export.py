@@ -33,19 +33,24 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--problem", metavar="FILE", help="the problem that a solution solves")
     p.add_argument(
-        "--format", metavar="NAME",
+        "--format",
+        metavar="NAME",
         help="plan (QGroundControl), wpl (QGC WPL 110), cockpit (Cockpit, .cmp), geojson, kml, kmz "
         "or csv; default: by the extension",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--origin", metavar="LAT,LON[,HEADING]",
+        "--origin",
+        metavar="LAT,LON[,HEADING]",
         help="position of the base, and compass heading of the y axis in degrees; "
         "default: the problem's own origin",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--acceptance", type=length, default=0.0, metavar="R",
+        "--acceptance",
+        type=length,
+        default=0.0,
+        metavar="R",
         help="acceptance radius of the vehicle (m), within which it cuts corners; default 0",
-    )  # fmt: skip
+    )
     p.add_argument(
         "--hold",
         type=natural,
@@ -63,23 +68,33 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="maximum number of waypoints; default 650",
     )
     p.add_argument(
-        "--fence-bytes", type=whole_bytes, default=672, metavar="N",
+        "--fence-bytes",
+        type=whole_bytes,
+        default=672,
+        metavar="N",
         help="storage of the vehicle for its fence, bytes; default 672, that of Pixhawk flight "
         "controllers without an SD card",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--margin", default="0.3,0.2", metavar="SLACK[,CLEARANCE]",
+        "--margin",
+        default="0.3,0.2",
+        metavar="SLACK[,CLEARANCE]",
         help="warn where less tether is left or an obstacle is closer; default 0.3,0.2",
-    )  # fmt: skip
+    )
     clearance_flags(p)
     p.add_argument(
-        "--depth", type=depth, metavar="D",
+        "--depth",
+        type=depth,
+        metavar="D",
         help="depth of all goals of a solution (m), instead of their own",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--surface", type=float, default=0.0, metavar="Z",
+        "--surface",
+        type=float,
+        default=0.0,
+        metavar="Z",
         help="of a mission: z of the water's surface (m); default 0",
-    )  # fmt: skip
+    )
     p.add_argument("-o", "--output", required=True, metavar="FILE")
     json_output.json_flag(p)
 
@@ -129,13 +144,20 @@ def run(args: argparse.Namespace) -> int:
     if args.origin:
         projection = Projection.parse(args.origin, problem.base[:2], "--origin")
     settings = ExportSettings(
-        goal_hold_s=args.hold, speed=SPEED if args.speed is None else args.speed,
-        max_waypoints=args.max_waypoints, fence=FencePolicy(max_bytes=args.fence_bytes),
-    )  # fmt: skip
+        goal_hold_s=args.hold,
+        speed=SPEED if args.speed is None else args.speed,
+        max_waypoints=args.max_waypoints,
+        fence=FencePolicy(max_bytes=args.fence_bytes),
+    )
     points = export(
-        problem, solution, args.output, kind, projection, acceptance=args.acceptance,
+        problem,
+        solution,
+        args.output,
+        kind,
+        projection,
+        acceptance=args.acceptance,
         settings=settings,
-    )  # fmt: skip
+    )
     goals = sum(p.goal is not None and p.goal >= 0 for p in points)
     seconds = predicted_s(points, settings)
     print(
@@ -145,10 +167,16 @@ def run(args: argparse.Namespace) -> int:
         file=sys.stderr,
     )
     if args.json:
-        json_output.tell({
-            "file": args.output, "format": kind, "waypoints": len(points), "stops": goals,
-            "seconds": seconds, "speed": settings.speed,
-        })  # fmt: skip
+        json_output.tell(
+            {
+                "file": args.output,
+                "format": kind,
+                "waypoints": len(points),
+                "stops": goals,
+                "seconds": seconds,
+                "speed": settings.speed,
+            }
+        )
     for line in warnings(problem, solution, points, slack, clearance):
         messages.warning(line)
     if kind in FOR_VEHICLES:
@@ -187,16 +215,22 @@ def _mission(args: argparse.Namespace) -> int:
     if args.origin:
         projection = Projection.parse(args.origin, mission.start[:2], "--origin")
     settings = ExportSettings(
-        goal_hold_s=args.hold, speed=mission.speed if args.speed is None else args.speed,
+        goal_hold_s=args.hold,
+        speed=mission.speed if args.speed is None else args.speed,
         max_waypoints=args.max_waypoints,
-    )  # fmt: skip
+    )
     done = until_interrupted(
         "exporting the tour",
         lambda: export_mission(
-            mission, args.output, kind, projection, acceptance=args.acceptance, settings=settings,
+            mission,
+            args.output,
+            kind,
+            projection,
+            acceptance=args.acceptance,
+            settings=settings,
             surface=args.surface,
         ),
-    )  # fmt: skip
+    )
     stops = sum(p.goal is not None and p.goal >= 0 for p in done.points)
     seconds = predicted_s(done.points, settings)
     print(
@@ -206,11 +240,18 @@ def _mission(args: argparse.Namespace) -> int:
         file=sys.stderr,
     )
     if args.json:
-        json_output.tell({
-            "file": args.output, "format": kind, "waypoints": len(done.points), "stops": stops,
-            "seconds": seconds, "speed": settings.speed,
-            "longest_tether": done.longest, "tether_length": mission.tether_length,
-        })  # fmt: skip
+        json_output.tell(
+            {
+                "file": args.output,
+                "format": kind,
+                "waypoints": len(done.points),
+                "stops": stops,
+                "seconds": seconds,
+                "speed": settings.speed,
+                "longest_tether": done.longest,
+                "tether_length": mission.tether_length,
+            }
+        )
     if mission.tether_length - done.longest < slack:
         messages.warning(
             f"only {mission.tether_length - done.longest:.2f} m of tether are left, less than the "

@@ -26,10 +26,18 @@ WRITTEN = ("log.csv", "summary.json", "mission.json", "run.png", "run.html")
 
 
 def fly(
-    mission: Mission, planners: Sequence[str], *, output: str | None, quiet: bool,
-    surprises: SceneSurprises | None, source: str | None, check: bool = False,
-    as_json: bool = False, inputs: Sequence[str | None] = (), **how: Any,
-) -> list[Run]:  # fmt: skip
+    mission: Mission,
+    planners: Sequence[str],
+    *,
+    output: str | None,
+    quiet: bool,
+    surprises: SceneSurprises | None,
+    source: str | None,
+    check: bool = False,
+    as_json: bool = False,
+    inputs: Sequence[str | None] = (),
+    **how: Any,
+) -> list[Run]:
     """Fly a mission by each of some planners, tell what came of it, and write the first run.
 
     `check` has the mission's tour judged before; `inputs` are files that must not be overwritten;
@@ -43,9 +51,16 @@ def fly(
     with until_interrupt(None) as clock, long_work():
         try:
             runs = _flown(
-                mission, planners, clock, output=output, quiet=quiet, surprises=surprises,
-                source=source, check=check, **how,
-            )  # fmt: skip
+                mission,
+                planners,
+                clock,
+                output=output,
+                quiet=quiet,
+                surprises=surprises,
+                source=source,
+                check=check,
+                **how,
+            )
         except LimitReachedError:
             if clock.stopped:
                 raise KeyboardInterrupt from None
@@ -56,9 +71,17 @@ def fly(
 
 
 def _flown(
-    mission: Mission, planners: Sequence[str], clock: Clock, *, output: str | None, quiet: bool,
-    surprises: SceneSurprises | None, source: str | None, check: bool, **how: Any,
-) -> list[Run]:  # fmt: skip
+    mission: Mission,
+    planners: Sequence[str],
+    clock: Clock,
+    *,
+    output: str | None,
+    quiet: bool,
+    surprises: SceneSurprises | None,
+    source: str | None,
+    check: bool,
+    **how: Any,
+) -> list[Run]:
     from netsp.base.files import output_folder
     from netsp.command.plot_scene import note_scene, tell, warn_of_scene
     from netsp.world.mission.run_log import describe_run, write_run
@@ -90,9 +113,15 @@ def _flown(
         for planner in planners:
             on_step = until_stopped(clock, show_mission(mission, scene.units) if show else None)
             fly_by = partial(
-                simulate, mission, planner, scene=scene, field=field, surprises=surprises,
-                on_step=on_step, **how,
-            )  # fmt: skip
+                simulate,
+                mission,
+                planner,
+                scene=scene,
+                field=field,
+                surprises=surprises,
+                on_step=on_step,
+                **how,
+            )
             run = clock.bounded("flying", fly_by, winds_down=True)
             runs.append(run)
             if mission.tour is not None and not mission.track:
@@ -160,7 +189,9 @@ def show_mission(mission: Mission, units: str) -> Callable[[LogRow, Planner], No
             f"\r[{'#' * done:.<20}] {row.time:7.1f} s  "
             f"waypoint {min(row.waypoint, count)}/{count}  "
             f"{row.mode:<8} tether {row.tether:.2f} of {mission.tether_length:g} {units}{seen}   ",
-            end="", file=sys.stderr, flush=True,
-        )  # fmt: skip
+            end="",
+            file=sys.stderr,
+            flush=True,
+        )
 
     return on_step

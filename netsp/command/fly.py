@@ -37,76 +37,106 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("problem", metavar="PROBLEM", nargs="?", help="problem file (JSON)")
     p.add_argument("solution", metavar="TOUR", nargs="?", help="its solution file (JSON)")
     p.add_argument(
-        "--resume", metavar="RUN",
+        "--resume",
+        metavar="RUN",
         help="resume the flight in this folder from where the vehicle is, in place of PROBLEM and "
         "TOUR; writes RUN/resumed unless -o names another folder",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--class", dest="word", metavar="WORD",
+        "--class",
+        dest="word",
+        metavar="WORD",
         help="begin where the vehicle is, with its tether in this class: numbers of obstacles from "
         "1, negative from right to left, such as --class=-1,2; '' for a straight tether",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--class-from", metavar="FILE",
+        "--class-from",
+        metavar="FILE",
         help="begin where the vehicle is, with the tether in the state file of netsp guard",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--link", metavar="ADDRESS",
+        "--link",
+        metavar="ADDRESS",
         help="MAVLink over UDP: udpin:PORT (this machine only), udpin:HOST:PORT, udpout:HOST:PORT",
-    )  # fmt: skip
+    )
     p.add_argument(
         "--dry-run", action="store_true", help="show what would be sent, and send nothing"
     )
     p.add_argument(
-        "--system", type=system_id, default=1, metavar="N",
+        "--system",
+        type=system_id,
+        default=1,
+        metavar="N",
         help="system id of the vehicle; others are not listened to; default 1",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--any-vehicle", action="store_true",
+        "--any-vehicle",
+        action="store_true",
         help="command any vehicle, not only an ArduPilot submarine; for experts: others use the "
         "same numbers for other modes",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--frame", metavar="NAME",
+        "--frame",
+        metavar="NAME",
         help="local (metres north, east, down of the base) or global; default global where the "
         "problem has an origin",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--speed", type=length, default=0.5, metavar="V",
+        "--speed",
+        type=length,
+        default=0.5,
+        metavar="V",
         help="cruise speed of the vehicle, m/s, used to predict times and to compare repairs; "
         "default 0.5",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--reach", type=length, default=0.3, metavar="R",
+        "--reach",
+        type=length,
+        default=0.3,
+        metavar="R",
         help="a vertex or goal this near is reached, m; default 0.3",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--pace", type=length, default=1.0, metavar="F",
+        "--pace",
+        type=length,
+        default=1.0,
+        metavar="F",
         help="seconds of the vehicle for each of ours: 1, but in simulations that run faster",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--at-end", choices=("hold", "position-hold", "surface", "leave"), default="hold",
+        "--at-end",
+        choices=("hold", "position-hold", "surface", "leave"),
+        default="hold",
         help="after the flight: hold the place in GUIDED, in POSHOLD, or come to the surface, "
         "until another ground station is heard or Ctrl-C; or leave the vehicle; default hold",
-    )  # fmt: skip
+    )
     p.add_argument("--surprise", metavar="FILE", help="surprise file (JSON): events on the way")
     p.add_argument(
-        "--events", action="store_true",
+        "--events",
+        action="store_true",
         help='take events from standard input, a JSON object a line: {"cancel_goal": "A3"}',
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--page", nargs="?", type=natural, const=PORT, metavar="PORT",
+        "--page",
+        nargs="?",
+        type=natural,
+        const=PORT,
+        metavar="PORT",
         help=f"serve a page on this machine, which takes events too; default port {PORT}",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--planning-limit", type=seconds, metavar="S",
+        "--planning-limit",
+        type=seconds,
+        metavar="S",
         help="seconds that a repair may take, while the vehicle holds its place; default 2",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--reserve", type=length, metavar="R",
+        "--reserve",
+        type=length,
+        metavar="R",
         help="tether that repairs keep in reserve, m; default: as the plan does, at most a tenth "
         "of the limit",
-    )  # fmt: skip
+    )
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="of solvers; default 0")
     p.add_argument("-o", "--output", metavar="RUN", help="folder for logs, summary and run.png")
     clearance_flags(p)
@@ -291,9 +321,15 @@ def _stand_by(
 
 
 def _flown(
-    args: argparse.Namespace, problem: Problem, solution: Solution, frame: Frame,
-    surprises: object, begins: BeginsAt | None, stack: ExitStack, predicted: FlightTime | None,
-) -> tuple[Execution | BaseException, Session, Clock]:  # fmt: skip
+    args: argparse.Namespace,
+    problem: Problem,
+    solution: Solution,
+    frame: Frame,
+    surprises: object,
+    begins: BeginsAt | None,
+    stack: ExitStack,
+    predicted: FlightTime | None,
+) -> tuple[Execution | BaseException, Session, Clock]:
     """Fly the tour, or return what ended the flight under way; the link stays open until the stack
     is left."""
     from netsp.base.clock import until_interrupt
@@ -315,10 +351,12 @@ def _flown(
     if planning_limit is None:
         planning_limit = RepairPolicy.time_limit_s
     options = ExecutionOptions(
-        speed=args.speed, reach=args.reach, seed=args.seed,
+        speed=args.speed,
+        reach=args.reach,
+        seed=args.seed,
         planning_limit=planning_limit,
         reserve_policy=ReservePolicy(args.reserve),
-    )  # fmt: skip
+    )
     assert surprises is None or isinstance(surprises, Surprises)
     address = Address.parse(args.link)
     check_options(options, surprises)
@@ -364,11 +402,18 @@ def _flown(
 
     try:
         done = fly(
-            problem, solution, session, options, surprises=surprises, on_step=on_step,
-            should_stop=lambda: clock.stopped, any_vehicle=args.any_vehicle, begins=begins,
+            problem,
+            solution,
+            session,
+            options,
+            surprises=surprises,
+            on_step=on_step,
+            should_stop=lambda: clock.stopped,
+            any_vehicle=args.any_vehicle,
+            begins=begins,
             record=None if args.output is None else RunRecord(args.output, solution),
             incoming=(lambda: [e for s in sources for e in s()]) if sources else None,
-        )  # fmt: skip
+        )
     except (Exception, KeyboardInterrupt) as error:
         if not rows:
             raise

@@ -24,26 +24,38 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument("instance", metavar="FILE", help="file in the format of TSPLIB or GTSPLIB")
     p.add_argument(
-        "--solver", default="auto", metavar="NAME",
+        "--solver",
+        default="auto",
+        metavar="NAME",
         help="auto (default), mip, dp, reduced-mip, lns, anneal or greedy",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--option", action="append", default=[], type=option, metavar="NAME=VALUE",
+        "--option",
+        action="append",
+        default=[],
+        type=option,
+        metavar="NAME=VALUE",
         help="an option of the solver, as docs/solvers.md lists them; may be repeated",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--time-limit", type=seconds, metavar="S",
+        "--time-limit",
+        type=seconds,
+        metavar="S",
         help="seconds; the best tour by then is written; default no limit",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--iteration-limit", type=positive, metavar="N",
+        "--iteration-limit",
+        type=positive,
+        metavar="N",
         help="iterations of the solver; default no limit",
-    )  # fmt: skip
+    )
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
     p.add_argument(
-        "-o", "--output", metavar="FILE",
+        "-o",
+        "--output",
+        metavar="FILE",
         help="write the tour, in TSPLIB's format, to this file (default: stdout)",
-    )  # fmt: skip
+    )
     p.add_argument("--plot", metavar="FILE", help="draw the tour (png, svg or pdf)")
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
     json_output.json_flag(p)
@@ -78,9 +90,14 @@ def run(args: argparse.Namespace) -> int:
         if table:
             table.begin(instance, "looking for a first tour …")
         result = solve_graph(
-            graph, args.solver, time_limit=clock, iteration_limit=args.iteration_limit,
-            seed=args.seed, params=dict(args.option), on_progress=table,
-        )  # fmt: skip
+            graph,
+            args.solver,
+            time_limit=clock,
+            iteration_limit=args.iteration_limit,
+            seed=args.seed,
+            params=dict(args.option),
+            on_progress=table,
+        )
     if result.tour is not None:
         write_text(args.output or "-", tour_text(instance, result))
     if args.plot:
@@ -121,10 +138,14 @@ def _summary(result: Result, spent: float, output: str | None, plot: str | None)
 def _told(instance: Instance, result: Result, spent: float) -> dict[str, object]:
     """For programs."""
     return {
-        "instance": instance.name, "vertices": len(instance.clusters),
-        "clusters": int(instance.clusters.max()) + 1, "status": result.status.value,
-        "length": result.length, "lower_bound": result.lower_bound, "gap": result.gap,
+        "instance": instance.name,
+        "vertices": len(instance.clusters),
+        "clusters": int(instance.clusters.max()) + 1,
+        "status": result.status.value,
+        "length": result.length,
+        "lower_bound": result.lower_bound,
+        "gap": result.gap,
         "lower_bound_of": None if result.bound is None else result.bound.scope.value,
         "tour": None if result.tour is None else [v + 1 for v in result.tour],
         "seconds": round(spent, 3),
-    }  # fmt: skip
+    }

@@ -34,15 +34,17 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     source = p.add_argument_group("where it listens; the vehicle is never commanded to move")
     source.add_argument(
-        "--link", metavar="ADDRESS",
+        "--link",
+        metavar="ADDRESS",
         help="MAVLink over UDP: udpin:PORT (this machine only), udpin:HOST:PORT, udpout:HOST:PORT",
-    )  # fmt: skip
+    )
     source.add_argument("--replay", metavar="LOG", help="a recording: .csv, .csv.gz, .tlog or .bin")
     source.add_argument(
-        "--frame", metavar="NAME",
+        "--frame",
+        metavar="NAME",
         help="local (metres north, east, down of the base) or global; default global where the "
         "site has an origin",
-    )  # fmt: skip
+    )
     source.add_argument(
         "--system",
         type=system_id,
@@ -52,36 +54,51 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     vehicle = p.add_argument_group("what is known of the vehicle")
     vehicle.add_argument(
-        "--noise", type=length, default=0.3, metavar="M",
+        "--noise",
+        type=length,
+        default=0.3,
+        metavar="M",
         help="standard deviation of one position, m; default 0.3",
-    )  # fmt: skip
+    )
     vehicle.add_argument(
-        "--drift", type=length, default=0.5, metavar="M",
+        "--drift",
+        type=length,
+        default=0.5,
+        metavar="M",
         help="standard deviation of how far positions are off for minutes, m; default 0.5",
-    )  # fmt: skip
+    )
     vehicle.add_argument(
         "--speed", type=length, default=0.5, metavar="V", help="fastest speed, m/s; default 0.5"
     )
     p.add_argument(
-        "--state", metavar="FILE",
+        "--state",
+        metavar="FILE",
         help="keep the class here, and go on from it when started again",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--publish", action="store_true",
+        "--publish",
+        action="store_true",
         help="send tether, slack and alarms to the link (NAMED_VALUE_FLOAT, STATUSTEXT)",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--ask-rates", action="store_true",
+        "--ask-rates",
+        action="store_true",
         help="ask the vehicle to send its position ten times a second (SET_MESSAGE_INTERVAL)",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--page", nargs="?", type=natural, const=PORT, metavar="PORT",
+        "--page",
+        nargs="?",
+        type=natural,
+        const=PORT,
+        metavar="PORT",
         help=f"serve a page on this machine; default port {PORT}",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "-o", "--output", metavar="FILE",
+        "-o",
+        "--output",
+        metavar="FILE",
         help="write every report as a line of JSON to this file; - is standard output",
-    )  # fmt: skip
+    )
     p.add_argument("--quiet", action="store_true", help="no status line and no alarms in words")
 
 
@@ -142,10 +159,17 @@ def run(args: argparse.Namespace) -> int:
                 from netsp.online.guard.live import watch
 
                 watch(
-                    guard, frame, args.link, take, system=args.system, state=args.state,
-                    publish=args.publish, corrections=None if page is None else page.corrections,
-                    say=None if args.quiet else told.say, ask_rates=args.ask_rates,
-                )  # fmt: skip
+                    guard,
+                    frame,
+                    args.link,
+                    take,
+                    system=args.system,
+                    state=args.state,
+                    publish=args.publish,
+                    corrections=None if page is None else page.corrections,
+                    say=None if args.quiet else told.say,
+                    ask_rates=args.ask_rates,
+                )
         except KeyboardInterrupt:
             told.say("stopped")
     if args.output is None:
@@ -179,15 +203,20 @@ class _Told:
         """One more report."""
         self._count += 1
         for alarm in report.raised:
-            self._raised.append({
-                "t": round(report.time, 1), "kind": alarm.kind,
-                "level": alarm.level.name.lower(), "text": alarm.text,
-            })  # fmt: skip
+            self._raised.append(
+                {
+                    "t": round(report.time, 1),
+                    "kind": alarm.kind,
+                    "level": alarm.level.name.lower(),
+                    "text": alarm.text,
+                }
+            )
             if not self.quiet and alarm.level > 1:
                 print(
                     f"{self._clear()}{report.time:8.1f} s  {alarm.level.name:<7} {alarm.text}",
-                    file=sys.stderr, flush=True,
-                )  # fmt: skip
+                    file=sys.stderr,
+                    flush=True,
+                )
         if report.classes:
             self.last = report
             self._doubt += len(report.classes) > 1
@@ -199,8 +228,10 @@ class _Told:
                 print(
                     f"{self._clear()}{report.time:8.1f} s  tether {now.taut:.2f} of "
                     f"{self.site.tether_length:g} {units}, {now.passes}"[:110],
-                    end="", file=sys.stderr, flush=True,
-                )  # fmt: skip
+                    end="",
+                    file=sys.stderr,
+                    flush=True,
+                )
 
     @property
     def reason(self) -> str:
@@ -221,9 +252,14 @@ class _Told:
             "longest_at_s": round(self._at, 2),
             "tether_length": self.site.tether_length,
             "alarms": self._raised,
-            "at_the_end": None if last is None else {
-                "t": round(last.time, 2), "claims": last.claims,
-                "word": list(last.classes[0].word), "passes": last.classes[0].passes,
-                "taut": round(last.classes[0].taut, 4), "loops": [list(x) for x in last.loops],
+            "at_the_end": None
+            if last is None
+            else {
+                "t": round(last.time, 2),
+                "claims": last.claims,
+                "word": list(last.classes[0].word),
+                "passes": last.classes[0].passes,
+                "taut": round(last.classes[0].taut, 4),
+                "loops": [list(x) for x in last.loops],
             },
-        }  # fmt: skip
+        }

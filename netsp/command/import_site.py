@@ -26,10 +26,11 @@ EXAMPLE = "netsp import examples/site.geojson -o problem.json"
 def arguments(p: argparse.ArgumentParser) -> None:
     """Add the arguments of the command line."""
     p.add_argument(
-        "site", metavar="SITE",
+        "site",
+        metavar="SITE",
         help="map: GeoJSON, KML, KMZ, shapefile, GeoPackage, DXF, S-57, GPX, .plan or .waypoints; "
         "or an occupancy image: YAML, PNG, PGM (docs/sites.md)",
-    )  # fmt: skip
+    )
     p.add_argument(
         "--base",
         metavar="LAT,LON[,HEADING]",
@@ -52,44 +53,61 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="radius (m) of point obstacles that have none in the file",
     )
     p.add_argument(
-        "--map", action="append", type=option, default=[], metavar="OURS=THEIRS",
+        "--map",
+        action="append",
+        type=option,
+        default=[],
+        metavar="OURS=THEIRS",
         help="what a layer holds (base, goal, obstacle, bounds, path, ignore=LAYER) or what a "
         "property is called (name, radius, depth, tether_length, clearance, heading=PROPERTY)",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--crs", metavar="SYSTEM",
+        "--crs",
+        metavar="SYSTEM",
         help="coordinate system of a file that names none, as EPSG:32632; local for a plane",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--units", metavar="UNIT",
+        "--units",
+        metavar="UNIT",
         help="unit of lengths and of local coordinates in the file: m, km, cm, mm, ft, us-ft, in, "
         "yd, fathom; default: the unit that the file states, or m",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--line-width", type=length, metavar="W",
+        "--line-width",
+        type=length,
+        metavar="W",
         help="width (m) of open lines that are obstacles and have none in the file",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--join-tolerance", type=length, metavar="T",
+        "--join-tolerance",
+        type=length,
+        metavar="T",
         help="join lines to an outline where their ends are no farther apart (m); default 0.01",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--crop", action=argparse.BooleanOptionalAction,
+        "--crop",
+        action=argparse.BooleanOptionalAction,
         help="leave out obstacles beyond the reach of the tether; default: in charts only",
-    )  # fmt: skip
+    )
     p.add_argument(
         "--inspect", type=positive, metavar="N", help="N goals about every obstacle, at every depth"
     )
     p.add_argument(
-        "--standoff", type=length, metavar="S",
+        "--standoff",
+        type=length,
+        metavar="S",
         help="distance (m) of those goals from its surface",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--of", action="append", type=option, default=[], metavar="WORD=VALUE",
+        "--of",
+        action="append",
+        type=option,
+        default=[],
+        metavar="WORD=VALUE",
         help="inspect these obstacles only: layer=NAME, name=NAME (with * and ?), "
         "box=XMIN,YMIN,XMAX,YMAX (m), earth=SOUTH,WEST,NORTH,EAST (degrees); repeat a word for "
         "alternatives, different words must all match",
-    )  # fmt: skip
+    )
     p.add_argument(
         "--depths", default="0", metavar="D[,D…]", help="depths (m) of those goals; default 0"
     )
@@ -97,23 +115,28 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--depth", type=depth, metavar="D", help="depth of all goals (m), instead of their own"
     )
     p.add_argument(
-        "--skip-unreachable", action="store_true",
+        "--skip-unreachable",
+        action="store_true",
         help="leave out goals that the tether cannot reach, and say which and why",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--goals", metavar="TABLE",
+        "--goals",
+        metavar="TABLE",
         help="more goals: CSV with the columns x, y (m) or lat, lon, and perhaps z or depth, name",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--candidates", metavar="TABLE",
+        "--candidates",
+        metavar="TABLE",
         help="places where the base may stand (columns as for --goals); a cropped map keeps the "
         "reach from each of them",
-    )  # fmt: skip
+    )
     charts = p.add_argument_group("charts")
     charts.add_argument(
-        "--draught", type=depth, metavar="D",
+        "--draught",
+        type=depth,
+        metavar="D",
         help="areas that may be shallower than this (m), or are not surveyed, become obstacles",
-    )  # fmt: skip
+    )
     charts.add_argument(
         "--floor",
         metavar="FILE",
@@ -133,17 +156,21 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="size of a cell (m), of an image without YAML",
     )
     images.add_argument(
-        "--tolerance", type=length, metavar="T",
+        "--tolerance",
+        type=length,
+        metavar="T",
         help="how far obstacles may go beyond occupied cells (m); default: a cell",
-    )  # fmt: skip
+    )
     images.add_argument(
-        "--unknown-free", action="store_true",
+        "--unknown-free",
+        action="store_true",
         help="take cells that the map does not know as free, not as obstacles",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--plot", metavar="FILE",
+        "--plot",
+        metavar="FILE",
         help="draw the problem, what was left out dashed: PNG, SVG or PDF",
-    )  # fmt: skip
+    )
     p.add_argument(
         "-o", "--output", metavar="FILE", help="write the problem to this file (default: stdout)"
     )
@@ -221,12 +248,19 @@ def run(args: argparse.Namespace) -> int:
 
         save_import(problem, left_out, args.plot)
     if args.json:
-        json_output.tell({
-            "problem": problem.name, "units": problem.units, "goals": len(problem.goals),
-            "obstacles": len(problem.obstacles), "tether_length": problem.tether_length,
-            "clearance": problem.clearance, "left_out": list(why), "file": args.output,
-            "site": None if problem.site is None else problem.site.model_dump(mode="json"),
-        })  # fmt: skip
+        json_output.tell(
+            {
+                "problem": problem.name,
+                "units": problem.units,
+                "goals": len(problem.goals),
+                "obstacles": len(problem.obstacles),
+                "tether_length": problem.tether_length,
+                "clearance": problem.clearance,
+                "left_out": list(why),
+                "file": args.output,
+                "site": None if problem.site is None else problem.site.model_dump(mode="json"),
+            }
+        )
     return 0
 
 
@@ -252,12 +286,24 @@ def _is_image(args: argparse.Namespace) -> bool:
     image: bool = args.site.lower().endswith((*FILES, *IMAGES))
     wrong = (
         (
-            "map", "crs", "radius", "inspect", "standoff", "line_width", "join_tolerance", "crop",
-            "of", "candidates", "draught", "floor", "floor_cell", "units",
+            "map",
+            "crs",
+            "radius",
+            "inspect",
+            "standoff",
+            "line_width",
+            "join_tolerance",
+            "crop",
+            "of",
+            "candidates",
+            "draught",
+            "floor",
+            "floor_cell",
+            "units",
         )
         if image
         else ("resolution", "tolerance", "unknown_free")
-    )  # fmt: skip
+    )
     for name in wrong:
         if getattr(args, name):
             kind = "a map with features" if image else "an occupancy image (YAML, PNG, PGM)"
@@ -286,10 +332,16 @@ def _of_image(args: argparse.Namespace) -> Problem:
         for k, (p, n) in enumerate(zip(places.tolist(), names, strict=True), 1)
     ]
     return read_occupancy(
-        args.site, base, goals, args.tether, clearance=args.clearance or 0.0,
-        resolution=args.resolution, tolerance=args.tolerance, unknown_is_free=args.unknown_free,
+        args.site,
+        base,
+        goals,
+        args.tether,
+        clearance=args.clearance or 0.0,
+        resolution=args.resolution,
+        tolerance=args.tolerance,
+        unknown_is_free=args.unknown_free,
         on_note=messages.note,
-    )  # fmt: skip
+    )
 
 
 def show_table(site: str, found: ImportedSite) -> None:
@@ -320,13 +372,23 @@ def _of_map(args: argparse.Namespace) -> ImportedSite:
 
     projection = Projection.parse(args.base, name="--base") if args.base else None
     options = SiteOptions(
-        tether=args.tether, clearance=args.clearance, radius=args.radius, crs=args.crs,
-        units=args.units, maps=args.map, looking=_looking(args),
-        skip_unreachable=args.skip_unreachable, line_width=args.line_width, crop=args.crop,
-        goals=args.goals, candidates=args.candidates, draught=args.draught,
-        floor=args.floor is not None, floor_cell=args.floor_cell,
+        tether=args.tether,
+        clearance=args.clearance,
+        radius=args.radius,
+        crs=args.crs,
+        units=args.units,
+        maps=args.map,
+        looking=_looking(args),
+        skip_unreachable=args.skip_unreachable,
+        line_width=args.line_width,
+        crop=args.crop,
+        goals=args.goals,
+        candidates=args.candidates,
+        draught=args.draught,
+        floor=args.floor is not None,
+        floor_cell=args.floor_cell,
         **({} if args.join_tolerance is None else {"join_tolerance": args.join_tolerance}),
-    )  # fmt: skip
+    )
     return import_site(args.site, projection, options=options)
 
 

@@ -43,44 +43,61 @@ def tell(summary: Mapping[str, Any]) -> None:
 def of_solution(problem: Problem, solution: Solution) -> dict[str, Any]:
     """What `netsp solve` says of a problem."""
     return {
-        "problem": problem.name, "units": problem.units, "status": solution.status.value,
-        "length": solution.length, "lower_bound": solution.lower_bound, "gap": solution.gap,
+        "problem": problem.name,
+        "units": problem.units,
+        "status": solution.status.value,
+        "length": solution.length,
+        "lower_bound": solution.lower_bound,
+        "gap": solution.gap,
         "lower_bound_of": None if solution.bound is None else solution.bound.scope.value,
         "order": [problem.goal_name(v.goal) for v in solution.tour],
         "longest_tether": max((v.tether_length for v in solution.tour), default=None),
         "tether_length": problem.tether_length,
         "entangled": [problem.obstacle_name(k) for k in solution.entangled],
-        "roadmap": solution.roadmap, "solver": solution.solver,
+        "roadmap": solution.roadmap,
+        "solver": solution.solver,
         "timings": solution.timings.model_dump(mode="json"),
-    }  # fmt: skip
+    }
 
 
 def of_infeasible(problem: Problem, error: InfeasibleError) -> dict[str, Any]:
     """What `netsp solve` says of a problem that has no tour."""
     return {
-        "problem": problem.name, "units": problem.units, "status": "infeasible",
-        "message": str(error), "tether_length": problem.tether_length,
+        "problem": problem.name,
+        "units": problem.units,
+        "status": "infeasible",
+        "message": str(error),
+        "tether_length": problem.tether_length,
         "goal": None if error.goal is None else problem.goal_name(error.goal),
         "needed": error.needed if error.needed is not None and isfinite(error.needed) else None,
-    }  # fmt: skip
+    }
 
 
 def of_mission(mission: Mission, found: SolvedMission, units: str) -> dict[str, Any]:
     """What `netsp solve` says of a mission."""
     tour = found.tour
     return {
-        "mission": mission.name, "units": units, "status": tour.status.value,
-        "length": tour.length, "lower_bound": tour.lower_bound, "gap": tour.gap,
-        "bound_of_all": tour.bound_of_all, "gap_to_all": tour.gap_to_all,
-        "unresolved_gaps": None if tour.unresolved_gaps is None else [
-            gap.model_dump(mode="json") for gap in tour.unresolved_gaps
-        ],
+        "mission": mission.name,
+        "units": units,
+        "status": tour.status.value,
+        "length": tour.length,
+        "lower_bound": tour.lower_bound,
+        "gap": tour.gap,
+        "bound_of_all": tour.bound_of_all,
+        "gap_to_all": tour.gap_to_all,
+        "unresolved_gaps": None
+        if tour.unresolved_gaps is None
+        else [gap.model_dump(mode="json") for gap in tour.unresolved_gaps],
         "cell": None if found.gaps is None else found.gaps.cell,
-        "order": list(found.order[: len(tour.stops)]), "left_out": list(found.left_out),
-        "longest_tether": tour.longest_tether, "tether_length": mission.tether_length,
-        "exact_words": tour.exact, "solver": tour.solver, "interrupted": found.interrupted,
+        "order": list(found.order[: len(tour.stops)]),
+        "left_out": list(found.left_out),
+        "longest_tether": tour.longest_tether,
+        "tether_length": mission.tether_length,
+        "exact_words": tour.exact,
+        "solver": tour.solver,
+        "interrupted": found.interrupted,
         "flight": None if found.run is None else found.run.summary,
-    }  # fmt: skip
+    }
 
 
 def of_verdict(verdict: Verification) -> dict[str, Any]:
@@ -90,4 +107,4 @@ def of_verdict(verdict: Verification) -> dict[str, Any]:
         "checks": [
             {"name": c.name, "passed": c.passed, "detail": c.detail} for c in verdict.checks
         ],
-    }  # fmt: skip
+    }

@@ -25,10 +25,11 @@ FOLDER = "problems/library"
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument(
-        "action", choices=("list", "check", "rank"),
+        "action",
+        choices=("list", "check", "rank"),
         help="list the problems with the best known of each; check solutions against them; rank "
         "solvers",
-    )  # fmt: skip
+    )
     p.add_argument("files", nargs="*", metavar="FILE", help="check: solution files (JSON)")
     p.add_argument(
         "--folder", default=FOLDER, metavar="DIR", help=f"where the library is; default {FOLDER}"
@@ -40,23 +41,30 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--by", default="a contributor", metavar="NAME", help="check: who found them")
     who = p.add_mutually_exclusive_group()
     who.add_argument(
-        "--solver", metavar="NAME",
+        "--solver",
+        metavar="NAME",
         help="rank: a solver, or a function of a travel graph as module:function",
-    )  # fmt: skip
+    )
     who.add_argument(
-        "--command", metavar="CMD",
+        "--command",
+        metavar="CMD",
         help="rank: a command with {problem}, {solution} and perhaps {seconds} in it",
-    )  # fmt: skip
+    )
     p.add_argument("--label", metavar="NAME", help="rank: what the solver is called")
     p.add_argument(
-        "--time-limit", type=seconds, default=10.0, metavar="S",
+        "--time-limit",
+        type=seconds,
+        default=10.0,
+        metavar="S",
         help="rank: seconds for each problem; default 10",
-    )  # fmt: skip
+    )
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
     p.add_argument(
-        "-o", "--output", metavar="FILE",
+        "-o",
+        "--output",
+        metavar="FILE",
         help="rank: file of rows; those that are there are ranked, too, and not run again",
-    )  # fmt: skip
+    )
     p.add_argument("--quiet", action="store_true", help="no progress")
     p.add_argument("--json", action="store_true", help="print the answer as JSON on stdout")
 
@@ -81,14 +89,27 @@ def _chosen(args: argparse.Namespace, library: Library) -> list[str]:
 def _list(args: argparse.Namespace, library: Library) -> int:
     names = _chosen(args, library)
     if args.json:
-        json_output.tell({"problems": [
-            {"problem": name} | (
-                {"length": r.length, "lower_bound": r.lower_bound, "gap": r.gap,
-                 "lower_bound_of": None if r.bound is None else r.bound.scope.value,
-                 "solver": r.solver, "by": r.by, "date": r.date}
-                if (r := library.records.get(name)) else {}
-            ) for name in names
-        ]})  # fmt: skip
+        json_output.tell(
+            {
+                "problems": [
+                    {"problem": name}
+                    | (
+                        {
+                            "length": r.length,
+                            "lower_bound": r.lower_bound,
+                            "gap": r.gap,
+                            "lower_bound_of": None if r.bound is None else r.bound.scope.value,
+                            "solver": r.solver,
+                            "by": r.by,
+                            "date": r.date,
+                        }
+                        if (r := library.records.get(name))
+                        else {}
+                    )
+                    for name in names
+                ]
+            }
+        )
         return 0
     print(f"bounds are on {Scope.ALL_TOURS.tours}")
     print(f"{'problem':<20} {'goals':>6} {'best':>12} {'bound':>12} {'gap':>9}  found by")
@@ -133,11 +154,16 @@ def _check(args: argparse.Namespace, library: Library) -> int:
         if args.keep and found.better:
             library.take(solution, args.by)
             kept = True
-        answers.append({
-            "file": file, "problem": found.name, "verified": bool(found.verification),
-            "length": found.length, "best_known": None if record is None else record.length,
-            "better": found.better,
-        })  # fmt: skip
+        answers.append(
+            {
+                "file": file,
+                "problem": found.name,
+                "verified": bool(found.verification),
+                "length": found.length,
+                "best_known": None if record is None else record.length,
+                "better": found.better,
+            }
+        )
         if not args.json:
             print(f"{file}: {found.name}: {text}")
     if kept:
@@ -156,12 +182,10 @@ def _rank(args: argparse.Namespace, library: Library) -> int:
         check_writable(args.output)
         solve = (
             rank.by_name(args.solver, args.seed) if args.solver else rank.by_command(args.command)
-        )  # fmt: skip
+        )
         label = args.label or args.solver or args.command.split()[0].rsplit("/", 1)[-1]
         there = {(r.solver, r.limit, r.problem) for r in rows}
-        names = [
-            n for n in _chosen(args, library) if (label, args.time_limit, n) not in there
-        ]  # fmt: skip
+        names = [n for n in _chosen(args, library) if (label, args.time_limit, n) not in there]
         skipped = len(_chosen(args, library)) - len(names)
         if skipped and not args.quiet:
             messages.note(
@@ -183,8 +207,10 @@ def _rank(args: argparse.Namespace, library: Library) -> int:
                         what += f", {100 * (row.length / record.length - 1):.3f} % above the best"
                 print(
                     f"[{k}/{len(names)}] {row.problem}: {what}, {row.seconds:.1f} s; "
-                    f"{span(left)} left", file=sys.stderr, flush=True,
-                )  # fmt: skip
+                    f"{span(left)} left",
+                    file=sys.stderr,
+                    flush=True,
+                )
     entries = rank.ranking(library, rows)
     if len({e["problems"] for e in entries}) > 1 and not args.quiet:
         messages.note("not all ran over the same problems: their means are not of the same")
@@ -193,8 +219,10 @@ def _rank(args: argparse.Namespace, library: Library) -> int:
         return 0
     if not entries:
         raise InputError(f"{output}: there is nothing to rank; expected --solver or --command")
-    print(f"{'solver':<16} {'limit s':>8} {'problems':>9} {'verified':>9} {'as the best':>12} "
-          f"{'above, mean %':>14} {'worst %':>9} {'median s':>9}")  # fmt: skip
+    print(
+        f"{'solver':<16} {'limit s':>8} {'problems':>9} {'verified':>9} {'as the best':>12} "
+        f"{'above, mean %':>14} {'worst %':>9} {'median s':>9}"
+    )
     for e in entries:
         print(
             f"{e['solver']:<16.16} {e['limit']:>8g} {e['problems']:>9} {e['verified']:>9} "

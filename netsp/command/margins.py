@@ -20,10 +20,13 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
     p.add_argument("solution", metavar="SOLUTION", help="solution file (JSON)")
     p.add_argument(
-        "--friction", type=friction, default=0.0, metavar="MU",
+        "--friction",
+        type=friction,
+        default=0.0,
+        metavar="MU",
         help="coefficient of friction of tether on obstacle, 0 to 10, for the tension ratios; "
         "default 0",
-    )  # fmt: skip
+    )
     p.add_argument("-o", "--output", metavar="FILE", help="write the margins (JSON)")
 
 

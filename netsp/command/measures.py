@@ -19,9 +19,7 @@ DEFINITIONS = (
 )
 
 
-def describe_path(
-    problem: Problem, path: npt.ArrayLike, times: npt.ArrayLike | None = None
-) -> str:  # fmt: skip
+def describe_path(problem: Problem, path: npt.ArrayLike, times: npt.ArrayLike | None = None) -> str:
     """Return all measures of one path, a line each."""
     figures = measure_path(problem, path, times=times)
     m = measure(problem, figures.route if figures.is_closed else _open_route(figures))

@@ -28,22 +28,31 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument("problem", metavar="PROBLEM", help="problem, scene or mission file (JSON)")
     p.add_argument(
-        "solution", metavar="SOLUTION", nargs="?",
+        "solution",
+        metavar="SOLUTION",
+        nargs="?",
         help="solution; for a scene, a path that begins at the anchor (CSV x,y,z or JSON), along "
         "which the tether is laid",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "-o", "--output", required=True, metavar="FILE",
+        "-o",
+        "--output",
+        required=True,
+        metavar="FILE",
         help="png, svg or pdf; a scene or a mission also html, interactive",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--tether-model", default="geodesic", metavar="NAME",
+        "--tether-model",
+        default="geodesic",
+        metavar="NAME",
         help="scene: geodesic (default) or react",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--delta", type=length, metavar="L",
+        "--delta",
+        type=length,
+        metavar="L",
         help="scene: resolution of the tether; default: by the scene",
-    )  # fmt: skip
+    )
     p.add_argument("--roadmap", metavar="NAME", help="draw this roadmap: taut or prm")
     p.add_argument("--samples", type=positive, metavar="N", help="prm: milestones; default 1000")
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="prm: random seed")
@@ -106,8 +115,10 @@ def _drawn(args: argparse.Namespace) -> int:
 def _mission(args: argparse.Namespace) -> int:
     """Draw a mission: its waypoints in their order, and its tour if it has one."""
     for name, flag in (
-        ("solution", "SOLUTION"), ("roadmap", "--roadmap"), ("tethers_to", "--tethers-to")
-    ):  # fmt: skip
+        ("solution", "SOLUTION"),
+        ("roadmap", "--roadmap"),
+        ("tethers_to", "--tethers-to"),
+    ):
         if getattr(args, name) is not None:
             raise InputError(f"{flag}: {args.problem} is a mission; expected nothing beside it")
     from netsp.view.pictures import style

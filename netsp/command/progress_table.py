@@ -171,9 +171,7 @@ MAX_NAMED_LEGS = 3
 
 def _left_out(problem: Problem, solution: Solution) -> str:
     """Return the line that says which legs were left out."""
-    legs = [
-        f"{problem.goal_name(a)} to {problem.goal_name(b)}" for a, b in solution.legs_left_out
-    ]  # fmt: skip
+    legs = [f"{problem.goal_name(a)} to {problem.goal_name(b)}" for a, b in solution.legs_left_out]
     more = f" and {len(legs) - MAX_NAMED_LEGS} more" if len(legs) > MAX_NAMED_LEGS else ""
     named = ", ".join(legs[:MAX_NAMED_LEGS]) + more
     return (

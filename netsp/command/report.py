@@ -16,9 +16,10 @@ EXAMPLE = "netsp report rows.jsonl -o report.html"
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument(
-        "results", metavar="RESULTS",
+        "results",
+        metavar="RESULTS",
         help="rows of `netsp compare`, a solution, a planned mission, or the folder of a run",
-    )  # fmt: skip
+    )
     p.add_argument("--problem", metavar="FILE", help="the problem of a solution file")
     p.add_argument(
         "-o", "--output", required=True, metavar="FILE", help="write the page (HTML) to this file"

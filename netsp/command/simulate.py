@@ -20,36 +20,46 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument("mission", metavar="MISSION", help="mission file (JSON)")
     p.add_argument(
-        "--planner", default="predictive", metavar="NAME",
+        "--planner",
+        default="predictive",
+        metavar="NAME",
         help=choices(
             "predictive (default), repair, react, react-draft, react-thresholds or none",
             "netsp.planners",
         ),
-    )  # fmt: skip
+    )
     p.add_argument(
         "--tether", type=length, metavar="L", help="tether length, instead of the mission's"
     )
     p.add_argument(
-        "--vehicle", default="kinematic", metavar="NAME",
+        "--vehicle",
+        default="kinematic",
+        metavar="NAME",
         help="kinematic (default) or bluerov2 (with its dynamics and controller)",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--tether-model", default="geodesic", metavar="NAME",
+        "--tether-model",
+        default="geodesic",
+        metavar="NAME",
         help=choices("used by the planner: geodesic (default) or react", "netsp.tethers"),
-    )  # fmt: skip
+    )
     p.add_argument("--current", metavar="X,Y,Z", help="current (m/s), instead of the mission's")
     p.add_argument(
-        "--paths", default="tree", metavar="NAME",
+        "--paths",
+        default="tree",
+        metavar="NAME",
         help="how paths are found: tree (default), bitstar, rrtstar or prmstar (OMPL)",
-    )  # fmt: skip
+    )
     p.add_argument(
         "--refine", metavar="NAME", help="none, paper or gradient; default is the planner's own"
     )
     p.add_argument(
-        "--perturbation", choices=("free", "farther"), default="free",
+        "--perturbation",
+        choices=("free", "farther"),
+        default="free",
         help="random moves that --refine paper keeps: free (default), as the paper says, or those "
         "that lead farther from solids",
-    )  # fmt: skip
+    )
     p.add_argument(
         "--seed",
         type=natural,
@@ -59,10 +69,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--compare", metavar="NAME", help="also fly with this planner, for comparison")
     p.add_argument(
-        "--surprise", metavar="FILE",
+        "--surprise",
+        metavar="FILE",
         help="surprise file (JSON): solids that appear, vanish or move; waypoints added or "
         "cancelled; a robot carried off",
-    )  # fmt: skip
+    )
     p.add_argument("--snap", action="store_true", help="move waypoints out of solids")
     p.add_argument(
         "-o",
@@ -95,15 +106,22 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--compare: expected {', '.join(PLANNERS)}, got {args.compare!r}")
     surprises = SceneSurprises.load(args.surprise) if args.surprise else None
     runs = fly(
-        mission, [args.planner, args.compare] if args.compare else [args.planner],
-        output=args.output, quiet=args.quiet, as_json=args.json, surprises=surprises,
+        mission,
+        [args.planner, args.compare] if args.compare else [args.planner],
+        output=args.output,
+        quiet=args.quiet,
+        as_json=args.json,
+        surprises=surprises,
         source=args.surprise,
-        inputs=(args.mission, args.surprise), vehicle=args.vehicle, tether=args.tether_model,
-        snap=args.snap, seed=args.seed,
+        inputs=(args.mission, args.surprise),
+        vehicle=args.vehicle,
+        tether=args.tether_model,
+        snap=args.snap,
+        seed=args.seed,
         options=PlannerOptions(
             args.paths, args.refine, args.seed, RefineParams(keeps=args.perturbation)
         ),
-    )  # fmt: skip
+    )
     if any(r.summary["defects"] for r in runs):
         return EXIT_DEFECT
     s = runs[0].summary

@@ -38,9 +38,10 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def for_all(p: argparse.ArgumentParser) -> None:
     """What problems and missions take."""
     p.add_argument(
-        "problem", metavar="PROBLEM",
+        "problem",
+        metavar="PROBLEM",
         help="problem file or mission file (JSON); a mission is written with its tour",
-    )  # fmt: skip
+    )
     p.add_argument(
         "--solver",
         default="auto",
@@ -77,9 +78,11 @@ def for_all(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
     p.add_argument(
-        "-o", "--output", metavar="FILE",
+        "-o",
+        "--output",
+        metavar="FILE",
         help="write the solution (the planned mission) to this file (default: stdout)",
-    )  # fmt: skip
+    )
     p.add_argument("--plot", metavar="FILE", help="draw the solution (png, svg or pdf)")
     clearance_flags(p)
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
@@ -95,9 +98,11 @@ def _for_problems(p: argparse._ArgumentGroup) -> None:
         help=choices("taut (default) or prm", "netsp.roadmaps"),
     )
     p.add_argument(
-        "--classes", metavar="RULE", dest="classes_rule",
+        "--classes",
+        metavar="RULE",
+        dest="classes_rule",
         help="taut: all homotopy classes (default), or non-looping as in the 2017 paper",
-    )  # fmt: skip
+    )
     p.add_argument("--samples", type=positive, metavar="N", help="prm: milestones; default 1000")
     p.add_argument(
         "--shortcut", action="store_true", help="prm: pull every leg taut within its class"
@@ -109,28 +114,42 @@ def _for_problems(p: argparse._ArgumentGroup) -> None:
         help="taut: upper limit on the classes of all goals together",
     )
     p.add_argument(
-        "--keep-order", action="store_true",
+        "--keep-order",
+        action="store_true",
         help="visit the goals in the order of the file; only their homotopy classes are chosen",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--slack", type=length, default=0.0, metavar="S",
+        "--slack",
+        type=length,
+        default=0.0,
+        metavar="S",
         help="share of the taut length that must fit beyond it, as 0.05; default 0",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--friction", type=friction, default=0.0, metavar="MU",
+        "--friction",
+        type=friction,
+        default=0.0,
+        metavar="MU",
         help="coefficient of friction of tether on obstacle, 0 to 10; default 0",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--max-tension-ratio", type=length, metavar="K",
+        "--max-tension-ratio",
+        type=length,
+        metavar="K",
         help="use only classes in which friction multiplies the tension by at most K",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--margin", type=length, default=0.0, metavar="R",
+        "--margin",
+        type=length,
+        default=0.0,
+        metavar="R",
         help="plan so that every obstacle may be off by R; default 0 (docs/sizing.md)",
-    )  # fmt: skip
-    p.add_argument("--warm-start", metavar="SOLUTION",
+    )
+    p.add_argument(
+        "--warm-start",
+        metavar="SOLUTION",
         help="start from this solution's tour, also one of an older version of the problem",
-    )  # fmt: skip
+    )
     p.add_argument(
         "--plot-trace",
         metavar="FILE",
@@ -144,11 +163,19 @@ def run_mission(args: argparse.Namespace) -> int:
     from netsp.command import solve_mission
 
     return solve_mission.solve(
-        args.problem, solver=args.solver, params=_params(args), time_limit=args.time_limit,
-        iteration_limit=args.iteration_limit, seed=args.seed, output=args.output, plot=args.plot,
-        quiet=args.quiet, as_json=args.json, position_error=args.position_error,
+        args.problem,
+        solver=args.solver,
+        params=_params(args),
+        time_limit=args.time_limit,
+        iteration_limit=args.iteration_limit,
+        seed=args.seed,
+        output=args.output,
+        plot=args.plot,
+        quiet=args.quiet,
+        as_json=args.json,
+        position_error=args.position_error,
         current=args.current,
-    )  # fmt: skip
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -27,11 +27,19 @@ TIME_LIMIT = 60.0
 """Seconds, where no limit is given."""
 
 FOR_PROBLEMS = {
-    "roadmap": "--roadmap", "classes_rule": "--classes", "samples": "--samples",
-    "shortcut": "--shortcut", "max_classes": "--max-classes", "keep_order": "--keep-order",
-    "slack": "--slack", "friction": "--friction", "max_tension_ratio": "--max-tension-ratio",
-    "margin": "--margin", "warm_start": "--warm-start", "plot_trace": "--plot-trace",
-}  # fmt: skip
+    "roadmap": "--roadmap",
+    "classes_rule": "--classes",
+    "samples": "--samples",
+    "shortcut": "--shortcut",
+    "max_classes": "--max-classes",
+    "keep_order": "--keep-order",
+    "slack": "--slack",
+    "friction": "--friction",
+    "max_tension_ratio": "--max-tension-ratio",
+    "margin": "--margin",
+    "warm_start": "--warm-start",
+    "plot_trace": "--plot-trace",
+}
 """Flags of `netsp solve` that say something of a problem only."""
 
 
@@ -59,10 +67,20 @@ def check_flags(args: argparse.Namespace, parser_defaults: dict[str, Any]) -> No
 
 
 def solve(
-    file: str, *, solver: str, params: dict[str, str], time_limit: float | None,
-    iteration_limit: int | None, seed: int, output: str | None, plot: str | None, quiet: bool,
-    as_json: bool = False, position_error: float = 0.0, current: float = 0.0,
-) -> int:  # fmt: skip
+    file: str,
+    *,
+    solver: str,
+    params: dict[str, str],
+    time_limit: float | None,
+    iteration_limit: int | None,
+    seed: int,
+    output: str | None,
+    plot: str | None,
+    quiet: bool,
+    as_json: bool = False,
+    position_error: float = 0.0,
+    current: float = 0.0,
+) -> int:
     """Plan the mission, write it, and return the exit code."""
     check_writable(output, plot, inputs=(file,))
     from netsp.base.files import read_text, write_text
@@ -97,10 +115,16 @@ def solve(
                 GeodesicTether(field, mission.delta), mission.delta, "lower the mission's delta"
             )
         found = solve_mission(
-            mission, scene=scene, field=field, solver=solver, params=params,
-            time_limit=clock, iteration_limit=iteration_limit, seed=seed,
+            mission,
+            scene=scene,
+            field=field,
+            solver=solver,
+            params=params,
+            time_limit=clock,
+            iteration_limit=iteration_limit,
+            seed=seed,
             on_progress=stages,
-        )  # fmt: skip
+        )
     placed = Mission.from_json(read_text(file)).scene
     if output is not None and not Path(placed).is_absolute():
         # a mission file names its scene from where it lies itself
@@ -142,9 +166,13 @@ MOST_NAMED = 16
 
 
 def summary(
-    mission: Mission, found: SolvedMission, seconds: float, output: str | None, plot: str | None,
+    mission: Mission,
+    found: SolvedMission,
+    seconds: float,
+    output: str | None,
+    plot: str | None,
     units: str,
-) -> str:  # fmt: skip
+) -> str:
     """What was found, in a few lines."""
     from netsp.model.bound_scope import LowerBound, Scope
     from netsp.model.solution import Status

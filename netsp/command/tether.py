@@ -17,13 +17,17 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
     p.add_argument(
-        "--longest", type=length, metavar="L",
+        "--longest",
+        type=length,
+        metavar="L",
         help="longest tether to look at, in the problem's units; default: the problem's",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--time-limit", type=seconds, metavar="S",
+        "--time-limit",
+        type=seconds,
+        metavar="S",
         help="seconds; what is known by then is written; default none",
-    )  # fmt: skip
+    )
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="default 0")
     p.add_argument("-o", "--output", metavar="FILE", help="write the curve: a table (.csv) or JSON")
     p.add_argument("--plot", metavar="FILE", help="draw the curve (.png, .svg or .pdf)")
@@ -49,9 +53,12 @@ def run(args: argparse.Namespace) -> int:
         )
 
     curve = tether_curve(
-        problem, args.longest, time_limit=clock, seed=args.seed,
+        problem,
+        args.longest,
+        time_limit=clock,
+        seed=args.seed,
         on_step=None if args.quiet else tell,
-    )  # fmt: skip
+    )
     print(f"{'tether from':>12} {'up to':>12} {'tour':>12} {'saves':>8}  status")
     first = curve.steps[0].length if curve.steps else 0.0
     for s in curve.steps:

@@ -33,17 +33,21 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "(a file that netsp compare-path reads, or a JSON list of points)",
     )
     p.add_argument(
-        "--margins", action="store_true",
+        "--margins",
+        action="store_true",
         help="print how far the world may be off, too (netsp margins)",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--frame", metavar="NAME",
+        "--frame",
+        metavar="NAME",
         help="frame of a path to measure: local (the problem's plane) or global (degrees)",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--system", type=natural, metavar="N",
+        "--system",
+        type=natural,
+        metavar="N",
         help="the vehicle's system id in a .tlog to measure; default: the only one with positions",
-    )  # fmt: skip
+    )
     p.add_argument("--quiet", action="store_true", help="exit code only")
     json_output.json_flag(p)
 

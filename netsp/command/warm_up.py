@@ -18,9 +18,12 @@ Step = tuple[str, Callable[[], object]]
 """Name of a step, and the step."""
 
 STEP_WORDS = {
-    "simulate": "mission", "cover": "space", "execute": "carried out", "fly": "carried out",
+    "simulate": "mission",
+    "cover": "space",
+    "execute": "carried out",
+    "fly": "carried out",
     "guard": "guard",
-}  # fmt: skip
+}
 """Word in the names of the steps that a command needs, by command; other commands need `solver`."""
 
 
@@ -28,14 +31,18 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     p.add_argument("--quiet", action="store_true", help="no progress")
     p.add_argument(
-        "--list", action="store_true",
+        "--list",
+        action="store_true",
         help="print all functions and the CPU seconds of compiling each, without the functions "
         "that it calls; - if it was on disk already, or another process compiled it",
-    )  # fmt: skip
+    )
     p.add_argument(
-        "--jobs", type=positive, default=1, metavar="N",
+        "--jobs",
+        type=positive,
+        default=1,
+        metavar="N",
         help="processes that compile at the same time (default: 1)",
-    )  # fmt: skip
+    )
     p.add_argument("--part", type=int, default=0, help=argparse.SUPPRESS)
     p.add_argument("--after", default=None, metavar="COMMAND", help=argparse.SUPPRESS)
 
@@ -239,17 +246,27 @@ def steps() -> Iterator[Step]:
 
     yield "sampled roadmap", sampled
     yield "tours carried out", rehearse
-    solids = [{"capsule": {"a": (0, 0, -3), "b": (0, 0, 3), "radius": 0.5}},
-              {"box": {"center": (3, 0, 0), "size": (1, 1, 1)}}]  # fmt: skip
+    solids = [
+        {"capsule": {"a": (0, 0, -3), "b": (0, 0, 3), "radius": 0.5}},
+        {"box": {"center": (3, 0, 0), "size": (1, 1, 1)}},
+    ]
     scene = Scene.model_validate({"schema_version": 1, "name": "warm-up", "solids": solids})
     angle = np.linspace(np.pi, np.pi + 5.0, 12)
     ring = np.column_stack([np.cos(angle), np.sin(angle), 0.1 * angle])
     mission = Mission.model_validate(
-        {"schema_version": 1, "scene": "-", "anchor": (-2, 0, 0), "start": (-1.9, 0, 0),
-         "tether_length": 4.5, "waypoints": ring.tolist(), "camera": {"range": 2.0}, "speed": 0.5,
-         "tether": {"slack": 0.01, "diameter": 0.01, "pulls_vehicle": True},
-         "current": (0.1, 0, 0)}
-    )  # fmt: skip
+        {
+            "schema_version": 1,
+            "scene": "-",
+            "anchor": (-2, 0, 0),
+            "start": (-1.9, 0, 0),
+            "tether_length": 4.5,
+            "waypoints": ring.tolist(),
+            "camera": {"range": 2.0},
+            "speed": 0.5,
+            "tether": {"slack": 0.01, "diameter": 0.01, "pulls_vehicle": True},
+            "current": (0.1, 0, 0),
+        }
+    )
     plain = mission.model_copy(update={"tether": TetherPhysics()})
     for planner, vehicle in (("predictive", "kinematic"), ("react", "bluerov2")):
         yield (
@@ -260,9 +277,13 @@ def steps() -> Iterator[Step]:
 
     yield (
         "tours in space",
-        partial(solve_mission, plain.model_copy(update={"waypoints": plain.waypoints[:4]}),
-                scene=scene, time_limit=None),
-    )  # fmt: skip
+        partial(
+            solve_mission,
+            plain.model_copy(update={"waypoints": plain.waypoints[:4]}),
+            scene=scene,
+            time_limit=None,
+        ),
+    )
 
     for in_space in (False, True):
         yield f"a guard in {'space' if in_space else 'a site'}", partial(watched, in_space)
@@ -270,9 +291,19 @@ def steps() -> Iterator[Step]:
     def voxelled() -> None:
         corners = np.array(np.meshgrid((0, 12), (0, 0.5), (0, 0.5), indexing="ij"))
         faces = [
-            (0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1),
-            (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3),
-        ]  # fmt: skip
+            (0, 1, 3),
+            (0, 3, 2),
+            (4, 6, 7),
+            (4, 7, 5),
+            (0, 4, 5),
+            (0, 5, 1),
+            (2, 3, 7),
+            (2, 7, 6),
+            (0, 2, 6),
+            (0, 6, 4),
+            (1, 5, 7),
+            (1, 7, 3),
+        ]
         # along the diagonal of its box, most of which is empty: with little memory only what is
         # near surfaces is held, by kernels of its own
         turn = np.linalg.qr(np.ones((3, 1)), mode="complete")[0].T

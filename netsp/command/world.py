@@ -38,9 +38,13 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--side", type=length, default=500.0, metavar="L", help="side of the square; default 500"
     )
     p.add_argument(
-        "--radii", type=length, nargs=2, default=(10.0, 30.0), metavar="R",
+        "--radii",
+        type=length,
+        nargs=2,
+        default=(10.0, 30.0),
+        metavar="R",
         help="minimum and maximum radius; default 10 30",
-    )  # fmt: skip
+    )
     p.add_argument(
         "-o", "--output", metavar="FILE", help="write the problem to this file (default: stdout)"
     )

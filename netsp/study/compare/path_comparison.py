@@ -29,10 +29,27 @@ ORDER_SHARE = 0.2
 """Least share of the time limit for each path's order, even if the tour has used all of it."""
 
 COLUMNS = (
-    "path", "length", "longer_by", "longer_by_percent", "time_s", "time_from", "goals_visited",
-    "goals", "order", "revisits", "longest_tether", "tether_length", "comes_home", "free", "word",
-    "entangled", "through", "out_of_bounds", "order_length", "order_longer_by_percent",
-)  # fmt: skip
+    "path",
+    "length",
+    "longer_by",
+    "longer_by_percent",
+    "time_s",
+    "time_from",
+    "goals_visited",
+    "goals",
+    "order",
+    "revisits",
+    "longest_tether",
+    "tether_length",
+    "comes_home",
+    "free",
+    "word",
+    "entangled",
+    "through",
+    "out_of_bounds",
+    "order_length",
+    "order_longer_by_percent",
+)
 
 
 @dataclass(frozen=True)
@@ -123,36 +140,54 @@ class PathComparison:
         problem = self.problem
         length = float(tour.length or 0.0)
         return {
-            **dict.fromkeys(COLUMNS), "path": "planned tour", "length": length, "longer_by": 0.0,
-            "longer_by_percent": 0.0, "time_s": length / self.speed, "time_from": "speed",
-            "goals_visited": len(tour.tour), "goals": problem.visits,
-            "order": [problem.goal_name(v.goal) for v in tour.tour], "revisits": [],
+            **dict.fromkeys(COLUMNS),
+            "path": "planned tour",
+            "length": length,
+            "longer_by": 0.0,
+            "longer_by_percent": 0.0,
+            "time_s": length / self.speed,
+            "time_from": "speed",
+            "goals_visited": len(tour.tour),
+            "goals": problem.visits,
+            "order": [problem.goal_name(v.goal) for v in tour.tour],
+            "revisits": [],
             "longest_tether": max((v.tether_length for v in tour.tour), default=None),
-            "tether_length": problem.tether_length, "comes_home": True,
-            "free": not tour.entangled, "word": [],
+            "tether_length": problem.tether_length,
+            "comes_home": True,
+            "free": not tour.entangled,
+            "word": [],
             "entangled": [problem.obstacle_name(k) for k in tour.entangled],
-            "through": [], "out_of_bounds": False, "order_length": length,
+            "through": [],
+            "out_of_bounds": False,
+            "order_length": length,
             "order_longer_by_percent": 0.0,
-        }  # fmt: skip
+        }
 
     def _path_row(self, path: ComparedPath) -> dict[str, Any]:
         m, problem = path.measures, self.problem
         through = sorted({k for s in m.stretches if s.kind == "obstacle" for k in s.obstacles})
         return {
-            "path": path.name, "length": m.length, "longer_by": self.longer_by(m.length),
-            "longer_by_percent": self.percent(m.length), "time_s": m.duration_s,
+            "path": path.name,
+            "length": m.length,
+            "longer_by": self.longer_by(m.length),
+            "longer_by_percent": self.percent(m.length),
+            "time_s": m.duration_s,
             "time_from": "time stamps" if m.is_timed else "speed",
-            "goals_visited": len(m.order), "goals": problem.visits,
+            "goals_visited": len(m.order),
+            "goals": problem.visits,
             "order": [problem.goal_name(g) for g in m.order],
             "revisits": [problem.goal_name(g) for g in m.revisits],
-            "longest_tether": m.longest_tether, "tether_length": problem.tether_length,
-            "comes_home": m.is_closed, "free": m.is_free, "word": list(m.word),
+            "longest_tether": m.longest_tether,
+            "tether_length": problem.tether_length,
+            "comes_home": m.is_closed,
+            "free": m.is_free,
+            "word": list(m.word),
             "entangled": [problem.obstacle_name(k) for k in m.entangled],
             "through": [problem.obstacle_name(k) for k in through],
             "out_of_bounds": any(s.kind == "bounds" for s in m.stretches),
             "order_length": path.order_length,
             "order_longer_by_percent": self.percent(path.order_length),
-        }  # fmt: skip
+        }
 
     def to_csv(self) -> str:
         """Return the rows as CSV; lists are joined by semicolons, booleans are 1 and 0."""
@@ -167,9 +202,14 @@ class PathComparison:
         """Return all figures, as `--json` prints them."""
         tour, problem = self.tour, self.problem
         return {
-            "problem": problem.name, "units": problem.units, "speed": self.speed,
-            "tour": None if tour is None else {
-                "length": tour.length, "lower_bound": tour.lower_bound,
+            "problem": problem.name,
+            "units": problem.units,
+            "speed": self.speed,
+            "tour": None
+            if tour is None
+            else {
+                "length": tour.length,
+                "lower_bound": tour.lower_bound,
                 "lower_bound_of": tour.lower_bound_of,
                 "status": tour.status.value,
                 "order": [problem.goal_name(v.goal) for v in tour.tour],
@@ -177,7 +217,7 @@ class PathComparison:
             },
             "tour_note": self.tour_note,
             "paths": [{**self._path_row(p), **_details(problem, p)} for p in self.paths],
-        }  # fmt: skip
+        }
 
 
 def _cell(value: Any) -> str:
@@ -195,27 +235,44 @@ def _cell(value: Any) -> str:
 def _details(problem: Problem, path: ComparedPath) -> dict[str, Any]:
     m = path.measures
     return {
-        "is_timed": m.is_timed, "speed": m.speed, "has_heights": m.has_heights,
-        "radius": m.radius, "start_gap": m.start_gap, "end_gap": m.end_gap,
-        "longest_at": m.longest_at, "longest_place": list(m.longest_place),
-        "end_tether": m.end_tether, "end_word": list(m.end_word), "fits": m.fits,
+        "is_timed": m.is_timed,
+        "speed": m.speed,
+        "has_heights": m.has_heights,
+        "radius": m.radius,
+        "start_gap": m.start_gap,
+        "end_gap": m.end_gap,
+        "longest_at": m.longest_at,
+        "longest_place": list(m.longest_place),
+        "end_tether": m.end_tether,
+        "end_word": list(m.end_word),
+        "fits": m.fits,
         "missing": [problem.goal_name(g) for g in m.missing],
-        "order_note": path.order_note, "visited_length": path.visited_length,
+        "order_note": path.order_note,
+        "visited_length": path.visited_length,
         "visits": [
             {
-                "goal": problem.goal_name(v.goal), "first": v.is_first, "along": v.along,
-                "time_s": v.time_s, "miss": v.miss, "tether": v.tether, "word": list(v.word),
+                "goal": problem.goal_name(v.goal),
+                "first": v.is_first,
+                "along": v.along,
+                "time_s": v.time_s,
+                "miss": v.miss,
+                "tether": v.tether,
+                "word": list(v.word),
             }
             for v in m.visits
         ],
         "stretches": [
             {
-                "kind": s.kind, "obstacles": [problem.obstacle_name(k) for k in s.obstacles],
-                "start": s.start, "end": s.end, "depth": s.depth, "place": list(s.place),
+                "kind": s.kind,
+                "obstacles": [problem.obstacle_name(k) for k in s.obstacles],
+                "start": s.start,
+                "end": s.end,
+                "depth": s.depth,
+                "place": list(s.place),
             }
             for s in m.stretches
         ],
-    }  # fmt: skip
+    }
 
 
 def compare_paths(
@@ -280,9 +337,16 @@ def compare_paths(
     measured = []
     for path in paths:
         try:
-            measured.append(measure_path(
-                problem, path.points, times=path.times, speed=speed, policy=policy, tether=laid,
-            ))  # fmt: skip
+            measured.append(
+                measure_path(
+                    problem,
+                    path.points,
+                    times=path.times,
+                    speed=speed,
+                    policy=policy,
+                    tether=laid,
+                )
+            )
         except InputError as error:
             raise InputError(f"{path.name}: {error}") from None
     clock = Clock(time_limit)

@@ -98,16 +98,27 @@ def _encodable(row: object) -> bool:
 
 _MAYBE = (int, float, type(None))
 _WORLD: dict[str, tuple[type, ...]] = {
-    "goals": (int,), "tether_length": (int, float), "family": (str,),
-}  # fmt: skip
+    "goals": (int,),
+    "tether_length": (int, float),
+    "family": (str,),
+}
 _VALUES: dict[str, tuple[type, ...]] = {
-    "length": _MAYBE, "lower_bound": _MAYBE, "gap": _MAYBE, "total_s": _MAYBE,
+    "length": _MAYBE,
+    "lower_bound": _MAYBE,
+    "gap": _MAYBE,
+    "total_s": _MAYBE,
     "cpu_s": _MAYBE,
-    "roadmap_s": _MAYBE, "matrix_s": _MAYBE, "solve_s": _MAYBE, "longest_tether": _MAYBE,
-    "entangled": (int, type(None)), "redrawn": (int, type(None)),
-    "problem_sha256": (str, type(None)), "versions": (dict, type(None)),
-    "history": (list, type(None)), "lower_bound_of": (str, type(None)),
-}  # fmt: skip
+    "roadmap_s": _MAYBE,
+    "matrix_s": _MAYBE,
+    "solve_s": _MAYBE,
+    "longest_tether": _MAYBE,
+    "entangled": (int, type(None)),
+    "redrawn": (int, type(None)),
+    "problem_sha256": (str, type(None)),
+    "versions": (dict, type(None)),
+    "history": (list, type(None)),
+    "lower_bound_of": (str, type(None)),
+}
 """Which types the fields of a row may have; a page is made of them without asking again."""
 
 

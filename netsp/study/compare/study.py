@@ -253,10 +253,12 @@ class Trial:
         """Hash of all of it: the same trial anywhere."""
         return _digest(
             {
-                "world": self.world, "roadmap": self.roadmap, "solver": self.solver,
+                "world": self.world,
+                "roadmap": self.roadmap,
+                "solver": self.solver,
                 "seed": self.seed,
             }
-        )[:16]  # fmt: skip
+        )[:16]
 
 
 def shard(trials: list[Trial], part: int, of: int) -> list[Trial]:

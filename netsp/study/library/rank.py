@@ -115,14 +115,20 @@ def by_command(command: str) -> Solve:
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / "solution.json"
             filled = [
-                w.replace("{problem}", str(path)).replace("{solution}", str(out))
-                .replace("{seconds}", f"{limit:g}") for w in words
-            ]  # fmt: skip
+                w.replace("{problem}", str(path))
+                .replace("{solution}", str(out))
+                .replace("{seconds}", f"{limit:g}")
+                for w in words
+            ]
             try:
                 done = subprocess.run(
-                    filled, timeout=2.0 * limit + GRACE, stdout=subprocess.DEVNULL,
-                    stderr=subprocess.PIPE, text=True, errors="replace",
-                )  # fmt: skip
+                    filled,
+                    timeout=2.0 * limit + GRACE,
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.PIPE,
+                    text=True,
+                    errors="replace",
+                )
             except OSError as error:
                 raise InputError(f"--command: {words[0]}: {error.strerror or error}") from None
             except subprocess.TimeoutExpired:
@@ -172,14 +178,16 @@ def run(
             yield row
 
 
-def _run(
-    library: Library, name: str, label: str, solve: Solve, limit: float, clock: Clock
-) -> Row:  # fmt: skip
+def _run(library: Library, name: str, label: str, solve: Solve, limit: float, clock: Clock) -> Row:
     """Of one problem."""
     problem = library.problem(name)
     begin = time.perf_counter()
-    row: dict[str, Any] = {"solver": label, "problem": name, "limit": limit,
-                           "date": str(datetime.date.today())}  # fmt: skip
+    row: dict[str, Any] = {
+        "solver": label,
+        "problem": name,
+        "limit": limit,
+        "date": str(datetime.date.today()),
+    }
     try:
         solution = solve(problem, library.paths[name], limit, lambda: clock.stopped)
         row["seconds"] = round(time.perf_counter() - begin, 3)
@@ -254,13 +262,18 @@ def ranking(library: Library, rows: Iterable[Row]) -> list[dict[str, Any]]:
     out = []
     for (solver, limit), some in groups.items():
         above = [_above(row, library.records[row.problem].length) for row in some]
-        out.append({
-            "solver": solver, "limit": limit, "problems": len(some),
-            "verified": sum(row.verified for row in some),
-            "best": sum(a <= SAME for a in above),
-            "above": statistics.fmean(above), "worst": max(above),
-            "seconds": statistics.median(row.seconds for row in some),
-        })  # fmt: skip
+        out.append(
+            {
+                "solver": solver,
+                "limit": limit,
+                "problems": len(some),
+                "verified": sum(row.verified for row in some),
+                "best": sum(a <= SAME for a in above),
+                "above": statistics.fmean(above),
+                "worst": max(above),
+                "seconds": statistics.median(row.seconds for row in some),
+            }
+        )
     return sorted(out, key=lambda e: (e["above"], e["seconds"]))
 
 

@@ -244,12 +244,17 @@ class Library:
         low = None if best is None else best.length
         if found.better:
             self.records[found.name] = Record(
-                problem=found.name, sha256=solution.problem.sha256, length=solution.length,
+                problem=found.name,
+                sha256=solution.problem.sha256,
+                length=solution.length,
                 lower_bound=None if low is None else min(low, solution.length),
-                solver=solution.solver, by=by, seconds=round(solution.timings.total_s, 3),
-                commit=commit, date=str(datetime.date.today()),
+                solver=solution.solver,
+                by=by,
+                seconds=round(solution.timings.total_s, 3),
+                commit=commit,
+                date=str(datetime.date.today()),
                 tour=tuple((v.goal, v.signature) for v in solution.tour),
-            )  # fmt: skip
+            )
         elif old is not None and low is not None and low > (old.lower_bound or 0.0):
             self.records[found.name] = old.model_copy(update={"lower_bound": min(low, old.length)})
         return found
@@ -264,8 +269,9 @@ class Library:
         """
         rows = [
             json.dumps(self.records[name].model_dump(mode="json"), ensure_ascii=False)
-            for name in self if name in self.records
-        ]  # fmt: skip
+            for name in self
+            if name in self.records
+        ]
         body = ",\n".join("  " + row for row in rows)
         write_text(
             self.folder / RECORDS, f'{{\n "schema_version": 1,\n "records": [\n{body}\n ]\n}}\n'

@@ -129,9 +129,9 @@ class CarriedTether:
         (int, float)
             Index of the point, and the length in the problem's units.
         """
-        along = np.concatenate([
-            [0.0], np.cumsum(np.linalg.norm(np.diff(self._route, axis=0), axis=1))
-        ])  # fmt: skip
+        along = np.concatenate(
+            [[0.0], np.cumsum(np.linalg.norm(np.diff(self._route, axis=0), axis=1))]
+        )
         last = len(self._route) - 1
         best = max((first, last), key=self.length)
 

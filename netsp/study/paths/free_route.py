@@ -204,8 +204,10 @@ class FreeSpace:
             middle = shapely.LineString(way).centroid
             return (
                 int(np.count_nonzero(np.round(turns))),
-                round(polylines.length(way) / self.place), middle.x, middle.y,
-            )  # fmt: skip
+                round(polylines.length(way) / self.place),
+                middle.x,
+                middle.y,
+            )
 
         return min((forward, back), key=rank)
 
@@ -213,9 +215,10 @@ class FreeSpace:
         """Return the obstacles that a part runs through."""
         line = shapely.LineString(part + self.origin)
         return [
-            i for i, o in enumerate(self.problem.obstacles)
+            i
+            for i, o in enumerate(self.problem.obstacles)
             if line.intersection(o.shape()).length > self.place
-        ]  # fmt: skip
+        ]
 
     def stretches(self, xy: Floats, along: Floats) -> tuple[Stretch, ...]:
         """Return the parts of a path in obstacles, within their clearance and out of bounds.
@@ -244,20 +247,21 @@ class FreeSpace:
             hits = np.sort(tree.query(grown, predicate="intersects"))
             if not len(hits):
                 continue
-            inside = _merged([
-                part for k in hits.tolist() for part in _shares(xy, k, segments[k] & shape)
-            ])  # fmt: skip
+            inside = _merged(
+                [part for k in hits.tolist() for part in _shares(xy, k, segments[k] & shape)]
+            )
             depths = [_depth(_part(xy, *part), o) for part in inside]
             deep = [
-                (part, depth) for part, depth in zip(inside, depths, strict=True)
+                (part, depth)
+                for part, depth in zip(inside, depths, strict=True)
                 if depth > self.place
-            ]  # fmt: skip
+            ]
             found += [_stretch("obstacle", (i,), xy, along, p, d) for p, d in deep]
             if deep or clearance <= self.place:
                 continue
-            close = _merged([
-                part for k in hits.tolist() for part in _shares(xy, k, segments[k] & grown)
-            ])  # fmt: skip
+            close = _merged(
+                [part for k in hits.tolist() for part in _shares(xy, k, segments[k] & grown)]
+            )
             for part in close:
                 line = _part(xy, *part)
                 lack = clearance - float(shapely.LineString(line).distance(shape))
@@ -275,10 +279,13 @@ class FreeSpace:
         bounds = np.array(self.problem.bounds)
         box = shapely.box(*bounds)
         shapely.prepare(box)
-        parts = _merged([
-            part for k in np.flatnonzero(~shapely.covers(box, segments)).tolist()
-            for part in _shares(xy, k, segments[k] - box)
-        ])  # fmt: skip
+        parts = _merged(
+            [
+                part
+                for k in np.flatnonzero(~shapely.covers(box, segments)).tolist()
+                for part in _shares(xy, k, segments[k] - box)
+            ]
+        )
         out = []
         for part in parts:
             line = _part(xy, *part)
@@ -361,9 +368,13 @@ def _depth(part: Floats, obstacle: Circle | Polygon) -> float:
 
 
 def _stretch(
-    kind: str, obstacles: tuple[int, ...], xy: Floats, along: Floats,
-    part: tuple[float, float], depth: float,
-) -> Stretch:  # fmt: skip
+    kind: str,
+    obstacles: tuple[int, ...],
+    xy: Floats,
+    along: Floats,
+    part: tuple[float, float],
+    depth: float,
+) -> Stretch:
     s = [_at(along, place) for place in part]
     place = (_at(xy[:, 0], part[0]), _at(xy[:, 1], part[0]))
     return Stretch(kind, obstacles, s[0], s[1], depth, place)

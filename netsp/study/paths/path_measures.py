@@ -336,32 +336,48 @@ def measure_path(
     cluster, before, visits = problem.clusters, set[int](), []
     for p in seen:
         k, goal = led.index(p.place), goals[p.goal]
-        visits.append(GoalVisit(
-            goal=p.goal, is_first=int(cluster[p.goal]) not in before,
-            along=float(np.interp(p.place, place, travelled)),
-            time_s=float(np.interp(p.place, place, seconds)), miss=p.miss,
-            tether=carried.length_to(k, goal) if led.is_reached(k) else None,
-            word=led.word(k, goal),
-        ))  # fmt: skip
+        visits.append(
+            GoalVisit(
+                goal=p.goal,
+                is_first=int(cluster[p.goal]) not in before,
+                along=float(np.interp(p.place, place, travelled)),
+                time_s=float(np.interp(p.place, place, seconds)),
+                miss=p.miss,
+                tether=carried.length_to(k, goal) if led.is_reached(k) else None,
+                word=led.word(k, goal),
+            )
+        )
         before.add(int(cluster[p.goal]))
     is_reached = led.is_reached(led.last)
     error = policy.tether_error * problem.tether_length
     at, longest = carried.longest(error, led.first) if is_reached else (led.first, 0.0)
     word = led.closed_word
     return PathMeasures(
-        problem=problem, length=length, duration_s=duration, is_timed=stamps is not None,
-        speed=speed, has_heights=size == 3, radius=radius, visits=tuple(visits),
-        start_gap=start_gap, end_gap=end_gap, is_closed=max(start_gap, end_gap) <= radius,
+        problem=problem,
+        length=length,
+        duration_s=duration,
+        is_timed=stamps is not None,
+        speed=speed,
+        has_heights=size == 3,
+        radius=radius,
+        visits=tuple(visits),
+        start_gap=start_gap,
+        end_gap=end_gap,
+        is_closed=max(start_gap, end_gap) <= radius,
         longest_tether=longest if is_reached else None,
         longest_at=float(np.interp(led.route.along[at], led.flat, travelled)),
         longest_place=(float(route[at, 0]), float(route[at, 1])),
         end_tether=carried.length(led.last) if is_reached else None,
-        end_word=led.word(led.last), word=word,
+        end_word=led.word(led.last),
+        word=word,
         entangled=tuple(k - 1 for k in entangled(word)),
-        stretches=led.space.stretches(given[:, :2], led.flat), route=route, route_end=led.last,
+        stretches=led.space.stretches(given[:, :2], led.flat),
+        route=route,
+        route_end=led.last,
         route_lengths=np.interp(led.route.along[: led.last + 1], led.flat, travelled),
-        points=points, carried=carried,
-    )  # fmt: skip
+        points=points,
+        carried=carried,
+    )
 
 
 class _Led:
@@ -384,9 +400,9 @@ class _Led:
         out = polylines.along(self.tether)
         home = float(np.hypot(*(dense[-1] - base)))
         line = np.vstack([self.tether, dense, base])
-        along = np.concatenate([
-            out - out[-1], np.interp(places, self._place, self.flat), [self.flat[-1] + home]
-        ])  # fmt: skip
+        along = np.concatenate(
+            [out - out[-1], np.interp(places, self._place, self.flat), [self.flat[-1] + home]]
+        )
         moves = np.concatenate([[True], np.any(np.diff(line, axis=0) != 0.0, axis=1)])
         reach = float(np.abs(line - base).max())
         self.puller = StringPuller(problem, max(reach, problem.scale))

@@ -52,9 +52,12 @@ HOLD_S = 1.5
 
 
 def save_animation(
-    films: Sequence[Film], file: str | Path, seconds: float = 12.0, fps: int = 15,
+    films: Sequence[Film],
+    file: str | Path,
+    seconds: float = 12.0,
+    fps: int = 15,
     on_progress: Callable[[int, int], None] | None = None,
-) -> None:  # fmt: skip
+) -> None:
     """Write one film, or several side by side.
 
     Parameters
@@ -118,8 +121,12 @@ def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
     ]
     moving = [_moving(ax, film) for ax, film in zip(panels, films, strict=True)]
     figure.legend(
-        handles=handles, loc="outside lower center", ncols=columns, fontsize=8, frameon=False,
-    )  # fmt: skip
+        handles=handles,
+        loc="outside lower center",
+        ncols=columns,
+        fontsize=8,
+        frameon=False,
+    )
     style.literal(figure)
     shown: list[Problem | None] | None = None
     still = None
@@ -177,11 +184,13 @@ def _legend(films: Sequence[Film]) -> list[Any]:
         *(
             Line2D([], [], ls="none", label=label, **look)
             for label, look in (
-                ("robot", ROBOT), (base, star), (what, to_visit),
+                ("robot", ROBOT),
+                (base, star),
+                (what, to_visit),
                 *((f"{what} {fate}", look) for fate, look in MARKS if fate in found),
             )
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _draw_space(ax: Any, film: Film) -> None:
@@ -240,9 +249,16 @@ def _palette(picture: Any) -> Any:
     from PIL import Image
 
     roles = (
-        style.ROBOT, style.TETHER, style.PATH, style.BASE, style.OBSTACLE, style.EDGE,
-        style.VISITED, style.LEFT_OUT, style.CANCELLED,
-    )  # fmt: skip
+        style.ROBOT,
+        style.TETHER,
+        style.PATH,
+        style.BASE,
+        style.OBSTACLE,
+        style.EDGE,
+        style.VISITED,
+        style.LEFT_OUT,
+        style.CANCELLED,
+    )
     out = Image.new("RGB", (picture.width, picture.height + 20 * len(roles)))
     out.paste(picture)
     for k, colour in enumerate(roles):

@@ -16,9 +16,13 @@ from netsp.view.pictures import style
 from netsp.view.pictures.problem_picture import draw_obstacles
 
 RESPONSES = {
-    "local": "mended on the spot", "replan": "planned anew", "home": "went home",
-    "kept": "plan kept", "defect": "defect, went home", "shorten": "tether shortened",
-}  # fmt: skip
+    "local": "mended on the spot",
+    "replan": "planned anew",
+    "home": "went home",
+    "kept": "plan kept",
+    "defect": "defect, went home",
+    "shorten": "tether shortened",
+}
 """What is said of what a robot did about an event."""
 
 
@@ -73,8 +77,14 @@ def draw_map(done: Execution, *, ax: Any = None) -> Any:
     ax.set(aspect="equal", xlabel=f"x ({problem.units})", ylabel=f"y ({problem.units})")
     if len(problem.goals) <= 40:
         for k, goal in enumerate(problem.goals):
-            ax.annotate(problem.goal_name(k), goal.position[:2], xytext=(6, 5), fontsize=7,
-                        textcoords="offset points", path_effects=style.halo())  # fmt: skip
+            ax.annotate(
+                problem.goal_name(k),
+                goal.position[:2],
+                xytext=(6, 5),
+                fontsize=7,
+                textcoords="offset points",
+                path_effects=style.halo(),
+            )
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=6, fontsize=8, frameon=False)
     return ax
 
@@ -103,9 +113,16 @@ def _draw_passing(ax: Any, maps: Maps, busy: Floats) -> None:
 
         place, offset, across, up, _ = max(sides, key=room)
         ax.annotate(
-            text, place, xytext=offset, textcoords="offset points", ha=across, va=up, fontsize=6.5,
-            path_effects=style.halo(), zorder=5,
-        )  # fmt: skip
+            text,
+            place,
+            xytext=offset,
+            textcoords="offset points",
+            ha=across,
+            va=up,
+            fontsize=6.5,
+            path_effects=style.halo(),
+            zorder=5,
+        )
 
 
 def draw_tether(done: Execution, *, ax: Any = None) -> Any:
@@ -121,8 +138,15 @@ def draw_tether(done: Execution, *, ax: Any = None) -> Any:
     for e in done.entries:
         ax.axvline(e.time, color=style.EVENT, lw=1.0)
         what = f"{e.event.replace('_', ' ')}: {RESPONSES.get(e.response, e.response)}"
-        ax.annotate(what, (e.time, 0), xytext=(3, 4), rotation=90,
-                    textcoords="offset points", fontsize=8, color=style.EDGE)  # fmt: skip
+        ax.annotate(
+            what,
+            (e.time, 0),
+            xytext=(3, 4),
+            rotation=90,
+            textcoords="offset points",
+            fontsize=8,
+            color=style.EDGE,
+        )
     ax.set(xlabel="time (s)", ylabel=f"length ({done.problem.units})", ylim=(0, None))
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, fontsize=8, frameon=False)
     return ax

@@ -108,9 +108,10 @@ def steps_of(films: Sequence[Film], count: int) -> tuple[str, list[Step]]:
     for share in np.linspace(0.0, 1.0, count):
         numbers = tuple(
             round(min(share * most / film.length, 1.0) * (len(film.moments) - 1))
-            if film.length > 0.0 else 0
+            if film.length > 0.0
+            else 0
             for film, most in zip(films, longest, strict=True)
-        )  # fmt: skip
+        )
         steps.append(Step(f"{share * (longest[0] if alike else 100.0):.4g}", numbers))
     return films[0].measured_in if alike else "done (%)", steps
 
@@ -140,9 +141,12 @@ def film_of_plan(problem: Problem, solution: Solution, count: int) -> Film:
 
 
 def film_of_run(
-    maps: Sequence[tuple[float, Problem]], rows: Sequence[dict[str, str]],
-    tethers: Sequence[dict[str, Any]], since: Mapping[str, Mapping[int, float]], count: int,
-) -> Film:  # fmt: skip
+    maps: Sequence[tuple[float, Problem]],
+    rows: Sequence[dict[str, str]],
+    tethers: Sequence[dict[str, Any]],
+    since: Mapping[str, Mapping[int, float]],
+    count: int,
+) -> Film:
     """Of a tour that was carried out.
 
     Parameters
@@ -216,6 +220,11 @@ def film_of_mission(mission: Mission, scene: Scene, count: int) -> Film:
     title = f"{mission.name}\nplanned by {mission.tour.solver}: {stops} of "
     title += f"{len(mission.waypoints)} waypoints, {length:.4g} {units}"
     return Film(
-        title, moments, polylines.length(mission.tour.line), mission.places, mission.anchor, scene,
+        title,
+        moments,
+        polylines.length(mission.tour.line),
+        mission.places,
+        mission.anchor,
+        scene,
         by_time=False,
-    )  # fmt: skip
+    )

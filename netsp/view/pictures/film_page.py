@@ -61,9 +61,12 @@ def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
         for film in films
     ]
     figure = make_subplots(
-        rows=1, cols=columns, specs=[[{"type": "scene"}] * columns], subplot_titles=titles,
+        rows=1,
+        cols=columns,
+        specs=[[{"type": "scene"}] * columns],
+        subplot_titles=titles,
         horizontal_spacing=0.01,
-    )  # fmt: skip
+    )
     figure.update_annotations(font={"size": 13}, yanchor="bottom")
     what, found = steps_of(films, FRAMES)
     changing: list[list[dict[str, Any]]] = [[] for _ in found]
@@ -98,13 +101,20 @@ def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
     lines = max(text.count("<br>") + 1 for text in titles)
     figure.update_layout(
         title={"text": html.escape(title), "x": 0.01, "y": 0.985, "yanchor": "top"},
-        margin={"l": 0, "r": 0, "t": 45 + 18 * lines, "b": 115}, legend=base["legend"],
-        sliders=[{
-            "steps": steps, "currentvalue": {"prefix": f"{what} "}, "pad": {"t": 20}, "x": 0.17,
-            "len": 0.81,
-        }],
-        updatemenus=[_play()], **scenes,
-    )  # fmt: skip
+        margin={"l": 0, "r": 0, "t": 45 + 18 * lines, "b": 115},
+        legend=base["legend"],
+        sliders=[
+            {
+                "steps": steps,
+                "currentvalue": {"prefix": f"{what} "},
+                "pad": {"t": 20},
+                "x": 0.17,
+                "len": 0.81,
+            }
+        ],
+        updatemenus=[_play()],
+        **scenes,
+    )
     write_figure(figure, title, file, frames)
 
 
@@ -133,15 +143,23 @@ def _marks(film: Film, name: str, which: list[int], **marker: Any) -> dict[str, 
 def _play() -> dict[str, Any]:
     """Buttons that have the frames go by."""
     on = {
-        "frame": {"duration": FILM_MS // FRAMES, "redraw": True}, "fromcurrent": True,
+        "frame": {"duration": FILM_MS // FRAMES, "redraw": True},
+        "fromcurrent": True,
         "transition": {"duration": 0},
-    }  # fmt: skip
+    }
     stop = {"frame": {"duration": 0, "redraw": False}, "mode": "immediate"}
     buttons = [
         {"label": "▶ play", "method": "animate", "args": [None, on]},
         {"label": "❚❚ pause", "method": "animate", "args": [[None], stop]},
     ]
     return {
-        "type": "buttons", "direction": "left", "buttons": buttons, "showactive": False,
-        "x": 0.0, "xanchor": "left", "y": 0.0, "yanchor": "top", "pad": {"t": 40, "l": 8},
-    }  # fmt: skip
+        "type": "buttons",
+        "direction": "left",
+        "buttons": buttons,
+        "showactive": False,
+        "x": 0.0,
+        "xanchor": "left",
+        "y": 0.0,
+        "yanchor": "top",
+        "pad": {"t": 40, "l": 8},
+    }

@@ -18,8 +18,9 @@ def draw_classes(graph: TravelGraph, *, ax: Any = None) -> Any:
     shown = graph.tethers if graph.roadmapped else graph.costs_to_base
     ax.plot(graph.cluster[1:] - 1, shown[1:], "_", color=style.TETHER, ms=9, mew=1.2)
     ax.set(
-        xlabel="goal", ylim=(0, None),
+        xlabel="goal",
+        ylim=(0, None),
         ylabel="tether length of each class" if graph.roadmapped else "leg from the base",
-    )  # fmt: skip
+    )
     ax.set_title(repr(graph).strip("<>"), fontsize=9, loc="left")
     return ax

@@ -85,9 +85,11 @@ def write_figure(
         The file cannot be written.
     """
     told = {
-        "data": figure.data, "layout": figure.layout, "frames": frames,
+        "data": figure.data,
+        "layout": figure.layout,
+        "frames": frames,
         "config": {"responsive": True, "displaylogo": False},
-    }  # fmt: skip
+    }
     packed = json.dumps([_packed_library(), _packed(json.dumps(_plain(told)))])
     write_text(file, PAGE.format(title=html.escape(title), packed=packed))
 
@@ -120,9 +122,14 @@ def _plain(value: Any) -> Any:
 
 
 def write_scene(
-    scene: Scene, parts: Sequence[tuple[str, Triangles]], path: Floats, nodes: Floats, title: str,
-    stops: WaypointMarks | None, file: str | Path,
-) -> None:  # fmt: skip
+    scene: Scene,
+    parts: Sequence[tuple[str, Triangles]],
+    path: Floats,
+    nodes: Floats,
+    title: str,
+    stops: WaypointMarks | None,
+    file: str | Path,
+) -> None:
     """A page of a scene, as of `netsp.view.pictures.scene_picture.save`."""
     go = plotly_objects()
     figure = go.Figure()
@@ -181,9 +188,18 @@ def mesh_trace(name: str, vertices: Floats, faces: npt.NDArray[np.int64]) -> Any
     x, y, z = np.round(vertices, 4).T
     i, j, k = faces.T
     return plotly_objects().Mesh3d(
-        x=x, y=y, z=z, i=i, j=j, k=k, color=style.OBSTACLE, flatshading=True, name=name,
-        hoverinfo="name", lighting={"ambient": 0.55, "diffuse": 0.7, "specular": 0.1},
-    )  # fmt: skip
+        x=x,
+        y=y,
+        z=z,
+        i=i,
+        j=j,
+        k=k,
+        color=style.OBSTACLE,
+        flatshading=True,
+        name=name,
+        hoverinfo="name",
+        lighting={"ambient": 0.55, "diffuse": 0.7, "specular": 0.1},
+    )
 
 
 def seen(points: Floats) -> Ints:
@@ -197,8 +213,14 @@ def line_trace(name: str, points: Floats, colour: str, width: float) -> dict[str
     x, y, z = points[seen(points)].T
     line = {"color": colour, "width": width}
     return {
-        "line": line, "mode": "lines", "name": name, "x": x, "y": y, "z": z, "type": "scatter3d"
-    }  # fmt: skip
+        "line": line,
+        "mode": "lines",
+        "name": name,
+        "x": x,
+        "y": y,
+        "z": z,
+        "type": "scatter3d",
+    }
 
 
 def point_trace(name: str, point: Floats, colour: str) -> dict[str, Any]:
@@ -226,9 +248,15 @@ def marks_trace(
     x, y, z = places
     text = {} if texts is None else {"text": list(texts)}
     return {
-        "marker": marker, "mode": "markers", "name": name, **text, "x": x, "y": y, "z": z,
+        "marker": marker,
+        "mode": "markers",
+        "name": name,
+        **text,
+        "x": x,
+        "y": y,
+        "z": z,
         "type": "scatter3d",
-    }  # fmt: skip
+    }
 
 
 def layout(title: str, units: str) -> dict[str, Any]:

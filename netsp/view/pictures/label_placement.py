@@ -49,9 +49,13 @@ class LabelPlace:
 
 
 def place_labels(
-    places: Floats, texts: Sequence[str], *, font_size: float, marker_radius: float,
+    places: Floats,
+    texts: Sequence[str],
+    *,
+    font_size: float,
+    marker_radius: float,
     taken: Floats | None = None,
-) -> list[LabelPlace | None]:  # fmt: skip
+) -> list[LabelPlace | None]:
     """Return the place of each label; None if it would cover a marker or another label.
 
     Labels are placed one after the other beside their markers, on the first side that is free.

@@ -68,9 +68,12 @@ def save_mission(mission: Mission, scene: Scene, file: str | Path) -> None:
     if tour is not None:
         title += f", tour {tour.length:.5g} {scene.units}"
     save(
-        scene, file, path=None if tour is None else tour.line, title=title,
+        scene,
+        file,
+        path=None if tour is None else tour.line,
+        title=title,
         stops=WaypointMarks(mission.places, left, mission.anchor),
-    )  # fmt: skip
+    )
 
 
 def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
@@ -117,15 +120,24 @@ def draw_tether(runs: Sequence[Run], *, ax: Any = None, units: str = "m") -> Any
         recovering = [r.mode == "recovery" for r in run.log]
         if len(runs) == 1 and any(recovering):
             ax.fill_between(
-                t, 0, 1, where=recovering, color=style.RECOVERY,
-                transform=ax.get_xaxis_transform(), label="tether recovery",
-            )  # fmt: skip
+                t,
+                0,
+                1,
+                where=recovering,
+                color=style.RECOVERY,
+                transform=ax.get_xaxis_transform(),
+                label="tether recovery",
+            )
         ax.plot(t, [r.payout for r in run.log], color=colour, lw=1.3, ls=dashes, label=run.planner)
     longest = max(runs, key=lambda run: len(run.log))
     ax.plot(
-        [r.time for r in longest.log], [r.limit for r in longest.log], color=style.LIMIT, lw=1.0,
-        ls="--", label="limit",
-    )  # fmt: skip
+        [r.time for r in longest.log],
+        [r.limit for r in longest.log],
+        color=style.LIMIT,
+        lw=1.0,
+        ls="--",
+        label="limit",
+    )
     what = "payout" if any(r.payout > r.tether for run in runs for r in run.log) else "taut tether"
     most = max(max(r.payout, r.limit) for run in runs for r in run.log)
     ax.set(xlabel="time (s)", ylabel=f"{what} ({units})", ylim=(0, 1.06 * most))

@@ -110,9 +110,12 @@ def _reached(path: Floats, problem: Problem, solution: Solution) -> list[tuple[i
 
 
 def moments_of_run(
-    maps: Sequence[tuple[float, Problem]], rows: Sequence[dict[str, str]],
-    tethers: Sequence[dict[str, Any]], count: int, since: Mapping[str, Mapping[int, float]],
-) -> list[Moment]:  # fmt: skip
+    maps: Sequence[tuple[float, Problem]],
+    rows: Sequence[dict[str, str]],
+    tethers: Sequence[dict[str, Any]],
+    count: int,
+    since: Mapping[str, Mapping[int, float]],
+) -> list[Moment]:
     """Moments of a run that were recorded.
 
     Parameters

@@ -45,9 +45,11 @@ def draw_comparison(found: PathComparison) -> Any:
         draw_path_map(found, path, ax=left)
         draw_tether_along(path.measures, ax=right)
         left.set_title(_title(found, path), fontsize=10, loc="left")
-    tour = f"no tour ({found.tour_note})" if found.tour_length is None else (
-        f"planned tour of {found.tour_length:.6g} {found.problem.units}, {found.proof}"
-    )  # fmt: skip
+    tour = (
+        f"no tour ({found.tour_note})"
+        if found.tour_length is None
+        else (f"planned tour of {found.tour_length:.6g} {found.problem.units}, {found.proof}")
+    )
     figure.suptitle(f"{found.problem.name}: paths beside the {tour}"[:MAX_TITLE], fontsize=11)
     return figure
 
@@ -56,9 +58,11 @@ def _title(found: PathComparison, path: ComparedPath) -> str:
     m, u = path.measures, found.problem.units
     percent = found.percent(m.length)
     beside = "" if percent is None else f", {percent:+.1f} % beside the tour"
-    home = "comes home free" if m.is_free else (
-        "does not come home" if not m.is_closed else "comes home entangled"
-    )  # fmt: skip
+    home = (
+        "comes home free"
+        if m.is_free
+        else ("does not come home" if not m.is_closed else "comes home entangled")
+    )
     return (
         f"{path.name}: {m.length:.4g} {u}{beside}\n"
         f"{len(m.order)} of {found.problem.visits} goals, {home}"
@@ -96,24 +100,41 @@ def draw_path_map(found: PathComparison, path: ComparedPath, *, ax: Any = None) 
         if places:
             edge = style.PATH if mark == "o" else colour
             ax.plot(
-                *np.array(places).T, mark, color=colour, mec=edge, ms=12 if mark == "o" else 8,
-                mew=1.6, label=name, zorder=5, ls="none",
-            )  # fmt: skip
+                *np.array(places).T,
+                mark,
+                color=colour,
+                mec=edge,
+                ms=12 if mark == "o" else 8,
+                mew=1.6,
+                label=name,
+                zorder=5,
+                ls="none",
+            )
     for k, goal in enumerate(problem.goals):
         place = goal.position[:2]
         if k in number:
-            ax.annotate(
-                str(number[k]), place, ha="center", va="center", fontsize=7, zorder=6
-            )  # fmt: skip
+            ax.annotate(str(number[k]), place, ha="center", va="center", fontsize=7, zorder=6)
         if len(problem.goals) <= MAX_NAMES and goal.name:
             ax.annotate(
-                goal.name, place, xytext=(8, 4), textcoords="offset points", fontsize=7, zorder=6,
-                color=style.EDGE, path_effects=style.halo(),
-            )  # fmt: skip
+                goal.name,
+                place,
+                xytext=(8, 4),
+                textcoords="offset points",
+                fontsize=7,
+                zorder=6,
+                color=style.EDGE,
+                path_effects=style.halo(),
+            )
     ax.plot(
-        *problem.base[:2], "*", color=style.BASE, mec="white", ms=15, ls="none", label="base",
+        *problem.base[:2],
+        "*",
+        color=style.BASE,
+        mec="white",
+        ms=15,
+        ls="none",
+        label="base",
         zorder=7,
-    )  # fmt: skip
+    )
     ax.margins(0.05, 0.08)
     ax.set(aspect="equal", xlabel=f"x ({problem.units})", ylabel=f"y ({problem.units})")
     ax.tick_params(labelsize=8)
@@ -131,31 +152,44 @@ def draw_tether_along(m: PathMeasures, *, ax: Any = None) -> Any:
     rows = m.tether_profile()
     if len(rows):
         ax.plot(*rows.T, color=style.TETHER, lw=1.4, label="taut tether")
-    ax.axhline(
-        problem.tether_length, color=style.LIMIT, lw=1.0, ls="--", label="tether length"
-    )  # fmt: skip
+    ax.axhline(problem.tether_length, color=style.LIMIT, lw=1.0, ls="--", label="tether length")
     visits = [(v.along, v.tether) for v in m.visits if v.tether is not None]
     if visits:
         ax.plot(
-            *np.array(visits).T, "o", color=style.GOAL, mec=style.PATH, ms=6, ls="none",
+            *np.array(visits).T,
+            "o",
+            color=style.GOAL,
+            mec=style.PATH,
+            ms=6,
+            ls="none",
             label="at a goal",
-        )  # fmt: skip
+        )
     if len(problem.goals) <= MAX_NAMES:
         for v in m.visits:
             if v.tether is not None:
                 ax.annotate(
-                    problem.goal_name(v.goal), (v.along, v.tether), xytext=(0, 6), fontsize=7,
-                    textcoords="offset points", ha="center", path_effects=style.halo(),
-                )  # fmt: skip
+                    problem.goal_name(v.goal),
+                    (v.along, v.tether),
+                    xytext=(0, 6),
+                    fontsize=7,
+                    textcoords="offset points",
+                    ha="center",
+                    path_effects=style.halo(),
+                )
     if not len(rows):
         ax.annotate(
-            "unknown: obstacles enclose a part of the path", (0.5, 0.5), xycoords="axes fraction",
-            ha="center", fontsize=9,
-        )  # fmt: skip
+            "unknown: obstacles enclose a part of the path",
+            (0.5, 0.5),
+            xycoords="axes fraction",
+            ha="center",
+            fontsize=9,
+        )
     ax.set(
-        xlabel=f"along the path ({problem.units})", ylabel=f"length ({problem.units})",
-        ylim=(0, None), xlim=(0, m.length or None),
-    )  # fmt: skip
+        xlabel=f"along the path ({problem.units})",
+        ylabel=f"length ({problem.units})",
+        ylim=(0, None),
+        xlim=(0, m.length or None),
+    )
     ax.margins(y=0.12)
     ax.tick_params(labelsize=8)
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, fontsize=8, frameon=False)

@@ -280,9 +280,12 @@ def _single(problem: Problem) -> tuple[Any, Any]:
 
 
 def draw_map(
-    problem: Problem, solution: Solution | None = None, *, ax: Axes | None = None,
+    problem: Problem,
+    solution: Solution | None = None,
+    *,
+    ax: Axes | None = None,
     tethers: bool = False,
-) -> Axes:  # fmt: skip
+) -> Axes:
     """The map of a problem, with the path of a solution if given, on axes of the caller or on new
     ones; returns the axes.
 
@@ -316,15 +319,27 @@ def draw_map(
     for k, goal in enumerate(problem.goals):
         x, y = goal.position[:2]
         ax.plot(
-            x, y, "o", ms=13 if order else 9, mec=style.PATH, mew=1.4, zorder=5,
+            x,
+            y,
+            "o",
+            ms=13 if order else 9,
+            mec=style.PATH,
+            mew=1.4,
+            zorder=5,
             color="white" if order and k not in order else style.GOAL,
-        )  # fmt: skip
+        )
         visit = str(order.get(k, ""))
         ax.annotate(visit, (x, y), ha="center", va="center", fontsize=7, zorder=6)
     ax.plot(
-        *problem.base[:2], marker="*", ms=17, color=style.BASE, mec="white", zorder=7, ls="none",
+        *problem.base[:2],
+        marker="*",
+        ms=17,
+        color=style.BASE,
+        mec="white",
+        zorder=7,
+        ls="none",
         label="base",
-    )  # fmt: skip
+    )
     ax.set_xlabel(f"x ({problem.units})")
     ax.set_ylabel(f"y ({problem.units})")
     ax.tick_params(labelsize=8)
@@ -380,10 +395,17 @@ def _label_goals(ax: Axes, problem: Problem, radius: float, *, is_numbered: bool
     for goal, text, place in zip(problem.goals, texts, found, strict=True):
         if place is not None:
             ax.annotate(
-                text, goal.position[:2], xytext=place.offset, textcoords="offset points",
-                ha=place.align, va="center", fontsize=LABEL_SIZE, color=style.EDGE, zorder=6,
+                text,
+                goal.position[:2],
+                xytext=place.offset,
+                textcoords="offset points",
+                ha=place.align,
+                va="center",
+                fontsize=LABEL_SIZE,
+                color=style.EDGE,
+                zorder=6,
                 path_effects=style.halo(),
-            )  # fmt: skip
+            )
     return more
 
 
@@ -431,9 +453,12 @@ def _title(problem: Problem, solution: Solution | None) -> str:
 
 
 def draw_obstacles(
-    ax: Axes, problem: Problem, *, label: Callable[[int], str] | None = None,
+    ax: Axes,
+    problem: Problem,
+    *,
+    label: Callable[[int], str] | None = None,
     wrapped: tuple[int, ...] = (),
-) -> None:  # fmt: skip
+) -> None:
     """Draw obstacles, and dotted lines at the clearance around them, on axes of the caller.
 
     Parameters
@@ -472,14 +497,25 @@ def draw_obstacles(
         if label is not None:
             inside = not isinstance(o, Circle) or o.radius >= small
             place: dict[str, Any] = (
-                {"ha": "center", "va": "center"} if inside
-                else {"ha": "right", "va": "bottom", "xytext": (-5, 4),
-                      "textcoords": "offset points"}
-            )  # fmt: skip
+                {"ha": "center", "va": "center"}
+                if inside
+                else {
+                    "ha": "right",
+                    "va": "bottom",
+                    "xytext": (-5, 4),
+                    "textcoords": "offset points",
+                }
+            )
             ax.annotate(
-                label(i), o.representative_point, fontsize=6, color=style.BASE, zorder=6,
-                clip_on=True, path_effects=style.halo(), **place,
-            )  # fmt: skip
+                label(i),
+                o.representative_point,
+                fontsize=6,
+                color=style.BASE,
+                zorder=6,
+                clip_on=True,
+                path_effects=style.halo(),
+                **place,
+            )
     # faster than `add_patch`, which computes the extent of each curve
     ax.update_datalim(corners)
 
@@ -499,9 +535,12 @@ def _arrows(ax: Axes, path: Any, count: int) -> None:
         d = (path[k + 1, :2] - path[k, :2]) / step[k]
         tip = a + d * 1e-3 * along[-1]
         ax.annotate(
-            "", xy=tip, xytext=a, zorder=4,
+            "",
+            xy=tip,
+            xytext=a,
+            zorder=4,
             arrowprops={"arrowstyle": "-|>", "color": style.PATH, "lw": 0, "mutation_scale": 13},
-        )  # fmt: skip
+        )
 
 
 def view(problem: Problem, solution: Solution | None = None) -> tuple[float, float, float, float]:

@@ -29,9 +29,14 @@ MOST_NUMBERED = 30
 
 
 def save(
-    scene: Scene, file: str | Path, *, path: npt.ArrayLike | None = None,
-    tether: Tether | None = None, title: str | None = None, stops: WaypointMarks | None = None,
-) -> None:  # fmt: skip
+    scene: Scene,
+    file: str | Path,
+    *,
+    path: npt.ArrayLike | None = None,
+    tether: Tether | None = None,
+    title: str | None = None,
+    stops: WaypointMarks | None = None,
+) -> None:
     """Draw a scene, with a path (k, 3), a tether and waypoints if given, by the file name's ending:
     .png, .svg and .pdf a figure, .html a page that needs nothing else.
 
@@ -99,9 +104,14 @@ def parts_of(scene: Scene, low: Floats, high: Floats) -> list[tuple[str, Triangl
 
 
 def _figure(
-    scene: Scene, parts: Sequence[tuple[str, Triangles]], path: Floats, nodes: Floats,
-    box: tuple[Floats, Floats], title: str, stops: WaypointMarks | None = None,
-) -> Any:  # fmt: skip
+    scene: Scene,
+    parts: Sequence[tuple[str, Triangles]],
+    path: Floats,
+    nodes: Floats,
+    box: tuple[Floats, Floats],
+    title: str,
+    stops: WaypointMarks | None = None,
+) -> Any:
     """A view in space, and the plans from above and from two sides."""
     from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
@@ -199,9 +209,13 @@ def draw_stops(ax: Any, stops: WaypointMarks, axes: tuple[int, ...]) -> None:
     if len(columns) == 2 and len(stops.places) <= MOST_NUMBERED:
         for k, (x, y) in enumerate(stops.places[:, columns]):
             ax.annotate(
-                str(k), (x, y), xytext=(3, 3), textcoords="offset points", fontsize=7,
+                str(k),
+                (x, y),
+                xytext=(3, 3),
+                textcoords="offset points",
+                fontsize=7,
                 path_effects=style.halo(),
-            )  # fmt: skip
+            )
     if stops.anchor is not None:
         place = np.array(stops.anchor)[columns]
         ax.plot(*place[:, None], "*", color=style.BASE, ms=9, ls="none", label="anchor")

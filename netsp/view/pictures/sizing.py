@@ -29,18 +29,30 @@ def draw_tether_curve(curve: TetherCurve, *, ax: Axes | None = None) -> Any:
         ax = Figure(figsize=(7.2, 4.2), layout="constrained").subplots()
     for k, s in enumerate(curve.steps):
         proven = s.status is Status.OPTIMAL
-        ax.plot([s.tether, s.until], [s.length] * 2, color=style.PATH, lw=2.2,
-                ls="-" if proven else (0, (4, 2)), solid_capstyle="butt")  # fmt: skip
+        ax.plot(
+            [s.tether, s.until],
+            [s.length] * 2,
+            color=style.PATH,
+            lw=2.2,
+            ls="-" if proven else (0, (4, 2)),
+            solid_capstyle="butt",
+        )
         ax.plot([s.tether], [s.length], "o", color=style.PATH, ms=4.5, zorder=3)
         if k:
             before = curve.steps[k - 1]
             ax.plot([s.tether] * 2, [s.length, before.length], color=style.PATH, lw=0.7, ls=":")
         if not proven:
-            ax.fill_between([s.tether, s.until], s.lower_bound, s.length, color=style.PLAN,
-                            alpha=0.25, lw=0)  # fmt: skip
+            ax.fill_between(
+                [s.tether, s.until], s.lower_bound, s.length, color=style.PLAN, alpha=0.25, lw=0
+            )
         if len(curve.steps) <= MOST_LABELS:
-            ax.annotate(f"{s.tether:.4g}: {s.length:.5g}", (s.tether, s.length), (4, 5),
-                        textcoords="offset points", fontsize=7)  # fmt: skip
+            ax.annotate(
+                f"{s.tether:.4g}: {s.length:.5g}",
+                (s.tether, s.length),
+                (4, 5),
+                textcoords="offset points",
+                fontsize=7,
+            )
     ax.axvline(curve.shortest, color=style.LIMIT, lw=1.0, ls="--")
     low, high = ax.get_xlim()
     ax.set_xlim(min(low, curve.shortest - 0.04 * (high - low)), high)
@@ -51,8 +63,9 @@ def draw_tether_curve(curve: TetherCurve, *, ax: Axes | None = None) -> Any:
         proof += "; time ran out before the shortest tether"
     ax.set_title(
         f"{curve.name}: at least {curve.shortest:.6g} {curve.units} of tether; {proof}",
-        fontsize=10, loc="left",
-    )  # fmt: skip
+        fontsize=10,
+        loc="left",
+    )
     ax.margins(y=0.12)
     ax.ticklabel_format(axis="y", useOffset=False)
     return ax
@@ -83,19 +96,38 @@ def draw_base_search(search: BaseSearch, *, ax: Any = None) -> Any:
     _map(left, problem, xy, tether, possible, "shortest sufficient tether")
     _map(right, problem, xy, tour, possible, "shortest tour")
     only = np.isnan(tour) & possible
-    right.plot(*xy[only].T, "o", mfc="none", mec=style.EDGE, ms=6, zorder=4,
-               label="proven worse without a tour" if search.proven else "not solved")  # fmt: skip
+    right.plot(
+        *xy[only].T,
+        "o",
+        mfc="none",
+        mec=style.EDGE,
+        ms=6,
+        zorder=4,
+        label="proven worse without a tour" if search.proven else "not solved",
+    )
     if len(xy) <= MOST_NAMES:
         for c in search.candidates:
             left.annotate(c.name, c.position[:2], (4, 4), textcoords="offset points", fontsize=7)
     best = search.best
     for ax in (left, right):
         if best is not None:
-            ax.plot(*best.position[:2], "*", color=style.BASE, mec="white", ms=15, zorder=6,
-                    label=f"best: {best.name}")  # fmt: skip
+            ax.plot(
+                *best.position[:2],
+                "*",
+                color=style.BASE,
+                mec="white",
+                ms=15,
+                zorder=6,
+                label=f"best: {best.name}",
+            )
     if best is not None:
-        figure.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=4,
-                      fontsize=8, frameon=False)  # fmt: skip
+        figure.legend(
+            *right.get_legend_handles_labels(),
+            loc="outside lower center",
+            ncols=4,
+            fontsize=8,
+            frameon=False,
+        )
     proof = "proven the best" if search.proven else "not proven the best"
     if best is None:
         figure.suptitle(f"{problem.name}: no place has a tour", fontsize=11)
@@ -116,8 +148,9 @@ def _map(ax: Axes, problem: Any, xy: Any, values: Any, possible: Any, label: str
     size = float(np.ptp(xy, axis=0).max()) or 1.0
     spread = np.linalg.svd(xy[ok] - xy[ok].mean(0))[1] if ok.sum() >= 4 else np.zeros(2)
     if ok.sum() >= 4 and spread[1] > 1e-3 * size and np.ptp(values[ok]) > 0.0:
-        drawn = ax.tricontour(*xy[ok].T, values[ok], levels=LEVELS, cmap="viridis", linewidths=1.2,
-                              zorder=1)  # fmt: skip
+        drawn = ax.tricontour(
+            *xy[ok].T, values[ok], levels=LEVELS, cmap="viridis", linewidths=1.2, zorder=1
+        )
         ax.clabel(drawn, fontsize=7, fmt="%.4g")
     if ok.any():
         dots = ax.scatter(xy[ok, 0], xy[ok, 1], c=values[ok], s=24, cmap="viridis", zorder=5, lw=0)

@@ -184,6 +184,12 @@ def _fonts_of_other_scripts() -> tuple[str, ...]:
     from matplotlib import font_manager
 
     there = set(font_manager.get_font_names())
-    wanted = ("Noto Sans CJK JP", "Noto Sans CJK SC", "WenQuanYi Zen Hei", "Droid Sans Fallback",
-              "Noto Sans", "Unifont")  # fmt: skip
+    wanted = (
+        "Noto Sans CJK JP",
+        "Noto Sans CJK SC",
+        "WenQuanYi Zen Hei",
+        "Droid Sans Fallback",
+        "Noto Sans",
+        "Unifont",
+    )
     return tuple(name for name in wanted if name in there)

@@ -137,8 +137,18 @@ def stops(problem: Problem, solution: Solution, found: Margins | None) -> str:
     """
     u = problem.units
     north = "from north" if problem.origin else "from y"
-    head = ["visit", "goal", f"x ({u})", f"y ({u})", f"depth ({u})", f"course (° {north})",
-            f"leg ({u})", f"path so far ({u})", f"tether ({u})", f"slack ({u})"]  # fmt: skip
+    head = [
+        "visit",
+        "goal",
+        f"x ({u})",
+        f"y ({u})",
+        f"depth ({u})",
+        f"course (° {north})",
+        f"leg ({u})",
+        f"path so far ({u})",
+        f"tether ({u})",
+        f"slack ({u})",
+    ]
     if found is not None:
         head += ["turning (°)", f"clearance ({u})"]
     rows, total = [], 0.0
@@ -146,10 +156,17 @@ def stops(problem: Problem, solution: Solution, found: Margins | None) -> str:
         x, y, z = problem.goals[v.goal].position
         total += leg.length
         row = [
-            str(n + 1), problem.goal_name(v.goal), f"{x:.6g}", f"{y:.6g}", f"{0.0 - z:g}",
-            _course(problem, leg.path), f"{leg.length:.5g}", f"{total:.6g}",
-            f"{v.tether_length:.5g}", f"{problem.tether_length - v.tether_length:.5g}",
-        ]  # fmt: skip
+            str(n + 1),
+            problem.goal_name(v.goal),
+            f"{x:.6g}",
+            f"{y:.6g}",
+            f"{0.0 - z:g}",
+            _course(problem, leg.path),
+            f"{leg.length:.5g}",
+            f"{total:.6g}",
+            f"{v.tether_length:.5g}",
+            f"{problem.tether_length - v.tether_length:.5g}",
+        ]
         if found is not None:
             s = found.stops[n]
             row += [
@@ -202,8 +219,9 @@ def tethers(problem: Problem, solution: Solution) -> str:
         rows.append([str(k + 1), name, passed, back, str(list(v.signature))])
     return table(
         ["visit", "goal", "the tether passes", "if it snags here, or on the way on", "word"],
-        rows, (1, 2, 3, 4),
-    )  # fmt: skip
+        rows,
+        (1, 2, 3, 4),
+    )
 
 
 def of_tour(problem: Problem, solution: Solution) -> Margins | None:

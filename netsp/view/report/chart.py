@@ -30,19 +30,29 @@ MANY = 40
 
 LEGEND = (
     (f'<path d="M8 1 10 6 15 6 11 9 13 15 8 11 3 15 5 9 1 6 6 6Z" fill="{style.BASE}"/>', "base"),
-    (f'<circle cx="8" cy="8" r="6" fill="{style.GOAL}" stroke="{style.PATH}" stroke-width="1.5"/>'
-     '<text x="8" y="11" font-size="8" text-anchor="middle">1</text>',
-     "goal, with the number of its visit"),
-    (f'<circle cx="8" cy="8" r="6" fill="{style.VISITED}" stroke="{style.PATH}" '
-     'stroke-width="1.5"/>', "visited by then"),
-    (f'<rect x="2" y="3" width="12" height="10" fill="{style.OBSTACLE}" stroke="{style.EDGE}"/>',
-     "obstacle"),
-    (f'<rect x="1" y="2" width="14" height="12" fill="none" stroke="{style.EDGE}" '
-     'stroke-dasharray="1 2"/>', "clearance"),
+    (
+        f'<circle cx="8" cy="8" r="6" fill="{style.GOAL}" stroke="{style.PATH}" stroke-width="1.5"/>'
+        '<text x="8" y="11" font-size="8" text-anchor="middle">1</text>',
+        "goal, with the number of its visit",
+    ),
+    (
+        f'<circle cx="8" cy="8" r="6" fill="{style.VISITED}" stroke="{style.PATH}" '
+        'stroke-width="1.5"/>',
+        "visited by then",
+    ),
+    (
+        f'<rect x="2" y="3" width="12" height="10" fill="{style.OBSTACLE}" stroke="{style.EDGE}"/>',
+        "obstacle",
+    ),
+    (
+        f'<rect x="1" y="2" width="14" height="12" fill="none" stroke="{style.EDGE}" '
+        'stroke-dasharray="1 2"/>',
+        "clearance",
+    ),
     (f'<path d="M0 8H16" stroke="{style.PATH}" stroke-width="2"/>', "tour"),
     (f'<path d="M0 8H16" stroke="{style.PLAN}" stroke-width="3"/>', "gone so far"),
     (f'<path d="M0 8H16" stroke="{style.TETHER}" stroke-width="3"/>', "tether"),
-)  # fmt: skip
+)
 
 
 MOVING = ("visited by then", "gone so far", "tether")
@@ -153,14 +163,18 @@ def draw(
     if order is None:
         order = {v.goal: n for n, v in enumerate(solution.tour, 1)}
     shapes = [
-        *_frame(problem, view), *_obstacles(lasting(maps) if maps else problem, view),
+        *_frame(problem, view),
+        *_obstacles(lasting(maps) if maps else problem, view),
         *_passing(maps, view),
-        *(_tour(np.array(solution.path), view) if driven is None
-          else [*_planned(np.array(solution.path), view), *_tour(driven, view)]),
+        *(
+            _tour(np.array(solution.path), view)
+            if driven is None
+            else [*_planned(np.array(solution.path), view), *_tour(driven, view)]
+        ),
         f'<polyline class="done" fill="none" stroke="{style.PLAN}" stroke-width="3"/>',
         f'<polyline class="tether" fill="none" stroke="{style.TETHER}" stroke-width="3"/>',
         *_goals(problem, order, view, fates),
-    ]  # fmt: skip
+    ]
     x, y = view.point(problem.base)
     shapes.append(
         f'<polygon points="{_star(x, y)}" fill="{style.BASE}"><title>base</title></polygon>'
@@ -233,30 +247,43 @@ def _frame(problem: Problem, view: View) -> list[str]:
             place = [value, view.low[1]] if axis == 0 else [view.low[0], value]
             x, y = view.point(place)
             if axis == 0:
-                out.append(f'<path d="M{x} {top}V{bottom}" class="grid"/>'
-                           f'<text x="{x}" y="{bottom + 16}" text-anchor="middle">{value:g}'
-                           "</text>")  # fmt: skip
+                out.append(
+                    f'<path d="M{x} {top}V{bottom}" class="grid"/>'
+                    f'<text x="{x}" y="{bottom + 16}" text-anchor="middle">{value:g}'
+                    "</text>"
+                )
             else:
-                out.append(f'<path d="M{left} {y}H{right}" class="grid"/>'
-                           f'<text x="{left - 5}" y="{y + 4}" text-anchor="end">{value:g}'
-                           "</text>")  # fmt: skip
-    out.append(f'<rect x="{left}" y="{top}" width="{right - left:.2f}" height="{bottom - top:.2f}" '
-               f'fill="none" stroke="{style.EDGE}"/>')  # fmt: skip
-    out.append(f'<text x="{(left + right) / 2}" y="{bottom + 36}" text-anchor="middle">'
-               f"x ({units})</text>")  # fmt: skip
+                out.append(
+                    f'<path d="M{left} {y}H{right}" class="grid"/>'
+                    f'<text x="{left - 5}" y="{y + 4}" text-anchor="end">{value:g}'
+                    "</text>"
+                )
+    out.append(
+        f'<rect x="{left}" y="{top}" width="{right - left:.2f}" height="{bottom - top:.2f}" '
+        f'fill="none" stroke="{style.EDGE}"/>'
+    )
+    out.append(
+        f'<text x="{(left + right) / 2}" y="{bottom + 36}" text-anchor="middle">x ({units})</text>'
+    )
     middle = (top + bottom) / 2
-    out.append(f'<text x="13" y="{middle}" text-anchor="middle" '
-               f'transform="rotate(-90 13 {middle})">y ({units})</text>')  # fmt: skip
+    out.append(
+        f'<text x="13" y="{middle}" text-anchor="middle" '
+        f'transform="rotate(-90 13 {middle})">y ({units})</text>'
+    )
     bar = round_step(float(view.high[0] - view.low[0]), 8.0)
     size = bar * view.scale
-    out.append(f'<path d="M{left} 24v8h{size:.2f}v-8" fill="none" stroke="{style.BASE}" '
-               f'stroke-width="1.5"/><text x="{left + size / 2}" y="22" text-anchor="middle">'
-               f"{bar:g} {units}</text>")  # fmt: skip
+    out.append(
+        f'<path d="M{left} 24v8h{size:.2f}v-8" fill="none" stroke="{style.BASE}" '
+        f'stroke-width="1.5"/><text x="{left + size / 2}" y="22" text-anchor="middle">'
+        f"{bar:g} {units}</text>"
+    )
     if problem.origin is not None:
         x = right - 24
-        out.append(f'<g transform="rotate({-problem.origin.heading:g} {x} 24)"><path d="M{x} 6'
-                   f'l6 16h-4v14h-4v-14h-4z" fill="{style.BASE}"/></g><text x="{x - 18}" y="29" '
-                   'text-anchor="end">N</text>')  # fmt: skip
+        out.append(
+            f'<g transform="rotate({-problem.origin.heading:g} {x} 24)"><path d="M{x} 6'
+            f'l6 16h-4v14h-4v-14h-4z" fill="{style.BASE}"/></g><text x="{x - 18}" y="29" '
+            'text-anchor="end">N</text>'
+        )
     return out
 
 
@@ -281,8 +308,10 @@ def _obstacles(problem: Problem, view: View) -> list[str]:
             corners = view.points(np.array(o.polygon))
             out.append(f'<polygon points="{corners}" {look}>{title}</polygon>')
         if len(problem.obstacles) <= MANY:
-            out.append(f'<text x="{x}" y="{y + 4}" class="name" text-anchor="middle">'
-                       f"{html.escape(problem.obstacle_name(i))}</text>")  # fmt: skip
+            out.append(
+                f'<text x="{x}" y="{y + 4}" class="name" text-anchor="middle">'
+                f"{html.escape(problem.obstacle_name(i))}</text>"
+            )
     return out
 
 
@@ -315,22 +344,26 @@ def _planned(path: Floats, view: View) -> list[str]:
 def _tour(path: Floats, view: View) -> list[str]:
     """A path, with an arrowhead in the middle of every long piece."""
     path = path[polylines.telling(path, 1e-3 / view.scale)]
-    out = [f'<polyline points="{view.points(path)}" fill="none" stroke="{style.PATH}" '
-           'stroke-width="1.5"/>']  # fmt: skip
+    out = [
+        f'<polyline points="{view.points(path)}" fill="none" stroke="{style.PATH}" '
+        'stroke-width="1.5"/>'
+    ]
     places = np.array([view.point(p) for p in path])
     for a, b in pairwise(places):
         if np.hypot(*(b - a)) < 36.0:
             continue
         x, y = 0.5 * (a + b)
         angle = math.degrees(math.atan2(*(b - a)[::-1]))
-        out.append(f'<path d="M-6 -4 5 0-6 4Z" fill="{style.PATH}" '
-                   f'transform="translate({x:.1f} {y:.1f}) rotate({angle:.1f})"/>')  # fmt: skip
+        out.append(
+            f'<path d="M-6 -4 5 0-6 4Z" fill="{style.PATH}" '
+            f'transform="translate({x:.1f} {y:.1f}) rotate({angle:.1f})"/>'
+        )
     return out
 
 
 def _goals(
     problem: Problem, visit: Mapping[int, int], view: View, fates: dict[int, str]
-) -> list[str]:  # fmt: skip
+) -> list[str]:
     named = len(problem.goals) <= MANY
     out = []
     for k, goal in enumerate(problem.goals):
@@ -340,11 +373,13 @@ def _goals(
             fate, style.PATH if k in visit else style.EDGE
         )
         note = html.escape(f"{problem.goal_label(k)} {fate}".strip())
-        out.append(f'<circle class="goal" data-goal="{k}" cx="{x}" cy="{y}" r="9" '
-                   f'fill="{style.GOAL}" stroke="{edge}" '
-                   f'stroke-width="1.6"><title>{note}</title></circle>'
-                   f'<text x="{x}" y="{y + 4}" class="visit" text-anchor="middle">'
-                   f"{visit.get(k, '–')}</text>")  # fmt: skip
+        out.append(
+            f'<circle class="goal" data-goal="{k}" cx="{x}" cy="{y}" r="9" '
+            f'fill="{style.GOAL}" stroke="{edge}" '
+            f'stroke-width="1.6"><title>{note}</title></circle>'
+            f'<text x="{x}" y="{y + 4}" class="visit" text-anchor="middle">'
+            f"{visit.get(k, '–')}</text>"
+        )
         text = " ".join(t for t in (goal.name or "", fate) if t)
         if text and named:
             out.append(f'<text x="{x + 12}" y="{y + 4}" class="name">{html.escape(text)}</text>')

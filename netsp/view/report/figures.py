@@ -118,8 +118,13 @@ def performance(by_method: dict[str, list[TrialRow]]) -> Any | None:
         share = np.repeat(np.arange(len(held) + 1) / len(r), 2)
         style = {**_style(k), "marker": ""}
         panel.plot(x, share, label=name, **style)
-    panel.set(xscale="log", xlim=(1.0, most), ylim=(-0.02, 1.02), ylabel="share proven",
-              xlabel="times the seconds of the fastest")  # fmt: skip
+    panel.set(
+        xscale="log",
+        xlim=(1.0, most),
+        ylim=(-0.02, 1.02),
+        ylabel="share proven",
+        xlabel="times the seconds of the fastest",
+    )
     panel.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     panel.xaxis.set_minor_formatter(NullFormatter())
     if most < 30.0:  # less than two numbers would stand at powers of ten

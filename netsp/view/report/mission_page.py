@@ -113,9 +113,10 @@ def page(mission: Mission, scene: Scene, run: Path | None) -> str:
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f'<title>{html.escape(title)}</title><link rel="icon" href="data:,">'
-        f"<style>{STYLE}{briefing.STYLE}</style></head><body>" + "\n".join(parts)
+        f"<style>{STYLE}{briefing.STYLE}</style></head><body>"
+        + "\n".join(parts)
         + "</body></html>\n"
-    )  # fmt: skip
+    )
 
 
 def _stops(mission: Mission) -> int:
@@ -205,21 +206,31 @@ def _waypoints(mission: Mission, summary: dict[str, Any]) -> str:
     flown = {int(s["waypoint"]): s for s in summary.get("stops", ())}
     words = {int(s["waypoint"]): s for s in (summary.get("words") or {}).get("stops", ())}
     reasons = {int(w["waypoint"]): w["reason"] for w in summary.get("left_out", ())}
-    head = ["#", "given as", "position (m)", "heading (°)", "stay (s)", "leg (m)",
-            "tether planned (m)", "most on the way (m)"]  # fmt: skip
+    head = [
+        "#",
+        "given as",
+        "position (m)",
+        "heading (°)",
+        "stay (s)",
+        "leg (m)",
+        "tether planned (m)",
+        "most on the way (m)",
+    ]
     head += ["tether flown (m)", "as planned"] if summary else []
     head.append("word")
     rows = []
     for k, w in enumerate(mission.waypoints):
         stop = tour.stops[k] if tour is not None and k < len(tour.stops) else None
         row = [
-            str(k), "–" if stop is None or stop.given_as is None else f"#{stop.given_as}",
+            str(k),
+            "–" if stop is None or stop.given_as is None else f"#{stop.given_as}",
             ", ".join(f"{v:.4g}" for v in w.position),
-            "–" if w.heading is None else f"{w.heading:g}", f"{w.dwell:g}",
+            "–" if w.heading is None else f"{w.heading:g}",
+            f"{w.dwell:g}",
             "–" if stop is None else f"{polylines.length(np.array(stop.path)):.4g}",
             "–" if stop is None else f"{stop.tether_length:.4g}",
             "–" if stop is None else f"{stop.longest_tether:.4g}",
-        ]  # fmt: skip
+        ]
         word = None if stop is None else list(stop.signature)
         if summary:
             row.append(f"{flown[k]['tether']:.4g}" if k in flown else reasons.get(k, "–"))
@@ -245,9 +256,15 @@ def _repairs(summary: dict[str, Any]) -> str:
     if not repairs:
         return text
     rows = [
-        [f"{r['time']:.1f}", f"#{r['waypoint']}", r["response"], r["reason"],
-         f"{r['length']:.4g}", f"{r['planning_s']:.2f}"]
+        [
+            f"{r['time']:.1f}",
+            f"#{r['waypoint']}",
+            r["response"],
+            r["reason"],
+            f"{r['length']:.4g}",
+            f"{r['planning_s']:.2f}",
+        ]
         for r in repairs
-    ]  # fmt: skip
+    ]
     head = ["time (s)", "before waypoint", "response", "reason", "to go (m)", "planning (s)"]
     return text + briefing.table(head, rows, (2, 3))

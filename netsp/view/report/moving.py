@@ -116,6 +116,9 @@ def script(films: Sequence[Film], views: Sequence[View]) -> str:
 
 def _frame(moment: Moment, view: View) -> dict[str, object]:
     return {
-        "t": view.points(moment.nodes), "r": view.point(moment.nodes[-1]),
-        "p": view.points(moment.path), "s": moment.text, "v": moment.fates.get(VISITED, ()),
-    }  # fmt: skip
+        "t": view.points(moment.nodes),
+        "r": view.point(moment.nodes[-1]),
+        "p": view.points(moment.path),
+        "s": moment.text,
+        "v": moment.fates.get(VISITED, ()),
+    }

@@ -177,9 +177,10 @@ def opened(source: str | Path, problem_file: str | Path | None) -> Opened:
     if problem_file is None:
         raise InputError(f"{source}: does not hold its problem; expected --problem FILE")
     problem = (
-        Problem.load(problem_file) if run is None
+        Problem.load(problem_file)
+        if run is None
         else Problem.from_run(read_text(problem_file), str(problem_file))
-    )  # fmt: skip
+    )
     if run is None and problem.sha256 != solution.problem.sha256:
         raise InputError(f"{source}: solves another problem than {problem_file} (sha256 differs)")
     if solution.length is None:

@@ -128,20 +128,34 @@ def _cells_table(by_cell: dict[Cell, list[TrialRow]], best: dict[str, float]) ->
         ids = " ".join(r["trial"] for r in rows)
         body.append(
             [
-                html.escape(cell.method), cell.goals, f"{cell.tether:g}", len(rows),
+                html.escape(cell.method),
+                cell.goals,
+                f"{cell.tether:g}",
+                len(rows),
                 "" if over is None else f"{over.median:.2f} ({over.low:.2f} to {over.high:.2f})",
                 "" if over is None else f"{over.mean:.2f}",
-                "" if seconds is None
+                ""
+                if seconds is None
                 else f"{seconds.median:.3g} ({seconds.low:.3g} to {seconds.high:.3g})",
                 sum(is_proven(r) for r in rows),
                 "" if gaps is None else f"{gaps.median:.3g}",
                 scopes,
                 f"<details><summary>rows</summary><code>{html.escape(ids)}</code></details>",
             ]
-        )  # fmt: skip
-    head = ["method", "goals", "tether", "trials", "% over best, median (95 %)", "mean",
-            "seconds, median (95 %)", "proven", "gap %, median", "proofs and gaps: of",
-            "rows"]  # fmt: skip
+        )
+    head = [
+        "method",
+        "goals",
+        "tether",
+        "trials",
+        "% over best, median (95 %)",
+        "mean",
+        "seconds, median (95 %)",
+        "proven",
+        "gap %, median",
+        "proofs and gaps: of",
+        "rows",
+    ]
     return "<h2>All cells</h2>" + _table(head, body)
 
 
@@ -181,11 +195,17 @@ def _failures_table(rows: list[TrialRow]) -> str:
     if not failed:
         return "<h2>Failures</h2><p>None.</p>"
     body = [
-        [html.escape(r["solver"]["label"]), r["world"]["seed"], r["world"]["goals"],
-         f"{r['world']['tether_length']:g}", html.escape(r["status"]),
-         html.escape(r["message"][:200]), f"<code>{html.escape(r['trial'])}</code>"]
+        [
+            html.escape(r["solver"]["label"]),
+            r["world"]["seed"],
+            r["world"]["goals"],
+            f"{r['world']['tether_length']:g}",
+            html.escape(r["status"]),
+            html.escape(r["message"][:200]),
+            f"<code>{html.escape(r['trial'])}</code>",
+        ]
         for r in failed
-    ]  # fmt: skip
+    ]
     head = ["solver", "world", "goals", "tether", "status", "message", "trial"]
     return f"<h2>Failures ({len(failed)})</h2>" + _table(head, body)
 
@@ -193,20 +213,51 @@ def _failures_table(rows: list[TrialRow]) -> str:
 def _rows_link(rows: list[TrialRow], best: dict[str, float]) -> str:
     """Every row as CSV within the page."""
     out = io.StringIO()
-    names = ["status", "length", "lower_bound", "lower_bound_of", "gap", "entangled",
-             "roadmap_s", "matrix_s", "solve_s", "total_s", "problem_sha256",
-             "message"]  # fmt: skip
+    names = [
+        "status",
+        "length",
+        "lower_bound",
+        "lower_bound_of",
+        "gap",
+        "entangled",
+        "roadmap_s",
+        "matrix_s",
+        "solve_s",
+        "total_s",
+        "problem_sha256",
+        "message",
+    ]
     writer = csv.writer(out)
-    writer.writerow(["trial", "family", "world", "goals", "tether", "roadmap", "solver", "seed",
-                     "over_best_percent", *names])  # fmt: skip
+    writer.writerow(
+        [
+            "trial",
+            "family",
+            "world",
+            "goals",
+            "tether",
+            "roadmap",
+            "solver",
+            "seed",
+            "over_best_percent",
+            *names,
+        ]
+    )
     for r in rows:
         world, over = r["world"], over_best(r, best)
         writer.writerow(
-            [plain_cell(r["trial"]), plain_cell(world["family"]), world["seed"], world["goals"],
-             world["tether_length"], plain_cell(r["roadmap"]["label"]),
-             plain_cell(r["solver"]["label"]), r["seed"], "" if over is None else f"{over:.6g}",
-             *(plain_cell(v) if isinstance(v := r.get(name, ""), str) else v for name in names)]
-        )  # fmt: skip
+            [
+                plain_cell(r["trial"]),
+                plain_cell(world["family"]),
+                world["seed"],
+                world["goals"],
+                world["tether_length"],
+                plain_cell(r["roadmap"]["label"]),
+                plain_cell(r["solver"]["label"]),
+                r["seed"],
+                "" if over is None else f"{over:.6g}",
+                *(plain_cell(v) if isinstance(v := r.get(name, ""), str) else v for name in names),
+            ]
+        )
     data = base64.b64encode(out.getvalue().encode()).decode()
     return (
         "<h2>Rows</h2><p>Every number above comes from these rows; a trial is found by its id. "

@@ -55,9 +55,10 @@ def page(found: PathComparison) -> str:
 def _introduction(found: PathComparison) -> str:
     problem = found.problem
     tour = (
-        f"There is no planned tour: {found.tour_note}." if found.tour_length is None
+        f"There is no planned tour: {found.tour_note}."
+        if found.tour_length is None
         else f"The planned tour is {found.tour_length:.6g} {problem.units} long ({found.proof})."
-    )  # fmt: skip
+    )
     return (
         f"{problem.summary}. {tour} A goal counts as visited within "
         f'{found.paths[0].measures.radius:g} {problem.units}. "Order" is the shortest tour that '
@@ -68,17 +69,33 @@ def _introduction(found: PathComparison) -> str:
 
 def _figures(found: PathComparison) -> str:
     u = found.problem.units
-    head = ["path", f"length ({u})", "more (%)", "time (s)", "goals", f"tether ({u})", "home",
-            f"order ({u})", "more (%)"]  # fmt: skip
+    head = [
+        "path",
+        f"length ({u})",
+        "more (%)",
+        "time (s)",
+        "goals",
+        f"tether ({u})",
+        "home",
+        f"order ({u})",
+        "more (%)",
+    ]
     rows = []
     for row in found.rows():
         home = "free" if row["free"] else ("entangled" if row["comes_home"] else "no")
-        rows.append([
-            row["path"], _number(row["length"], ".4f"), _number(row["longer_by_percent"], "+.1f"),
-            _number(row["time_s"], ".0f"), f"{row['goals_visited']} of {row['goals']}",
-            _number(row["longest_tether"], ".2f"), home, _number(row["order_length"], ".4f"),
-            _number(row["order_longer_by_percent"], "+.1f"),
-        ])  # fmt: skip
+        rows.append(
+            [
+                row["path"],
+                _number(row["length"], ".4f"),
+                _number(row["longer_by_percent"], "+.1f"),
+                _number(row["time_s"], ".0f"),
+                f"{row['goals_visited']} of {row['goals']}",
+                _number(row["longest_tether"], ".2f"),
+                home,
+                _number(row["order_length"], ".4f"),
+                _number(row["order_longer_by_percent"], "+.1f"),
+            ]
+        )
     return briefing.table(head, rows, (0,))
 
 
@@ -104,19 +121,31 @@ def _path(found: PathComparison, path: ComparedPath) -> list[str]:
     m, problem = path.measures, found.problem
     u = problem.units
     visits = briefing.table(
-        ["visit", "goal", f"path so far ({u})", "time (s)", f"off by ({u})", f"tether ({u})",
-         f"slack ({u})", "word"],
+        [
+            "visit",
+            "goal",
+            f"path so far ({u})",
+            "time (s)",
+            f"off by ({u})",
+            f"tether ({u})",
+            f"slack ({u})",
+            "word",
+        ],
         [
             [
-                str(k), problem.goal_name(v.goal) + ("" if v.is_first else " again"),
-                f"{v.along:.2f}", f"{v.time_s:.1f}", f"{v.miss:.2f}",
+                str(k),
+                problem.goal_name(v.goal) + ("" if v.is_first else " again"),
+                f"{v.along:.2f}",
+                f"{v.time_s:.1f}",
+                f"{v.miss:.2f}",
                 "unknown" if v.tether is None else f"{v.tether:.2f}",
                 "–" if v.tether is None else f"{problem.tether_length - v.tether:.2f}",
                 str(list(v.word)) if v.word else "empty",
             ]
             for k, v in enumerate(m.visits, 1)
-        ], (1, 7),
-    )  # fmt: skip
+        ],
+        (1, 7),
+    )
     return [
         '<div class="pair">' + "".join(pictures) + "</div>",
         briefing.table(["figure", "value"], [list(r) for r in figures_of(found, path)], (0, 1)),

@@ -50,9 +50,11 @@ def path_rows(m: PathMeasures) -> list[tuple[str, str]]:
         ("comes home", _home(m)),
     ]
     for kind, name in (
-        ("obstacle", "runs through"), ("touching", "runs between"), ("bounds", "leaves the bounds"),
+        ("obstacle", "runs through"),
+        ("touching", "runs between"),
+        ("bounds", "leaves the bounds"),
         ("clearance", "within the clearance"),
-    ):  # fmt: skip
+    ):
         found = [s for s in m.stretches if s.kind == kind]
         if found:
             rows.append((name, _stretches(problem, found)))
@@ -105,8 +107,10 @@ def _stretches(problem: Problem, found: list[Stretch]) -> str:
             out.append(f"{names} at ({x:.4g}, {y:.4g}){times}")
             continue
         by = {
-            "obstacle": "deep", "clearance": f"of {problem.clearance:g} short", "bounds": "out",
-        }[parts[0].kind]  # fmt: skip
+            "obstacle": "deep",
+            "clearance": f"of {problem.clearance:g} short",
+            "bounds": "out",
+        }[parts[0].kind]
         begin = f"{names} " if names else ""
         out.append(
             f"{begin}for {size:.3g} {u} from ({x:.4g}, {y:.4g}) on, {depth:.3g} {u} {by}{times}"
@@ -167,9 +171,11 @@ def figures_of(found: PathComparison, path: ComparedPath) -> list[tuple[str, str
     if path.visited_length is not None:
         more = m.length - path.visited_length
         percent = 100.0 * more / path.visited_length if path.visited_length else 0.0
-        rows.append((
-            "its goals alone",
-            f"a tour of {path.visited_length:.6g} {u} visits them; the path is {more:.4g} {u} "
-            f"({percent:.3g} %) longer",
-        ))  # fmt: skip
+        rows.append(
+            (
+                "its goals alone",
+                f"a tour of {path.visited_length:.6g} {u} visits them; the path is {more:.4g} {u} "
+                f"({percent:.3g} %) longer",
+            )
+        )
     return rows

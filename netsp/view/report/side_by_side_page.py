@@ -43,12 +43,15 @@ def save_beside(opened: Sequence[Opened], output: str | Path) -> None:
         "</section>"
         for one, film, view in zip(opened, films, views, strict=True)
     )
-    write_text(output, (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f'<title>{html.escape(title)}</title><link rel="icon" href="data:,">'
-        f"<style>{STYLE}{moving.STYLE}{BESIDE}</style></head><body>"
-        f"<h1>{html.escape(title)}</h1>{moving.CONTROLS}"
-        f'<div class="beside">{sections}</div>{chart.legend(run=any(one.run for one in opened))}'
-        f"{moving.script(films, views)}</body></html>\n"
-    ))  # fmt: skip
+    write_text(
+        output,
+        (
+            '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+            '<meta name="viewport" content="width=device-width, initial-scale=1">'
+            f'<title>{html.escape(title)}</title><link rel="icon" href="data:,">'
+            f"<style>{STYLE}{moving.STYLE}{BESIDE}</style></head><body>"
+            f"<h1>{html.escape(title)}</h1>{moving.CONTROLS}"
+            f'<div class="beside">{sections}</div>{chart.legend(run=any(one.run for one in opened))}'
+            f"{moving.script(films, views)}</body></html>\n"
+        ),
+    )

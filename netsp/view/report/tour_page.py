@@ -89,11 +89,13 @@ def page(what: Opened) -> str:
         "<h2>Map</h2>",
         chart.draw(problem, solution, view, fates, what.maps, what.driven, what.order),
         chart.legend(run=run is not None),
-        moving.CONTROLS, moving.STATE,
+        moving.CONTROLS,
+        moving.STATE,
         "<h2>Goals in their order</h2>",
-        briefing.stops(problem, solution, found) if run is None
+        briefing.stops(problem, solution, found)
+        if run is None
         else _reached(problem, solution, run, fates, what.rows),
-    ]  # fmt: skip
+    ]
     if own and problem.state is None and solution.status is not Status.INVALID:
         parts += ["<h2>How the tether runs</h2>", briefing.tethers(problem, solution)]
     if found is not None:
@@ -156,15 +158,26 @@ def lengths_of(rows: Sequence[dict[str, str]]) -> tuple[Floats, Floats, Floats, 
 
 
 def _reached(
-    problem: Problem, solution: Solution, run: Path, fates: dict[int, str],
+    problem: Problem,
+    solution: Solution,
+    run: Path,
+    fates: dict[int, str],
     rows_of_log: Sequence[dict[str, str]],
-) -> str:  # fmt: skip
+) -> str:
     """Return a table of the visits that were made, in their order, and of the goals that were not
     reached."""
     times, _, limits, _ = lengths_of(rows_of_log)
     u, planned = problem.units, {v.goal: v for v in solution.tour}
-    head = ["visit", "goal", "reached at (s)", f"tether out ({u})", f"slack ({u})", "word",
-            f"planned at the start ({u})", "word then"]  # fmt: skip
+    head = [
+        "visit",
+        "goal",
+        "reached at (s)",
+        f"tether out ({u})",
+        f"slack ({u})",
+        "word",
+        f"planned at the start ({u})",
+        "word then",
+    ]
     rows: list[list[str]] = []
     missed = list(planned)
 
@@ -180,11 +193,17 @@ def _reached(
         out = float(row["tether"])
         then = int(np.searchsorted(times, float(row["time"]), "right"))
         limit = float(limits[max(then - 1, 0)])
-        rows.append([
-            str(len(rows) + 1), problem.goal_name(goal), f"{float(row['time']):.1f}", f"{out:.5g}",
-            f"{limit - out:.5g}", str([int(a) for a in row["word"].split()]),
-            *told(goal),
-        ])  # fmt: skip
+        rows.append(
+            [
+                str(len(rows) + 1),
+                problem.goal_name(goal),
+                f"{float(row['time']):.1f}",
+                f"{out:.5g}",
+                f"{limit - out:.5g}",
+                str([int(a) for a in row["word"].split()]),
+                *told(goal),
+            ]
+        )
     for goal in missed:
         fate = fates.get(goal, "not reached")
         rows.append(["–", problem.goal_name(goal), fate, "–", "–", "–", *told(goal)])
@@ -225,9 +244,12 @@ def _events(run: Path | None) -> str:
     if not events:
         return "<p>Nothing unforeseen happened.</p>"
     columns = {
-        "time": "time (s)", "event": "event", "response": "response", "reason": "reason",
+        "time": "time (s)",
+        "event": "event",
+        "response": "response",
+        "reason": "reason",
         "planning_s": "planning (s)",
-    }  # fmt: skip
+    }
     top = "<tr>" + "".join(f"<th>{n}</th>" for n in columns.values()) + "</tr>"
     body = "".join(
         f"<tr><td>{float(e['time']):.1f}</td><td>{html.escape(e['event'])}</td>"
