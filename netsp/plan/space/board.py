@@ -1,4 +1,5 @@
-"""The travel graph of a mission: states, legs and ways by the anchor, less what was forbidden."""
+"""Travel graph of a mission: states, legs and paths through the start, without the forbidden
+ones."""
 
 from __future__ import annotations
 
@@ -26,22 +27,22 @@ from netsp.roadmap.from_state import from_state
 
 @dataclass(frozen=True)
 class TourVisit:
-    """A waypoint of a plan.
+    """Visit of a waypoint in a tour.
 
-    Parameters
+    Attributes
     ----------
-    waypoint : int
-        Which one.
-    choice : int
-        Which of its alternatives was chosen, from 1 on; 0 for its own position.
-    word : tuple of int
+    waypoint
+        Number of the waypoint.
+    choice
+        Number of its alternative, from 1 on; 0 for the position of the waypoint itself.
+    word
         Word of the tether there.
-    tether_length : float
-        Metres of tether there.
-    path : ndarray, shape (k, 3)
-        How the robot gets there from the stop before, metres.
-    longest_tether : float
-        Metres of tether on the way, at most.
+    tether_length
+        Length of the tether there, metres.
+    path
+        (k, 3) path of the robot from the visit before, metres.
+    longest_tether
+        Maximum length of the tether on that path, metres.
     """
 
     waypoint: int
@@ -54,23 +55,23 @@ class TourVisit:
 
 @dataclass(frozen=True)
 class DrivenTour:
-    """What came of driving a tour.
+    """Tour along which the tether was driven.
 
-    Parameters
+    Attributes
     ----------
-    tour : list of int
-        States, in their order.
-    visits : list of TourVisit
-        The same with their paths.
-    home : ndarray, shape (k, 3)
-        From the last stop to the start, metres.
-    length : float
-        Of it all, metres.
-    free : bool
-        Whether the tether was at the end as it is laid at the start.
-    fault : (int, int) or None
-        Two states, -1 for the start: the leg between them is to blame for a tether over its limit,
-        or one that is not free at the end.
+    tour
+        States in their order.
+    visits
+        The visits with their paths.
+    home
+        (k, 3) path from the last visit to the start, metres.
+    length
+        Length of the tour, metres.
+    free
+        Whether the tether lay at the end as it does at the start.
+    fault
+        Two states, -1 for the start, whose leg is to blame for a tether over its limit, or one that
+        is not free at the end.
     """
 
     tour: list[int]
@@ -83,16 +84,14 @@ class DrivenTour:
 
 @dataclass
 class StateGraph:
-    """States and how to get from one to another.
+    """States and the robot's paths between them.
 
-    Parameters
+    Attributes
     ----------
-    context : PlanningContext
-        Where they are.
-    states : States
-        Those so far.
-    legs : dict of (int, int) to ndarray of shape (k, 3)
-        Paths from the state with the lower number to the other, metres.
+    context, states
+        Context of the mission, and the states so far.
+    legs
+        Paths (k, 3) from the state with the lower number to the other, metres.
     """
 
     context: PlanningContext
@@ -106,19 +105,17 @@ class StateGraph:
     _cut: set[tuple[int, int]] = field(default_factory=set)
 
     def update(self, legs: DrivenLegs, clock: Clock) -> bool:
-        """Legs as they are now, and ways from the start to new states.
+        """Replace the legs, and find paths from the start to new states.
 
         Parameters
         ----------
-        legs : DrivenLegs
-            Those driven so far.
         clock : Clock
-            When it is up, states that are left are reached by legs only.
+            When it is up, only the first state of each waypoint gets a path from the start.
 
         Returns
         -------
         bool
-            Whether there was time for all of them.
+            Whether there was time for the paths to all states.
         """
         is_complete = True
         for v in range(len(self._out), len(self.states.entries)):
@@ -150,15 +147,15 @@ class StateGraph:
         return is_complete
 
     def _path_along_tether(self, v: int) -> Floats | None:
-        """Return the path from the start along a state's tether, pulled taut in its class; None if
-        the robot has no room on it, because a tether fits through narrower gaps."""
+        """Return the path from the start along the tether of a state, pulled taut in its class;
+        None if the robot has no room there, because a tether fits through narrower gaps."""
         tether = self.states.entries[v].tether
         line = np.vstack([self.context.start_tether.nodes[::-1], tether.nodes[1:]])
         return self.context.pull_taut_nearby(line)
 
     def _measure_paths_home(self, legs: dict[tuple[int, int], Floats]) -> None:
-        """How far it is from the start to each state: along its own tether, or where the robot has
-        no room on that way, by way of others, there and back."""
+        """Measure the shortest path from the start to each state: along its tether or, if the robot
+        has no room there, through other states."""
         legs_from: dict[int, list[tuple[int, float]]] = {}
         for (v, w), path in legs.items():
             if (v, w) in self._one_way:
@@ -180,15 +177,15 @@ class StateGraph:
                     heapq.heappush(waiting, (length + leg, w))
 
     def _has_clearance(self, v: int) -> bool:
-        """Whether others may be reached by way of a state: its waypoint may be nearer to solids
-        than the clearance, and others' paths may not."""
+        """Return whether paths to other states may lead through a state: its waypoint may be nearer
+        to solids than the clearance, but other paths may not."""
         place = self.states.places.points[self.states.entries[v].place]
         mission = self.context.mission
         return float(self.context.field.distance(place)) >= mission.clearance - 0.5 * mission.delta
 
     @property
     def reached_waypoints(self) -> set[int]:
-        """Waypoints that the robot gets to, whichever way."""
+        """Return the numbers of the waypoints that the robot can get to."""
         places = self.states.places
         count = len(self.context.mission.waypoints)
         found = {
@@ -199,20 +196,7 @@ class StateGraph:
         return {n for n in found if n < count}
 
     def path(self, v: int, w: int) -> Floats:
-        """From one state to another.
-
-        Parameters
-        ----------
-        v : int
-            Its number, -1 for the start.
-        w : int
-            The other's.
-
-        Returns
-        -------
-        ndarray, shape (k, 3)
-            Metres.
-        """
+        """Return the path (k, 3) from one state to another, -1 for the start, metres."""
         if v < 0:
             return self._path_out(w)
         if w < 0:
@@ -223,22 +207,12 @@ class StateGraph:
         return direct if v < w else direct[::-1]
 
     def path_out(self, v: int) -> Floats | None:
-        """How the robot gets from the start to a state.
-
-        Parameters
-        ----------
-        v : int
-            Its number.
-
-        Returns
-        -------
-        ndarray, shape (k, 3), or None
-            Metres; None where no way has room.
-        """
+        """Return the path (k, 3) from the start to a state, metres; None if the robot cannot get
+        there."""
         return self._path_out(v) if np.isfinite(self._home[v]) else None
 
     def _path_out(self, v: int) -> Floats:
-        """(k, 3) from the start to a state that it gets to."""
+        """Return the path (k, 3) from the start to a state that the robot can get to."""
         own = self._out[v] if v >= 0 else self.context.start_tether.nodes[-1:]
         if own is not None:
             return own
@@ -247,18 +221,8 @@ class StateGraph:
         return np.vstack([self._path_out(u), (leg if u < v else leg[::-1])[1:]])
 
     def forbid(self, pair: tuple[int, int]) -> bool:
-        """Take the leg between two states away, or if it was by way of the start, that.
-
-        Parameters
-        ----------
-        pair : (int, int)
-            The states, the lower number first.
-
-        Returns
-        -------
-        bool
-            Whether they are still joined.
-        """
+        """Remove the leg between two states, the lower number first, or their path through the
+        start if there is no leg; return whether the states are still connected."""
         if self.legs.pop(pair, None) is None:
             self._cut.add(pair)
         else:
@@ -269,41 +233,34 @@ class StateGraph:
     def can_reach_all(self, tour: Sequence[int]) -> bool:
         """Return whether the robot gets from the start to every state of a tour.
 
-        A leg that is forbidden may have been the only way to a state.
-
-        Parameters
-        ----------
-        tour : sequence of int
-            States.
+        A leg that is forbidden may have been the only path to a state.
         """
         return all(np.isfinite(self._home[v]) for v in tour)
 
     @property
     def _reached_states(self) -> list[int]:
-        """States that the robot gets to."""
+        """Return the states that the robot gets to."""
         return [v for v, far in enumerate(self._home) if np.isfinite(far)]
 
     def solve(
         self, clock: Clock, warm_start: Sequence[int] | None = None, **options: Any
     ) -> tuple[Result, list[int]] | None:
-        """The graph as it is now, solved.
+        """Solve the travel graph.
 
         Parameters
         ----------
         clock : Clock
-            When it is up, the result is the best by then.
+            When it is up, the result is the best so far.
         warm_start : sequence of int, optional
-            States of a tour to start from.
-        **how : Any
-            As of `netsp.plan.solve_problem.solve_graph`.
+            States of a tour.
+        **options : Any
+            Options of `netsp.plan.solve_problem.solve_graph`.
 
         Returns
         -------
-        result : Result
-            Of the solver.
-        tour : list of int
-            States in the order of its tour, but for that which the mission begins in.
-            None in place of both where there is no tour.
+        (Result, list of int) or None
+            Result of the solver, and the states in the order of its tour without the state in which
+            the mission begins. None if there is no tour.
         """
         usable = self._reached_states
         vertex = {v: k for k, v in enumerate(usable, 1)}
@@ -336,7 +293,8 @@ class StateGraph:
         return result, [usable[int(k) - 1] for k in result.tour[len(fixed_start) :]]
 
     def drive_out_and_back(self) -> DrivenTour | None:
-        """Drive a tour that goes out to each waypoint along a taut tether, and back the same path.
+        """Drive a tour that goes out to each waypoint along a taut tether, and back along the same
+        path.
 
         The tour needs no legs between states, so it exists whenever each waypoint can be reached.
 
@@ -379,19 +337,8 @@ class StateGraph:
         return free and max(longest, longest_back) <= self.states.limit
 
     def drive(self, tour: Sequence[int]) -> DrivenTour:
-        """A tour, driven with the tether it begins with, in the direction that is right for more of
-        its legs, and where that fails, in the other.
-
-        Parameters
-        ----------
-        tour : sequence of int
-            States.
-
-        Returns
-        -------
-        DrivenTour
-            What came of it; where both directions fail, of the first.
-        """
+        """Drive a tour with the tether at its beginning, in the direction in which more of its legs
+        were driven; if that fails, in the other. If both fail, return the first."""
         if self.states.present is not None:
             return self._drive(tour)  # it begins elsewhere than it ends
         forward, backward = list(tour), list(tour)[::-1]
@@ -404,13 +351,13 @@ class StateGraph:
         return second if second.fault is None else first
 
     def _count_reversed_legs(self, tour: Sequence[int]) -> int:
-        """How many legs of a tour arrive in the other direction only."""
+        """Return how many legs of a tour arrive only in the other direction."""
         return sum(
             self._one_way.get((min(v, w), max(v, w)), v < w) != (v < w) for v, w in pairwise(tour)
         )
 
     def _drive(self, tour: Sequence[int]) -> DrivenTour:
-        """A tour, driven in the direction given."""
+        """Drive a tour in the given direction."""
         states, context, places = self.states, self.context, self.states.places
         tether, last = context.present_tether, -1 if states.present is None else states.present
         stops: list[TourVisit] = []
@@ -458,22 +405,14 @@ class StateGraph:
 
 
 def with_status(result: Result, driven: DrivenTour, tolerance: float) -> Result:
-    """A solver's result, of a tour that was driven: by way of the start it may be longer than what
-    the solver spoke of, and is then no longer proven.
+    """Return the result of a solver with the status that holds for the tour that was driven.
+
+    A driven path through the start may be longer than the solver's leg; then nothing is proven.
 
     Parameters
     ----------
-    result : Result
-        Of the solver.
-    driven : DrivenTour
-        Its tour.
     tolerance : float
-        Of the length, and metres, that rounding may take.
-
-    Returns
-    -------
-    Result
-        The same, with the status that still holds.
+        Tolerance for rounding, metres and share of the length.
     """
     solved = np.inf if result.length is None else result.length
     if driven.length <= solved * (1.0 + tolerance) + tolerance:

@@ -38,13 +38,13 @@ solid is then near the side of the solid, not near its end."""
 class Depths:
     """Range of heights in which paths and tethers stay.
 
-    Parameters
+    Attributes
     ----------
-    low, high : float
+    low, high
         Ends of the range, metres.
-    anchor : ndarray, shape (3,)
-        Anchor of the tether, metres.
-    reach : float
+    anchor
+        (3,) anchor of the tether, metres.
+    reach
         Greatest distance of paths and tethers from the anchor, metres.
     """
 
@@ -71,10 +71,6 @@ def cross_sections(
 
     Parameters
     ----------
-    field : DistanceField
-        The scene.
-    depths : Depths
-        Range that the solids must stand through.
     dip : float
         Depth to which paths and tethers may enter solids, metres.
 
@@ -100,19 +96,12 @@ def cross_sections(
 
 
 def level_range(field: DistanceField, dip: float) -> tuple[float, float]:
-    """Return the heights between horizontal floors and ceilings, which are half-spaces.
+    """Return the heights between horizontal floors and ceilings, metres; infinite without them.
 
     Parameters
     ----------
-    field : DistanceField
-        The scene.
     dip : float
         Depth to which paths and tethers may enter solids, metres.
-
-    Returns
-    -------
-    low, high : float
-        Heights, metres; infinite where there is no floor or ceiling.
     """
     low, high, offset = -math.inf, math.inf, float(field.arrays.offset)
     for kind, row in rows_of(field):
@@ -125,20 +114,7 @@ def level_range(field: DistanceField, dip: float) -> tuple[float, float]:
 
 
 def rows_of(field: DistanceField) -> Iterator[tuple[int, Floats]]:
-    """Yield kind and numbers of each solid of a field (`netsp.world.scene.solids`).
-
-    Parameters
-    ----------
-    field : DistanceField
-        The scene.
-
-    Yields
-    ------
-    kind : int
-        Kind of the solid.
-    row : ndarray
-        Its numbers.
-    """
+    """Yield the kind and the numbers of each solid of a field (`netsp.world.scene.solids`)."""
     data = field.arrays.data
     for n in range(int(data[COUNT])):
         at = ROWS + ROW * n
@@ -251,20 +227,8 @@ def _polygon(corners: Floats, growth: float) -> Polygon | None:
 
 
 def grown_within(corners: Floats, by: float) -> Floats | None:
-    """Return a simple polygon within a polygon that was grown or shrunk.
-
-    Parameters
-    ----------
-    corners : ndarray, shape (n, 2)
-        Corners of the polygon before.
-    by : float
-        Growth, metres; negative to shrink.
-
-    Returns
-    -------
-    ndarray, shape (m, 2), or None
-        Corners; None if nothing or more than one piece is left.
-    """
+    """Return a simple polygon (m, 2) within a polygon that was grown, or shrunk by a negative
+    distance; None if nothing or more than one piece is left."""
     from shapely.geometry import Polygon as Shape
 
     # arcs become chords, which lie outside of a hollow that is shrunk by up to a thousandth of `by`

@@ -1,8 +1,8 @@
-"""Ways that pass bodies with free ends on their other sides.
+"""Paths that pass bodies with free ends on their other sides.
 
-Such bodies give no letters, so that a search by words finds one way where there are several that
-are locally shortest: over a mooring line, and under it. On which side the robot passes decides
-where its tether will hang. So ways are bent outwards to all sides, and pulled taut again.
+Such bodies give no letters. A search by words therefore finds one path where several are locally
+shortest, such as over a mooring line and under it. The side on which the robot passes decides where
+its tether will hang. So paths are bent outwards in all directions, and pulled taut again.
 """
 
 from __future__ import annotations
@@ -22,21 +22,19 @@ from netsp.plan.space.planning_context import PlanningContext, keeps_clearance
 def find_bent_paths(
     context: PlanningContext, known: list[Floats], max_length: float
 ) -> list[Floats]:
-    """Locally shortest ways between the same ends as others.
+    """Return further locally shortest paths between the ends of known ones.
 
     Parameters
     ----------
-    context : PlanningContext
-        Where they are.
     known : list of ndarray of shape (k, 3)
-        Taut ways that are known, at least one, shortest first, metres.
+        Taut paths, at least one, shortest first, metres.
     max_length : float
-        Metres that they may be long.
+        Maximum length, metres.
 
     Returns
     -------
     list of ndarray of shape (m, 3)
-        Taut ways that are like none of those, shortest first.
+        Taut paths that are like none of the known ones, shortest first.
     """
     begin, end = known[0][0], known[0][-1]
     found: list[Floats] = []
@@ -60,7 +58,7 @@ def find_bent_paths(
 def _bent_paths(
     begin: Floats, end: Floats, max_length: float, policy: DetourPolicy
 ) -> Iterator[Floats]:
-    """RobotPaths with one bend or two, out from the straight one."""
+    """Yield paths with one bend, out from the straight one."""
     step = end - begin
     far = float(np.linalg.norm(step))
     if far < 1e-9 or max_length <= far:
@@ -74,18 +72,7 @@ def _bent_paths(
 
 
 def perpendiculars(step: Floats) -> tuple[Floats, Floats]:
-    """Two directions at right angles to one and to each other.
-
-    Parameters
-    ----------
-    step : ndarray, shape (3,)
-        The direction, of any length but 0.
-
-    Returns
-    -------
-    tuple of ndarray, shape (3,)
-        Of length 1.
-    """
+    """Return two unit vectors (3,) perpendicular to a direction and to each other."""
     ahead = step / np.linalg.norm(step)
     u = np.cross(ahead, np.eye(3)[int(np.argmin(np.abs(ahead)))])
     u /= np.linalg.norm(u)
@@ -93,17 +80,19 @@ def perpendiculars(step: Floats) -> tuple[Floats, Floats]:
 
 
 def _is_free(context: PlanningContext, path: Floats) -> bool:
+    """Return whether all segments of a path are free."""
     return all(context.field.line_of_sight(a, b) for a, b in pairwise(path))
 
 
 def _is_seen_from(context: PlanningContext, way: Floats, bent: Floats) -> bool:
-    """Whether one can be pulled into the other, straight across."""
+    """Return whether one path can be pulled straight across into the other."""
     shares = np.linspace(0.0, 1.0, context.policy.detours.n_sight_lines + 2)[1:-1]
     one, other = _points_at(way, shares), _points_at(bent, shares)
     return all(context.field.line_of_sight(a, b) for a, b in zip(one, other, strict=True))
 
 
 def _is_alike(a: Floats, b: Floats, delta: float) -> bool:
+    """Return whether two taut paths are the same but for a tolerance of delta."""
     if abs(polylines.length(a) - polylines.length(b)) > delta:
         return False
     shares = np.array([0.25, 0.5, 0.75])
@@ -113,6 +102,6 @@ def _is_alike(a: Floats, b: Floats, delta: float) -> bool:
 
 
 def _points_at(path: Floats, shares: Floats) -> Floats:
-    """(k, 3) the points at shares of a path's length."""
+    """Return the points (k, 3) at shares of the length of a path."""
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     return np.column_stack([np.interp(shares * lengths[-1], lengths, path[:, k]) for k in range(3)])

@@ -18,14 +18,14 @@ from netsp.plan.space.states import hang_alike
 class LegTo:
     """Leg of a tour to a waypoint.
 
-    Parameters
+    Attributes
     ----------
-    waypoint : int
+    waypoint
         Number of the waypoint.
-    choice : int
-        Number of the alternative of the waypoint, from 1 on; 0 for the waypoint's position.
-    path : ndarray, shape (k, 3)
-        Path from the waypoint before, metres.
+    choice
+        Number of its alternative, from 1 on; 0 for the position of the waypoint itself.
+    path
+        (k, 3) path from the waypoint before, metres.
     """
 
     waypoint: int
@@ -38,18 +38,16 @@ def drive_legs(context: PlanningContext, legs: Sequence[LegTo], home: Floats) ->
 
     Parameters
     ----------
-    context : PlanningContext
-        Where they are.
     legs : sequence of LegTo
-        In the order of the tour; the first begins where the mission does.
+        Legs in the order of the tour; the first begins where the mission does.
     home : ndarray, shape (k, 3)
-        From the last stop to the start, metres.
+        Path from the last visit to the start, metres.
 
     Returns
     -------
     DrivenTour or None
-        The tour with its words and tethers; None where a leg has no room for the robot or no word,
-        the tether exceeds its limit, or is not free at the end.
+        The tour with its words and tethers; None if a leg has no room for the robot or no word,
+        the tether exceeds its limit, or it is not free at the end.
     """
     tether, word = context.present_tether, context.word_number(context.present_tether.nodes)
     limit = max(context.mission.tether_length, tether.length)

@@ -1,4 +1,4 @@
-"""In which classes a tether was on a flight: at each stop, and at home."""
+"""Homotopy classes of the tether during a flight: at each visit, and at home."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from netsp.world.scene.scene import Scene
 
 @dataclass(frozen=True)
 class FlownWords:
-    """Words of a flight, by the scene of its mission.
+    """Words of the tether during a flight, by the scene of its mission.
 
-    Parameters
+    Attributes
     ----------
-    visits : tuple of (int, Word or None)
-        Waypoint that was visited, and the word of the tether there; None where there is none, as
-        when the robot went where the map has a solid.
-    home : Word or None
-        Of the tether at the end, closed along the way from the start to the anchor; empty where it
-        was left free.
-    exact : bool
-        Whether words that differ are of different classes.
-    planned : tuple of (Word or None)
-        Of the mission's tour, if it has one, in the same scene.
+    visits
+        Number of each waypoint that was visited, and the word of the tether there; None if there is
+        none, as when the robot went where the map has a solid.
+    home
+        Word of the tether at the end, closed along the path from the start to the anchor; empty if
+        the tether was left free.
+    exact
+        Whether words that differ are always of different classes.
+    planned
+        Words at the visits of the mission's tour, if it has one, in the same scene.
     """
 
     visits: tuple[tuple[int, Word | None], ...]
@@ -41,25 +41,20 @@ class FlownWords:
 
     @property
     def is_complete(self) -> bool:
-        """Whether every word could be told."""
+        """Return whether the words at all visits and at home are known."""
         return self.home is not None and all(word is not None for _, word in self.visits)
 
     @property
     def as_planned(self) -> int:
-        """How many stops were made in the class that the tour has there."""
+        """Return the number of visits in the class that the tour has there."""
         return sum(self._is_as_planned(k, word) for k, word in self.visits)
 
     def _is_as_planned(self, k: int, word: Word | None) -> bool:
+        """Return whether a waypoint was visited in the class that the tour has there."""
         return k < len(self.planned) and word is not None and self.planned[k] == word
 
     def to_summary(self) -> dict[str, Any]:
-        """For the summary of a run.
-
-        Returns
-        -------
-        dict
-            The words by name.
-        """
+        """Return the words for the summary of a run."""
         return {
             "exact": self.exact,
             "stops": [
@@ -82,29 +77,22 @@ class FlownWords:
 def words_of_flight(
     run: Run, *, scene: Scene | None = None, field: DistanceField | None = None
 ) -> FlownWords:
-    """The words of a flight.
+    """Return the words of the tether during a flight.
 
-    The tether and the robot's path are of one class, so that the path tells the word.
+    The tether and the robot's path are of one class, so the path gives the word.
 
     Parameters
     ----------
     run : Run
-        The flight; its anchor stays where it is. Words are by the map that it began with; where
-        that has solids on the way, by the scene as it was at the end.
-    scene : Scene, optional
-        Of the mission, when it is at hand.
-    field : DistanceField, optional
-        The field of that scene, when it is at hand.
-
-    Returns
-    -------
-    FlownWords
-        The words.
+        The flight, with a fixed anchor. Words are by the map that it began with; if that has solids
+        on the robot's path, by the scene as it was at the end.
+    scene, field : Scene, DistanceField, optional
+        Scene of the mission and its field; loaded and computed if needed.
 
     Raises
     ------
     InputError
-        A moving anchor; as of `netsp.plan.space.space_signature.SpaceSignature.in_box`.
+        A moving anchor, or as `netsp.plan.space.space_signature.SpaceSignature.in_box`.
     """
     mission = run.mission
     if mission.track:
@@ -123,7 +111,7 @@ def words_of_flight(
 
 
 def _words_in_scene(run: Run, context: PlanningContext) -> FlownWords:
-    """The words of a flight in some scene."""
+    """Return the words of a flight in a scene."""
     mission, words = run.mission, context.words
     laid, begin = context.start_tether.nodes, context.present_tether.nodes
     places = np.vstack([begin, np.array([[r.x, r.y, r.z] for r in run.log])])
@@ -141,7 +129,8 @@ def _words_in_scene(run: Run, context: PlanningContext) -> FlownWords:
 
 
 def _planned_words(tour: PlannedTour, context: PlanningContext) -> tuple[Word | None, ...]:
-    """Words at the stops of a tour, whose own letters may be those of another map."""
+    """Return the words at the visits of a tour in a scene, whose letters may differ from those of
+    the tour's map."""
     walked, out = context.present_tether.nodes, list[Word | None]()
     for stop, place in zip(tour.stops, context.mission.places, strict=False):
         walked = np.vstack([walked, np.array(stop.path)])

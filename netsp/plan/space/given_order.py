@@ -1,7 +1,7 @@
-"""Tours in an order of waypoints: that of the mission file, the first incumbent, or another.
+"""Tours in a given order of waypoints: that of the mission file, the first incumbent, or another.
 
 The planner `predictive` plans at the waypoints only, and the tether is driven along its paths. The
-tour is that of a simulated flight, without the time that a simulation takes.
+result is the tour of a simulated flight, without the time that a simulation takes.
 """
 
 from __future__ import annotations
@@ -21,12 +21,8 @@ from netsp.world.planner.predictive import PredictivePlanner
 
 
 def drive_given_order(context: PlanningContext) -> DrivenTour | None:
-    """Drive a mission in the order of its file, whatever the time.
-
-    Parameters
-    ----------
-    context : PlanningContext
-        Water of the mission; if the mission has a tour, the legs of that tour are driven.
+    """Drive a mission in the order of its file, whatever the time. If the mission has a tour, drive
+    its legs.
 
     Returns
     -------
@@ -49,8 +45,6 @@ def drive_order(
 
     Parameters
     ----------
-    context : PlanningContext
-        Water of the mission.
     order : sequence of (int, int)
         Number of each waypoint, and of its alternative, from 1 on; 0 for the waypoint's position.
     clock : Clock

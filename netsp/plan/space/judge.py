@@ -1,8 +1,8 @@
-"""The judge of a planned mission: asks again what its tour says, and imports no solver.
+"""Judge of a planned mission: checks what its tour states, and imports no solver.
 
-The tether is driven along the whole tour by the same model at half the resolution, which is another
-discretisation but not another model; benchmarks compare the model with strings of beads. Words are
-those of the mission's own cells, for letters have no meaning beyond them.
+The tether is driven along the whole tour by the same model at half the resolution: another
+discretisation, but not another model; benchmarks compare the model with strings of beads. Words are
+those of the mission's own cells, because letters have no meaning beyond them.
 """
 
 from __future__ import annotations
@@ -76,15 +76,12 @@ def verify_mission(
 
     Parameters
     ----------
-    mission : Mission
-        A mission with a tour.
-    scene : Scene, optional
-        Its scene, when it is at hand.
-    field : DistanceField, optional
-        The scene's field, when it is at hand.
+    scene, field : Scene, DistanceField, optional
+        Scene of the mission and its distance field; loaded and computed if needed.
     context : PlanningContext, optional
-        Water of the mission, if it is already computed; its words depend on field, box and cell
-        only.
+        Context of the mission, if it is known; its words depend on field, box and cell only.
+    policy : JudgePolicy, optional
+        Accuracy.
 
     Returns
     -------
@@ -114,19 +111,10 @@ def verify_mission(
 def check_mission_tour(mission: Mission, scene: Scene, field: DistanceField) -> None:
     """Refuse a mission whose tour fails a check, as before it is flown.
 
-    Parameters
-    ----------
-    mission : Mission
-        A mission with a tour.
-    scene : Scene
-        Its scene.
-    field : DistanceField
-        The scene's field.
-
     Raises
     ------
     InputError
-        As of `verify_mission`; the tour fails a check.
+        As `verify_mission`, or the tour fails a check.
     """
     failed = [c for c in verify_mission(mission, scene=scene, field=field).checks if not c.passed]
     if failed:
@@ -143,6 +131,8 @@ def _shown(point: Floats) -> str:
 
 @dataclass
 class _Judge:
+    """Checks of one tour."""
+
     mission: Mission
     tour: PlannedTour
     context: PlanningContext
@@ -154,6 +144,7 @@ class _Judge:
         return self.context.field
 
     def run(self) -> list[Check]:
+        """Return all checks, in order."""
         within = self._within()
         if not within.passed:  # nothing is known of the water there
             return [self._joined(), within, self._length(), self._bounds()]
@@ -170,14 +161,15 @@ class _Judge:
 
     @cached_property
     def legs(self) -> list[Floats]:
-        """(k, 3) each; the last is the way home."""
+        """Return the paths (k, 3) of the legs; the last leads home."""
         return [*(np.array(s.path) for s in self.tour.stops), np.array(self.tour.home)]
 
     def _name(self, leg: int) -> str:
+        """Return the name of a leg in messages."""
         return "the way home" if leg == len(self.tour.stops) else f"the way to stop {leg}"
 
     def _within(self) -> Check:
-        """No path leads where the scene ends, nor farther than any tether."""
+        """Check that paths stay within the scene's bounds and the tether's reach."""
         line, mission, name = self.tour.line, self.mission, "within the scene and the tether"
         if self.context.bounds is not None:
             low, high = np.array(self.context.bounds[:3]), np.array(self.context.bounds[3:])
@@ -192,7 +184,8 @@ class _Judge:
         return Check(name, True, "all paths")
 
     def _joined(self) -> Check:
-        """Validation asks the ends of each path; that one goes on where the other ended, here."""
+        """Check that each leg begins where the one before ended; the mission's validation checks
+        the ends."""
         gaps = [float(np.linalg.norm(b[0] - a[-1])) for a, b in pairwise(self.legs)]
         largest_gap = max(gaps, default=0.0)
         left = len(self.mission.waypoints) - len(self.tour.stops)
@@ -216,8 +209,11 @@ class _Judge:
         )
 
     def _left_out(self) -> Check:
-        """Only waypoints that no tether reaches within what plans may use may be missing; where the
-        robot has room along a shortest path from the start, the tether follows it."""
+        """Check that only waypoints out of reach are left out.
+
+        A waypoint is in reach if the tether that follows a shortest path of the robot from the
+        start stays within the part that plans may use.
+        """
         mission, left = self.mission, range(len(self.tour.stops), len(self.mission.waypoints))
         name = "leaves out only what is out of reach"
         if not left:
@@ -238,6 +234,7 @@ class _Judge:
         return Check(name, True, f"{len(left)} of {len(mission.waypoints)} waypoints")
 
     def _clear(self) -> Check:
+        """Check that paths keep clear of solids."""
         line, mission = self.tour.line, self.mission
         room = min_clearance_along(self.field, line)
         tight = [
@@ -261,6 +258,7 @@ class _Judge:
         )
 
     def _words(self) -> list[Check]:
+        """Check the words at the stops, and that the word at the end is empty."""
         mission, words = self.mission, self.context.words
         walked, wrong = self.context.present_tether.nodes, []
         for k, (stop, leg) in enumerate(zip(self.tour.stops, self.legs, strict=False)):
@@ -295,6 +293,7 @@ class _Judge:
         ]
 
     def _tethers(self) -> list[Check]:
+        """Check the lengths of the tether, and that it is free at home."""
         model, laid = self.context.model, self.context.start_tether
         tether, longest, longest_leg, deviations = self.context.present_tether, 0.0, 0, []
         for k, leg in enumerate(self.legs):
@@ -339,6 +338,7 @@ class _Judge:
         ]
 
     def _length(self) -> Check:
+        """Check the length of the tour."""
         length = sum(float(polylines.length(leg)) for leg in self.legs)
         stated = self.tour.length
         passed = abs(length - stated) <= STATED_TOLERANCE * (1.0 + stated)
@@ -351,6 +351,7 @@ class _Judge:
         )
 
     def _bounds(self) -> Check:
+        """Check bounds, gaps and status."""
         tour, faults = self.tour, []
         for name, bound, gap in (
             ("lower_bound", tour.lower_bound, tour.gap),

@@ -1,6 +1,6 @@
-"""Measures of entanglement of any path in any scene: its word, and how often it winds about what.
+"""Measures of entanglement of any path in any scene: its word, and its winding numbers.
 
-Winding numbers are the word's class in the abelianisation of the scene's group. About rings and
+Winding numbers are the word's class in the abelianisation of the scene's group. For rings and
 closed bars they are linking numbers: how often a loop goes through each of them.
 """
 
@@ -46,23 +46,23 @@ class MeasurePolicy:
 
 @dataclass(frozen=True)
 class SpaceMeasures:
-    """Of a path in a scene.
+    """Measures of a path in a scene.
 
-    Parameters
+    Attributes
     ----------
-    length : float
-        Metres.
-    closed : bool
-        Whether it was taken for a loop; else each end counts as joined to where the path begins by
-        the shortest way.
-    signature : Word
-        Empty if the path can be pulled straight without passing through anything.
-    windings : tuple of int
-        How often it winds about what there is, with signs.
-    exact : bool
-        Whether words that differ are of different classes.
-    cell : float
-        Metres: gaps narrower than that may count as closed.
+    length
+        Length, metres.
+    closed
+        Whether the path was measured as a loop; if not, each end counts as joined to the beginning
+        of the path by the shortest path.
+    signature
+        Word; empty if the path can be pulled straight without passing through anything.
+    windings
+        How often the path winds around each hole, with signs.
+    exact
+        Whether words that differ are always of different classes.
+    cell
+        Size of a cell, metres; narrower gaps may count as closed.
     """
 
     length: float
@@ -81,31 +81,22 @@ def measure_path(
     cell: float | None = None,
     policy: MeasurePolicy | None = None,
 ) -> SpaceMeasures:
-    """Measure a path.
+    """Measure a path (k, 3), metres, in a scene.
 
     Parameters
     ----------
-    scene : Scene
-        The scene.
-    path : array_like, shape (k, 3)
-        Metres.
     closed : bool, optional
-        Whether its end is joined to its beginning; by default if they are one point.
+        Whether the end is joined to the beginning; by default if they are one point.
     cell : float, optional
-        Size of a cell, metres; by default that of the policy, or more where the scene is large.
+        Size of a cell, metres; by default that of the policy, or more in a large scene.
     policy : MeasurePolicy, optional
         Grid on which the path is measured.
-
-    Returns
-    -------
-    SpaceMeasures
-        The measures.
 
     Raises
     ------
     InputError
-        Less than two points; a path that runs through a solid or a gap narrower than a cell, says
-        where; too many cells for the memory.
+        Fewer than two points; a path that runs through a solid or a gap narrower than a cell, says
+        where; too many cells.
 
     Examples
     --------

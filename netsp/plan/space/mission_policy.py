@@ -38,7 +38,7 @@ class WordPolicy:
         Maximum number of cells; six million take about 0.4 GiB with their labels.
     max_halvings
         How often an edge or a square is divided to prove that it is free. Each halving finds
-        tighter passages, and takes up to four times as long on those that stay closed.
+        tighter passages, and takes up to four times as long where they stay closed.
     max_generators
         Maximum number of generators before relations eliminate any; scenes with more are refused.
     max_hold_cells

@@ -1,11 +1,11 @@
-"""`repair`: flies the tour that was planned, and plans what is left of it anew when the map changes
-so that it no longer holds.
+"""Planner `repair`: flies the planned tour, and repairs it when the map changes so that it no
+longer holds.
 
-As in the plane (`netsp.online.execute.tour_repair`): what is left is whole if its paths keep off
-solids, the tether fits on them and comes home free. Otherwise the order is kept, and shortest ways
-are sought round what blocks it. The rest is planned anew, from where the robot is and with its
-tether as it lies by then, where that is not enough, or takes longer than planning does: the robot
-holds its place meanwhile.
+The rest of the tour still holds if its paths keep off solids, the tether fits on them, and it comes
+home free (as in the plane, `netsp.online.execute.tour_repair`). If not, the order is kept, and the
+shortest paths around the obstacles are found. If there are none, or they take longer than planning
+does, the rest is planned anew from the present place and tether; the robot holds its place
+meanwhile.
 """
 
 from __future__ import annotations
@@ -31,29 +31,37 @@ from netsp.world.planner.predictive import PredictivePlanner
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.tether import Tether
 
-KEPT, LOCAL, REPLANNED, BY_LEGS = "kept", "local", "replan", "legs"
-"""What became of the rest of a tour: kept; kept but for legs round what blocks it; planned anew; or
-left to be found leg by leg."""
+KEPT = "kept"
+"""Response of a repair: the rest of the tour is kept."""
+
+LOCAL = "local"
+"""Response of a repair: the order is kept, with legs around obstacles."""
+
+REPLANNED = "replan"
+"""Response of a repair: the rest of the tour is planned anew."""
+
+BY_LEGS = "legs"
+"""Response of a repair: no tour was found, so the planner searches leg by leg."""
 
 
 @dataclass(frozen=True)
 class Repair:
-    """What was done when the map had changed.
+    """Repair of the rest of a tour.
 
-    Parameters
+    Attributes
     ----------
-    time : float
+    time
         Seconds since the start.
-    waypoint : int
-        The one that was next.
-    response : {"kept", "local", "replan", "legs"}
-        What became of the rest of the tour.
-    reason : str
-        Why.
-    length : float
-        Metres to go, as planned; 0 where no tour was found.
-    planning_s : float
-        Seconds that it took.
+    waypoint
+        Number of the next waypoint.
+    response
+        Response: kept, local, replan or legs.
+    reason
+        Reason for it.
+    length
+        Planned length of the rest, metres; 0 if no tour was found.
+    planning_s
+        CPU seconds that the repair took.
     """
 
     time: float
@@ -75,9 +83,21 @@ def _gaps_named(found: SpacePlan) -> str:
 
 @dataclass
 class _RemainingTour:
-    """What is left of a tour: its legs with the tether's length at their ends, the way home last;
-    waypoints that it goes to, and those that solids stand on; whether all legs are there; how long
-    it was as planned, and what does not hold of that."""
+    """Rest of a tour by the present map.
+
+    Attributes
+    ----------
+    legs
+        Path and tether length at its end of each leg, the path home last.
+    kept, lost
+        Numbers of the waypoints that it visits, and of waypoints with solids on them.
+    whole
+        Whether all legs are known.
+    old
+        Length as planned, metres.
+    reason
+        Reason why the planned tour does not hold; None if it does.
+    """
 
     legs: list[tuple[Floats, float]] = field(default_factory=list)
     kept: list[int] = field(default_factory=list)
@@ -88,7 +108,7 @@ class _RemainingTour:
 
     @property
     def length(self) -> float:
-        """Metres."""
+        """Return the length of the legs, metres."""
         return float(sum(polylines.length(leg) for leg, _ in self.legs))
 
 
@@ -120,8 +140,8 @@ class RepairPlanner(PredictivePlanner):
         self._must_check = self.mission.tour is not None
 
     def step(self, robot: Floats, tether: Tether) -> Command:
-        """See `Planner`; holds its place until a plan is due, however soon it was ready, so that
-        the same seed gives the same flight."""
+        """See `Planner`. The robot holds its place until a plan is due, even if it is ready
+        earlier, so that the same seed gives the same flight."""
         self._walked.append(np.array(robot))
         if self._must_check and not self.done and self._shortened(tether) is None:
             self._must_check = False
@@ -145,7 +165,7 @@ class RepairPlanner(PredictivePlanner):
         self._must_check = self._has_new_waypoint = self.mission.tour is not None
 
     def _without_stop(self, k: int) -> None:
-        """The tour goes from the stop before to the one after, pulled taut in its class."""
+        """Join the legs before and after a visit that is left out, pulled taut in their class."""
         tour = self.mission.tour
         if tour is None or k >= len(tour.stops):
             return
@@ -181,7 +201,7 @@ class RepairPlanner(PredictivePlanner):
         self._walked = self._walked[-1:]
 
     def _mend(self, robot: Floats, tether: Tether) -> None:
-        """See what is left of the tour, and mend it if it no longer holds."""
+        """Check the rest of the tour, and repair it if it no longer holds."""
         begin = time.process_time()
         rest = self._remaining_tour(robot, tether)
         if rest is None:
@@ -206,11 +226,13 @@ class RepairPlanner(PredictivePlanner):
             self._note(BY_LEGS, f"{rest.reason}, and no tour was found", 0.0, begin)
 
     def _note(self, response: str, reason: str, length: float, begin: float) -> None:
+        """Record a repair."""
         spent = time.process_time() - begin
         self.repairs.append(Repair(self.now, self.index, response, reason, length, spent))
 
     def _remaining_tour(self, robot: Floats, tether: Tether) -> _RemainingTour | None:
-        """What is left of the tour by the map, with ways round what blocks it."""
+        """Return the rest of the tour by the map, with paths around obstacles; None beyond the
+        tour."""
         tour = self.mission.tour
         assert tour is not None
         if self.index > len(tour.stops):
@@ -248,14 +270,15 @@ class RepairPlanner(PredictivePlanner):
         return rest
 
     def _path_around(self, begin: Floats, end: Floats) -> Floats | None:
-        """The shortest way by the map, pulled taut."""
+        """Return the shortest path by the map, pulled taut; None if there is none."""
         path = ShortestTree(self.grid, end, begin[None]).path(0)
         return None if path is None else self.pulled(path)
 
     def _drive_leg(
         self, tether: Tether, leg: Floats | None, name: str
     ) -> tuple[Tether | None, str]:
-        """The tether at the end of a leg; None, and why, where the robot cannot go along it."""
+        """Return the tether at the end of a leg; None, and the reason, if the robot cannot follow
+        it."""
         if leg is None or not self.keeps_off(leg):
             return None, f"{name} is blocked"
         step = drive_step(self.mission, self.mission_policy.tether_share)
@@ -271,8 +294,8 @@ class RepairPlanner(PredictivePlanner):
     def _replan(
         self, robot: Floats, tether: Tether, rest: _RemainingTour, added: bool
     ) -> SpacePlan | None:
-        """A tour from here, if one is found that goes to more waypoints or is shorter than what
-        there is."""
+        """Return a new tour of the rest that visits more waypoints or is shorter; None if none is
+        found."""
         self._hold_until_s = self.now + self.options.planning_limit
         if all(self._is_lost(k) for k in self._left):
             return None
@@ -284,7 +307,7 @@ class RepairPlanner(PredictivePlanner):
         return None if rest.whole and rest.length <= found.length and not visits_more else found
 
     def _plan_rest(self, robot: Floats, tether: Tether) -> SpacePlan:
-        """A tour from here through the waypoints that are left, by the map."""
+        """Plan a tour from the robot's position through the remaining waypoints, by the map."""
         mission = self.mission
         place = pushed_out(self.scene, robot[None], 1e-3)[0] if self._inside(robot) else robot
         line = np.vstack([tether.nodes[:-1], place])
@@ -309,19 +332,20 @@ class RepairPlanner(PredictivePlanner):
         )
 
     def _inside(self, place: Floats) -> bool:
+        """Return whether a place is inside a solid, or touches one."""
         return float(self.scene.distance(place)) < DIP_RATIO * self.mission.delta
 
     @property
     def _left(self) -> range:
-        """Waypoints that are left."""
+        """Return the numbers of the remaining waypoints."""
         return range(self.index, len(self.mission.waypoints))
 
     def _is_lost(self, k: int) -> bool:
-        """Whether a solid stands on a waypoint."""
+        """Return whether a solid stands on a waypoint."""
         return self._inside(self.mission.places[k])
 
     def _follow_plan(self, found: SpacePlan) -> None:
-        """Go on along a new tour: the waypoints that are left come in its order from now on."""
+        """Follow a new tour; the remaining waypoints come in its order from now on."""
         rest = found.to_mission(seed=self.options.seed)
         assert rest.tour is not None
         good = [k for k in self._left if not self._is_lost(k)]
@@ -331,7 +355,7 @@ class RepairPlanner(PredictivePlanner):
         self._splice(rest.tour, rest.tour.stops, rest.tour.home, waypoints, left)
 
     def _follow_rest(self, rest: _RemainingTour) -> None:
-        """Go on along the same tour, round what blocks it."""
+        """Follow the same tour, around the obstacles."""
         tour = self.mission.tour
         assert tour is not None
         stops = tuple(
@@ -351,8 +375,8 @@ class RepairPlanner(PredictivePlanner):
         waypoints: tuple[MissionWaypoint, ...],
         left: list[int],
     ) -> None:
-        """Take stops and waypoints for those that are left, whose numbers were `left`. The file of
-        the tour has the first of them begin at the stop before."""
+        """Replace the rest of the tour by stops and waypoints whose present numbers are `left`. In
+        the file of the tour, the first leg begins at the last stop."""
         old, n = self.mission.tour, self.index
         file = self._as_given
         assert file is not None
@@ -384,13 +408,13 @@ class RepairPlanner(PredictivePlanner):
         return super()._planned_leg()
 
     def told(self) -> dict[str, Any]:
-        """See `Planner`: what was done when the map had changed."""
+        """See `Planner`: all repairs, and the original numbers of the waypoints."""
         return {"repairs": [asdict(r) for r in self.repairs], "given_as": self.given}
 
     @property
     def flown(self) -> Mission:
-        """See `Planner`: without a tour that the waypoints do not lie on, as when some were left
-        out before it was planned anew."""
+        """See `Planner`: the mission without a tour that its waypoints do not lie on, as when
+        waypoints were left out before the tour was planned anew."""
         m = self.mission if self.mission.waypoints else self._as_given
         assert m is not None
         if m.tour is not None and m.tour.against(m.begin, m.start, m.places, m.reach):

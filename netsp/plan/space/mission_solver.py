@@ -1,4 +1,4 @@
-"""From a mission to the same mission planned: order, legs, and a flight that proves them.
+"""Plan a mission: order, legs, and a flight that proves them.
 
 The order of the mission file is driven and judged first, before any search, and is the first
 incumbent. Searches follow: tours of the plane if all solids are upright prisms
@@ -61,23 +61,23 @@ GOING_ON = "going-straight-on"
 
 @dataclass(frozen=True)
 class SolvedMission:
-    """Planned mission, whose tour has passed the judge.
+    """Planned mission whose tour has passed the judge.
 
-    Parameters
+    Attributes
     ----------
-    mission : Mission
-        With its waypoints in the order of the tour, and the tour.
-    order : tuple of int
-        Old numbers of the waypoints in the new order; those that are left out come last.
-    run : Run or None
-        The planned mission, flown; None when there was no time left.
-    given : Run or None
-        The mission as it was given, flown; None when there was no time left.
-    plan : SpacePlan or None
-        The tour of states and legs, whether it was kept or not; None where none was found.
-    interrupted : bool
-        Whether Ctrl-C ended it.
-    gaps : Resolved, optional
+    mission
+        Mission with its waypoints in the order of the tour, and the tour.
+    order
+        Original numbers of the waypoints in the new order; those left out come last.
+    run
+        Flight of the planned mission; None if there was no time.
+    given
+        Flight of the mission as it was given; None if there was no time.
+    plan
+        Tour of states and legs, whether it was accepted or not; None if none was found.
+    interrupted
+        Whether Ctrl-C ended the run.
+    gaps
         Cell size of the plan, and the gaps that its grid shows and does not show.
     """
 
@@ -91,13 +91,13 @@ class SolvedMission:
 
     @property
     def tour(self) -> PlannedTour:
-        """Of the mission."""
+        """Return the tour of the mission."""
         assert self.mission.tour is not None
         return self.mission.tour
 
     @property
     def left_out(self) -> tuple[int, ...]:
-        """Old numbers of the waypoints that the tour does not go to."""
+        """Return the original numbers of the waypoints that the tour does not visit."""
         return self.order[len(self.tour.stops) :]
 
 
@@ -119,8 +119,6 @@ class _Flights:
 
         Parameters
         ----------
-        mission : Mission
-            The mission.
         name : str
             Name of the tour in progress messages.
         cutoff_s : float
@@ -184,16 +182,16 @@ class _Flights:
 class _Incumbents:
     """Incumbent of a run. It accepts no tour that the judge refuses.
 
-    Parameters
+    Attributes
     ----------
-    flights : _Flights
+    flights
         Flights of the mission.
-    first : SolvedMission or None
+    first
         Tour in the order of the file, if it passes the judge. A tour that is longer, or home later,
         is not accepted.
-    given : Run or None
+    given
         Flight of the mission as it was given.
-    best : SolvedMission or None
+    best
         The incumbent.
     """
 
@@ -236,8 +234,8 @@ class _Incumbents:
             self.best = found
 
     def _needs_flight(self, found: SolvedMission) -> bool:
-        """Return whether a tour counts only with a flight: it needs the part of the tether that
-        plans reserve for steering."""
+        """Return whether a tour counts only with a flight, because it needs the part of the tether
+        that plans reserve for steering."""
         limit = self.flights.policy.tether_share * self.flights.mission.tether_length
         in_plane = found.plan is not None and found.plan.kind == PLANE
         return in_plane and found.tour.longest_tether > limit
@@ -276,9 +274,11 @@ class _Incumbents:
         return (found.tour.length - saved) / mission.speed < allowed
 
     def _max_ratio(self, found: SolvedMission, best: SolvedMission) -> float:
-        """Return the largest ratio of a tour to the incumbent at which it is accepted: a little
-        more than 1 for a tour along states and legs, because it has a bound, and less than 1 for
-        one by going straight on."""
+        """Return the largest ratio of a tour to the incumbent at which it is accepted.
+
+        The ratio is a little more than 1 for a tour along states and legs, because it has a bound,
+        and less than 1 for a tour by going straight on.
+        """
         without_bound = (GOING_ON, AS_GIVEN, SHORT_ORDER)
         if found.tour.solver == GOING_ON and best.tour.solver not in without_bound:
             return 1.0 - self.flights.policy.min_saving
@@ -326,37 +326,26 @@ def solve_mission(
 
     Parameters
     ----------
-    mission : Mission
-        The mission.
-    scene : Scene, optional
-        Its scene, when it is at hand.
-    field : DistanceField, optional
-        The scene's field, when it is at hand.
-    solver : str or callable
-        As of `netsp.plan.solve_problem.solve_graph`.
-    params : mapping, optional
-        Options of the solver.
+    scene, field : Scene, DistanceField, optional
+        Scene of the mission and its distance field; loaded and computed if needed.
+    solver, params, iteration_limit, seed
+        As in `netsp.plan.solve_problem.solve_graph`.
     time_limit : float or Clock, optional
-        Seconds for all; when they are up, the best by then is returned
-        (`netsp.plan.space.space_plan.plan`).
-    iteration_limit : int, optional
-        Iterations of the solver.
-    seed : int
-        Of the solver.
+        Seconds for all stages; when they are up, the best tour so far is returned.
     on_progress : callable, optional
-        Called with a line of text now and then.
+        Called with a line of text at each stage.
     policy : MissionPolicy, optional
         Effort, time and limits.
 
     Returns
     -------
     SolvedMission
-        The planned mission and its flight. At Ctrl-C, the best by then.
+        The planned mission and its flight. At Ctrl-C, the best so far.
 
     Raises
     ------
     InputError
-        As of `netsp.plan.space.space_plan.plan` and `simulate`.
+        As `netsp.plan.space.space_plan.plan` and `netsp.world.simulator.mission_run.simulate`.
     LimitReachedError
         No tour was found on which the tether stays within its limit.
     """
@@ -405,20 +394,7 @@ def solve_mission(
 
 
 def with_gaps(mission: Mission, context: PlanningContext) -> Mission:
-    """Return a planned mission whose tour names the gaps that its cells do not show.
-
-    Parameters
-    ----------
-    mission : Mission
-        Mission with a tour.
-    context : PlanningContext
-        PlanningContext with the gaps.
-
-    Returns
-    -------
-    Mission
-        The mission with `tour.unresolved_gaps`.
-    """
+    """Return a planned mission whose tour names the gaps that its cells do not show."""
     assert mission.tour is not None
     gaps = {"unresolved_gaps": context.unresolved_gaps}
     return mission.model_copy(update={"tour": mission.tour.model_copy(update=gaps)})
@@ -428,15 +404,15 @@ def with_gaps(mission: Mission, context: PlanningContext) -> Mission:
 class _SearchResult:
     """Result of the search.
 
-    Parameters
+    Attributes
     ----------
-    plan : SpacePlan or None
+    plan
         The plan; None if there is none.
-    bounds : dict
+    bounds
         Bounds on all tours through a set of waypoints, metres, by the set.
-    failure : InputError, LimitReachedError or None
+    failure
         Error that ended the search.
-    has_all_bounds : bool
+    has_all_bounds
         Whether all kinds of bounds have been computed.
     """
 
@@ -447,8 +423,11 @@ class _SearchResult:
 
 
 def _begin_as_given(found: _Incumbents, flying: Clock, seed: int) -> None:
-    """Accept the mission as it was given, whatever the time: its tour if that passes the judge,
-    else the tour in its order. Then fly it as long as the clock allows."""
+    """Accept the mission as it was given, whatever the time, and fly it as long as the clock
+    allows.
+
+    Its tour is accepted if it passes the judge, else the tour in its order.
+    """
     flights = found.flights
     mission, on_progress = flights.mission, flights.on_progress
     order = tuple(range(len(mission.waypoints)))
@@ -544,8 +523,11 @@ def _search(
 def _raise_bound(
     out: _SearchResult, plan: SpacePlan, flights: _Flights, clock: Clock, seed: int
 ) -> None:
-    """Bound all tours to the waypoints of a plan: at the first plans by the upright solids alone,
-    which takes little time, and once paths between waypoints are known by all bounds."""
+    """Bound all tours to the waypoints of a plan.
+
+    The first plans are bounded by the upright solids alone, which takes little time; once paths
+    between waypoints are known, by all bounds.
+    """
     visited, part = frozenset(plan.order), clock.part(flights.policy.bound_share)
     before = out.bounds.get(visited)
     if plan.kind in (PLANE, SHORT_ORDER) and before is None:
@@ -564,6 +546,7 @@ def _raise_bound(
 
 
 def _solved_from_plan(planned: SpacePlan, solver: str, seed: int) -> SolvedMission:
+    """Return a plan as a solved mission."""
     mission = planned.to_mission(solver, seed)
     return SolvedMission(mission, planned.all_waypoints, None, None, planned)
 
@@ -634,7 +617,7 @@ def _offer_going_on(found: _Incumbents, seed: int) -> None:
 
 
 def _is_good(run: Run) -> bool:
-    """Whether a flight came home free, and never exceeded the limit."""
+    """Return whether a flight came home free, and never exceeded the limit of the tether."""
     return bool(run.summary["home"]["tether_free"]) and run.summary["exceedance_s"] == 0.0
 
 
@@ -648,27 +631,19 @@ def tour_of_flight(
     seed: int = 0,
     solver: str = GOING_ON,
 ) -> SolvedMission | None:
-    """Where a robot was on a flight, made the tour of its mission.
+    """Return a mission with the path of a flight as its tour.
 
     Parameters
     ----------
-    mission : Mission
-        What was flown.
     order : tuple of int
-        Numbers of its waypoints in the mission that it came of.
-    run : Run
-        The flight.
-    field : DistanceField
-        Of the scene.
+        Original numbers of the mission's waypoints.
     context : PlanningContext, optional
-        Whose words the stops get, when it is at hand.
+        Context for the words of the visits; computed if needed.
     bound : float, optional
-        Of all tours through the waypoints, metres. A robot that turns back a bit before them goes
-        less, by twice as much as it stays away, and once at home.
-    seed : int
-        Of what found the order.
+        Bound on all tours through the waypoints, metres. It is reduced by twice the distance that
+        the robot kept from each waypoint, and once at home.
     solver : str
-        Random seed of the search.
+        Value of `solver` in the tour.
 
     Returns
     -------
@@ -730,7 +705,8 @@ def tour_of_flight(
 
 
 def _log_of_legs(log: tuple[LogRow, ...], visited: list[int]) -> list[tuple[LogRow, ...]]:
-    """A log from each waypoint that was visited to the next, and home; two rows at least."""
+    """Return the log of each leg, from waypoint to waypoint and home; each has two rows at
+    least."""
     next_one = np.array([r.waypoint for r in log])
     ends = [int(np.argmax(next_one > k)) for k in visited]
     cuts = [0, *ends, len(log) - 1]
@@ -738,16 +714,5 @@ def _log_of_legs(log: tuple[LogRow, ...], visited: list[int]) -> list[tuple[LogR
 
 
 def seconds_until_home(run: Run) -> float:
-    """Of a flight.
-
-    Parameters
-    ----------
-    run : Run
-        The flight.
-
-    Returns
-    -------
-    float
-        Seconds of inspection and way home.
-    """
+    """Return the seconds of a flight until the robot is home."""
     return float(run.summary["inspection_s"] + run.summary["home"]["seconds"])

@@ -1,14 +1,13 @@
-"""Tours with detours: legs a little longer than need be, so that the tether comes down on the right
-side of what it would hang on.
+"""Tours with detours: legs that are longer than necessary, so that the tether comes to hang
+elsewhere.
 
 A robot that passes half a metre farther out may leave its tether on the other side of a bar with a
-free end. Pulled taut, such a leg is the straight one again, so no search for taut ways finds it,
-and no word tells the two apart. In a frame of eleven bars, detours free a tour that is 3 % shorter
-than all of those along taut ways (benchmarks/space.py, frame 1).
+free end. Pulled taut, such a leg is the straight one again, so no search for taut paths finds it,
+and no word tells the two apart.
 
-An order is driven leg by leg along taut ways and detours, and of the tethers that hang differently
-after each leg, those of the shortest paths are kept (beam search). Orders are the best one so far,
-that of the shortest tour without a tether, and what moves of pieces make of the best.
+An order is driven leg by leg along taut paths and detours. After each leg, the tethers of the
+shortest paths that hang differently are kept (beam search). The first orders are that of the best
+tour so far and that of the shortest tour without a tether; further ones move pieces of the best.
 """
 
 from __future__ import annotations
@@ -41,9 +40,21 @@ HOME = -1
 
 @dataclass(frozen=True)
 class _PartialTour:
-    """The beginning of a tour: how far it goes, the tether at its end, the same of a robot that is
-    not as exact, and the number of its word; and the last leg: where to, along which path, and the
-    longest tether on it."""
+    """Beginning of a tour: its length, the tether at its end, and its last leg.
+
+    Attributes
+    ----------
+    tether, in_flight
+        The tether, and the tether of a robot in flight, which turns back within reach of each
+        waypoint.
+    word
+        Number of the tether's word.
+    before
+        The tour without its last leg.
+    place, path, longest_tether
+        Where the last leg leads, its path (k, 3), metres, and the maximum length of the tether on
+        it, metres.
+    """
 
     length: float
     tether: Tether
@@ -56,7 +67,7 @@ class _PartialTour:
 
     @property
     def legs(self) -> list[_PartialTour]:
-        """All of its legs, in order."""
+        """Return all legs in order, each as the partial tour that it completes."""
         out, line = [], self
         while line.before is not None:
             out.append(line)
@@ -68,12 +79,12 @@ class _PartialTour:
 class Detours:
     """Legs of a mission with their detours.
 
-    Parameters
+    Attributes
     ----------
-    board : Board
-        States, and the ways from the start to them.
-    paths : RobotPaths
-        The robot's ways between waypoints.
+    board
+        States, and the paths from the start to them.
+    paths
+        The robot's paths between waypoints.
     """
 
     board: StateGraph
@@ -82,6 +93,7 @@ class Detours:
 
     @property
     def _policy(self) -> DetourPolicy:
+        """Return the policy of detours."""
         return self.paths.context.policy.detours
 
     def shorten(
@@ -91,23 +103,23 @@ class Detours:
         on_progress: Callable[[str], None],
         seed: int = 0,
     ) -> DrivenTour | None:
-        """A tour that is shorter than the best so far.
+        """Search for a tour that is shorter than the best so far.
 
         Parameters
         ----------
         best : DrivenTour, optional
-            That tour.
+            The best tour so far.
         clock : Clock
             When it is up, no more orders are driven.
         on_progress : callable
-            Called with a line of text now and then.
+            Called with a line of text.
         seed : int
-            Of the solver that orders the waypoints as if there were no tether.
+            Random seed of the solver that orders the waypoints without a tether.
 
         Returns
         -------
         DrivenTour or None
-            None where none was found.
+            The tour; None if no shorter one was found.
         """
         if clock.up and best is not None:
             return None
@@ -150,7 +162,7 @@ class Detours:
         return self._to_driven_tour(found[-1][0]) if found else None
 
     def _paths_between(self, n: int, m: int) -> list[tuple[Floats, int]]:
-        """Paths from a place to another and their words, shortest first."""
+        """Return the paths from a place to another and their words, shortest first."""
         if (n, m) in self._paths:
             return self._paths[n, m]
         if m == HOME or (n != HOME and n > m):
@@ -173,7 +185,7 @@ class Detours:
         return self._paths[n, m]
 
     def _taut_paths(self, n: int, m: int) -> list[Floats]:
-        """Paths without detours."""
+        """Return the paths between two places without detours."""
         context, mission = self.paths.context, self.paths.context.mission
         begin, end = self._place(n), self._place(m)
         paths = [] if n == HOME else [path for _, path in self.paths.between(n, m)]
@@ -188,7 +200,7 @@ class Detours:
         return [path for path in paths if keeps_clearance(context.field, path, mission)]
 
     def _detours(self, begin: Floats, end: Floats) -> Iterator[Floats]:
-        """Paths with one bend, out to all sides from the middle of the straight one."""
+        """Yield paths with one bend, out in all directions from the middle of the straight path."""
         effort, step = self.paths.effort, end - begin
         far = float(np.linalg.norm(step))
         if far < 1e-9:
@@ -201,12 +213,13 @@ class Detours:
                 yield np.array([begin, begin + 0.5 * step + away, end])
 
     def _place(self, n: int) -> Floats:
-        """(3,) where it is, metres."""
+        """Return the position (3,) of a place, metres."""
         return self.paths.context.start_tether.robot if n == HOME else self.paths.points[n]
 
     def _shortest_lengths(self, clock: Clock) -> Floats:
-        """(n + 1, n + 1) metres between places, the last of which is the start; infinite where no
-        way is known, or there is no time to look whether places far apart see each other."""
+        """Return the lengths (n + 1, n + 1) of the shortest paths between places, the start last,
+        metres; infinite if no path is known, or if there is no time to test the lines of sight of
+        places far apart."""
         count = len(self.paths.points)
         looking = clock.part(self._policy.order_share)
         out = np.full((count + 1, count + 1), np.inf)
@@ -220,7 +233,7 @@ class Detours:
         return out
 
     def _order_without_tether(self, shortest: Floats, clock: Clock, seed: int) -> list[int] | None:
-        """Places in the order of the shortest tour without a tether."""
+        """Return the places in the order of the shortest tour without a tether."""
         places, reached = self.paths.places, self.board.reached_waypoints
         numbers = [
             n for n in range(len(places)) if n == places.present or places.waypoint[n] in reached
@@ -243,7 +256,7 @@ class Detours:
     def _neighbouring_orders(
         self, order: Sequence[int], shortest: Floats, cutoff: float
     ) -> Iterator[list[int]]:
-        """Orders that a piece moved, or turned round, makes of one, shortest first without a
+        """Yield the orders that result from moving or reversing a piece, shortest first without a
         tether."""
         begin = HOME if self.paths.places.present is None else self.paths.places.present
         found: set[tuple[float, tuple[int, ...]]] = set()
@@ -263,9 +276,21 @@ class Detours:
         similar: Sequence[int] = (),
         known: Sequence[list[_PartialTour]] = (),
     ) -> list[list[_PartialTour]] | None:
-        """What is kept after each leg of an order, the tour itself at the end; None where none was
-        found that is shorter than so many metres. Of an order that begins like one that was driven,
-        what was kept by there is taken."""
+        """Drive an order, and return the partial tours kept after each leg, the whole tour last.
+
+        Parameters
+        ----------
+        cutoff : float
+            Length that the tour must stay below, metres.
+        similar, known : sequence
+            An order that was driven, and the partial tours kept after each of its legs. They are
+            reused up to where the orders differ.
+
+        Returns
+        -------
+        list or None
+            Partial tours after each leg; None if no tour is short enough.
+        """
         context, states, places = self.paths.context, self.board.states, self.paths.places
         begin = HOME if places.present is None else places.present
         ends = [begin, *order, HOME]
@@ -314,10 +339,13 @@ class Detours:
         return stages
 
     def _tether_in_flight(self, line: _PartialTour, path: Floats, after: Tether) -> Tether | None:
-        """The tether of a robot that goes in fine steps and turns back within reach of each stop,
-        as flights do; None where it does not come to hang as it should. Where it slips off
-        something on the way, it must do so in steps of all sizes, and with bends that are farther
-        out, or less far."""
+        """Return the tether of a robot in flight at the end of a leg; None if it does not hang as
+        it should.
+
+        In flight a robot moves in fine steps and turns back within reach of each waypoint. If the
+        tether slips off something on the way, it must do so in steps of all sizes, and with bends
+        that are farther out or in.
+        """
         shares = np.linspace(0.0, 1.0, len(path))[1:-1, None]
         away = path[1:-1] - (path[0] + shares * (path[-1] - path[0]))
         offsets = (
@@ -346,8 +374,9 @@ class Detours:
     def _drive_finely(
         self, before: Tether, path: Floats, after: Tether, step: float
     ) -> tuple[Tether | None, bool]:
-        """A tether, driven in steps along a path to within reach of its end, and whether it slipped
-        off something; None in its place where it is not like another at the end."""
+        """Drive a tether in steps along a path to within reach of its end, and return it with
+        whether it slipped off something; None in its place if it does not hang like `after` at the
+        end."""
         context = self.paths.context
         line = np.vstack([before.robot[None], path[1:]])
         shortened = _shortened_path(line, context.mission.reach)
@@ -362,15 +391,18 @@ class Detours:
         return arrived, bool((drops > step + delta).any())
 
     def _is_same(self, line: _PartialTour, tether: Tether, word: int) -> bool:
+        """Return whether the tether of a partial tour hangs like another."""
         delta = self.paths.context.mission.delta
         return line.word == word and hang_alike(line.tether, tether, 0.25 * delta)
 
     def _is_free(self, tether: Tether, word: int) -> bool:
+        """Return whether a tether lies as at the start."""
         context = self.paths.context
         same = not context.words.exact or word == context.word_number(context.start_tether.nodes)
         return same and hang_alike(tether, context.start_tether, context.mission.delta)
 
     def _to_driven_tour(self, line: _PartialTour) -> DrivenTour:
+        """Return a complete partial tour as a driven tour."""
         *legs, home = line.legs
         places, letters = self.paths.places, self.paths.context.words.letters
         stops = [
@@ -388,7 +420,7 @@ class Detours:
 
 
 def _shortened_path(path: Floats, short: float) -> Floats:
-    """A path, less its last metres, or half of it where it is no longer than twice that."""
+    """Return a path without its last metres, or half of it if it is no longer than twice that."""
     length = polylines.length(path)
     keep = max(length - short, 0.5 * length)
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
@@ -398,12 +430,14 @@ def _shortened_path(path: Floats, short: float) -> Floats:
 
 
 def _path(leg: _PartialTour) -> Floats:
+    """Return the path of the last leg, which only the empty tour lacks."""
     assert leg.path is not None
     return leg.path
 
 
 def _moved_pieces(order: list[int], piece_lengths: Sequence[int]) -> Iterator[list[int]]:
-    """An order with a piece of it elsewhere, either way round, or turned round where it is."""
+    """Yield an order with a piece of it moved elsewhere in either direction, or reversed in
+    place."""
     count = len(order)
     for size in piece_lengths:
         for i in range(count - size + 1):

@@ -28,16 +28,16 @@ from netsp.world.simulator.mission_run import grid_box
 
 @dataclass(frozen=True)
 class Gap:
-    """A passage that the cells of a grid do not show.
+    """Passage that the cells of a grid do not show.
 
-    Parameters
+    Attributes
     ----------
-    place : ndarray, shape (3,)
-        Middle of the gap, metres.
-    width : float
+    place
+        (3,) middle of the gap, metres.
+    width
         Twice the distance of `place` from solids, metres.
-    sides : ndarray, shape (2, 3)
-        Middles of one free cell on each side, metres.
+    sides
+        (2, 3) middles of one free cell on each side, metres.
     """
 
     place: Floats
@@ -53,16 +53,18 @@ class Gap:
 class GapGrid:
     """Grid whose cells are free or not by the distance of their middles from solids.
 
-    Parameters
+    Attributes
     ----------
-    field : DistanceField
+    field
         The scene.
-    low, high : ndarray, shape (3,)
-        Corners of the box, metres.
-    cell : float
+    low, high
+        (3,) corners of the box, metres.
+    cell
         Cell size, metres.
-    clearance : float
+    clearance
         Clearance of the robot, metres.
+    min_room_ratio
+        Minimum distance of the middle of a free cell from solids, in cells.
     """
 
     field: DistanceField
@@ -80,22 +82,8 @@ class GapGrid:
         clearance: float,
         min_room_ratio: float = WordPolicy.min_room_ratio,
     ) -> GapGrid:
-        """Return the cells of a grid (`netsp.world.simulator.mission_run.grid_box`).
-
-        Parameters
-        ----------
-        field : DistanceField
-            The scene.
-        box : tuple of (ndarray, ndarray, float)
-            Corners of the box and cell size, metres.
-        clearance : float
-            Clearance of the robot, metres.
-
-        Returns
-        -------
-        GapGrid
-            The cells.
-        """
+        """Return the cells of a grid by its box and cell size
+        (`netsp.world.simulator.mission_run.grid_box`)."""
         low, high, cell = box
         counts = np.maximum(1.0, np.round((high - low) / cell))  # as `Grid` counts
         return cls(field, low, low + cell * counts, cell, clearance, min_room_ratio)
@@ -104,20 +92,7 @@ class GapGrid:
     def from_grid(
         cls, grid: Grid, clearance: float, min_room_ratio: float = WordPolicy.min_room_ratio
     ) -> GapGrid:
-        """Return the cells of a grid for paths.
-
-        Parameters
-        ----------
-        grid : Grid
-            The grid.
-        clearance : float
-            Clearance of the robot, metres.
-
-        Returns
-        -------
-        GapGrid
-            The cells.
-        """
+        """Return the cells of a grid for paths."""
         high = grid.low + grid.cell * np.array(grid.free.shape)
         return cls(grid.field, grid.low, high, grid.cell, clearance, min_room_ratio)
 
@@ -129,43 +104,18 @@ class GapGrid:
 
     @property
     def min_room(self) -> float:
-        """Least distance of the middle of a free cell from solids, metres."""
+        """Return the least distance of the middle of a free cell from solids, metres."""
         return max(self.clearance, self.min_room_ratio * self.cell)
 
     def free(self, first: Ints, shape: tuple[int, ...]) -> Bools:
-        """Return the mask of free cells in a block of cells.
-
-        Parameters
-        ----------
-        first : ndarray of int, shape (3,)
-            First cell of the block.
-        shape : tuple of int
-            Numbers of cells of the block along x, y and z.
-
-        Returns
-        -------
-        ndarray of bool
-            Mask of the given shape.
-        """
+        """Return the mask of free cells in a block, given by its first cell and its shape."""
         axes = [self.low[k] + (first[k] + np.arange(shape[k]) + 0.5) * self.cell for k in range(3)]
         points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         return np.asarray(self.field.distance(points) >= self.min_room)
 
     def connects(self, gap: Gap, around: int) -> bool:
-        """Say whether free cells join the two sides of a gap near it.
-
-        Parameters
-        ----------
-        gap : Gap
-            The gap.
-        around : int
-            Number of cells around the gap in which the sides may be connected.
-
-        Returns
-        -------
-        bool
-            True if they are connected.
-        """
+        """Return whether free cells connect the two sides of a gap, at most `around` cells away
+        from it."""
         from scipy.ndimage import label
 
         at = np.floor((gap.sides - self.low) / self.cell).astype(np.int64)
@@ -191,21 +141,8 @@ def _near(parts: Ints, at: Ints) -> set[int]:
 def find_hidden_gaps(
     grid: GapGrid, policy: GapPolicy | None = None, clock: Clock | None = None
 ) -> list[Gap]:
-    """Return the gaps that have room for the robot but no free cells through them.
-
-    Parameters
-    ----------
-    grid : GapGrid
-        The cells.
-    policy : GapPolicy, optional
-        Effort.
-    clock : Clock, optional
-        Clock of the search.
-
-    Returns
-    -------
-    list of Gap
-        At most `policy.max_gaps` gaps, the widest first.
+    """Return the gaps that have room for the robot but no free cells through them, the widest
+    first.
 
     Raises
     ------
@@ -454,16 +391,10 @@ def find_resolving_cell(
 
     Parameters
     ----------
-    grid : GapGrid
-        Grid that shows none of the gaps.
     gaps : list of Gap
-        Gaps from `find_hidden_gaps`.
+        Gaps that the grid does not show.
     box_of : callable
         Takes a cell size; returns the corners of the box of such a grid and the cell size, metres.
-    policy : GapPolicy, optional
-        Limits of the cell size.
-    clock : Clock, optional
-        Clock of the search.
 
     Returns
     -------
@@ -495,15 +426,15 @@ def find_resolving_cell(
 class GapResolution:
     """Mission with the cell size that shows the gaps of its scene, as far as possible.
 
-    Parameters
+    Attributes
     ----------
-    mission : Mission
+    mission
         The mission, with a finer cell if that shows more gaps.
-    cell : float
+    cell
         Cell size of its grid, metres.
-    shown : tuple of Gap
+    shown
         Gaps that only the finer cell shows.
-    left : tuple of Gap or None
+    left
         Gaps that stay hidden; None if the time was up before they were found.
     """
 
@@ -531,26 +462,7 @@ def find_gaps_on(
     clock: Clock | None = None,
     min_room_ratio: float = WordPolicy.min_room_ratio,
 ) -> GapResolution:
-    """Find the gaps that a given grid does not show. Its cell size is kept.
-
-    Parameters
-    ----------
-    mission : Mission
-        The mission.
-    grid : Grid
-        Grid for paths.
-    policy : GapPolicy, optional
-        Effort.
-    clock : Clock, optional
-        Clock of the run.
-    min_room_ratio : float
-        Minimum distance of the middle of a free cell from solids, in cells (`WordPolicy`).
-
-    Returns
-    -------
-    Resolved
-        The mission, unchanged, the cell size and the gaps.
-    """
+    """Find the gaps that a given grid does not show, and keep its cell size."""
     policy, clock = policy or GapPolicy(), clock or Clock()
     try:
         gaps = find_hidden_gaps(
@@ -575,26 +487,6 @@ def resolve_gaps(
 
     A cell size that the mission states is kept, and its gaps are only reported. The same holds for
     a mission with a tour, because the words of the tour refer to its cells.
-
-    Parameters
-    ----------
-    mission : Mission
-        The mission.
-    scene : Scene
-        Its scene.
-    field : DistanceField
-        The scene's field.
-    policy : GapPolicy, optional
-        Effort.
-    clock : Clock, optional
-        Clock of the run.
-    min_room_ratio : float
-        Minimum distance of the middle of a free cell from solids, in cells (`WordPolicy`).
-
-    Returns
-    -------
-    Resolved
-        Mission, cell size and gaps.
     """
     policy = policy or GapPolicy()
     searching = (clock or Clock()).part(policy.time_share)

@@ -1,14 +1,14 @@
-"""A certified lower bound on every tour of a mission's waypoints.
+"""Certified lower bound on every tour of a mission's waypoints.
 
-Each leg gets a certified least length: the straight distance, which is exact between places in
+Each leg gets a certified lower bound: the straight distance, which is exact between places in
 sight of one another, or the bound of a potential over all cells that are not certain to be blocked
 (`netsp.plan.space.potential`). The shortest tour by these lengths is a lower bound on every tour.
 The length of a path that was found, pulled taut or not, only says how far to look: a path found on
 a grid is no bound on other paths.
 
-These lengths ignore the tether. Where a scene has upright solids, the plane's proof over all
-homotopy classes of the tether around them is a second bound (`netsp.plan.space.upright`). The
-result is the larger of the two bounds.
+These lengths ignore the tether. If a scene has upright solids, the plane's proof over all homotopy
+classes of the tether around them is a second bound (`netsp.plan.space.upright`). The result is the
+larger of the two bounds.
 """
 
 from __future__ import annotations
@@ -58,12 +58,10 @@ def bound_all_tours(
         Numbers of the waypoints that the tours visit.
     clock : Clock, optional
         Clock of the run; when it is up, the bound proven so far is returned.
-    seed : int
-        Random seed of the solver.
     policy : BoundPolicy, optional
-        Time and accuracy; by default those of `robot_paths.context.policy`.
+        Time and accuracy; by default those of the context.
     potential : PotentialPolicy, optional
-        Effort for each leg; by default that of `robot_paths.context.policy`.
+        Effort for each leg; by default that of the context.
 
     Returns
     -------
@@ -92,27 +90,22 @@ def bound_all_tours(
 
 @dataclass
 class LegBounds:
-    """Certified least lengths of legs between the start and some places.
-
-    Parameters
-    ----------
-    paths : RobotPaths
-        Known paths between waypoints.
-    place_numbers : list of int
-        Numbers of the places, as in `robot_paths.places`.
-    potential : PotentialPolicy
-        Effort for each leg.
-    policy : BoundPolicy
-        Time and accuracy.
+    """Certified lower bounds on legs between the start and some places.
 
     Attributes
     ----------
-    points : ndarray, shape (v, 3)
-        The start, then the places, metres.
-    costs : ndarray, shape (v, v)
-        Lower bound on the length of each leg, metres.
-    final : ndarray of bool, shape (v, v)
-        True where more effort cannot raise the bound.
+    paths
+        Known paths between waypoints.
+    place_numbers
+        Numbers of the places, as in `paths.places`.
+    potential, policy
+        Effort for each leg; time and accuracy.
+    points
+        (v, 3) the start, then the places, metres.
+    costs
+        (v, v) lower bound on the length of each leg, metres.
+    final
+        (v, v) true if more effort cannot raise the bound.
     """
 
     paths: RobotPaths
@@ -138,21 +131,14 @@ class LegBounds:
         self._clearance = context.field.distance(self.points)
 
     def raise_bound(self, u: int, v: int, clock: Clock) -> bool:
-        """Raise the bound of a leg on a finer grid.
+        """Raise the bound of a leg on a finer grid, and return whether it has grown.
 
         Parameters
         ----------
-        u : int
-            Begin of the leg, as in `points`.
-        v : int
-            End of the leg.
+        u, v : int
+            Ends of the leg, as in `points`.
         clock : Clock
             Clock of the run; a grid that would take longer than it allows is skipped.
-
-        Returns
-        -------
-        bool
-            True if the bound has grown.
         """
         if self.final[u, v]:
             return False
@@ -210,7 +196,7 @@ class LegBounds:
 
 
 def _bound_without_tether(legs: LegBounds, clock: Clock, seed: int) -> float | None:
-    """Return the bound that the least lengths of legs prove.
+    """Return the bound that the lower bounds of legs prove.
 
     Solve for the shortest tour by these lengths, raise the bounds of its legs, and solve again,
     until no bound of a leg can be raised or the time is up.

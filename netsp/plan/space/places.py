@@ -1,4 +1,5 @@
-"""Where a tour may stop: the waypoints, their alternatives, and where the robot is by now."""
+"""Places that a tour may visit: waypoints, their alternatives, and the present place of the
+robot."""
 
 from __future__ import annotations
 
@@ -15,18 +16,19 @@ from netsp.world.scene.field import DistanceField
 
 @dataclass(frozen=True)
 class Places:
-    """The points that states are sought at.
+    """Places where states are searched for.
 
-    Parameters
+    Attributes
     ----------
-    points : ndarray, shape (n, 3)
-        Metres; waypoints in their order, each followed by its alternatives, then the state.
-    waypoint : ndarray of int, shape (n,)
-        Which waypoint each is a place of; of the state, the number of waypoints.
-    choice : ndarray of int, shape (n,)
-        Which of its waypoint's alternatives it is, from 1 on; 0 for the waypoint's own position.
-    present : int or None
-        Number of the point of the mission's state; None where the robot is at the start.
+    points
+        (n, 3) metres: the waypoints in their order, each followed by its alternatives, then the
+        present place.
+    waypoint
+        (n,) number of the waypoint of each place; for the present place, the number of waypoints.
+    choice
+        (n,) number of the alternative, from 1 on; 0 for the position of the waypoint itself.
+    present
+        Number of the place where the mission begins; None if that is the start.
     """
 
     points: Floats
@@ -36,19 +38,7 @@ class Places:
 
     @classmethod
     def for_mission(cls, mission: Mission, field: DistanceField) -> Places:
-        """The places of a mission.
-
-        Parameters
-        ----------
-        mission : Mission
-            Its waypoints and its state count.
-        field : DistanceField
-            Its scene.
-
-        Returns
-        -------
-        Places
-            The places.
+        """Return the places of a mission.
 
         Raises
         ------
@@ -87,12 +77,12 @@ class Places:
 
     @property
     def distances(self) -> Floats:
-        """(n, n) straight distances, metres; infinite between places of one waypoint."""
+        """Return the straight distances (n, n), metres; infinite between places of one waypoint."""
         distances = np.linalg.norm(self.points[:, None] - self.points[None], axis=2)
         distances[self.waypoint[:, None] == self.waypoint[None]] = np.inf
         return np.asarray(distances)
 
     @property
     def is_waypoint(self) -> Bools:
-        """(n,) all but the state."""
+        """Return the mask (n,) of all places but the present one."""
         return np.asarray(np.arange(len(self)) != (-1 if self.present is None else self.present))

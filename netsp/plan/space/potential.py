@@ -63,16 +63,13 @@ def path_bound(
     policy: PotentialPolicy | None = None,
     clock: Clock | None = None,
 ) -> float:
-    """Return a lower bound on the length of paths between two points.
+    """Return a lower bound on the length of paths between two points, metres; at least their
+    distance.
 
     Parameters
     ----------
-    field : DistanceField
-        The scene.
-    a : ndarray, shape (3,)
-        One end, metres.
-    b : ndarray, shape (3,)
-        The other end, metres.
+    a, b : ndarray, shape (3,)
+        The two points, metres.
     region : Region
         Region of the paths; both ends are in it.
     longest : float
@@ -80,15 +77,8 @@ def path_bound(
         holds all paths up to this length.
     cells : int
         Approximate number of cells of the grid.
-    policy : PotentialPolicy, optional
-        Effort.
     clock : Clock, optional
         Clock of the run; when it is up, the bound proven so far is returned.
-
-    Returns
-    -------
-    float
-        Lower bound, metres; at least the straight distance.
     """
     policy, clock = policy or PotentialPolicy(), clock or Clock()
     straight = float(np.linalg.norm(b - a))

@@ -54,11 +54,11 @@ Corner = tuple[float, float]
 class FloorPlan:
     """Floor plan of a scene of upright prisms.
 
-    Parameters
+    Attributes
     ----------
-    circles : tuple of ((x, y), radius)
-        Round solids, metres.
-    polygons : tuple of (corners, growth)
+    circles
+        Centre (x, y) and radius of each round solid, metres.
+    polygons
         Corners (x, y) of each polygon, and the distance by which it grows, metres.
     """
 
@@ -66,15 +66,8 @@ class FloorPlan:
     polygons: tuple[tuple[tuple[Corner, ...], float], ...]
 
     def obstacles(self, corner_segments: int) -> tuple[tuple[Circle | Polygon, ...], float]:
-        """Return obstacles of a problem, and the clearance that grows them to the solids.
-
-        Returns
-        -------
-        obstacles : tuple of Circle or Polygon
-            Obstacles, smaller than the solids by the clearance.
-        clearance : float
-            Least growth of a solid, metres.
-        """
+        """Return obstacles of a problem, smaller than the solids by a clearance, and this
+        clearance, metres."""
         growth = min((g for _, g in self.polygons), default=0.0)
         growth = min([growth, *(0.5 * r for _, r in self.circles)])
         out: list[Circle | Polygon] = [
@@ -96,20 +89,7 @@ class FloorPlan:
 
 def floor_plan(scene: Scene, mission: Mission) -> FloorPlan | None:
     """Return the floor plan of a scene if every solid in reach of the tether is an upright prism
-    that spans all depths in its reach.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    mission : Mission
-        Mission with the anchor and the tether.
-
-    Returns
-    -------
-    FloorPlan or None
-        The plan; None for other scenes.
-    """
+    that spans all depths in its reach; None for other scenes."""
     if scene.mesh is not None or scene.cloud is not None or scene.floor is not None:
         return None
     anchor, far = np.array(mission.anchor), mission.tether_length
@@ -186,8 +166,8 @@ def _polygon_of(shape: Shape, low: float, high: float) -> tuple[tuple[Corner, ..
 
 
 def wall_corners(point: Floats, normal: Floats, anchor: Floats, far: float) -> tuple[Corner, ...]:
-    """Return the corners of a rectangle that stands for an upright half-space within the reach of
-    the tether.
+    """Return the corners (x, y) of a rectangle that stands for an upright half-space in the reach
+    of the tether, metres.
 
     Parameters
     ----------
@@ -199,11 +179,6 @@ def wall_corners(point: Floats, normal: Floats, anchor: Floats, far: float) -> t
         Anchor of the tether, metres.
     far : float
         Length of the tether, metres.
-
-    Returns
-    -------
-    tuple of (x, y)
-        Corners, metres.
     """
     along = np.array([-normal[1], normal[0]])
     foot = point + ((anchor[:2] - point) @ along) * along
@@ -226,18 +201,10 @@ def drive_plane_tours(
 
     Parameters
     ----------
-    context : PlanningContext
-        Water of the mission.
-    scene : Scene
-        Scene of the mission.
-    places : Places
-        Places of the waypoints.
     clock : Clock
         Clock of the run; when it is up, the best tours so far are driven.
-    seed : int
-        Random seed of the solver.
     policy : PlanePolicy, optional
-        Budget; by default that of `water.policy`.
+        Budget; by default that of the context.
     whole_tether : bool
         Whether tours may need the whole tether, for a caller that flies them.
 

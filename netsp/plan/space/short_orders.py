@@ -35,21 +35,15 @@ def short_order_tour(
 
     Parameters
     ----------
-    context : PlanningContext
-        Water of the mission.
-    places : Places
-        Places of the waypoints.
     clock : Clock
         Clock of the run; when it is up, the best tour so far is returned.
-    seed : int
-        Random seed of the solver.
     policy : OrderPolicy, optional
-        Effort; by default that of `water.policy`.
+        Effort; by default that of the context.
 
     Returns
     -------
     DrivenTour or None
-        The tour with the most stops, and of these the shortest; None if no order can be driven.
+        The tour with the most visits, and of these the shortest; None if no order can be driven.
     """
     policy = policy or context.policy.orders
     clock = clock.part(policy.time_share)

@@ -1,4 +1,4 @@
-"""Ways of the robot from one waypoint to another, and what its tether does on them."""
+"""Paths of the robot between waypoints, and how its tether comes out of them."""
 
 from __future__ import annotations
 
@@ -21,19 +21,17 @@ from netsp.plan.space.states import State, States
 
 @dataclass
 class RobotPaths:
-    """The robot's ways between waypoints that are near one another, by the words they write.
+    """The robot's paths between waypoints that are near one another, by their words.
 
-    Parameters
+    Attributes
     ----------
-    context : PlanningContext
-        Where they are.
-    places : Places
-        The waypoints, and where else the robot may be.
-    effort : StateEffort
-        How many.
-    tethers : dict of int to list of ndarray of shape (k, 3)
-        Of some places, how tethers hang there: ways are made of these where there is no time for a
-        search, metres.
+    context, places
+        Context of the mission, and its places.
+    effort
+        Maximum numbers and lengths of paths.
+    tethers
+        Lines (k, 3) of tethers at some places, metres. If there is no time for a search, paths are
+        made of these.
     """
 
     context: PlanningContext
@@ -58,20 +56,19 @@ class RobotPaths:
 
     @property
     def points(self) -> Floats:
-        """(n, 3) the places, metres."""
+        """Return the places (n, 3), metres."""
         return self.places.points
 
     def find_from(self, n: int, *, search: bool = True, tether_clock: Clock | None = None) -> None:
-        """Seek the ways from a waypoint to those near it that have a greater number.
+        """Find the paths from a place to its neighbours with greater numbers.
 
         Parameters
         ----------
-        n : int
-            The waypoint.
         search : bool
-            Search for all classes; else there are the straight ways, and those along tethers.
+            Whether to search for paths of all classes; if not, there are only straight paths and
+            paths along tethers.
         tether_clock : Clock, optional
-            When it is up, there are no more of those along tethers, either.
+            When it is up, no more paths are made of tethers.
         """
         targets = [int(m) for m in self.neighbours[n] if m > n and (n, int(m)) not in self._known]
         if not targets:
@@ -125,8 +122,8 @@ class RobotPaths:
             self._known[n, m], self._known[m, n] = paths, reversed_paths
 
     def _add_along_tethers(self, n: int, m: int, paths: list[tuple[int, Floats]]) -> None:
-        """The shortest ways back along a tether of one place and out along one of another, pulled
-        taut, each of a class of its own."""
+        """Add the shortest paths back along a tether of one place and out along one of another,
+        pulled taut, one for each class."""
         found: dict[int, Floats] = {}
         for tether_back in self.tethers.get(n, ()):
             for tether_out in self.tethers.get(m, ()):
@@ -143,15 +140,15 @@ class RobotPaths:
                 paths.append((word, path))
 
     def find_all(self, clock: Clock, on_progress: Callable[[str], None]) -> None:
-        """Seek all ways between waypoints that are near.
+        """Find all paths between neighbours.
 
         Parameters
         ----------
         clock : Clock
-            When a share of it is up, ways are made of tethers; when another is, straight ways are
-            all that is looked at.
+            When a share of it is up, paths are made of tethers instead of a search; when another is
+            up, only straight paths are found (`StageTimePolicy`).
         on_progress : callable
-            Called with a line of text now and then.
+            Called with a line of text.
         """
         times = self.context.policy.times
         search_clock, tether_clock = clock.part(times.path_search_share), None
@@ -162,46 +159,39 @@ class RobotPaths:
             self.find_from(n, search=tether_clock is None, tether_clock=tether_clock)
 
     def between(self, n: int, m: int) -> list[tuple[int, Floats]]:
-        """Ways from one waypoint to another that were found so far, shortest first.
-
-        Parameters
-        ----------
-        n : int
-            Where they begin.
-        m : int
-            Where they end.
+        """Return the paths found so far from one place to another, shortest first.
 
         Returns
         -------
         list of (int, ndarray of shape (k, 3))
-            Number of the word, and the path, metres.
+            Number of the word, and path, metres.
         """
         return self._known.get((n, m), [])
 
 
 @dataclass
 class DrivenLegs:
-    """Legs between states: each was driven with the tether of the state that it begins at.
+    """Legs between states, each driven with the tether of the state where it begins.
 
     Attributes
     ----------
-    arrives : dict of (state, state) to ndarray of shape (k, 3)
-        The shortest path from one to the other.
+    arrives
+        The shortest path (k, 3) from one state to another that arrives in it, metres.
     """
 
     arrives: dict[tuple[int, int], Floats] = field(default_factory=dict)
 
     def both_directions(self) -> Iterator[tuple[int, int, Floats, bool]]:
-        """Legs that arrive in one direction at least.
+        """Yield each leg once.
 
-        A tether may hang otherwise when the robot comes back: from there it then arrives in a state
-        that is none or another one.
+        A tether may hang otherwise when the robot comes back, and then arrives in another state or
+        in none.
 
         Yields
         ------
         (int, int, ndarray, bool)
-            The two states, the path from the first to the second, and whether the way back arrives,
-            too: the lower number is then the first, and the path the shorter of the two.
+            The two states, the path from the first to the second, and whether the reverse arrives,
+            too. In that case the lower number comes first, and the path is the shorter of the two.
         """
         for (v, w), path in self.arrives.items():
             reverse = self.arrives.get((w, v))
@@ -213,16 +203,11 @@ class DrivenLegs:
 
 @dataclass
 class StateGrowth:
-    """Legs and the states that they lead to: each state's own tether is driven along all ways to
-    waypoints near, and what it arrives in is a state, too. The shortest legs come first, so that
-    states are made in chains of neighbours, and what there is when the time is up joins them.
+    """Legs and the states that they lead to.
 
-    Parameters
-    ----------
-    states : States
-        Those so far; more are added.
-    paths : RobotPaths
-        The robot's ways.
+    The tether of each state is driven along all paths to neighbouring places, and where it arrives
+    is a state, too. The shortest legs come first, so that states are found in chains of neighbours,
+    and the legs known when the time is up connect them.
     """
 
     states: States
@@ -235,21 +220,14 @@ class StateGrowth:
     _shortest: dict[tuple[int, int], float] = field(default_factory=dict)
 
     def grow(self, max_per_place: int, clock: Clock, on_progress: Callable[[str], None]) -> bool:
-        """Drive legs until there are none left to drive, or the time is up.
+        """Drive legs until all are driven, or the time is up; return whether all are.
 
         Parameters
         ----------
         max_per_place : int
-            States of a waypoint.
-        clock : Clock
-            When it is up, legs and states are what they are by then.
+            Maximum number of states of a place.
         on_progress : callable
-            Called with a line of text now and then.
-
-        Returns
-        -------
-        bool
-            Whether there are none left for so many states.
+            Called with a line of text.
         """
         self.states.max_per_place = max_per_place
         for leg in self._postponed:
@@ -264,7 +242,7 @@ class StateGrowth:
         return True
 
     def _queue_new_states(self) -> None:
-        """Take the ways from new states on among those that wait."""
+        """Queue the paths from new states."""
         for v in range(self._known, len(self.states.entries)):
             state = self.states.entries[v]
             key = state.place, state.word
@@ -276,7 +254,7 @@ class StateGrowth:
         self._known = len(self.states.entries)
 
     def _drive_next(self) -> bool:
-        """Drive the next leg; whether there was one."""
+        """Drive the next leg in the queue; return whether there was one."""
         self._queue_new_states()
         if not self._queue:
             return False
@@ -306,8 +284,8 @@ class StateGrowth:
         return True
 
     def _may_fit(self, state: State, target: int, word: int, path: Floats) -> bool:
-        """Whether the tether may be within its limit at the end of a way: a drive takes ten times
-        as long as to pull it taut there."""
+        """Return whether the tether may be within its limit at the end of a path. Pulling it taut
+        there takes a tenth of the time of driving it."""
         key = target, word
         if self._shortest.get(key, np.inf) > self.states.limit:
             line = np.vstack([state.tether.nodes, path[1:]])

@@ -1,13 +1,11 @@
 """NE-TSP in space: the shortest tour through a mission's waypoints that the tether allows.
 
-Offline, a goal and the class of its tether make one vertex, and legs belong to classes, so that no
-tour can wind the tether up. The same here, where states take the place of classes
-(`netsp.plan.space.states`), and legs are those that the tether model was driven along
-(`netsp.plan.space.space_legs`); between any two states there is also the way back along one tether
-and out along the other. The travel graph is solved like any other, and the whole tour is driven.
-Where the tether gets too long on the way, or is not free at the end, the first leg that did not
-arrive in the state that was meant is forbidden, and the graph is solved again: no tour is believed
-that was not driven without fault.
+Vertices of the travel graph are states (`netsp.plan.space.states`): a waypoint with a tether that
+reaches it. Legs are paths along which the tether model was driven (`netsp.plan.space.space_legs`).
+Any two states are also joined by the path back along one tether and out along the other. The graph
+is solved like any other, and the whole tour is driven. If the tether gets too long on the way, or
+is not free at the end, the first leg that did not arrive in its state is forbidden, and the graph
+is solved again: no tour is accepted that was not driven without fault.
 
 Status and bound of the result hold for tours along these states and legs, without the forbidden
 ones, and not for all tours: the shortest tour along them is `optimal_of_states`. It is `optimal`
@@ -78,34 +76,32 @@ AS_GIVEN = "as-given"
 
 @dataclass(frozen=True)
 class SpacePlan:
-    """A tour of a mission's waypoints.
+    """Tour of a mission's waypoints.
 
-    Parameters
+    Attributes
     ----------
-    mission : Mission
-        What was planned.
-    visits : tuple of TourVisit
-        In the order of the tour.
-    home : ndarray, shape (k, 3)
-        From the last stop back to the start, metres.
-    length : float
-        Of the tour, metres.
-    result : Result
-        Of the solver: its status, bound and gap are about the states and legs that were found.
-    states : int
-        How many there were to choose from.
-    legs : int
-        How many of them were driven.
-    unreached : tuple of int
-        Waypoints that no tether within the limit was found to.
-    free : bool
+    mission
+        Mission that was planned.
+    visits
+        Visits in the order of the tour.
+    home
+        (k, 3) path from the last visit to the start, metres.
+    length
+        Length of the tour, metres.
+    result
+        Result of the solver; its status, bound and gap hold for the states and legs found.
+    states, legs
+        Numbers of states and of driven legs to choose from.
+    unreached
+        Waypoints to which no tether within the limit was found.
+    free
         Whether the tether was as at the start when the whole tour was driven.
-    context : PlanningContext
-        With the words.
-    paths : RobotPaths
-        Of the robot between waypoints.
-    kind : str
-        How the tour was found: `TAUT_LEGS`, `DETOURS`, `PLANE`, `SHORT_ORDER`, `OUT_AND_BACK` or
+    context
+        Context of the mission.
+    paths
+        The robot's paths between waypoints.
+    kind
+        Kind of the plan: `TAUT_LEGS`, `DETOURS`, `PLANE`, `SHORT_ORDER`, `OUT_AND_BACK` or
         `AS_GIVEN`.
     """
 
@@ -124,12 +120,13 @@ class SpacePlan:
 
     @property
     def order(self) -> tuple[int, ...]:
-        """The waypoints' numbers in the order of the tour."""
+        """Return the numbers of the visited waypoints in the order of the tour."""
         return tuple(stop.waypoint for stop in self.visits)
 
     @property
     def all_waypoints(self) -> tuple[int, ...]:
-        """The same, and then those that no tether reaches."""
+        """Return the numbers of all waypoints: those of `order`, then the ones that no
+        tether reaches."""
         rest = set(range(len(self.mission.waypoints))) - set(self.order)
         return (*self.order, *sorted(rest))
 
@@ -142,16 +139,8 @@ class SpacePlan:
     def replaces(self, other: SpacePlan) -> bool:
         """Return whether this plan is better than another that has passed the judge.
 
-        Parameters
-        ----------
-        other : SpacePlan
-            The other plan.
-
-        Returns
-        -------
-        bool
-            True if it visits more waypoints, or as many and is shorter. A tour along states and
-            legs may be longer than a tour of the plane by `bound_worth` of the policy.
+        It is if it visits more waypoints, or as many and is shorter. A tour along states and legs
+        may be longer than a tour of the plane by `bound_worth` of the policy.
         """
         if len(self.visits) != len(other.visits):
             return len(self.visits) > len(other.visits)
@@ -171,22 +160,17 @@ class SpacePlan:
     def to_mission(
         self, solver: str = "auto", seed: int = 0, bound: float | None = None
     ) -> Mission:
-        """The mission with its waypoints in the order of the tour, and the tour; waypoints that no
-        tether reaches come last.
+        """Return the mission with the tour, and its waypoints in the order of the tour; waypoints
+        that no tether reaches come last.
 
         Parameters
         ----------
         solver : str
             Name of the solver that was used.
         seed : int
-            That it was given.
+            Its random seed.
         bound : float, optional
-            Of all tours (`netsp.plan.space.path_bound`), metres.
-
-        Returns
-        -------
-        Mission
-            The same mission, planned.
+            Bound on all tours (`netsp.plan.space.path_bound`), metres.
         """
         result = self.result
         if bound is not None:
@@ -241,46 +225,37 @@ def plan(
 ) -> SpacePlan:
     """Find the shortest tour of a mission's waypoints that leaves the tether free.
 
-    It begins where the mission's state has the robot, and goes to one alternative of each waypoint.
+    The tour begins at the mission's state, and visits one alternative of each waypoint.
 
     Parameters
     ----------
     mission : Mission
-        The mission; the order of its waypoints does not count.
-    scene : Scene, optional
-        Its scene, when it is at hand.
-    field : DistanceField, optional
-        The scene's field, when it is at hand.
-    grid : Grid, optional
-        That paths are sought on, when it is at hand; the scene is then not asked for.
-    solver : str or callable
-        As of `netsp.plan.solve_problem.solve_graph`.
-    params : mapping, optional
-        Options of the solver.
+        The mission; the order of its waypoints is ignored.
+    scene, field, grid : Scene, DistanceField, Grid, optional
+        Scene of the mission, its distance field, and the grid for paths; loaded or computed if
+        needed. With field and grid, the scene is not needed.
+    solver, params, iteration_limit, seed
+        As in `netsp.plan.solve_problem.solve_graph`.
     time_limit : float or Clock, optional
-        Seconds for all; the best tour so far is returned when they are up.
-    iteration_limit : int, optional
-        Iterations of the solver.
-    seed : int
-        Of the solver.
+        Seconds for all stages; the best tour so far is returned when they are up.
     on_progress : callable, optional
-        Called with a line of text now and then.
+        Called with a line of text at each stage.
     policy : MissionPolicy, optional
         Effort, time and limits.
 
     Returns
     -------
     SpacePlan
-        The tour. At Ctrl-C, the best by then.
+        The tour. At Ctrl-C, the best so far.
 
     Raises
     ------
     InputError
-        A moving anchor; waypoints in solids; no tether that reaches any of them; as of
-        `netsp.plan.space.space_signature.SpaceSignature`.
+        A moving anchor; waypoints in solids; no tether that reaches any of them; or as
+        `netsp.plan.space.space_signature.SpaceSignature.in_box`.
     LimitReachedError
-        No tour was found whose tether stays within its limit all along, or the time was up before
-        the words of the scene were found.
+        No tour was found whose tether stays within its limit, or the time was up before the words
+        of the scene were found.
     """
     kept: SpacePlan | None = None
     with until_interrupt(time_limit) as clock:
@@ -331,38 +306,29 @@ def candidate_plans(
     ----------
     mission : Mission
         The mission; the order of its waypoints is ignored.
-    scene : Scene, optional
-        Scene of the mission; loaded if needed.
-    field : DistanceField, optional
-        Distance field of the scene; computed if needed.
-    grid : Grid, optional
-        Grid for paths; made if needed.
+    scene, field, grid : Scene, DistanceField, Grid, optional
+        Scene of the mission, its distance field, and the grid for paths; loaded or computed if
+        needed.
     context : PlanningContext, optional
-        Water of the mission with its words; if given, `field` and `grid` are not used.
-    solver : str or callable
-        Solver, as in `netsp.plan.solve_problem.solve_graph`.
-    params : mapping, optional
-        Options of the solver.
+        Context of the mission; if given, `field`, `grid` and `policy` are not used.
+    solver, params, iteration_limit, seed
+        As in `netsp.plan.solve_problem.solve_graph`.
     clock : Clock
         Clock of the run; when it is up, the best tours so far are yielded.
-    iteration_limit : int, optional
-        Largest number of iterations of the solver.
-    seed : int
-        Random seed of the solver.
     whole_tether : bool
         Whether tours of the plane may need the whole tether, for a caller that flies them.
     on_progress : callable, optional
         Called with a line of text at each stage.
     policy : MissionPolicy, optional
-        Effort, time and limits; not used if `context` is given, which has its own.
+        Effort, time and limits.
 
     Yields
     ------
     SpacePlan
         First, among upright prisms, the tours of the plane, or if there are none, the tour in a
-        short order; then the tour with detours, if it is
-        shorter than the tour along taut legs; then the tour along taut legs; last the tour out and
-        back to each waypoint, which is computed only if the caller asks for it.
+        short order; then the tour with detours, if it is shorter than the tour along taut legs;
+        then the tour along taut legs; last the tour out and back to each waypoint, which is
+        computed only if the caller asks for it.
 
     Raises
     ------
@@ -396,13 +362,13 @@ def prepare_context(
     on_progress: Callable[[str], None] | None = None,
     policy: MissionPolicy | None = None,
 ) -> PlanningContext:
-    """Make the water of a mission for a plan: check the mission, find the gaps that its grid does
-    not show, refine the grid where that shows them, and find the words of the scene.
+    """Return the context for planning a mission.
+
+    This checks the mission, finds the gaps that its grid does not show, refines the grid to show
+    them, and finds the words of the scene.
 
     Parameters
     ----------
-    mission : Mission
-        The mission.
     clock : Clock
         Clock of the run; the search for gaps takes a share of it (`GapPolicy`).
     scene : Scene, optional
@@ -420,7 +386,7 @@ def prepare_context(
     Returns
     -------
     PlanningContext
-        The water, with `cells`. Its mission has the cell size of the grid.
+        The context, with `gaps`. Its mission has the cell size of the grid.
 
     Raises
     ------
@@ -465,11 +431,6 @@ def prepare_context(
 def plan_given_order(context: PlanningContext) -> SpacePlan | None:
     """Drive a mission in the order of its file: the first incumbent.
 
-    Parameters
-    ----------
-    context : PlanningContext
-        Water of the mission.
-
     Returns
     -------
     SpacePlan or None
@@ -505,24 +466,7 @@ def _plan_of(context: PlanningContext, places: Places, driven: DrivenTour, kind:
 def check_plannable(
     mission: Mission, solver: SolverLike, params: Mapping[str, Any] | None, seed: int
 ) -> None:
-    """Refuse arguments that are wrong, before the search begins.
-
-    Parameters
-    ----------
-    mission : Mission
-        The mission.
-    solver : str or callable
-        Solver, as in `netsp.plan.solve_problem.solve_graph`.
-    params : mapping, optional
-        Options of the solver.
-    seed : int
-        Random seed of the solver.
-
-    Raises
-    ------
-    InputError
-        A moving anchor; an unknown solver or option.
-    """
+    """Refuse a moving anchor, and an unknown solver or option, before the search begins."""
     if mission.track:
         raise InputError("track: a moving anchor has no one best order; expected a mission without")
     _try_out(solver, params, seed)
@@ -540,6 +484,7 @@ def _planned(
     how: dict[str, Any],
     whole_tether: bool,
 ) -> Iterator[SpacePlan]:
+    """Yield the candidates of `candidate_plans`."""
     mission, field = context.mission, context.field
     policy, times = context.policy, context.policy.times
     places = Places.for_mission(mission, field)
@@ -667,7 +612,7 @@ def _planned(
 
 
 def _try_out(solver: SolverLike, params: Mapping[str, Any] | None, seed: int) -> None:
-    """Solve next to nothing, so that a name or an option that is wrong is told at once."""
+    """Solve a tiny graph, so that a wrong solver or option is refused at once."""
     if isinstance(solver, str) and SOLVERS.named(solver).geometric:
         raise InputError(
             f"solver: {solver!r} needs the geometry of a problem in the plane; expected one that "
@@ -686,7 +631,8 @@ def _try_out(solver: SolverLike, params: Mapping[str, Any] | None, seed: int) ->
 def _better(
     best: tuple[Result, DrivenTour] | None, found: tuple[Result, DrivenTour] | None
 ) -> tuple[Result, DrivenTour] | None:
-    """The shorter of two tours; of equals the second, more was known when it was found."""
+    """Return the shorter of two tours; of equals the second, because more was known when it was
+    found."""
     if best is None or (found is not None and found[1].length <= best[1].length):
         return found
     return best
@@ -700,8 +646,11 @@ def _best_driven(
     share: float,
     how: dict[str, Any],
 ) -> tuple[Result, DrivenTour] | None:
-    """The best tour that was driven without fault. As long as there is time, the graph is solved
-    again without the legs that were at fault; then the tour goes by way of the start there."""
+    """Return the best tour that was driven without fault.
+
+    As long as there is time, the graph is solved again without the legs at fault; then those legs
+    are replaced by paths through the start.
+    """
     times = board.context.policy.times
     again, found = 0, None
     warm = None if best is None else best[1].tour

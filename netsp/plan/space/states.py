@@ -1,8 +1,8 @@
-"""How a tether can come to lie when the robot is at a waypoint.
+"""States of the tether with the robot at a waypoint.
 
-A state is a waypoint, a word, and the tether as it hangs: words alone do not tell all there is,
-for tethers hang on bodies with free ends, which give no letters. The few shortest words of each
-waypoint make the first states; others come of going on from these (`netsp.plan.space.space_legs`).
+A state is a place, a word, and the tether as it hangs. The word alone is not enough, because
+tethers hang on bodies with free ends, which give no letters. The words with the shortest paths to
+each place make the first states; others are found from these (`netsp.plan.space.space_legs`).
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from netsp.world.tether import Tether
 
 @dataclass(frozen=True)
 class State:
-    """A tether at a waypoint.
+    """Tether at a place.
 
-    Parameters
+    Attributes
     ----------
-    place : int
-        The waypoint.
-    word : int
-        Number of the tether's word in the water's table.
-    tether : Tether
-        As it hangs.
+    place
+        Number of the place.
+    word
+        Number of the tether's word in the table of the context.
+    tether
+        The tether as it hangs.
     """
 
     place: int
@@ -46,16 +46,20 @@ class State:
 class States:
     """All states so far.
 
-    Parameters
+    Attributes
     ----------
-    context : PlanningContext
-        Where they are.
-    places : Places
-        The points; that of the mission's state has the one tether that hangs there now.
-    limit : float
-        Longest tether, metres.
-    max_per_place : int
-        States of a waypoint.
+    context
+        Context of the mission.
+    places
+        Places of the robot. The place where the mission begins has only the present tether.
+    limit
+        Maximum length of a tether, metres.
+    max_per_place
+        Maximum number of states of a place.
+    entries
+        The states.
+    at_place
+        Numbers of the states of each place.
     """
 
     context: PlanningContext
@@ -66,22 +70,7 @@ class States:
     at_place: dict[int, list[int]] = field(default_factory=dict)
 
     def find(self, point: int, word: int, tether: Tether) -> int | None:
-        """The number of the state that a tether is in.
-
-        Parameters
-        ----------
-        point : int
-            The waypoint.
-        word : int
-            The tether's word.
-        tether : Tether
-            The tether.
-
-        Returns
-        -------
-        int or None
-            None where it is in none so far.
-        """
+        """Return the number of the state that a tether is in; None if it is in none so far."""
         delta = self.context.mission.delta
         for s in self.at_place.get(point, ()):
             if self.entries[s].word == word and hang_alike(self.entries[s].tether, tether, delta):
@@ -89,41 +78,14 @@ class States:
         return None
 
     def can_hold(self, point: int, word: int) -> bool:
-        """Whether a tether of a word may be in some state of a waypoint, or make a new one.
-
-        Parameters
-        ----------
-        point : int
-            The waypoint.
-        word : int
-            The tether's word.
-
-        Returns
-        -------
-        bool
-            Whether it may.
-        """
+        """Return whether a tether of a word may be in a state of a place, or make a new one."""
         numbers = self.at_place.get(point, [])
         has_room = len(numbers) < self.max_per_place and point != self.places.present
         return has_room or any(self.entries[s].word == word for s in numbers)
 
     def add(self, point: int, word: int, tether: Tether) -> int | None:
-        """A new state, if there is room for one more and the tether is no longer than its limit.
-
-        Parameters
-        ----------
-        point : int
-            The waypoint.
-        word : int
-            The tether's word.
-        tether : Tether
-            The tether.
-
-        Returns
-        -------
-        int or None
-            Its number, None if there is none.
-        """
+        """Add a state and return its number; None if the place has no room for another state, or
+        the tether exceeds its limit."""
         numbers = self.at_place.setdefault(point, [])
         if (
             len(numbers) >= self.max_per_place
@@ -137,38 +99,24 @@ class States:
 
     @property
     def present(self) -> int | None:
-        """Number of the state that the mission begins in; None at the start."""
+        """Return the number of the state in which the mission begins; None at the start."""
         return None if self.places.present is None else self.at_place[self.places.present][0]
 
     @property
     def has_free_ends(self) -> bool:
-        """Whether tethers of one word hang in several ways at some waypoint."""
+        """Return whether tethers of one word hang in several ways at some place."""
         of_words = {(s.place, s.word) for s in self.entries}
         return len(of_words) < len(self.entries)
 
     @property
     def reached(self) -> set[int]:
-        """The waypoints that have states; that of the mission's state counts as one more."""
+        """Return the waypoints that have states; that of the mission's state counts as one more."""
         return {int(self.places.waypoint[n]) for n in self.at_place}
 
 
 def hang_alike(a: Tether, b: Tether, delta: float) -> bool:
-    """Whether two tethers of one word between the same ends hang alike.
-
-    Parameters
-    ----------
-    a : Tether
-        One tether.
-    b : Tether
-        The other.
-    delta : float
-        Resolution of both, metres.
-
-    Returns
-    -------
-    bool
-        By length, and points at quarters of it.
-    """
+    """Return whether two tethers of one word between the same ends hang alike, by their lengths and
+    by points at quarters of them, with a tolerance of a delta, metres."""
     if abs(a.length - b.length) > delta:
         return False
     points_a, points_b = (
@@ -183,30 +131,25 @@ def hang_alike(a: Tether, b: Tether, delta: float) -> bool:
 def find_first_states(
     context: PlanningContext, places: Places, limit: float, effort: StateEffort, clock: Clock
 ) -> States:
-    """States of the shortest words of each waypoint, and the one that the mission begins in.
+    """Return the states of the shortest words of each place, and the state in which the mission
+    begins.
 
     Parameters
     ----------
-    context : PlanningContext
-        Where they are.
-    places : Places
-        The points.
     limit : float
-        Longest tether, metres.
-    effort : StateEffort
-        How many.
+        Maximum length of a tether, metres.
     clock : Clock
-        When it is up, one for each of the waypoints that are left.
+        When it is up, each remaining place gets one state.
 
     Returns
     -------
     States
-        The states; waypoints without any are out of reach of the tether.
+        The states. Places without any are out of reach of the tether.
 
     Raises
     ------
     InputError
-        The tether of the mission's state has no word: says where.
+        The tether of the mission's state has no word; says where.
     """
     states = States(context, places, limit, effort.states[0])
     words = context.words
@@ -230,19 +173,17 @@ def find_first_states(
 
 
 def add_states_with_room(states: States, missing: set[int], words: int, clock: Clock) -> None:
-    """More states, along the robot's own shortest ways from the start: where it does not fit
-    through the gaps that the shortest tethers go through.
+    """Add states along the robot's own shortest paths from the start, for waypoints whose shortest
+    tethers lead through gaps that are too narrow for the robot.
 
     Parameters
     ----------
-    states : States
-        Those so far; more are added.
     missing : set of int
-        Waypoints that these are for.
+        Numbers of the waypoints.
     words : int
-        Shortest words of a waypoint that make states.
+        Maximum number of words of a place.
     clock : Clock
-        When it is up, there is only the soonest of each.
+        When it is up, each place gets its first word only.
     """
     context = states.context
     start = context.words.visible_cell(context.start_tether.robot)
@@ -255,7 +196,7 @@ def add_states_with_room(states: States, missing: set[int], words: int, clock: C
 
 
 def _add_states(states: States, n: int, found: WordSearch, line: Floats, max_states: int) -> None:
-    """States of a place by the shortest ways found to it, which go on from a line."""
+    """Add states of a place: those of the shortest paths found to it, each continuing a line."""
     context, words, point = states.context, states.context.words, states.places.points[n]
     cell = words.visible_cell(point)
     if cell is None or n == states.places.present:

@@ -1,10 +1,10 @@
-"""States that a tether comes to in going from waypoint to waypoint, along trees of short legs.
+"""States that a tether reaches from waypoint to waypoint along trees of short legs.
 
-A tour that goes around a tree leaves its tether free, and tours that are short stay near such
-trees; but the states that it comes through need not be of the shortest words of their waypoints,
-nor hang as the shortest tethers do. So the tether is driven along a few trees, between the one of
-the shortest legs and the one of the shortest ways from the start (Prim and Dijkstra; the trade-off
-between the two is that of Alpert et al. 1995, IEEE Trans. CAD 14(7)).
+A tour around a tree leaves its tether free, and short tours stay near such trees. The states along
+such a tour need not have the shortest words of their waypoints, nor hang as the shortest tethers
+do. So the tether is driven along a few trees between the tree of the shortest legs and that of the
+shortest paths from the start (Prim and Dijkstra; the trade-off between the two is that of Alpert et
+al. 1995, IEEE Trans. CAD 14(7)).
 """
 
 from __future__ import annotations
@@ -18,17 +18,13 @@ from netsp.plan.space.states import States
 
 
 def add_states_of_trees(states: States, robot_paths: RobotPaths, clock: Clock) -> None:
-    """Drive the tether along trees; where it arrives in a state that was not there, there is one
-    more.
+    """Drive the tether along trees, and add the states in which it arrives, beyond the maximum per
+    place.
 
     Parameters
     ----------
-    states : States
-        The first ones; more are added, whatever the most of a waypoint.
-    paths : RobotPaths
-        The robot's ways between waypoints.
     clock : Clock
-        When it is up, trees are left as they are.
+        When it is up, the remaining trees are left out.
     """
     max_per_place, trade_offs = states.max_per_place, states.context.policy.states.tree_trade_offs
     states.max_per_place += len(trade_offs)
@@ -45,6 +41,7 @@ def add_states_of_trees(states: States, robot_paths: RobotPaths, clock: Clock) -
 def _grow(
     states: States, robot_paths: RobotPaths, clock: Clock, roots: list[int], trade: float
 ) -> None:
+    """Grow one tree from the states with the shortest tethers, and drive the tether along it."""
     context = states.context
     # (key, tie, how far from the start, state, waypoint, way); a way of -1 is straight to a root
     waiting: list[tuple[float, int, float, int, int, int]] = []

@@ -35,14 +35,8 @@ def bound_by_upright_solids(
 
     Parameters
     ----------
-    mission : Mission
-        Mission with the tether.
-    context : PlanningContext
-        Scene, and tether at the start.
     place_numbers : list of int
         Numbers of the places that tours visit.
-    places : Places
-        All places.
     clock : Clock
         Clock of the run; when it is up, the bound proven so far is returned.
 
@@ -91,8 +85,6 @@ def upright_obstacles(context: PlanningContext, dip: float) -> list[Circle | Pol
 
     Parameters
     ----------
-    context : PlanningContext
-        The scene.
     dip : float
         Depth to which paths and tethers may enter solids, metres.
 

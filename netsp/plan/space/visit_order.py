@@ -1,12 +1,12 @@
-"""An order of waypoints in which the tether stays short, by going straight on: the older way.
+"""Order of waypoints in which the tether stays short by going straight on.
 
-A tour of states and legs (`netsp.plan.space.space_plan`) is mostly shorter; this one is for bodies
-with many free ends. A waypoint and the class of its tether make one vertex, and legs belong to
-classes, so that no tour can wind the tether up, as offline. Classes are found by the tether model:
-the shortest tether to each waypoint, and those that come of going straight on to it from its
-neighbours. A leg within a class is the straight line if the tether that comes of it is that of the
-class; between any two classes there is the path back along one tether and out along the other,
-pulled taut. What comes out is a generalised TSP, which our own solvers take.
+A tour along states and legs (`netsp.plan.space.space_plan`) is usually shorter; this order is
+better for some bodies with many free ends. A waypoint and a class of its tether make one vertex,
+and legs belong to classes, so no tour can wind the tether up. The tether model finds the classes:
+the shortest tether to each waypoint, and the tethers that result from going straight on from
+neighbouring waypoints. A leg is the straight line if the resulting tether is that of the class. For
+any two classes there is also the path back along one tether and out along the other, pulled taut.
+The result is a generalised TSP for netsp's own solvers.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from netsp.world.tether import GeodesicTether, Tether
 
 @dataclass
 class _Classes:
-    """Tethers to the waypoints: waypoint and state of each vertex."""
+    """Tethers to the waypoints: number of the waypoint and tether of each vertex."""
 
     point: list[int]
     tether: list[Tether]
 
     def find(self, n: int, tether: Tether, delta: float) -> int | None:
-        """The vertex of a waypoint with the same tether."""
+        """Return the vertex of a waypoint with a tether that hangs alike; None if there is none."""
         for v, (m, other) in enumerate(zip(self.point, self.tether, strict=True)):
             if m == n and hang_alike(tether, other, delta):
                 return v
@@ -54,27 +54,21 @@ def order_by_going_on(
     seed: int = 0,
     policy: MissionPolicy | None = None,
 ) -> tuple[int, ...]:
-    """The shortest order of a mission's waypoints along classes and legs of going straight on.
+    """Return the shortest order of a mission's waypoints along straight legs and taut tethers.
 
     Parameters
     ----------
     mission : Mission
-        The mission; its order is what the search starts from.
-    field : DistanceField
-        Its scene.
-    grid : Grid
-        The grid that paths are sought on.
+        Mission whose order is the warm start.
     clock : Clock
-        When it is up, the best order so far is returned.
-    seed : int
-        Random seed of the solver.
+        Clock of the run; when it is up, the best order so far is returned.
     policy : MissionPolicy, optional
         Effort, and share of the tether.
 
     Returns
     -------
     tuple of int
-        Waypoints; those that no tether reaches are left out.
+        Waypoints; without any that no tether reaches.
 
     Raises
     ------
@@ -107,20 +101,12 @@ def waypoint_graph(
     clock: Clock | None = None,
     policy: MissionPolicy | None = None,
 ) -> tuple[TravelGraph, list[int], list[int]]:
-    """Classes and legs of a mission.
-
-    Waypoints that no tether reaches are left out.
+    """Return the travel graph of a mission's waypoints, without waypoints that no tether reaches.
 
     Parameters
     ----------
-    mission : Mission
-        The mission.
-    field : DistanceField
-        Its scene.
-    grid : Grid
-        The grid that paths are sought on.
     clock : Clock, optional
-        When it is up, there is no graph.
+        Clock of the run; when it is up, there is no graph.
     policy : MissionPolicy, optional
         Effort, and share of the tether.
 
@@ -129,9 +115,9 @@ def waypoint_graph(
     graph : TravelGraph
         Classes of the waypoints, and legs.
     at : list of int
-        The waypoint of each vertex, -1 for the anchor.
+        Waypoint of each vertex, -1 for the anchor.
     clusters : list of int
-        The waypoints in the order of the clusters.
+        Waypoints in the order of the clusters.
 
     Raises
     ------
