@@ -252,7 +252,7 @@ def compared(roadmap: TautRoadmap, brute: BruteForce | WholeNumbers | None) -> O
     for u, v in zip(us.tolist(), vs.tolist(), strict=True):
         word = roadmap.legs.relative_word(u, v)
         most = float(roadmap.planar[u] + roadmap.planar[v])
-        sought = roadmap.paths._searched(1, 2, word, most)
+        sought = roadmap.paths._search_word(1, 2, word, most)
         legs[u, v] = None if sought is None else sought[0]
         worst = max(worst, most if sought is None else sought[0])
     true: dict[tuple[int, Word], float] = {}

@@ -53,11 +53,11 @@ def off(paths: TautPaths, legs: list[Leg]) -> tuple[float, float]:
     search finds."""
     failed, worst = 0, 0.0
     for a, b, word in legs:
-        length, _, _ = paths._pulled(a, b, word)
+        length, _, _ = paths._pull(a, b, word)
         if length == NOT_PULLED:
             failed += 1
             continue
-        found = paths._searched(a, b, word)
+        found = paths._search_word(a, b, word)
         worst = max(worst, np.inf if found is None else abs(length - found[0]) / max(length, 1.0))
     return failed / len(legs), worst
 
@@ -99,9 +99,9 @@ def measured(roadmap: TautRoadmap) -> list[str]:
     pairs, legs = some_legs(roadmap, 2000)
     failed, worst = off(paths, legs[:500])
     a, b, words = zip(*legs, strict=True)
-    compiled = microseconds(lambda: roadmap.legs._each(pairs[:, 0], pairs[:, 1]), len(legs))
+    compiled = microseconds(lambda: roadmap.legs._pull_pairs(pairs[:, 0], pairs[:, 1]), len(legs))
     bulk = microseconds(lambda: paths.lengths(a, b, words), len(legs))
-    single, search = one_by_one(paths._pulled, legs), one_by_one(paths._searched, legs[:300])
+    single, search = one_by_one(paths._pull, legs), one_by_one(paths._search_word, legs[:300])
     return [
         str(len(roadmap.cluster)), f"{100.0 * failed:.1f}", f"{worst:.0e}", f"{compiled:.1f}",
         f"{bulk:.1f}", f"{single:.0f}", f"{search:.0f}",

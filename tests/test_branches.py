@@ -127,13 +127,13 @@ def test_legs_between_strided_vertices_are_pulled_by_the_same_kernel(monkeypatch
 def searches(monkeypatch):
     """How often a leg was searched for by itself."""
     seen = []
-    search = TautLegs._searched
+    search = TautLegs._search_leg
 
     def note(self, u, v, *more):
         seen.append((u, v))
         return search(self, u, v, *more)
 
-    monkeypatch.setattr(TautLegs, "_searched", note)
+    monkeypatch.setattr(TautLegs, "_search_leg", note)
     return seen
 
 
@@ -175,10 +175,10 @@ def test_tethers_that_cannot_be_pulled_are_searched_for_and_grow_the_same_tree(
     one = TautRoadmap(problem)
     joint = LegPolicy(min_joint_searches=0 if together else len(one.cluster))
     other = TautRoadmap(problem, RoadmapPolicy(legs=joint))
-    tree = one.legs._grown(NEVER)
+    tree = one.legs._tether_tree(NEVER)
     searches.clear()
     request.getfixturevalue("none_pulled")
-    same = other.legs._grown(NEVER)
+    same = other.legs._tether_tree(NEVER)
     assert len(searches) == (0 if together else len(one.cluster) - 1)
     assert (same.node == tree.node).all()
     assert (same.parent == tree.parent).all()
@@ -190,7 +190,7 @@ def test_tethers_that_cannot_be_pulled_are_searched_for_and_grow_the_same_tree(
 def test_legs_among_walls_that_one_search_found_the_tethers_of(none_pulled, searches):
     problem = Problem.load(LIBRARY / "maze-30-0.json").model_copy(update={"tether_length": 330.0})
     roadmap = TautRoadmap(problem, max_classes=180)
-    roadmap.legs._grown(NEVER)
+    roadmap.legs._tether_tree(NEVER)
     assert not searches
     found = roadmap.legs.lengths(np.arange(len(roadmap.cluster)))
     assert np.allclose(found, one_by_one(roadmap), rtol=1e-10, atol=1e-7)
@@ -198,7 +198,7 @@ def test_legs_among_walls_that_one_search_found_the_tethers_of(none_pulled, sear
 
 def test_the_tree_ends_where_the_tethers_do():
     roadmap = TautRoadmap(random_world(5, goals=8, obstacles=12, tether_length=380.0))
-    tree, places = roadmap.legs._grown(NEVER), roadmap.outline.places
+    tree, places = roadmap.legs._tether_tree(NEVER), roadmap.outline.places
     for v in range(1, len(roadmap.cluster)):
         bend = tree.last[v]
         assert tree.length[bend] <= roadmap.planar[v]

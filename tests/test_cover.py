@@ -13,9 +13,16 @@ from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.command.main import main
 from netsp.plan.cover import cover
-from netsp.plan.cover.choose import by_program, choose, greedy, merged, pruned, simple_bound
+from netsp.plan.cover.choose import (
+    choose,
+    choose_greedily,
+    counting_bound,
+    merge_patches,
+    prune,
+    solve_program,
+)
 from netsp.plan.cover.cover_policy import CoverPolicy
-from netsp.plan.cover.viewpoints import Viewer, coarser, spread
+from netsp.plan.cover.viewpoints import Viewer, coarsen, spread_out
 from netsp.world import Scene
 from netsp.world.mission.equipment import Camera
 from netsp.world.mission.mission import Mission
@@ -95,7 +102,7 @@ def test_a_wall_hides_what_is_behind_it():
 
 def test_lines_of_sight_keep_to_their_limits():
     field = RING.field()
-    patches = coarser(patches_of(RING, field, 0.25, np.array([ANCHOR])), 0.25)
+    patches = coarsen(patches_of(RING, field, 0.25, np.array([ANCHOR])), 0.25)
     place = np.array([2.9, 0.1, -4.0])
     seen = {}
     for incidence, farthest in ((80.0, 2.5), (40.0, 2.5), (80.0, 1.3)):
@@ -115,7 +122,7 @@ def test_lines_of_sight_keep_to_their_limits():
 
 def test_coarser_patches_have_the_same_area():
     fine = patches_of(RING, RING.field(), 0.2, np.array([ANCHOR]))
-    coarse = coarser(fine, 0.25)
+    coarse = coarsen(fine, 0.25)
     assert len(coarse.areas) < 0.5 * len(fine.areas)
     assert coarse.areas.sum() == pytest.approx(fine.areas.sum())
     assert coarse.areas.sum() == pytest.approx(4 * np.pi**2 * 1.5 * 0.3, rel=0.03)
@@ -144,18 +151,18 @@ def test_no_choice_is_smaller_than_the_bound_and_the_best_is_found(rows, areas, 
     assert found.bound <= best
     assert len(found.chosen) == best
     if total:
-        matrix, weights = merged(sees, areas)
+        matrix, weights = merge_patches(sees, areas)
         assert weights.sum() == pytest.approx(total)
-        assert simple_bound(matrix, weights, share * total) <= best
-        assert by_program(matrix, weights, share * total, Clock())[1] <= best
-        first = greedy(matrix, weights, share * total)
-        assert best <= len(pruned(matrix, weights, first, share * total)) <= len(first)
+        assert counting_bound(matrix, weights, share * total) <= best
+        assert solve_program(matrix, weights, share * total, Clock())[1] <= best
+        first = choose_greedily(matrix, weights, share * total)
+        assert best <= len(prune(matrix, weights, first, share * total)) <= len(first)
 
 
 @given(st.lists(st.tuples(*[st.floats(-5, 5)] * 3), min_size=1, max_size=30), st.floats(0.1, 4.0))
 def test_points_spread_apart_are_near_to_all(points, apart):
     points = np.array(points)
-    taken = points[spread(points, apart)]
+    taken = points[spread_out(points, apart)]
     assert np.linalg.norm(points[:, None] - taken[None], axis=2).min(axis=1).max() <= apart
     gaps = np.linalg.norm(taken[:, None] - taken[None], axis=2)[~np.eye(len(taken), dtype=bool)]
     assert gaps.size == 0 or gaps.min() > apart

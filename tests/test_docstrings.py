@@ -74,6 +74,7 @@ def _public():
 PUBLIC = _public()
 
 
+@pytest.mark.filterwarnings("ignore:.* is now :DeprecationWarning")  # numpydoc reads all attributes
 @pytest.mark.parametrize("name", sorted(PUBLIC))
 def test_sections_of_public_docstrings_are_true_and_complete_in_themselves(name):
     value = PUBLIC[name]

@@ -27,7 +27,7 @@ from netsp.gtsp.search import Instance, Search
 from netsp.mip.flows import min_cuts
 from netsp.mip.mip_solver import MipRun
 from netsp.mip.subtours import cover_branches
-from netsp.roadmap.slits import _taut, build_slits, slit_lengths
+from netsp.roadmap.slits import _taut_string, build_slits, slit_lengths
 from netsp.roadmap.taut import TautRoadmap
 from tests.brute import brute_tour
 from tests.travel_graphs import random_graph
@@ -99,7 +99,7 @@ def test_the_taut_string_is_the_least_of_a_convex_program(gates, start):
     )
     rows[-1, 1:] = gates[-1][1]
     corner = np.empty((len(rows), 2), dtype=np.int64)
-    length, _ = _taut(start, np.column_stack([rows, rows]), len(rows), corner)
+    length, _ = _taut_string(start, np.column_stack([rows, rows]), len(rows), corner)
     xs = np.concatenate([[0.0], rows[:, 0]])
     best = math.inf
     for first in (-3.0, 0.0, 3.0):

@@ -17,7 +17,7 @@ from netsp.command.measures import describe_tethers
 from netsp.online.execute.tour_repair import repair
 from netsp.plan.solve_problem import travel_graph
 from netsp.roadmap.paths import TautPaths, UnknownPathError
-from netsp.roadmap.turning import turnings, within_turning
+from netsp.roadmap.turning import limit_turning, tether_turnings
 from netsp.view.pictures.problem_picture import draw_map
 from netsp.view.report.briefing import tethers
 
@@ -96,15 +96,15 @@ def test_states_of_unknown_turning_are_left_out_and_no_bound_claims_them(fails):
     gone = graph.signatures[shortest], int(graph.goal[shortest])
     fails(lambda b, word: (word, b) == gone)
     with pytest.warns(LeftOutWarning, match="1 state of the tether left out"):
-        assert np.isnan(turnings(PROBLEM, graph)).sum() == 1
+        assert np.isnan(tether_turnings(PROBLEM, graph)).sum() == 1
     with pytest.warns(LeftOutWarning):
-        part = within_turning(PROBLEM, graph, 100.0)
+        part = limit_turning(PROBLEM, graph, 100.0)
     assert len(part) == len(graph) - 1
     assert part.scope.value == "kept_classes"
     assert part.least_left_out == graph.tethers[shortest]
     fails(lambda b, word: b == 1)
     with pytest.warns(LeftOutWarning), pytest.raises(LimitReachedError, match="it is unknown how"):
-        within_turning(PROBLEM, graph, 100.0)
+        limit_turning(PROBLEM, graph, 100.0)
 
 
 def test_a_blind_tour_states_the_length_of_its_path_for_a_tether_not_found(fails):

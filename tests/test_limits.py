@@ -16,7 +16,7 @@ from netsp.hsignature import reduce
 from netsp.hsignature.rays import crossings
 from netsp.model.solution import max_turning
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.turning import turnings
+from netsp.roadmap.turning import tether_turnings
 from tests.brute import brute_tour
 from tests.worlds import random_world
 
@@ -45,7 +45,7 @@ def test_the_best_tour_among_classes_that_turn_no_farther(seed, goals, share):
         turn_of(paths.path(0, int(c), w))
         for c, w in zip(graph.cluster[1:], graph.signatures[1:], strict=True)
     ])  # fmt: skip
-    assert turnings(problem, graph) == pytest.approx(drawn, abs=1e-6)
+    assert tether_turnings(problem, graph) == pytest.approx(drawn, abs=1e-6)
     most = float(np.quantile(drawn, share)) + 1e-3
     ratio = math.exp(0.3 * most)
     kept = np.flatnonzero(drawn <= max_turning(0.3, ratio))

@@ -46,8 +46,8 @@ def test_a_basin_with_a_hooked_wall_is_solved(flip):
     assert solution.length == pytest.approx(30.431575, abs=1e-5)
     # right of the post, and back to its left below the hook: both cross the ray of the post
     paths = TautPaths(problem)
-    length, _ = paths._searched(0, 1, ())
-    assert length == pytest.approx(paths._pulled(0, 1, ())[0], rel=1e-9) or length > 0.0
+    length, _ = paths._search_word(0, 1, ())
+    assert length == pytest.approx(paths._pull(0, 1, ())[0], rel=1e-9) or length > 0.0
 
 
 def test_a_bar_that_a_ray_cuts_may_reach_below_the_point_of_the_ray():
@@ -65,7 +65,7 @@ def test_a_bar_that_a_ray_cuts_may_reach_below_the_point_of_the_ray():
     path = paths.path(0, 1, (-2,))
     assert crossings(path, paths.problem.representative_points)[0] == 1
     assert path[:, 1].min() < -6.9
-    assert paths._searched(0, 1, (-2,))[0] == pytest.approx(found[1, (-2,)], rel=2e-3)
+    assert paths._search_word(0, 1, (-2,))[0] == pytest.approx(found[1, (-2,)], rel=2e-3)
     assert boxes_of(problem)[0, 0, YMIN] < -6.9
 
 
@@ -87,7 +87,7 @@ def test_a_hook_may_lead_a_path_under_the_point_and_back():
     found = BruteForce(problem).lengths(0, 70.0)
     for word in ((), (-2,), (2,), (1, -2), (-1,)):
         if (1, word) in found:
-            searched = TautPaths(problem)._searched(0, 1, word)
+            searched = TautPaths(problem)._search_word(0, 1, word)
             assert searched[0] == pytest.approx(found[1, word], abs=1e-5)
 
 
@@ -139,7 +139,9 @@ def test_a_base_on_the_corner_of_a_box_that_touches_another_gets_a_tour(width):
 
 def test_a_contact_lies_on_an_arc_in_both_senses_or_in_none():
     rng = np.random.default_rng(0)
-    key, reverse = (getattr(f, "py_func", f) for f in (tangents._key, tangents._reverse_key))
+    key, reverse = (
+        getattr(f, "py_func", f) for f in (tangents._arc_position, tangents._reversed_position)
+    )
     for _ in range(2000):
         start = rng.uniform(-7, 7)
         end = start + rng.choice([1e-9, 0.1, 3.0, 6.0])
@@ -169,13 +171,13 @@ def hidden_legs(monkeypatch):
     """Nothing is pulled, and legs between goals 0 and 1 are not found by a search either; the
     length of the shortest tour with these legs."""
     length = solve(HIDDEN).length
-    search = TautPaths._sought
+    search = TautPaths._find
 
     def sought(self, a, b, word, longest, stop):
         return None if {a, b} == {1, 2} else search(self, a, b, word, longest, stop)
 
-    monkeypatch.setattr(TautPaths, "_sought", sought)
-    monkeypatch.setattr(TautPaths, "_pulled", lambda *_: (-1.0, None, None))
+    monkeypatch.setattr(TautPaths, "_find", sought)
+    monkeypatch.setattr(TautPaths, "_pull", lambda *_: (-1.0, None, None))
     monkeypatch.setattr("netsp.roadmap.taut_legs.fill", _pulls_nothing)
     monkeypatch.setattr("netsp.roadmap.taut_legs.pull_each", lambda *args: args[-1].fill(-1.0))
     return length
@@ -204,7 +206,7 @@ def test_a_leg_that_the_search_for_its_word_misses_is_found_among_all_words(hidd
 def test_a_leg_that_is_not_found_is_left_out_and_said_and_the_bound_still_holds(
     hidden_legs, monkeypatch, capsys, tmp_path
 ):
-    monkeypatch.setattr(TautPaths, "_searched_among_all", lambda *_: None)
+    monkeypatch.setattr(TautPaths, "_search_all_words", lambda *_: None)
     graph = TautRoadmap(HIDDEN).to_travel_graph()
     costs, pairs = graph.costs, graph.legs_left_out
     assert pairs

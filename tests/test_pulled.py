@@ -32,10 +32,10 @@ def test_a_path_that_was_pulled_is_as_long_as_the_one_that_a_search_finds(seed, 
     paths, legs = roadmap.paths, roadmap.legs
     for u, v in some_legs(roadmap, np.random.default_rng(seed), 25):
         a, b, word = int(roadmap.cluster[u]), int(roadmap.cluster[v]), legs.relative_word(u, v)
-        length, edges, slid = paths._pulled(a, b, word)
+        length, edges, slid = paths._pull(a, b, word)
         if length == NOT_PULLED:
             continue
-        searched, pieces = paths._searched(a, b, word)
+        searched, pieces = paths._search_word(a, b, word)
         assert length == pytest.approx(searched, rel=1e-9, abs=1e-7)
         # tangents of no length may be spelled in several ways; what is drawn is the path
         drawn = paths._polyline(a, b, list(zip(edges.tolist(), slid.tolist(), strict=True)))
@@ -48,7 +48,7 @@ def test_hardly_any_path_of_a_random_world_cannot_be_pulled(family):
     problem = random_world(2, family=family, goals=12, obstacles=16, tether_length=350.0)
     roadmap = TautRoadmap(problem, max_classes=300)
     u, v = np.nonzero(roadmap.cluster[:, None] < roadmap.cluster[None])
-    lengths = roadmap.legs._each(u, v)
+    lengths = roadmap.legs._pull_pairs(u, v)
     assert (lengths < 0.0).mean() < 0.02
 
 
@@ -78,8 +78,8 @@ TURNS = Problem(
 def test_whole_turns_around_circles_and_polygons_are_counted(turns, letter, goal):
     paths = TautPaths(TURNS, longest=100.0)
     word = (letter,) * turns
-    length, edges, slid = paths._pulled(0, goal, word)
-    assert length == pytest.approx(paths._searched(0, goal, word)[0], rel=1e-12)
+    length, edges, slid = paths._pull(0, goal, word)
+    assert length == pytest.approx(paths._search_word(0, goal, word)[0], rel=1e-12)
     drawn = paths._polyline(0, goal, list(zip(edges.tolist(), slid.tolist(), strict=True)))
     drawn[-1] = paths.outline.places[goal]
     assert signature(drawn, paths.outline.rays) == word
@@ -92,12 +92,12 @@ def test_a_goal_straight_above_an_obstacle_is_reached_on_the_side_of_its_word():
     )  # fmt: skip
     roadmap = TautRoadmap(problem)
     u, v = np.nonzero(roadmap.cluster[:, None] < roadmap.cluster[None])
-    lengths = roadmap.legs._each(u, v)
+    lengths = roadmap.legs._pull_pairs(u, v)
     assert (lengths >= 0.0).all()
     for k in range(0, len(u), 1 + len(u) // 200):
         a, b = int(roadmap.cluster[u[k]]), int(roadmap.cluster[v[k]])
         word = roadmap.legs.relative_word(int(u[k]), int(v[k]))
-        assert lengths[k] == pytest.approx(roadmap.paths._searched(a, b, word)[0], rel=1e-12)
+        assert lengths[k] == pytest.approx(roadmap.paths._search_word(a, b, word)[0], rel=1e-12)
 
 
 def test_lengths_in_bulk_are_those_of_single_paths_and_unknown_words_have_none():

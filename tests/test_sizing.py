@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from netsp import Circle, InfeasibleError, InputError, Problem, Status, solve, travel_graph, verify
 from netsp.command.main import main
 from netsp.plan.sizing import best_base, margins, tether_curve
-from netsp.plan.sizing.tether_margins import _complaint
+from netsp.plan.sizing.tether_margins import _misfit
 from netsp.roadmap.explain_unreachable import shortest_tethers
 from netsp.roadmap.paths import TautPaths
 
@@ -210,8 +210,8 @@ def test_the_margin_of_a_post_is_the_closed_form():
     assert "goal #0: its tether does not fit" in found.limited_by
     assert found.tether == pytest.approx(over(1.5) - over(1.0))
     assert found.cross_track == pytest.approx(0.0, abs=1e-6)
-    assert found.stops[0].turning == pytest.approx(math.pi - 2.0 * math.acos(1 / 3))
-    assert found.stops[0].tension_ratio == pytest.approx(math.exp(0.3 * found.stops[0].turning))
+    assert found.visits[0].turning == pytest.approx(math.pi - 2.0 * math.acos(1 / 3))
+    assert found.visits[0].tension_ratio == pytest.approx(math.exp(0.3 * found.visits[0].turning))
 
 
 @settings(max_examples=5, deadline=None)
@@ -226,7 +226,7 @@ def test_within_its_margin_a_tour_fits_every_world_and_beyond_it_the_grown_one_d
     assert found.obstacles > 0.0
     assert violations(problem, solution, found.obstacles, worlds=4, seed=seed) == 0
     if not re.search("would (be nearer|lie in)", found.limited_by):
-        assert _complaint(problem, solution, found.obstacles * (1 + 1e-6) + 1e-9) is not None
+        assert _misfit(problem, solution, found.obstacles * (1 + 1e-6) + 1e-9) is not None
 
 
 def test_worlds_that_are_off_by_more_than_the_margin_are_seen(monkeypatch):

@@ -73,7 +73,7 @@ from netsp.online.guard.reasons import (
 from netsp.online.guard.site import Loop
 from netsp.online.guard.telemetry import Fix
 from netsp.online.link.vehicle_kind import VehicleKind
-from netsp.plan.cover.choose import greedy, pruned, simple_bound
+from netsp.plan.cover.choose import choose_greedily, counting_bound, prune
 from netsp.plan.tour_plan import HOME, Leg
 
 # words
@@ -249,27 +249,27 @@ def test_pruning_keeps_what_is_needed_and_takes_the_least_useful_first(seed):
     weights = rng.uniform(0.1, 1.0, 9)
     needed = 0.9 * float(weights[matrix.any(axis=0)].sum())
     taken = np.arange(6)
-    kept = pruned(matrix, weights, taken, needed)
+    kept = prune(matrix, weights, taken, needed)
 
     def seen(some):
         return float(weights[matrix[list(some)].any(axis=0)].sum()) if len(some) else 0.0
 
     assert seen(kept) >= needed * (1.0 - 1e-9)
     assert all(seen([j for j in kept if j != k]) < needed for k in kept)
-    found = greedy(matrix, weights, needed)
+    found = choose_greedily(matrix, weights, needed)
     assert seen(found) >= needed * (1.0 - 1e-9)
     fewest = next(
         n for n in range(7)
         if any(seen(c) >= needed * (1 - 1e-12) for c in itertools.combinations(range(6), n))
     )  # fmt: skip
-    assert simple_bound(matrix, weights, needed) <= fewest <= len(kept)
+    assert counting_bound(matrix, weights, needed) <= fewest <= len(kept)
 
 
 def test_pruning_drops_the_viewpoint_that_alone_sees_least():
     """The first sees nearly all by itself; the others see single patches that it lacks."""
     matrix = np.array([[1, 1, 1, 1, 0, 0], [0, 0, 0, 1, 1, 0], [0, 0, 0, 0, 0, 1]], dtype=bool)
     weights = np.array([4.0, 3.0, 2.0, 1.0, 0.5, 0.2])
-    assert pruned(matrix, weights, np.arange(3), 10.0).tolist() == [0]
+    assert prune(matrix, weights, np.arange(3), 10.0).tolist() == [0]
 
 
 # exported missions

@@ -645,17 +645,17 @@ def test_loops_and_vectorised_form_fill_in_the_same_legs(depth, monkeypatch):
         goal.model_copy(update={"position": (*goal.position[:2], -depth * k)})
         for k, goal in enumerate(problem.goals)
     ]
-    at_once, compared = interpreted(branches.spread), []
+    at_once, compared = interpreted(branches.fill_parallel), []
 
     def both(*args):
         lengths = args[-1]._replace(out=args[-1].out.copy())
-        _loops(branches.spread)(*args[:-1], lengths)
+        _loops(branches.fill_parallel)(*args[:-1], lengths)
         at_once(*args)
         compared.append(np.array_equal(lengths.out, args[-1].out, equal_nan=True))
 
-    monkeypatch.setitem(interpretation._in_numpy, branches.spread.py_func, both)
+    monkeypatch.setitem(interpretation._in_numpy, branches.fill_parallel.py_func, both)
     interpretation._interpreted.cache_clear()
-    monkeypatch.setattr(taut_legs, "spread", both)
+    monkeypatch.setattr(taut_legs, "fill_parallel", both)
     with everything_interpreted():
         travel_graph(problem.model_copy(update={"goals": tuple(goals)})).costs  # noqa: B018
     interpretation._interpreted.cache_clear()

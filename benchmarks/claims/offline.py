@@ -350,7 +350,7 @@ def pulled() -> tuple[str, bool]:
         roadmap = legs.TautRoadmap(problem)
         pairs, chosen = legs.some_legs(roadmap, 2000)
         _, off = legs.off(roadmap.paths, chosen[:100])
-        measure = functools.partial(roadmap.legs._each, pairs[:, 0], pairs[:, 1])
+        measure = functools.partial(roadmap.legs._pull_pairs, pairs[:, 0], pairs[:, 1])
         share, each = (measure() < 0.0).mean(), legs.microseconds(measure, len(pairs))
         failed, worst, longest = max(failed, share), max(worst, off), max(longest, each)
     held = failed <= 0.01 and worst <= 1e-9 and longest <= 20.0

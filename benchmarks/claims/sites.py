@@ -188,7 +188,7 @@ def chart() -> tuple[str, bool]:
     from netsp.exchange.maps.projection import Projection
     from netsp.exchange.maps.read_map import import_site
     from netsp.exchange.maps.selection import Selection
-    from netsp.roadmap.reachable_goals import within_reach
+    from netsp.roadmap.reachable_goals import keep_reachable_goals
 
     file = DATA / "charts" / "US5MIACB.000"
     if not file.is_file():
@@ -199,7 +199,7 @@ def chart() -> tuple[str, bool]:
     )  # fmt: skip
     begin = time.process_time()
     found = import_site(file, Projection(25.77854, -80.18550), options=options)
-    problem, _ = within_reach(found.problem, found.viewpoints)
+    problem, _ = keep_reachable_goals(found.problem, found.viewpoints)
     read = time.process_time() - begin
     assert problem.site is not None
     layers = problem.site.imported

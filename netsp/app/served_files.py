@@ -249,7 +249,7 @@ def _site(
     from netsp.exchange.maps.options import Looking, SiteOptions
     from netsp.exchange.maps.projection import Projection
     from netsp.exchange.maps.read_map import import_site
-    from netsp.roadmap.reachable_goals import UNREACHED, unreached_note, within_reach
+    from netsp.roadmap.reachable_goals import UNREACHED, keep_reachable_goals, unreached_note
 
     about = Projection.parse(answers.base, name="base") if answers.base else None
     asked = answers.viewpoints is not None and answers.standoff is not None
@@ -274,7 +274,7 @@ def _site(
     in_table = set(problem.site.notes)
     notes += [f"{file.name}: {note}" for note in found.notes if note not in in_table]
     if found.viewpoints and problem.site.cropped is not None:
-        problem, why = within_reach(problem, found.viewpoints)
+        problem, why = keep_reachable_goals(problem, found.viewpoints)
         if why:
             notes.append(f"{file.name}: {unreached_note(found.problem.goals, problem.goals)}")
             problem = found.keeping(problem, UNREACHED).problem

@@ -212,12 +212,14 @@ def run(args: argparse.Namespace) -> int:
     why: list[str] = []
     is_cropped = problem.site is not None and problem.site.cropped is not None
     if args.skip_unreachable or (is_cropped and viewpoints):
-        from netsp.roadmap.reachable_goals import UNREACHED, unreached_note, within_reach
+        from netsp.roadmap.reachable_goals import UNREACHED, keep_reachable_goals, unreached_note
 
         try:
             with Patience(sys.stderr, "looking for the goals in reach"):
                 before = problem.goals
-                problem, why = within_reach(problem, None if args.skip_unreachable else viewpoints)
+                problem, why = keep_reachable_goals(
+                    problem, None if args.skip_unreachable else viewpoints
+                )
         except InfeasibleError:
             if found is not None:
                 show_table(args.site, found)

@@ -55,7 +55,7 @@ def describe(problem: Problem, found: Margins) -> str:
         f"{'visit':>5}  {'goal':<14} {'tether':>10} {'slack':>10} {'turning':>9} {'tension':>8} "
         f"{'clearance':>9}",
     ]
-    for k, s in enumerate(found.stops, 1):
+    for k, s in enumerate(found.visits, 1):
         lines.append(
             f"{k:>5}  {s.name:<14.14} {s.tether:>10.6g} {s.slack:>10.6g} "
             f"{math.degrees(s.turning):>8.1f}° {s.tension_ratio:>8.3g} "

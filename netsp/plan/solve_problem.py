@@ -486,10 +486,10 @@ def _within_turning(problem: Problem, graph: TravelGraph, most: float, clock: Cl
         return graph
     if graph.start is not None:
         raise InputError("max_tension_ratio: a tour from a state has no such limit; expected none")
-    from netsp.roadmap.turning import within_turning
+    from netsp.roadmap.turning import limit_turning
 
     with graph.on_clock(clock):
-        return within_turning(problem, graph, most)
+        return limit_turning(problem, graph, most)
 
 
 def _timings(clock: Clock, built: float, graph: TravelGraph) -> Timings:

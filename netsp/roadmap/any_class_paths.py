@@ -56,7 +56,7 @@ def taut_detours(
     check()
     graph = ContactGraph(outline, tangents, policy=policy)
     check()
-    return tabulate(problem, outline, graph, np.arange(graph.points), places, side, check)
+    return tabulate_detours(problem, outline, graph, np.arange(graph.points), places, side, check)
 
 
 def sub_goals(
@@ -95,7 +95,7 @@ def sub_goals(
     return np.array(places).reshape(-1, 2), np.array(side, dtype=np.int64)
 
 
-def tabulate(
+def tabulate_detours(
     problem: Problem,
     outline: Outline,
     graph: ShortestPaths,

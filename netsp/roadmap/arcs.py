@@ -82,7 +82,7 @@ class Arcs(NamedTuple):
     max_backward_turn: float
 
 
-def arcs_of(
+def build_arcs(
     problem: Problem,
     outline: Outline,
     graph: TangentGraph,
@@ -113,9 +113,9 @@ def arcs_of(
         row.append(row[-1] + len(own))
     source = np.repeat(np.arange(nodes), np.diff(graph.start))
     gap_letters, gaps, begin = _gap_letters(graph)
-    real = np.column_stack([graph.length, graph.angle, graph.turn, _along(graph)])
+    real = np.column_stack([graph.length, graph.angle, graph.turn, _angles_along(graph)])
     table = np.full((1 << max(4, (3 * len(source)).bit_length()), 2), -1, dtype=np.int64)
-    _fill(source * nodes + graph.target, table)
+    _fill_table(source * nodes + graph.target, table)
     whole = np.column_stack([graph.first, graph.segment_row, graph.arrival_row, gaps])
     blockers = outline.blockers
     solid = np.column_stack(
@@ -147,7 +147,7 @@ def arcs_of(
     )
 
 
-def _along(graph: TangentGraph) -> Floats:
+def _angles_along(graph: TangentGraph) -> Floats:
     """(e,) angle from the first departure of an arc to each."""
     step = np.maximum(graph.gap, 0.0)
     before = np.concatenate([[0.0], np.cumsum(step)])
@@ -168,26 +168,26 @@ def _gap_letters(graph: TangentGraph) -> tuple[Ints, Ints, Ints]:
 
 
 @kernel
-def _slot(code: int, slots: int) -> int:
+def _first_slot(code: int, slots: int) -> int:
     """Where to look first: Knuth's multiplicative hashing."""
     return int(((code * 0x9E3779B1) >> 7) & (slots - 1))
 
 
 @kernel
-def _fill(code: Ints, table: Ints) -> None:
+def _fill_table(code: Ints, table: Ints) -> None:
     slots = len(table)
     for e in range(len(code)):
-        slot = _slot(code[e], slots)
+        slot = _first_slot(code[e], slots)
         while table[slot, 0] >= 0:
             slot = (slot + 1) & (slots - 1)
         table[slot, 0], table[slot, 1] = code[e], e
 
 
 @kernel
-def tangent(code: int, table: Ints) -> int:
+def find_tangent(code: int, table: Ints) -> int:
     """The departure of a code; -1 if there is none."""
     slots = len(table)
-    slot = _slot(code, slots)
+    slot = _first_slot(code, slots)
     while table[slot, 0] >= 0:
         if table[slot, 0] == code:
             return int(table[slot, 1])

@@ -146,7 +146,7 @@ def augment(
     edges: Ints,
     letters: tuple[Ints, Ints],
     tether_length: float,
-    cap: int,
+    max_vertices: int,
     stop: Flag = NEVER,
 ) -> AugmentedGraph:
     """Augment a roadmap from milestone 0, the base.
@@ -172,15 +172,15 @@ def augment(
     # a directed edge is its undirected number, with the sign of its sense
     number = np.concatenate([np.arange(len(edges)), -1 - np.arange(len(edges))])[order]
     head = np.concatenate([edges[:, 1], edges[:, 0]])[order]
-    milestone, node, length, trie, size, ok, complete = _reach(
-        start, number, head, cost, letters[0], letters[1], float(tether_length), cap, stop
+    milestone, node, length, trie, size, ok, complete = _reach_vertices(
+        start, number, head, cost, letters[0], letters[1], float(tether_length), max_vertices, stop
     )
     if not ok:
         raise InputError(
-            f"tether_length: {tether_length:g} gives more than {cap} vertices (milestone, word); "
-            "lower tether_length or samples, or raise max_augmented"
+            f"tether_length: {tether_length:g} gives more than {max_vertices} vertices "
+            "(milestone, word); lower tether_length or samples, or raise max_augmented"
         )
-    row, target, edge = _expand(
+    row, target, edge = _expand_edges(
         start, number, head, letters[0], letters[1], milestone, node, trie, n
     )
     return AugmentedGraph(
@@ -197,7 +197,9 @@ def augment(
 
 
 @kernel
-def _onward(node: int, k: int, letters: Ints, row: Ints, trie: Ints, size: int) -> tuple[int, int]:
+def _word_after_edge(
+    node: int, k: int, letters: Ints, row: Ints, trie: Ints, size: int
+) -> tuple[int, int]:
     """The trie node after edge k (negative: backwards); -1 where the word loops. Makes nodes up to
     the capacity of the trie when size >= 0, else only finds them. Returns node, size."""
     backward = k < 0
@@ -220,7 +222,7 @@ def _onward(node: int, k: int, letters: Ints, row: Ints, trie: Ints, size: int) 
 
 
 @kernel
-def _loops(node: int, trie: Ints) -> bool:
+def _is_looping(node: int, trie: Ints) -> bool:
     v = node
     while v > 0:
         u = trie[v, PARENT]
@@ -233,7 +235,7 @@ def _loops(node: int, trie: Ints) -> bool:
 
 
 @kernel
-def _reach(
+def _reach_vertices(
     start: Ints,
     number: Ints,
     head: Ints,
@@ -241,7 +243,7 @@ def _reach(
     letters: Ints,
     row: Ints,
     limit: float,
-    cap: int,
+    max_vertices: int,
     stop: Ints,
 ) -> tuple[Ints, Ints, Floats, Ints, int, bool, bool]:
     """Dijkstra over (milestone, word) from (0, empty word), up to the tether length."""
@@ -297,7 +299,7 @@ def _reach(
                 continue
             if size + longest >= len(trie):
                 trie = more_int_rows(trie)
-            w2, size = _onward(w, k, letters, row, trie, size)
+            w2, size = _word_after_edge(w, k, letters, row, trie, size)
             key = w2 * n + head[e]
             slot = (key * 0x9E3779B1) % slots
             while slot_key[slot] >= 0 and slot_key[slot] != key:
@@ -305,9 +307,9 @@ def _reach(
                 if slot == slots:
                     slot = 0
             if slot_key[slot] < 0:
-                if w2 != w and _loops(w2, trie):
+                if w2 != w and _is_looping(w2, trie):
                     continue
-                if count == cap:
+                if count == max_vertices:
                     return (
                         ids[:count, 0].copy(),
                         ids[:count, 1].copy(),
@@ -393,7 +395,7 @@ def _sift_down(heap_d: Floats, heap_v: Ints, heap: int) -> None:
 
 
 @kernel
-def _expand(
+def _expand_edges(
     start: Ints,
     number: Ints,
     head: Ints,
@@ -428,7 +430,7 @@ def _expand(
     for v in range(count):
         for e in range(start[milestone[v]], start[milestone[v] + 1]):
             k = number[e]
-            w, _ = _onward(node[v], k, letters, row, trie, -1)
+            w, _ = _word_after_edge(node[v], k, letters, row, trie, -1)
             if w < 0:
                 continue
             code = w * n + head[e]

@@ -23,8 +23,8 @@ from netsp.base.arrays import Floats, Ints
 from netsp.base.compiled.interpretation import interpreted, interprets
 from netsp.base.compiled.kernel import kernel
 from netsp.roadmap.arcs import Arcs
-from netsp.roadmap.slits import Ends, Slits, longest_word, room_for
-from netsp.roadmap.taut_by_word import NODE, SAME_ANGLE, SLID, path_for, pull
+from netsp.roadmap.slits import Ends, Slits, empty_workspace, max_word_length
+from netsp.roadmap.taut_by_word import NODE, SAME_ANGLE, SLID, empty_path, pull
 from netsp.roadmap.tethertree import TetherTree
 
 SLIDE_TOLERANCE = 1e-9
@@ -89,10 +89,10 @@ class Lengths(NamedTuple):
     row: Ints
 
 
-def branches_of(tree: TetherTree, vertices: Ints) -> Branches:
+def build_branches(tree: TetherTree, vertices: Ints) -> Branches:
     """The branches of some vertices of a tree."""
     last, slid = tree.last[vertices], tree.slid[vertices]
-    size = _sizes(tree.parent, last)
+    size = _subtree_sizes(tree.parent, last)
     # what leaves a bend: bends with vertices beyond them, as negative numbers (the root leaves
     # none), and vertices
     bends = np.flatnonzero(size[1:]) + 1
@@ -101,7 +101,7 @@ def branches_of(tree: TetherTree, vertices: Ints) -> Branches:
     what = np.concatenate([-bends, np.arange(len(last))])
     by_angle = np.lexsort((angle, owner))
     row = np.searchsorted(owner[by_angle], np.arange(len(size) + 1)).astype(np.int64)
-    order, begin, end = _laid_out(what[by_angle], row, size, len(last))
+    order, begin, end = _order_vertices(what[by_angle], row, size, len(last))
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     return Branches(
@@ -120,7 +120,7 @@ def branches_of(tree: TetherTree, vertices: Ints) -> Branches:
 
 
 @kernel
-def _sizes(parent: Ints, last: Ints) -> Ints:
+def _subtree_sizes(parent: Ints, last: Ints) -> Ints:
     """How many vertices are beyond each bend."""
     size = np.zeros(len(parent), dtype=np.int64)
     for v in range(len(last)):
@@ -131,7 +131,7 @@ def _sizes(parent: Ints, last: Ints) -> Ints:
 
 
 @kernel
-def _laid_out(what: Ints, row: Ints, size: Ints, count: int) -> tuple[Ints, Ints, Ints]:
+def _order_vertices(what: Ints, row: Ints, size: Ints, count: int) -> tuple[Ints, Ints, Ints]:
     """`Branches.order`, `begin` and `end`."""
     order = np.empty(count, dtype=np.int64)
     begin = np.empty(len(what), dtype=np.int64)
@@ -174,8 +174,8 @@ def fill(
     """
     order, out, row = branches.order, lengths.out, lengths.row
     whole = len(out) == len(order)  # then what comes before is known from the other end
-    longest = longest_word(ends.row)
-    room, path = room_for(longest, slits), path_for(longest, arcs.max_bends)
+    longest = max_word_length(ends.row)
+    room, path = empty_workspace(longest, slits), empty_path(longest, arcs.max_bends)
     while i < len(order) and stop[0] == 0:
         u = order[i]
         while j < len(order) and row[i] >= 0 and point[u] != 0:
@@ -186,7 +186,7 @@ def fill(
                 length, _, count = pull(a, b, ends, point, slits, arcs, room, path)
                 if length < 0.0:
                     return i, j
-                spread(a, b, length, count, path.whole, path.real, branches, lengths)
+                fill_parallel(a, b, length, count, path.whole, path.real, branches, lengths)
             j += 1
         i += 1
         j = i + 1 if whole else 0
@@ -208,12 +208,12 @@ def _fill_in_numpy(
     """Vectorise the search of `fill` for the open legs of a row."""
     order, out, row = branches.order, lengths.out, lengths.row
     whole, place = len(out) == len(order), point[order]
-    longest = interpreted(longest_word)(ends.row)
+    longest = interpreted(max_word_length)(ends.row)
     room, path = (
-        interpreted(room_for)(longest, slits),
-        interpreted(path_for)(longest, arcs.max_bends),
+        interpreted(empty_workspace)(longest, slits),
+        interpreted(empty_path)(longest, arcs.max_bends),
     )
-    pull_one, note_alike = interpreted(pull), interpreted(spread)
+    pull_one, note_alike = interpreted(pull), interpreted(fill_parallel)
     while i < len(order) and stop[0] == 0:
         u = order[i]
         if row[i] >= 0 and point[u] != 0:
@@ -234,7 +234,7 @@ def _fill_in_numpy(
 
 
 @kernel
-def spread(
+def fill_parallel(
     u: int,
     v: int,
     length: float,
@@ -246,20 +246,20 @@ def spread(
 ) -> None:
     """Note all legs that cross over as that from u to v does, whose planar length is given, and its
     number of tangents (`Path.whole` and `Path.real`)."""
-    i0, i1, j0, j1 = _alike(u, v, count, on, at, branches)
+    i0, i1, j0, j1 = _parallel_ranges(u, v, count, on, at, branches)
     order, planar, row = branches.order, lengths.planar, lengths.row
     saved = planar[u] + planar[v] - length
     # row by row, for memory's sake
     for x in range(i0, i1):
         if row[x] >= 0:
-            _note(lengths.out[row[x]], order[x], j0, j1, saved, order, lengths)
+            _write_legs(lengths.out[row[x]], order[x], j0, j1, saved, order, lengths)
     for y in range(j0, j1):
         if row[y] >= 0:
-            _note(lengths.out[row[y]], order[y], i0, i1, saved, order, lengths)
+            _write_legs(lengths.out[row[y]], order[y], i0, i1, saved, order, lengths)
 
 
 @kernel
-def _note(
+def _write_legs(
     out: Floats, a: int, begin: int, end: int, saved: float, order: Ints, lengths: Lengths
 ) -> None:
     """The legs from one vertex to those of places in the order, so much shorter than both tethers;
@@ -274,8 +274,8 @@ def _note(
         out[b] = share * length
 
 
-@interprets(spread)
-def _spread_in_numpy(
+@interprets(fill_parallel)
+def _fill_parallel_in_numpy(
     u: int,
     v: int,
     length: float,
@@ -285,8 +285,8 @@ def _spread_in_numpy(
     branches: Branches,
     lengths: Lengths,
 ) -> None:
-    """Vectorise `spread` over all legs."""
-    i0, i1, j0, j1 = interpreted(_alike)(u, v, count, on, at, branches)
+    """Vectorise `fill_parallel` over all legs."""
+    i0, i1, j0, j1 = interpreted(_parallel_ranges)(u, v, count, on, at, branches)
     order, planar, row = branches.order, lengths.planar, lengths.row
     saved = planar[u] + planar[v] - length
     a, b = order[i0:i1], order[j0:j1]
@@ -301,31 +301,31 @@ def _spread_in_numpy(
 
 
 @kernel
-def _alike(
+def _parallel_ranges(
     u: int, v: int, count: int, on: Ints, at: Floats, branches: Branches
 ) -> tuple[int, int, int, int]:
     """From and to which places the vertices are whose legs cross over as that of u and v does:
     those on the side of u, and those on the side of v."""
-    p, p_least, p_place = _fork(u, 1, 1, 1, count, on, at, branches)
-    q, q_least, q_place = _fork(v, count - 1, -1, 0, count, on, at, branches)
+    p, p_least, p_place = _find_fork(u, 1, 1, 1, count, on, at, branches)
+    q, q_least, q_place = _find_fork(v, count - 1, -1, 0, count, on, at, branches)
     i0, j0 = branches.rank[u], branches.rank[v]
     i1, j1 = i0 + 1, j0 + 1
     if p >= 0 and q >= 0 and p_place >= q_place:
         # around one arc from tether to tether: how far it slides is up to both ends, so those on
         # the side of u are to leave no earlier than u does
         if p_place == q_place:
-            i0, i1 = _from_angle(p, p_least + at[p_place, SLID], branches), branches.end[p]
-            j0, j1 = _from_angle(q, q_least, branches), branches.end[q]
+            i0, i1 = _first_place(p, p_least + at[p_place, SLID], branches), branches.end[p]
+            j0, j1 = _first_place(q, q_least, branches), branches.end[q]
     else:
         if p >= 0:
-            i0, i1 = _from_angle(p, p_least, branches), branches.end[p]
+            i0, i1 = _first_place(p, p_least, branches), branches.end[p]
         if q >= 0:
-            j0, j1 = _from_angle(q, q_least, branches), branches.end[q]
+            j0, j1 = _first_place(q, q_least, branches), branches.end[q]
     return i0, i1, j0, j1
 
 
 @kernel
-def _fork(
+def _find_fork(
     v: int, first: int, step: int, flip: int, count: int, on: Ints, at: Floats, branches: Branches
 ) -> tuple[int, float, int]:
     """The bend at which a leg leaves the tether of its end v, -1 if it is nowhere along it; the
@@ -345,7 +345,7 @@ def _fork(
 
 
 @kernel
-def _from_angle(bend: int, least: float, branches: Branches) -> int:
+def _first_place(bend: int, least: float, branches: Branches) -> int:
     """The place at which what leaves a bend from an angle on begins."""
     k, after = branches.row[bend], branches.row[bend + 1]
     while k < after and branches.angle[k] < least - SLIDE_TOLERANCE:

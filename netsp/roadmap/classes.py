@@ -16,8 +16,8 @@ import numpy as np
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock
 from netsp.hsignature import Word, is_looping, signature
-from netsp.roadmap.explain_unreachable import unreached
-from netsp.roadmap.explore import NON_LOOPING, Found, run_explore
+from netsp.roadmap.explain_unreachable import find_unreached_error
+from netsp.roadmap.explore import NON_LOOPING, FoundPaths, run_explore
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.trie import Trie
 
@@ -49,13 +49,13 @@ def find_classes(paths: TautPaths, rule: int, most: int, clock: Clock) -> Classe
     Raises InfeasibleError for a goal that no tether within the limit reaches.
     """
     search = _Search(paths, rule, most, clock)
-    search.ready()
+    search.load_kernel()
     search.clock = Clock(search.policy.max_time_share * clock.left, within=clock)
-    found = search.everything()
+    found = search.find_all()
     if found is not None:
         return found
     search.clock = Clock(search.policy.max_time_share * clock.left, within=clock)
-    return search.shortest()
+    return search.find_shortest()
 
 
 class _Search:
@@ -72,11 +72,11 @@ class _Search:
         self.within = np.sqrt(np.maximum(self.limit**2 - self.dz**2, 0.0)) * (1.0 + 1e-15)
         self.within[0] = -1.0
 
-    def ready(self) -> None:
+    def load_kernel(self) -> None:
         """Load the kernel, or compile it: that takes none of the share."""
         run_explore(self.paths.tangents, 0, Trie.root(0.0), margin=self.paths.outline.margin, cap=0)
 
-    def everything(self) -> Classes | None:
+    def find_all(self) -> Classes | None:
         """All classes; None if they are too many, or the time is too short."""
         trie = Trie.root(self.limit)
         found = self.clock.interruptible(
@@ -92,18 +92,18 @@ class _Search:
                 stop=self.clock.flag,
             )
         )
-        best = self._best(found)
+        best = self._shortest_by_class(found)
         if found.capped or len(best) > self.most:
             return None
         missing = sorted(set(range(1, self.goals + 1)) - {g for g, _ in best})
         if missing:
-            raise unreached(
+            raise find_unreached_error(
                 self.problem, self.paths.outline, missing, self.whole, self.paths.policy
             )
         rows = sorted((g, length, trie.word(w)) for (g, w), length in best.items())
-        return _together(rows, math.inf)
+        return _collect(rows, math.inf)
 
-    def shortest(self) -> Classes:
+    def find_shortest(self) -> Classes:
         """The shortest classes of every goal, about as many of each; at least one, whatever the
         time."""
         share = max(1, self.most // self.goals)
@@ -111,7 +111,7 @@ class _Search:
         planar, before = contacts.tree(0)
         missing = [g for g in range(1, self.goals + 1) if planar[g] > self.within[g]]
         if missing:
-            raise unreached(
+            raise find_unreached_error(
                 self.problem, self.paths.outline, missing, self.whole, self.paths.policy
             )
         rays = self.problem.representative_points - self.paths.outline.origin
@@ -122,16 +122,16 @@ class _Search:
             nearest = (float(planar[g]), word)
             own, beyond = [nearest], nearest[0]
             if not (self.clock.up or (self.rule == NON_LOOPING and is_looping(nearest[1]))):
-                own, beyond = self._of_goal(g, share)
+                own, beyond = self._shortest_of_goal(g, share)
                 own = own or [nearest]
             rows += [(g, length, word) for length, word in own]
             left_out = min(left_out, math.hypot(beyond, self.dz[g]))
-        return _together(rows, left_out)
+        return _collect(rows, left_out)
 
-    def _of_goal(self, g: int, share: int) -> tuple[list[tuple[float, Word]], float]:
+    def _shortest_of_goal(self, g: int, share: int) -> tuple[list[tuple[float, Word]], float]:
         """The shortest classes of one goal, in order, and the planar length up to which they are
         all (inf if there are no more within the tether)."""
-        rest = self.paths.contacts.rest(g)
+        rest = self.paths.contacts.remaining_lengths(g)
         least, most = float(rest.source), float(self.within[g])
         known: list[tuple[float, Word]] = []
         known_to = least
@@ -139,7 +139,7 @@ class _Search:
         excess = self.policy.first_excess * max(most - least, 0.0)
         for _ in range(self.policy.max_searches):
             reach = min(least + excess + self.paths.margin, most)
-            found, words = self._within(g, rest.to_end, reach, share)
+            found, words = self._classes_up_to(g, rest.to_end, reach, share)
             if found is None:
                 high = excess
                 if self.clock.up:
@@ -161,9 +161,9 @@ class _Search:
             known = known[:share]
         return known, known_to
 
-    def _within(
+    def _classes_up_to(
         self, g: int, rest: Floats, reach: float, share: int
-    ) -> tuple[Found | None, list[tuple[float, Word]]]:
+    ) -> tuple[FoundPaths | None, list[tuple[float, Word]]]:
         """The classes of a goal up to a planar length; None if there are too many to look at."""
         trie = Trie.root(reach)
         within = np.full(self.goals + 1, -1.0)
@@ -184,12 +184,12 @@ class _Search:
         )
         if found.capped:
             return None, []
-        nearest = sorted((length, w) for (_, w), length in self._best(found).items())
+        nearest = sorted((length, w) for (_, w), length in self._shortest_by_class(found).items())
         # one more than can be kept tells how long the shortest is that is not
         rows = [(length, trie.word(w)) for length, w in nearest[: share + 1]]
         return found, sorted(rows)
 
-    def _best(self, found: Found) -> dict[tuple[int, int], float]:
+    def _shortest_by_class(self, found: FoundPaths) -> dict[tuple[int, int], float]:
         """Shortest length by (goal, word) among the hits within the tether."""
         reach = np.hypot(found.length, self.dz[found.goal])
         rows = np.flatnonzero((found.goal > 0) & (reach <= self.limit))
@@ -204,7 +204,7 @@ class _Search:
         return best
 
 
-def _together(rows: list[tuple[int, float, Word]], left_out: float) -> Classes:
+def _collect(rows: list[tuple[int, float, Word]], left_out: float) -> Classes:
     return Classes(
         np.array([0, *(g for g, _, _ in rows)], dtype=np.int64),
         [(), *(word for _, _, word in rows)],

@@ -69,12 +69,12 @@ def shortest_tethers(
     return np.asarray(np.hypot(planar, points[1:, 2] - points[0, 2]))
 
 
-def explain_unreached(problem: Problem, outline: Outline, missing: list[int]) -> str:
+def unreached_message(problem: Problem, outline: Outline, missing: list[int]) -> str:
     """One line on goals (as point numbers, base 0) that no admissible tether reaches."""
-    return str(unreached(problem, outline, missing))
+    return str(find_unreached_error(problem, outline, missing))
 
 
-def unreached(
+def find_unreached_error(
     problem: Problem,
     outline: Outline,
     missing: list[int],
@@ -84,10 +84,10 @@ def unreached(
     """Return the error about goals (as point numbers, base 0) that no admissible tether reaches;
     LimitReachedError when the clock is up before it is known why."""
     needed = shortest_tethers(problem, outline, clock, policy)
-    return why_unreached(problem, needed, [g - 1 for g in missing])
+    return unreached_error(problem, needed, [g - 1 for g in missing])
 
 
-def why_unreached(problem: Problem, needed: Floats, missing: list[int]) -> InfeasibleError:
+def unreached_error(problem: Problem, needed: Floats, missing: list[int]) -> InfeasibleError:
     """The error about goals that no admissible tether reaches, given the shortest for each goal."""
     parts: list[str] = []
     enclosing: tuple[int, ...] = ()

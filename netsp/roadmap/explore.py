@@ -40,7 +40,7 @@ GIVEN, NON_LOOPING, ALL = range(3)
 """Codes of the words that may join the trie: only the given ones, those that do not loop, all."""
 
 
-class Net(NamedTuple):
+class TangentArrays(NamedTuple):
     """The arrays of a `TangentGraph` that the kernel walks.
 
     Attributes
@@ -66,7 +66,7 @@ class Net(NamedTuple):
     longest: int
 
 
-class Words(NamedTuple):
+class WordRules(NamedTuple):
     """How words grow: the letters that rows point into, the boxes in which letters may be pending
     (with the margin of positions), which new words join the core, and within which two lengths of
     one arrival are the same."""
@@ -77,7 +77,7 @@ class Words(NamedTuple):
     same: float
 
 
-class Ask(NamedTuple):
+class SearchRequest(NamedTuple):
     """What is sought.
 
     Attributes
@@ -115,7 +115,7 @@ before the departure taken."""
 
 
 @kernel
-def _may_wait(node: int, x: float, y: float, trie: Ints, pending: Floats) -> bool:
+def _can_cancel(node: int, x: float, y: float, trie: Ints, pending: Floats) -> bool:
     """Whether the letters that lead out of the core can all still be cancelled from a bend at
     (x, y)."""
     v = node
@@ -148,7 +148,7 @@ def _in_box(a: int, x: float, y: float, pending: Floats) -> bool:
 
 
 @kernel
-def _joins(node: int, a: int, rule: int, trie: Ints) -> bool:
+def _joins_core(node: int, a: int, rule: int, trie: Ints) -> bool:
     """Whether the word of a node with one letter more is one of those that are sought."""
     if rule == GIVEN or trie[node, CORE] == 0:
         return False
@@ -162,7 +162,7 @@ def _joins(node: int, a: int, rule: int, trie: Ints) -> bool:
 
 
 @kernel
-def _walk(
+def _follow_letters(
     node: int,
     lo: int,
     hi: int,
@@ -184,7 +184,7 @@ def _walk(
             continue
         c = trie_child(node, a, trie)
         if c < 0:
-            joins = _joins(node, a, rule, trie)
+            joins = _joins_core(node, a, rule, trie)
             if not joins and pending[0 if a > 0 else 1, abs(a) - 1, XMIN] == np.inf:
                 return -1, size
             c = size
@@ -192,13 +192,13 @@ def _walk(
             limit[c] = limit[node]
             size += 1
         node = c
-    if trie[node, CORE] == 0 and not _may_wait(node, x, y, trie, pending):
+    if trie[node, CORE] == 0 and not _can_cancel(node, x, y, trie, pending):
         return -1, size
     return node, size
 
 
 @kernel
-def _arrives_anew(code: int, mark: float, same: float, key: Ints, length: Floats) -> bool:
+def _is_new_arrival(code: int, mark: float, same: float, key: Ints, length: Floats) -> bool:
     """Whether no arrival with this code (word and directed arc) had this length; it is noted.
     Collinear tangents give one path several spellings."""
     slots = len(key)
@@ -216,7 +216,14 @@ def _arrives_anew(code: int, mark: float, same: float, key: Ints, length: Floats
 
 @kernel
 def explore(
-    net: Net, words: Words, ask: Ask, source: int, trie: Ints, limit: Floats, size: int, stop: Ints
+    net: TangentArrays,
+    words: WordRules,
+    ask: SearchRequest,
+    source: int,
+    trie: Ints,
+    limit: Floats,
+    size: int,
+    stop: Ints,
 ) -> tuple[tuple[Ints, Floats, int], tuple[Ints, Floats], tuple[Ints, Floats], bool]:
     """All taut paths from node `source` whose words stay in (or pend from) the core of the trie,
     which has `size` nodes, each with the limit of its paths.
@@ -277,7 +284,7 @@ def explore(
             least = reached + rest[e]
             w = -1
             if least <= limit[0]:  # no word may be longer
-                w, size = _walk(
+                w, size = _follow_letters(
                     word,
                     segment_row[e, 0],
                     segment_row[e, 1],
@@ -307,11 +314,11 @@ def explore(
                 f = first[e]
                 mark = reached + radius[goal] * turn[e]
                 code = w * len(radius) + goal
-                if _arrives_anew(code, mark, words.same, seen_key, seen_length):
+                if _is_new_arrival(code, mark, words.same, seen_key, seen_length):
                     seen += 1
                     if 2 * seen > len(seen_key):
                         seen_key, seen_length = rehashed(seen_key, seen_length)
-                    w, size = _walk(
+                    w, size = _follow_letters(
                         w,
                         arrival_row[e, 0],
                         arrival_row[e, 1],
@@ -343,7 +350,7 @@ def explore(
                 break
             slid += gap[e]
             following = e + 1 if e + 1 < end else begin
-            word, size = _walk(
+            word, size = _follow_letters(
                 word,
                 gap_row[e, 0],
                 gap_row[e, 1],
@@ -363,7 +370,7 @@ def explore(
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundPaths:
     """What a search hit: goal points, trie nodes of their words, lengths; and the search tree if it
     was kept: per state (arrival) the rows of the kernel, length at arrival, angle slid before."""
 
@@ -401,7 +408,7 @@ def run_explore(
     within: Floats | None = None,
     most: int | None = None,
     stop: Flag = NEVER,
-) -> Found:
+) -> FoundPaths:
     """Run the kernel from point `source`; updates the trie.
 
     Parameters
@@ -418,7 +425,7 @@ def run_explore(
     """
     no_limit = np.iinfo(np.int64).max
     aim, rest = toward or (-1, np.zeros(len(graph.target)))
-    net = Net(
+    net = TangentArrays(
         graph.start,
         graph.target,
         graph.length,
@@ -434,8 +441,8 @@ def run_explore(
         graph.longest_step,
     )
     wide = graph.pending + margin * np.array([-1.0, -1.0, 1.0, 1.0, 0.0])
-    words = Words(graph.letters, wide, rule, ARRIVAL_TOLERANCE * margin)
-    ask = Ask(
+    words = WordRules(graph.letters, wide, rule, ARRIVAL_TOLERANCE * margin)
+    ask = SearchRequest(
         keep,
         no_limit if cap is None else cap,
         rest,
@@ -446,7 +453,7 @@ def run_explore(
     (trie.nodes, trie.limit, trie.size), (h_i, h_f), (s_i, s_f), capped = explore(
         net, words, ask, graph.point_node(source), trie.nodes, trie.limit, trie.size, stop
     )
-    return Found(
+    return FoundPaths(
         h_i[:, 0],
         h_i[:, 1],
         h_f[:, 0],

@@ -67,7 +67,7 @@ class GraphFromState(TravelGraph):
             within.cluster,
             within.signatures,
             within.tethers,
-            _OpenedLegs(within, start, surcharge),
+            _SurchargedLegs(within, start, surcharge),
             within.roadmap,
             classes=within.classes,
             least_left_out=within.least_left_out,
@@ -88,7 +88,7 @@ class GraphFromState(TravelGraph):
         """As of `TravelGraph`, with the surcharge."""
         places = np.arange(self.goal_count + 1)
         ends = int(self.cluster[self.start or 0])
-        return charged(self.within.between_goals(up), places, places, ends, self.surcharge)
+        return add_surcharge(self.within.between_goals(up), places, places, ends, self.surcharge)
 
     @property
     def knows_ways(self) -> bool:
@@ -117,11 +117,11 @@ class GraphFromState(TravelGraph):
 
     def as_asked(self, result: Result) -> Result:
         """Return a solver's result on this graph as one about the path from the state."""
-        own = self._of_path(result.bound)
-        low = self._of_path(self.bound_as_asked(result.bound, anywhere=result.tour is not None))
+        own = self._path_bound(result.bound)
+        low = self._path_bound(self.bound_as_asked(result.bound, anywhere=result.tour is not None))
         result = dataclasses.replace(
             result,
-            trace=tuple(self._row_of_path(r, anywhere=False) for r in result.trace),
+            trace=tuple(self._path_progress(r, anywhere=False) for r in result.trace),
             lower_bound=None if low is None else low.length,
             lower_bound_of=self.scope if low is None else low.scope,
         )
@@ -154,7 +154,7 @@ class GraphFromState(TravelGraph):
             lower_bound=None if low is None else low.at_most(length).length,
         )
 
-    def _of_path(self, bound: LowerBound | None) -> LowerBound | None:
+    def _path_bound(self, bound: LowerBound | None) -> LowerBound | None:
         """Return a bound on paths from the state, given one on closed tours, which include the
         surcharge twice."""
         if bound is None:
@@ -177,20 +177,20 @@ class GraphFromState(TravelGraph):
         """Return a listener that receives progress of the path instead of the tour."""
         if listener is None:
             return None
-        return lambda row: listener(self._row_of_path(row))
+        return lambda row: listener(self._path_progress(row))
 
-    def _row_of_path(self, row: Progress, *, anywhere: bool = True) -> Progress:
+    def _path_progress(self, row: Progress, *, anywhere: bool = True) -> Progress:
         off = 2.0 * self.surcharge
         return dataclasses.replace(
             row,
             incumbent=None if row.incumbent is None else row.incumbent - off,
-            bound=self._of_path(self.bound_as_asked(row.bound, anywhere=anywhere)),
+            bound=self._path_bound(self.bound_as_asked(row.bound, anywhere=anywhere)),
             current=None if row.current is None else row.current - off,
             tour=None if row.tour is None else self.as_tour(row.tour),
         )
 
 
-def charged(table: Floats, rows: Ints, columns: Ints, start: int, surcharge: float) -> Floats:
+def add_surcharge(table: Floats, rows: Ints, columns: Ints, start: int, surcharge: float) -> Floats:
     """Lengths with the surcharge on all legs of the base and the start, but for the one between
     them, which is for nothing.
 
@@ -211,7 +211,7 @@ def charged(table: Floats, rows: Ints, columns: Ints, start: int, surcharge: flo
     return out
 
 
-class _OpenedLegs:
+class _SurchargedLegs:
     """Legs with the surcharge."""
 
     def __init__(self, within: TravelGraph, start: int, surcharge: float) -> None:
@@ -225,7 +225,7 @@ class _OpenedLegs:
         return self.within.bounds_of_left_out()
 
     def _charged(self, table: Floats, rows: Ints, columns: Ints) -> Floats:
-        return charged(table, rows, columns, self.start, self.surcharge)
+        return add_surcharge(table, rows, columns, self.start, self.surcharge)
 
     def lengths(
         self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None

@@ -129,7 +129,7 @@ def build_outline(problem: Problem, clock: Clock | None = None) -> Outline:
         OUTLINING, steps, lambda stop: _visible_arcs(disks, blockers, bounds, stop)
     )
     places = problem.points[:, :2] - origin
-    points = np.array([pushed_out(p, blockers, STAND_OFF * scale) for p in places])
+    points = np.array([push_out(p, blockers, STAND_OFF * scale) for p in places])
     rays = problem.representative_points - origin
     arcs, full = np.ascontiguousarray(rows[:, :5]), rows[:, 5] > 0.0
     return Outline(blockers, arcs, full, origin, places, points, rays, margin)
@@ -179,7 +179,7 @@ def _vertex_disks(v: Floats, growth: float) -> list[tuple[float, float, float, f
     return disks
 
 
-def pushed_out(point: Floats, blockers: Blockers, distance: float) -> Floats:
+def push_out(point: Floats, blockers: Blockers, distance: float) -> Floats:
     """Move a point that lies on a grown boundary, or nearly, to a distance from it."""
     p = np.array(point, dtype=float)
     for _ in range(32):
@@ -216,7 +216,7 @@ def _push_out_of_polygon(p: Floats, o: int, blockers: Blockers, stand_off: float
 
 
 @kernel
-def _covered(x: float, y: float, blockers: Blockers, bounds: Floats) -> bool:
+def _is_blocked(x: float, y: float, blockers: Blockers, bounds: Floats) -> bool:
     eps = blockers.eps
     if x < bounds[0] - eps or x > bounds[2] + eps or y < bounds[1] - eps or y > bounds[3] + eps:
         return True
@@ -224,7 +224,7 @@ def _covered(x: float, y: float, blockers: Blockers, bounds: Floats) -> bool:
 
 
 @kernel
-def apart(cx: float, cy: float, r: float, boxes: Floats, k: int) -> bool:
+def is_disjoint(cx: float, cy: float, r: float, boxes: Floats, k: int) -> bool:
     """Return whether the box of a disk and box k have no point in common."""
     return bool(
         boxes[k, 0] > cx + r or boxes[k, 2] < cx - r or boxes[k, 1] > cy + r or boxes[k, 3] < cy - r
@@ -251,14 +251,14 @@ def _visible_arcs(disks: Floats, blockers: Blockers, bounds: Floats, stop: Ints)
         n = zero
         node = zero
         while node < len(skip):
-            if apart(cx, cy, r, tree_box, node):
+            if is_disjoint(cx, cy, r, tree_box, node):
                 node = skip[node]
                 continue
             node += 1
             if skip[node - 1] > node:
                 continue
             for p in range(tree_first[node - 1], tree_stop[node - 1]):
-                if apart(cx, cy, r, part_box, p):
+                if is_disjoint(cx, cy, r, part_box, p):
                     continue
                 o, e = part[p, 0], part[p, 1]
                 if n + 6 > len(cuts):
@@ -302,7 +302,7 @@ def _visible_arcs(disks: Floats, blockers: Blockers, bounds: Floats, stop: Ints)
         open_start = np.nan
         for i in range(m - 1):
             mid = 0.5 * (inside[i] + inside[i + 1])
-            hidden = inside[i + 1] <= inside[i] or _covered(
+            hidden = inside[i + 1] <= inside[i] or _is_blocked(
                 cx + r * math.cos(mid), cy + r * math.sin(mid), blockers, bounds
             )
             if inside[i + 1] <= inside[i]:
@@ -310,22 +310,22 @@ def _visible_arcs(disks: Floats, blockers: Blockers, bounds: Floats, stop: Ints)
             if not hidden and math.isnan(open_start):
                 open_start = inside[i]
             if hidden and not math.isnan(open_start):
-                arcs, count = _append(arcs, count, cx, cy, r, open_start, inside[i], 0.0)
+                arcs, count = _append_arc(arcs, count, cx, cy, r, open_start, inside[i], 0.0)
                 open_start = np.nan
         if not math.isnan(open_start):
             if whole and open_start == start:
-                arcs, count = _append(arcs, count, cx, cy, r, 0.0, TWO_PI, 1.0)
+                arcs, count = _append_arc(arcs, count, cx, cy, r, 0.0, TWO_PI, 1.0)
             elif whole and count > first and arcs[first, 3] == start:
                 # the arc runs on through the angle where the cone was cut open
                 arcs[first, 3] = open_start
                 arcs[first, 4] += TWO_PI
             else:
-                arcs, count = _append(arcs, count, cx, cy, r, open_start, end, 0.0)
+                arcs, count = _append_arc(arcs, count, cx, cy, r, open_start, end, 0.0)
     return arcs[:count]
 
 
 @kernel
-def _append(
+def _append_arc(
     arcs: Floats, count: int, cx: float, cy: float, r: float, start: float, end: float, whole: float
 ) -> tuple[Floats, int]:
     if count == len(arcs):

@@ -19,12 +19,12 @@ from netsp.base.errors import (
 )
 from netsp.hsignature import Word
 from netsp.model.problem import Problem
-from netsp.roadmap.arcs import Arcs, arcs_of
-from netsp.roadmap.explore import ALL, Found, run_explore
+from netsp.roadmap.arcs import Arcs, build_arcs
+from netsp.roadmap.explore import ALL, FoundPaths, run_explore
 from netsp.roadmap.outline import Outline, build_outline, is_free
 from netsp.roadmap.roadmap_policy import RoadmapPolicy
 from netsp.roadmap.shortest import ContactGraph
-from netsp.roadmap.slits import Ends, Slits, build_slits, flattened, slit_lengths
+from netsp.roadmap.slits import Ends, Slits, build_slits, flatten_words, slit_lengths
 from netsp.roadmap.tangents import TangentGraph, build_tangents
 from netsp.roadmap.taut_by_word import pull_each, pull_one
 from netsp.roadmap.trie import Trie
@@ -69,7 +69,7 @@ class TautPaths:
         # what rounding and the extra growth of obstacles can add to a length
         self.margin = 100.0 * self.outline.margin
         self._z = problem.points[:, 2]
-        self._known: dict[tuple[int, int, Word], tuple[float, list[tuple[int, float]]]] = {}
+        self._cache: dict[tuple[int, int, Word], tuple[float, list[tuple[int, float]]]] = {}
 
     @cached_property
     def contacts(self) -> ContactGraph:
@@ -84,12 +84,12 @@ class TautPaths:
         up : callable
             Returns whether the time is up; the remaining pairs then get straight distances.
         """
-        return self.contacts.between(self._z, up)
+        return self.contacts.distance_bounds(self._z, up)
 
     @cached_property
     def arcs(self) -> Arcs:
         """What a path of a word is pulled over."""
-        return arcs_of(self.problem, self.outline, self.tangents, self.slits, self.policy.paths)
+        return build_arcs(self.problem, self.outline, self.tangents, self.slits, self.policy.paths)
 
     @cached_property
     def slits(self) -> Slits:
@@ -119,10 +119,10 @@ class TautPaths:
         from_, to = np.asarray(a, dtype=np.int64), np.asarray(b, dtype=np.int64)
         ends_of = list(zip(from_.tolist(), to.tolist(), words, strict=True))
         for p, q, word in ends_of:
-            if not self._knows(word):
+            if not self._has_obstacles_of(word):
                 raise UnknownPathError(f"no obstacle for every letter of word {word} ({p} to {q})")
         points = np.concatenate([from_, to])
-        letters, row = flattened([*[()] * len(from_), *words])
+        letters, row = flatten_words([*[()] * len(from_), *words])
         places = self.outline.places[points]
         ends = Ends(places, self.slits.cells(places[:, 0]), letters, row)
         out, pairs = np.empty(len(from_)), np.arange(len(from_))
@@ -150,12 +150,12 @@ class TautPaths:
         """Length in the plan of the taut path of a word from point a to point b; None if it is
         longer than so much."""
         key = (a, b, tuple(word))
-        if key not in self._known:
-            found = self._sought(a, b, word, longest)
+        if key not in self._cache:
+            found = self._find(a, b, word, longest)
             if found is None:
                 return None
-            self._known[key] = found
-        planar = self._known[key][0]
+            self._cache[key] = found
+        planar = self._cache[key][0]
         return planar if planar <= longest + self.margin else None
 
     def slit_length(self, a: int, b: int, word: Word) -> float:
@@ -179,9 +179,9 @@ class TautPaths:
             A planar length that it is known not to exceed.
         """
         _, pieces = self.pieces(a, b, word, longest)
-        return self._raised(a, b, self._polyline(a, b, pieces))
+        return self._with_heights(a, b, self._polyline(a, b, pieces))
 
-    def _raised(self, a: int, b: int, xy: Floats) -> Floats:
+    def _with_heights(self, a: int, b: int, xy: Floats) -> Floats:
         """(n, 3) of a planar polyline from point a to point b, rising evenly."""
         steps = np.hypot(*np.diff(xy, axis=0).T)
         total = float(steps.sum())
@@ -212,7 +212,7 @@ class TautPaths:
         try:
             return self.path(0, goal + 1, tuple(word))
         except UnknownPathError:
-            if not self._knows(word):
+            if not self._has_obstacles_of(word):
                 return self.tether(goal, word)
             label = self.problem.goal_label(goal)
             warn_left_out(f"tether to {label} left out: no taut path of word {list(word)} found")
@@ -232,57 +232,57 @@ class TautPaths:
             Flag of a clock; LimitReachedError when it is set before the path is found.
         """
         key = (a, b, tuple(word))
-        if key not in self._known:
-            if len(self._known) >= self.policy.paths.max_known:
-                self._known.clear()
-            self._known[key] = self._search(a, b, word, longest, stop)
-        return self._known[key]
+        if key not in self._cache:
+            if len(self._cache) >= self.policy.paths.max_known:
+                self._cache.clear()
+            self._cache[key] = self._search(a, b, word, longest, stop)
+        return self._cache[key]
 
     def _search(
         self, a: int, b: int, word: Word, longest: float | None, stop: Flag
     ) -> tuple[float, list[tuple[int, float]]]:
-        found = self._sought(a, b, word, longest, stop)
-        if found is None and self._knows(word):
-            found = self._searched_among_all(a, b, word, longest, stop)
+        found = self._find(a, b, word, longest, stop)
+        if found is None and self._has_obstacles_of(word):
+            found = self._search_all_words(a, b, word, longest, stop)
         if found is None:
             raise UnknownPathError(f"internal: no taut path of word {word} from {a} to {b}")
         return found
 
-    def _sought(
+    def _find(
         self, a: int, b: int, word: Word, longest: float | None, stop: Flag = NEVER
     ) -> tuple[float, list[tuple[int, float]]] | None:
         """Length and pieces; None if there is no path so short."""
-        if not self._knows(word):
+        if not self._has_obstacles_of(word):
             return None
-        length, edges, slid = self._pulled(a, b, word)
+        length, edges, slid = self._pull(a, b, word)
         if length >= 0.0:
             return length, list(zip(edges.tolist(), slid.tolist(), strict=True))
-        return self._searched(a, b, word, longest, stop)
+        return self._search_word(a, b, word, longest, stop)
 
-    def _searched(
+    def _search_word(
         self, a: int, b: int, word: Word, longest: float | None = None, stop: Flag = NEVER
     ) -> tuple[float, list[tuple[int, float]]] | None:
-        """Search for the path of a word, as `_sought`, by following the word."""
+        """Search for the path of a word, as `_find`, by following the word."""
         for limit in self._limits(a, b, longest):
-            trie = Trie.of_word(word, limit)
+            trie = Trie.from_word(word, limit)
             found = run_explore(
                 self.tangents, a, trie, keep=True, margin=self.outline.margin, stop=stop
             )
-            best = _shortest(found, b, len(word))
+            best = _shortest_hit(found, b, len(word))
             if best is not None:
                 return best
-            _check(stop, word)
+            _check_flag(stop, word)
         return None
 
-    def _searched_among_all(
+    def _search_all_words(
         self, a: int, b: int, word: Word, longest: float | None = None, stop: Flag = NEVER
     ) -> tuple[float, list[tuple[int, float]]] | None:
-        """Search for the path of a word, as `_sought`, among the paths of all words.
+        """Search for the path of a word, as `_find`, among the paths of all words.
 
         The search prunes no pending letter. It also returns None if it needs more than
         `PathPolicy.max_states`.
         """
-        rest = self.contacts.rest(b).to_end
+        rest = self.contacts.remaining_lengths(b).to_end
         for limit in self._limits(a, b, longest):
             trie = Trie.root(limit)
             found = run_explore(
@@ -298,8 +298,8 @@ class TautPaths:
             )
             for w in np.unique(found.word[found.goal == b]).tolist():
                 if trie.word(w) == tuple(word):
-                    return _shortest(found, b, w)
-            _check(stop, word)
+                    return _shortest_hit(found, b, w)
+            _check_flag(stop, word)
             if found.capped:
                 return None
         return None
@@ -332,7 +332,7 @@ class TautPaths:
         stop
             Of a clock; None for each path that was not found till then.
         """
-        trie, node = Trie.of_words(words, longest + self.margin)
+        trie, node = Trie.from_words(words, longest + self.margin)
         found = run_explore(
             self.tangents, 0, trie, keep=True, margin=self.outline.margin, stop=stop
         )
@@ -344,14 +344,14 @@ class TautPaths:
         at = [hit.get((goal, at)) for goal, at in zip(goals, node, strict=True)]
         return [None if k is None else found.pieces(k) for k in at]
 
-    def _knows(self, word: Word) -> bool:
+    def _has_obstacles_of(self, word: Word) -> bool:
         """Whether there is an obstacle for every letter."""
         return all(abs(letter) <= len(self.outline.rays) for letter in word)
 
-    def _pulled(self, a: int, b: int, word: Word) -> tuple[float, Ints, Floats]:
+    def _pull(self, a: int, b: int, word: Word) -> tuple[float, Ints, Floats]:
         """As of `netsp.roadmap.taut_by_word.pull_one`."""
         points = np.array([a, b])
-        letters, row = flattened([(), word])
+        letters, row = flatten_words([(), word])
         places = self.outline.places[points]
         ends = Ends(places, self.slits.cells(places[:, 0]), letters, row)
         return pull_one(ends, points, self.slits, self.arcs)
@@ -392,7 +392,9 @@ class TautPaths:
         return np.asarray(xy[keep] if keep.sum() > 1 else xy[[0, -1]])
 
 
-def _shortest(found: Found, goal: int, word: int) -> tuple[float, list[tuple[int, float]]] | None:
+def _shortest_hit(
+    found: FoundPaths, goal: int, word: int
+) -> tuple[float, list[tuple[int, float]]] | None:
     """Return the length and the pieces of the shortest hit of a goal with the word of a trie's
     node; None if there is none."""
     wanted = np.flatnonzero((found.goal == goal) & (found.word == word))
@@ -402,7 +404,7 @@ def _shortest(found: Found, goal: int, word: int) -> tuple[float, list[tuple[int
     return float(found.length[best]), found.pieces(best)
 
 
-def _check(stop: Flag, word: Word) -> None:
+def _check_flag(stop: Flag, word: Word) -> None:
     """Raise LimitReachedError if the flag of a clock is set."""
     if stop[0]:
         raise LimitReachedError(f"time limit reached while pulling a leg of word {word}")

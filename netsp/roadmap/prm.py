@@ -26,9 +26,9 @@ from netsp.gtsp.travel.graph import UNTIMED, TravelGraph
 from netsp.gtsp.travel.tether_blind_legs import Detours
 from netsp.hsignature import Word
 from netsp.model.problem import Circle, Problem
-from netsp.roadmap.any_class_paths import sub_goals, tabulate
+from netsp.roadmap.any_class_paths import sub_goals, tabulate_detours
 from netsp.roadmap.augmented import AugmentedGraph, augment
-from netsp.roadmap.explain_unreachable import unreached
+from netsp.roadmap.explain_unreachable import find_unreached_error
 from netsp.roadmap.letters import segment_letters
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.paths import TautPaths, UnknownPathError
@@ -103,7 +103,7 @@ class PrmRoadmap:
         self.milestones: Floats = local + np.append(outline.origin, 0.0)
         own = np.asarray(sampled[1], dtype=np.int64).reshape(-1, 2) + len(fixed)
         self.edges: Ints = _exactly_free(
-            np.unique(np.vstack([own, _join(local, len(fixed))]), axis=0),
+            np.unique(np.vstack([own, _nearest_edges(local, len(fixed))]), axis=0),
             local,
             outline,
         )
@@ -193,12 +193,12 @@ class PrmRoadmap:
         local = self.milestones - np.append(outline.origin, 0.0)
         level = np.full((len(places), 1), local[0, 2])
         every = np.vstack([np.hstack([places, level]), local])
-        new = _exactly_free(np.unique(_join(every, len(places)), axis=0), every, outline)
+        new = _exactly_free(np.unique(_nearest_edges(every, len(places)), axis=0), every, outline)
         edges = np.vstack([new, self.edges + len(places)])
         every[len(places) : len(places) + fixed, :2] = outline.places
         graph = MilestoneGraph(every[:, :2], edges)
         terminals = np.concatenate([len(places) + np.arange(fixed), np.arange(len(places))])
-        return tabulate(self.problem, outline, graph, terminals, places, side, check)
+        return tabulate_detours(self.problem, outline, graph, terminals, places, side, check)
 
     def _classes(self) -> tuple[Ints, list[Word], Ints]:
         """Augmented goals: those augmented vertices that stand on a goal, base first."""
@@ -213,7 +213,9 @@ class PrmRoadmap:
             needs = np.hypot(reach, points[:, 2] - points[0, 2])[: len(points)]
             beyond = [k for k in missing if needs[k] > self.problem.tether_length]
             if beyond:
-                raise unreached(self.problem, self.paths.outline, beyond, policy=self.policy)
+                raise find_unreached_error(
+                    self.problem, self.paths.outline, beyond, policy=self.policy
+                )
             k = missing[0]
             more = f" and {len(missing) - 1} more goals" if len(missing) > 1 else ""
             raise LimitReachedError(
@@ -291,7 +293,7 @@ class PrmRoadmap:
         return out
 
 
-def _ompl() -> Any:
+def _import_ompl() -> Any:
     try:
         from ompl import base, geometric, util
     except ImportError:
@@ -328,7 +330,7 @@ def _sample(
     problem: Problem, outline: Outline, samples: int, seed: int, clock: Clock
 ) -> tuple[Floats, list[tuple[int, int]]]:
     """Milestones (n, 3) and edges of OMPL's PRM*."""
-    ob, og, ou = _ompl()
+    ob, og, ou = _import_ompl()
     ou.noOutputHandler()
     # the generator is the process's own, but each planner's is seeded from it when made
     ou.RNG.setSeed(int(seed) % (2**32 - 2) + 1)
@@ -373,7 +375,7 @@ def _sample(
     return points, edges
 
 
-def _join(milestones: Floats, fixed: int) -> Ints:
+def _nearest_edges(milestones: Floats, fixed: int) -> Ints:
     """Edges from base and goals to their k nearest milestones, k by the PRM* rule in d dimensions,
     k = e (1 + 1/d) ln n (Karaman & Frazzoli 2011, section 3.3)."""
     from scipy.spatial import KDTree

@@ -19,7 +19,7 @@ from netsp.roadmap.explore import ALL, run_explore
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.trie import LETTER, PARENT, Trie
 
-Found = tuple[Ints, Floats, npt.NDArray[np.uint64]]
+ParityRows = tuple[Ints, Floats, npt.NDArray[np.uint64]]
 """(k,) other goals, (k,) lengths in the plan, (k, w) bits."""
 
 
@@ -34,23 +34,23 @@ def ways_by_parity(paths: TautPaths, up: Callable[[], bool]) -> WaysByParity | N
     reach, best = max(policy.first_ratio * nearest, policy.min_tether_share * tether), None
     if up():
         return None
-    from_base = _from(paths, 0, tether + paths.margin)
+    from_base = _paths_from(paths, 0, tether + paths.margin)
     while from_base is not None and reach < policy.growth * tether:
-        found = _within(paths, min(reach, tether), from_base[0], best is None, up)
+        found = _paths_up_to(paths, min(reach, tether), from_base[0], best is None, up)
         if found is None:
             break
         best, reach = found, reach * policy.growth
     return best
 
 
-def _within(
-    paths: TautPaths, reach: float, from_base: Found, first: bool, up: Callable[[], bool]
+def _paths_up_to(
+    paths: TautPaths, reach: float, from_base: ParityRows, first: bool, up: Callable[[], bool]
 ) -> WaysByParity | None:
     """All ways up to a length in the plan; None if there are too many, unless they are the first,
     or there is no time."""
     each, count = [from_base], 0
     for a in range(1, len(paths.outline.points) - 1):
-        found = None if up() else _from(paths, a, reach)
+        found = None if up() else _paths_from(paths, a, reach)
         if found is None:
             return None
         each.append(found[0])
@@ -67,7 +67,7 @@ def _within(
     return WaysByParity(ends, odd, in_space, reach, len(paths.outline.rays))
 
 
-def _from(paths: TautPaths, a: int, reach: float) -> tuple[Found, int] | None:
+def _paths_from(paths: TautPaths, a: int, reach: float) -> tuple[ParityRows, int] | None:
     """The ways from a goal to those of higher numbers, and how many paths there are; None where
     there are too many."""
     words = max(1, -(-len(paths.outline.rays) // BITS))
@@ -84,7 +84,7 @@ def _from(paths: TautPaths, a: int, reach: float) -> tuple[Found, int] | None:
         return None
     later = found.goal > a
     goal, planar = found.goal[later], found.length[later]
-    bits = _odd(trie.nodes, trie.size, words)[found.word[later]]
+    bits = _odd_letters(trie.nodes, trie.size, words)[found.word[later]]
     order = np.lexsort((planar, *bits.T, goal))
     goal, planar, bits = goal[order], planar[order], bits[order]
     new = np.ones(len(goal), dtype=bool)
@@ -93,7 +93,7 @@ def _from(paths: TautPaths, a: int, reach: float) -> tuple[Found, int] | None:
 
 
 @kernel
-def _odd(trie: Ints, size: int, words: int) -> npt.NDArray[np.uint64]:
+def _odd_letters(trie: Ints, size: int, words: int) -> npt.NDArray[np.uint64]:
     """(size, words) bits of the obstacles of which a node's word has an odd number of letters."""
     out = np.zeros((size, words), dtype=np.uint64)
     for k in range(1, size):

@@ -8,7 +8,7 @@ import numpy as np
 
 from netsp.base.errors import InfeasibleError, counted
 from netsp.model.problem import Goal, Problem
-from netsp.roadmap.explain_unreachable import shortest_tethers, why_unreached
+from netsp.roadmap.explain_unreachable import shortest_tethers, unreached_error
 from netsp.roadmap.roadmap_policy import RoadmapPolicy
 
 UNREACHED = "out of the tether's reach among the obstacles"
@@ -18,7 +18,7 @@ REACH_TOLERANCE = 1e-6
 """Tolerance of the tether that a goal needs, relative: nearer calls are left to the roadmap."""
 
 
-def within_reach(
+def keep_reachable_goals(
     problem: Problem,
     removable: Collection[str] | None = None,
     policy: RoadmapPolicy | None = None,
@@ -60,7 +60,7 @@ def within_reach(
         if np.isinf(needed[k]) and enclosed > policy.reach.max_explained:
             why.append(f"{problem.goal_label(k)} cannot be reached with a tether of any length")
         else:
-            why.append(str(why_unreached(problem, needed, [k])))
+            why.append(str(unreached_error(problem, needed, [k])))
     if far.all():
         raise InfeasibleError(f"no goal is in reach: {why[0]}")
     kept = [g for g, out in zip(problem.goals, far, strict=True) if not out]

@@ -25,13 +25,13 @@ class ShortestPaths(Protocol):
         """(k, 2) polyline of the path from the source to a target along a tree."""
 
 
-def _by_number(numbers: Ints, count: int) -> list[Ints]:
+def _positions_by_number(numbers: Ints, count: int) -> list[Ints]:
     """Where each of the first so many numbers stands, in order."""
     order = np.argsort(numbers, kind="stable")
     return np.split(order, np.searchsorted(numbers[order], np.arange(1, count + 1)))[:count]
 
 
-class Rest(NamedTuple):
+class RemainingLengths(NamedTuple):
     """Shortest lengths to a point.
 
     Attributes
@@ -79,7 +79,10 @@ class ContactGraph:
         self.arc = np.full(points + 2 * edges, -1, dtype=np.int64)
         self.angle = np.zeros(points + 2 * edges)
         each = policy.contacts.arcs_per_check
-        outward, inward = _by_number(tail // 2, arcs), _by_number(t.target // 2, arcs)
+        outward, inward = (
+            _positions_by_number(tail // 2, arcs),
+            _positions_by_number(t.target // 2, arcs),
+        )
         for a in range(arcs):
             if clock is not None and a % each == each - 1:
                 clock.check(JOINING)
@@ -112,7 +115,7 @@ class ContactGraph:
         found = dijkstra(self._graph, directed=False, indices=rows)
         return np.asarray(found[:, : self.points])
 
-    def between(self, height: Floats, up: Callable[[], bool]) -> Floats:
+    def distance_bounds(self, height: Floats, up: Callable[[], bool]) -> Floats:
         """(points, points) no more than the 3D length of any path between two points, in any class;
         straight lines for those that were not looked at when the time was up.
 
@@ -134,7 +137,7 @@ class ContactGraph:
         planar = np.maximum(np.maximum(planar, planar.T), straight * (1.0 - 1e-12))
         return np.asarray(np.hypot(planar, np.subtract.outer(height, height)))
 
-    def rest(self, goal: int) -> Rest:
+    def remaining_lengths(self, goal: int) -> RemainingLengths:
         """What is left to a point from the base and from the end of every tangent."""
         from scipy.sparse.csgraph import dijkstra
 
@@ -145,7 +148,7 @@ class ContactGraph:
             self.points + 2 * np.arange(len(self.tangents.target)) + 1,
         )
         # a rounding less, so that it is never more than what is left
-        return Rest(float(found[0]), np.asarray(found[ends]) * (1.0 - 1e-12))
+        return RemainingLengths(float(found[0]), np.asarray(found[ends]) * (1.0 - 1e-12))
 
     def tree(self, source: int, limit: float = np.inf) -> tuple[Floats, Ints]:
         """Length to every node and the node before it; inf for those beyond a limit."""

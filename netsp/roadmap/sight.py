@@ -62,7 +62,7 @@ class Targets(NamedTuple):
     last: Ints
 
 
-def make_targets(place: Floats) -> Targets:
+def build_targets(place: Floats) -> Targets:
     """Return the targets of arcs and points (n, 5), which are numbered as they stand there."""
     r = place[:, 2:3]
     boxes = np.hstack([place[:, :2] - r, place[:, :2] + r])
@@ -103,7 +103,7 @@ def empty_horizons(place: Floats, arc_count: int, full: Bools, policy: SightPoli
 
 
 @kernel
-def _lower(
+def _lower_sectors(
     begin: float, angle: float, far: float, pencil: int, farthest: Singles, width: float
 ) -> None:
     """Put the horizon of all sectors wholly within an angle, which begins so far after the first
@@ -138,7 +138,7 @@ def _is_hidden(
 
 
 @kernel
-def _block(
+def _lower_horizons(
     cx: float,
     cy: float,
     offset: float,
@@ -182,7 +182,7 @@ def _block(
         )
         end = first + max(math.asin((radius + offset) / a), turn + math.asin((radius + offset) / b))
     if end - begin >= width:
-        _lower(begin - low, end - begin, far, pencil, farthest, width)
+        _lower_sectors(begin - low, end - begin, far, pencil, farthest, width)
 
 
 @kernel
@@ -216,7 +216,7 @@ def find_horizons(
         while top > 0:
             top -= 1
             node = stack[top]
-            near = _distance(cx, cy, box, node)
+            near = _box_distance(cx, cy, box, node)
             if near > 2.0 * r:
                 away, angle = _subtended(cx, cy, box, node)
                 shift = ARCSINE_RATIO * r / near
@@ -232,7 +232,7 @@ def find_horizons(
                         max(box[node, 2] - cx, cx - box[node, 0]),
                         max(box[node, 3] - cy, cy - box[node, 1]),
                     )
-                    _block(
+                    _lower_horizons(
                         cx,
                         cy,
                         offset,
@@ -248,7 +248,7 @@ def find_horizons(
                     )
             if skip[node] > node + 1:
                 one, other = node + 1, skip[node + 1]
-                if _distance(cx, cy, box, one) < _distance(cx, cy, box, other):
+                if _box_distance(cx, cy, box, one) < _box_distance(cx, cy, box, other):
                     one, other = other, one
                 stack[top], stack[top + 1] = one, other
                 top += 2
@@ -259,7 +259,7 @@ def find_horizons(
                     d = math.hypot(circles[o, 0] - cx, circles[o, 1] - cy)
                     radius = circles[o, 2] - 2.0 * eps
                     if radius > 0.0 and d > min_clearance_ratio * (r + radius):
-                        _block(
+                        _lower_horizons(
                             cx,
                             cy,
                             offset,
@@ -285,7 +285,7 @@ def find_horizons(
                 )
                 if d > min_clearance_ratio * (r + radius):
                     far = max(math.hypot(ux, uy), math.hypot(vx, vy))
-                    _block(
+                    _lower_horizons(
                         cx,
                         cy,
                         offset,
@@ -302,7 +302,7 @@ def find_horizons(
 
 
 @kernel
-def _distance(cx: float, cy: float, box: Floats, k: int) -> float:
+def _box_distance(cx: float, cy: float, box: Floats, k: int) -> float:
     """Return the distance from a point to a box; 0 inside."""
     dx = max(box[k, 0] - cx, cx - box[k, 2], 0.0)
     dy = max(box[k, 1] - cy, cy - box[k, 3], 0.0)
@@ -369,7 +369,7 @@ def pairs_in_sight(
                 if last[node] <= i:
                     node = skip[node]
                     continue
-                near = _distance(cx, cy, box, node)
+                near = _box_distance(cx, cy, box, node)
                 if near > 2.0 * r:
                     away, angle = _subtended(cx, cy, box, node)
                     shift = ARCSINE_RATIO * r / near

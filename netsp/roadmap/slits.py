@@ -57,7 +57,7 @@ class Slits(NamedTuple):
         return np.searchsorted(self.x, x, side="right").astype(np.int64)
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """Where the string between two ends is worked out.
 
     Attributes
@@ -136,7 +136,7 @@ def slit_lengths(
     """
     policy = policy or LegPolicy()
     n = len(cluster)
-    letters, row = flattened(signatures)
+    letters, row = flatten_words(signatures)
     whole = rows is None
     asked: Ints = np.arange(n) if rows is None else rows
     out = np.zeros((len(asked), n))
@@ -146,14 +146,14 @@ def slit_lengths(
         (k, min(k + policy.bound_rows, len(asked))) for k in range(0, len(asked), policy.bound_rows)
     ]
     if len(blocks) < 4:
-        _rows(0, len(asked), *args)
+        _fill_rows(0, len(asked), *args)
     else:
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            list(pool.map(lambda b: _rows(b[0], b[1], *args), blocks))
+            list(pool.map(lambda b: _fill_rows(b[0], b[1], *args), blocks))
     return out
 
 
-def flattened(signatures: Sequence[Word]) -> tuple[Ints, Ints]:
+def flatten_words(signatures: Sequence[Word]) -> tuple[Ints, Ints]:
     """Words as one array of letters, and where each begins in it and the last ends."""
     flat = [np.array(w, dtype=np.int64) for w in signatures]
     row = np.concatenate([[0], np.cumsum([len(w) for w in flat])]).astype(np.int64)
@@ -161,7 +161,7 @@ def flattened(signatures: Sequence[Word]) -> tuple[Ints, Ints]:
 
 
 @kernel
-def _rows(
+def _fill_rows(
     first: int,
     last: int,
     asked: Ints,
@@ -174,7 +174,7 @@ def _rows(
 ) -> None:
     """Fill rows first … last - 1, which are those of the vertices `asked`; of the whole matrix only
     what is beyond the diagonal, and the columns with the same numbers."""
-    room = room_for(longest_word(ends.row), slits)
+    room = empty_workspace(max_word_length(ends.row), slits)
     for k in range(first, last):
         if stop[0] != 0:
             return
@@ -188,7 +188,7 @@ def _rows(
 
 
 @kernel
-def longest_word(row: Ints) -> int:
+def max_word_length(row: Ints) -> int:
     """Most letters of a word, given where each begins and the last ends."""
     longest = int(np.int64(0))  # no literal: callees are compiled once
     for k in range(len(row) - 1):
@@ -197,14 +197,14 @@ def longest_word(row: Ints) -> int:
 
 
 @kernel
-def room_for(longest: int, slits: Slits) -> Room:
+def empty_workspace(longest: int, slits: Slits) -> Workspace:
     """For the strings of words of at most twice so many letters."""
     gates = (2 * longest + 2) * (len(slits.x) + 2) + 2
-    return Room(np.empty((gates, 4)), np.empty((gates, 2), dtype=np.int64))
+    return Workspace(np.empty((gates, 4)), np.empty((gates, 2), dtype=np.int64))
 
 
 @kernel
-def string(u: int, v: int, ends: Ends, slits: Slits, room: Room) -> tuple[float, int]:
+def string(u: int, v: int, ends: Ends, slits: Slits, room: Workspace) -> tuple[float, int]:
     """Length of the path from u to v of the word inverse(word of u) times (word of v), and how
     often it bends; where is in `room`."""
     letters, row = ends.letters, ends.row
@@ -248,11 +248,11 @@ def string(u: int, v: int, ends: Ends, slits: Slits, room: Room) -> tuple[float,
             at += 1 if letter > 0 else -1
     s += abs(ends.place[v, 0] - before)
     gate[k, PLACE], gate[k, LOW], gate[k, HIGH] = s, ends.place[v, 1], ends.place[v, 1]
-    return _taut(ends.place[u, 1], gate, k + 1, room.corner)
+    return _taut_string(ends.place[u, 1], gate, k + 1, room.corner)
 
 
 @kernel
-def _taut(y: float, gate: Floats, count: int, corner: Ints) -> tuple[float, int]:
+def _taut_string(y: float, gate: Floats, count: int, corner: Ints) -> tuple[float, int]:
     """Length of the taut string from (0, y) through the first `count` gates, and how often it
     bends."""
     s = 0.0

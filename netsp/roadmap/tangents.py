@@ -27,9 +27,9 @@ from netsp.roadmap.outline import Outline
 from netsp.roadmap.pending_letters import pending_boxes
 from netsp.roadmap.roadmap_policy import SightPolicy
 from netsp.roadmap.sight import (
+    build_targets,
     empty_horizons,
     find_horizons,
-    make_targets,
     pairs_in_sight,
 )
 
@@ -128,7 +128,7 @@ def build_tangents(
     else:
         arcs, full = outline.arcs, outline.full
     rows = tangent_rows(outline, arcs, full, reach, clock=clock, policy=policy)
-    return assembled(outline, arcs, full, rows, clock)
+    return assemble(outline, arcs, full, rows, clock)
 
 
 def tangent_rows(
@@ -140,7 +140,7 @@ def tangent_rows(
     clock: Clock | None = None,
     policy: SightPolicy | None = None,
 ) -> Floats:
-    """Rows of `_tangents` between arcs and the outline's points.
+    """Rows of `_free_tangents` between arcs and the outline's points.
 
     Parameters
     ----------
@@ -161,18 +161,20 @@ def tangent_rows(
     place[len(arcs) :, :2] = outline.points
     total, first = len(place), len(arcs) + since if since else 0
 
-    def rows_of(pairs: Ints, stop: Flag) -> Floats:
+    def tangents_of(pairs: Ints, stop: Flag) -> Floats:
         # most segments are blocked by one of few parts, and the tree finds it
         base = outline.points[0]
-        return np.asarray(_tangents(place, len(arcs), full, base, reach, blockers, pairs, stop))
+        return np.asarray(
+            _free_tangents(place, len(arcs), full, base, reach, blockers, pairs, stop)
+        )
 
     if since or total * (total - 1) // 2 < policy.min_pairs:
         j = np.arange(first, total)
         one, other = np.triu_indices(total, 1) if not since else _pairs_with(j)
         pairs = np.column_stack([one, other]).astype(np.int64)
         steps = 4 * len(pairs) * (1 + len(blockers.tree.skip))
-        return clock.finish(JOINING, steps, lambda stop: rows_of(pairs, stop))
-    targets = make_targets(place)
+        return clock.finish(JOINING, steps, lambda stop: tangents_of(pairs, stop))
+    targets = build_targets(place)
     horizons = empty_horizons(place, len(arcs), full, policy)
     pencils = len(horizons.low)
     steps = pencils * policy.sectors * 8
@@ -185,7 +187,7 @@ def tangent_rows(
         def rows_from(begin: int) -> Floats:
             end = min(begin + policy.block, total)
             pairs = pairs_in_sight(place, len(arcs), targets, horizons, begin, end, stop)
-            return rows_of(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], stop)
+            return tangents_of(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], stop)
 
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             list(pool.map(horizons_from, range(0, pencils, policy.block)))
@@ -202,11 +204,13 @@ def _pairs_with(numbers: Ints) -> tuple[Ints, Ints]:
     return one[order], other[order]
 
 
-def assembled(
+def assemble(
     outline: Outline, arcs: Floats, full: Bools, rows: Floats, clock: Clock | None = None
 ) -> TangentGraph:
-    """Return the graph of rows of `_tangents`; LimitReachedError when the clock is up before it is
-    complete."""
+    """Return the graph of rows of `_free_tangents`.
+
+    Raises LimitReachedError when the clock is up before it is complete.
+    """
     source, target = rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64)
     key, arrival_key, length = rows[:, 2], rows[:, 3], rows[:, 4]
     ends, angle = np.ascontiguousarray(rows[:, 5:9]), np.ascontiguousarray(rows[:, 9:])
@@ -311,7 +315,7 @@ def _merge_contacts(
 
 
 @kernel
-def _key(theta: float, sense: int, start: float, end: float, full: bool) -> float:
+def _arc_position(theta: float, sense: int, start: float, end: float, full: bool) -> float:
     """How far along the directed arc a contact angle lies; NaN if not on the arc."""
     span = end - start
     if sense > 0:
@@ -328,7 +332,7 @@ def _key(theta: float, sense: int, start: float, end: float, full: bool) -> floa
 
 
 @kernel
-def _reverse_key(key: float, start: float, end: float, full: bool) -> float:
+def _reversed_position(key: float, start: float, end: float, full: bool) -> float:
     """Return the position of a contact along its arc in the other sense. It is computed from the
     key, so that rounding never puts a contact on an arc in one sense and off it in the other."""
     if full:
@@ -337,7 +341,7 @@ def _reverse_key(key: float, start: float, end: float, full: bool) -> float:
 
 
 @kernel
-def _tangents(
+def _free_tangents(
     place: Floats,
     a_count: int,
     full: Bools,
@@ -387,13 +391,13 @@ def _tangents(
                 key_i, key_j = 0.0, 0.0
                 back_i, back_j = 0.0, 0.0
                 if i < a_count:
-                    key_i = _key(theta_i, sense_i, si, ei, full[i])
-                    back_i = _reverse_key(key_i, si, ei, full[i])
+                    key_i = _arc_position(theta_i, sense_i, si, ei, full[i])
+                    back_i = _reversed_position(key_i, si, ei, full[i])
                     if math.isnan(key_i):
                         continue
                 if j < a_count:
-                    key_j = _key(theta_j, sense_j, sj, ej, full[j])
-                    back_j = _reverse_key(key_j, sj, ej, full[j])
+                    key_j = _arc_position(theta_j, sense_j, sj, ej, full[j])
+                    back_j = _reversed_position(key_j, sj, ej, full[j])
                     if math.isnan(key_j):
                         continue
                 ax, ay = xi + sense_i * ri * uy, yi - sense_i * ri * ux

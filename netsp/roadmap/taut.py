@@ -128,7 +128,7 @@ class TautRoadmap:
         contacts = self.paths.contacts
         line = contacts.draw(start, goal, contacts.tree_to(start, goal))
         there = concatenate(word, signature(line, self.outline.rays))
-        return None if self._tether(goal, there) is None else there
+        return None if self._tether_length(goal, there) is None else there
 
     def with_classes(
         self, wanted: Iterable[tuple[int, Word]], up: Callable[[], bool]
@@ -141,7 +141,7 @@ class TautRoadmap:
             for goal, word in dict.fromkeys(wanted)
             if not up()
             and (goal, word) not in known
-            and (length := self._tether(goal, word)) is not None
+            and (length := self._tether_length(goal, word)) is not None
         ]
         cluster = np.array([*self.cluster, *(g for g, _, _ in more)], dtype=np.int64)
         order = np.argsort(cluster, kind="stable")
@@ -153,7 +153,7 @@ class TautRoadmap:
         self.legs = TautLegs(self.paths, self.cluster, self.signatures, self.planar)
         return self.to_travel_graph()
 
-    def _tether(self, goal: int, word: Word) -> float | None:
+    def _tether_length(self, goal: int, word: Word) -> float | None:
         """Planar length of the taut tether of a class; None if it is too long."""
         rise = float(self._z[goal] - self._z[0])
         longest = math.sqrt(max(self.problem.tether_length**2 - rise**2, 0.0))

@@ -60,9 +60,19 @@ from netsp.roadmap.arcs import (
     YMAX,
     YMIN,
     Arcs,
-    tangent,
+    find_tangent,
 )
-from netsp.roadmap.slits import HIGH, LINE, LOW, Ends, Room, Slits, longest_word, room_for, string
+from netsp.roadmap.slits import (
+    HIGH,
+    LINE,
+    LOW,
+    Ends,
+    Slits,
+    Workspace,
+    empty_workspace,
+    max_word_length,
+    string,
+)
 from netsp.roadmap.tangents import ANGLE_TOLERANCE
 
 SAME_ANGLE = 1e-6
@@ -104,7 +114,7 @@ class Path(NamedTuple):
 
 
 @kernel
-def path_for(longest: int, max_bends: int) -> Path:
+def empty_path(longest: int, max_bends: int) -> Path:
     """For words of at most twice so many letters."""
     return Path(
         np.empty((max_bends, 8)),
@@ -113,7 +123,7 @@ def path_for(longest: int, max_bends: int) -> Path:
     )
 
 
-def path_along(a: int, pieces: Sequence[tuple[int, float]], target: Ints, arcs: Arcs) -> Path:
+def path_from_pieces(a: int, pieces: Sequence[tuple[int, float]], target: Ints, arcs: Arcs) -> Path:
     """A path from point a that was found otherwise.
 
     Parameters
@@ -137,7 +147,7 @@ def path_along(a: int, pieces: Sequence[tuple[int, float]], target: Ints, arcs: 
 
 @kernel
 def pull(
-    u: int, v: int, ends: Ends, point: Ints, slits: Slits, arcs: Arcs, room: Room, path: Path
+    u: int, v: int, ends: Ends, point: Ints, slits: Slits, arcs: Arcs, room: Workspace, path: Path
 ) -> tuple[float, float, int]:
     """The taut path from u to v of the word inverse(word of u) times (word of v).
 
@@ -153,7 +163,7 @@ def pull(
         it has. These, and the angles slid before them, are in `path`.
     """
     low, bends = string(u, v, ends, slits, room)
-    count = _named(
+    count = _initial_arcs(
         u,
         v,
         bends,
@@ -171,7 +181,7 @@ def pull(
         path.real,
         path.whole,
     )
-    count = _tightened(
+    count = _tighten(
         count,
         arcs.of,
         arcs.row,
@@ -185,7 +195,7 @@ def pull(
         path.whole,
         arcs.max_backward_turn,
     )
-    length = _proven(
+    length = _verified_length(
         u,
         v,
         count,
@@ -208,8 +218,8 @@ def pull_each(
     us: Ints, vs: Ints, ends: Ends, point: Ints, slits: Slits, arcs: Arcs, out: Floats
 ) -> None:
     """The lengths of (k,) taut paths as of `pull`, into `out`."""
-    longest = longest_word(ends.row)
-    room, path = room_for(longest, slits), path_for(longest, arcs.max_bends)
+    longest = max_word_length(ends.row)
+    room, path = empty_workspace(longest, slits), empty_path(longest, arcs.max_bends)
     for k in range(len(us)):
         out[k], _, _ = pull(us[k], vs[k], ends, point, slits, arcs, room, path)
 
@@ -218,14 +228,14 @@ def pull_each(
 def pull_one(ends: Ends, point: Ints, slits: Slits, arcs: Arcs) -> tuple[float, Ints, Floats]:
     """The taut path between two ends: its length as of `pull`, departures and angles slid before
     them."""
-    longest = longest_word(ends.row)
-    path = path_for(longest, arcs.max_bends)
-    length, _, count = pull(0, 1, ends, point, slits, arcs, room_for(longest, slits), path)
+    longest = max_word_length(ends.row)
+    path = empty_path(longest, arcs.max_bends)
+    length, _, count = pull(0, 1, ends, point, slits, arcs, empty_workspace(longest, slits), path)
     return length, path.whole[:count, EDGE].copy(), path.real[:count, SLID].copy()
 
 
 @kernel
-def _tightened(
+def _tighten(
     count: int,
     of: Ints,
     row: Ints,
@@ -263,18 +273,18 @@ def _tightened(
             turns = math.floor((on_by + max_backward_turn) / TWO_PI)
             at[i, LEAVING] = at[i + 1, LEAVING] - sense * turns * TWO_PI
             at[i, X_OUT], at[i, Y_OUT] = at[i + 1, X_OUT], at[i + 1, Y_OUT]
-            _close_up(i + 1, count, at, on)
+            _delete_node(i + 1, count, at, on)
             count -= 1
             continue
-        e = tangent(a * nodes + b, table)
+        e = find_tangent(a * nodes + b, table)
         if e < 0:
-            new, angle = _between(a, b, i, of, row, disk, span, solid, edges, at)
+            new, angle = _arc_between(a, b, i, of, row, disk, span, solid, edges, at)
             if new < 0 or new in (a, b):
                 return 0
             for k in range(count, i + 1, -1):
-                _copy(k - 1, k, at, on)
+                _copy_node(k - 1, k, at, on)
             on[i + 1, NODE], at[i + 1, ARRIVING], at[i + 1, LEAVING] = new, angle, angle
-            _note(
+            _set_position(
                 i + 1,
                 disk[new, CX] + disk[new, RADIUS] * math.cos(angle),
                 disk[new, CY] + disk[new, RADIUS] * math.sin(angle),
@@ -284,11 +294,11 @@ def _tightened(
             count += 1
             continue
         if i > 0:
-            arrival = _near(real[on[i - 1, EDGE], ARRIVES], at[i, ARRIVING])
-            departure = _near(real[e, LEAVES], at[i, LEAVING])
+            arrival = _unwrapped(real[on[i - 1, EDGE], ARRIVES], at[i, ARRIVING])
+            departure = _unwrapped(real[e, LEAVES], at[i, LEAVING])
             by = departure - arrival if a % 2 == 0 else arrival - departure
             if by < -SAME_ANGLE:
-                _close_up(i, count, at, on)
+                _delete_node(i, count, at, on)
                 count -= 1
                 i -= 1
                 continue
@@ -299,38 +309,38 @@ def _tightened(
 
 
 @kernel
-def _close_up(i: int, count: int, at: Floats, on: Ints) -> None:
+def _delete_node(i: int, count: int, at: Floats, on: Ints) -> None:
     """Node i is none any more."""
     for k in range(i, count - 1):
-        _copy(k + 1, k, at, on)
+        _copy_node(k + 1, k, at, on)
 
 
 @kernel
-def _copy(k: int, to: int, at: Floats, on: Ints) -> None:
+def _copy_node(k: int, to: int, at: Floats, on: Ints) -> None:
     on[to, NODE] = on[k, NODE]
     for c in range(SLID):
         at[to, c] = at[k, c]
 
 
 @kernel
-def _note(i: int, x: float, y: float, strip: float, at: Floats) -> None:
+def _set_position(i: int, x: float, y: float, strip: float, at: Floats) -> None:
     at[i, X_IN], at[i, Y_IN], at[i, X_OUT], at[i, Y_OUT], at[i, STRIP] = x, y, x, y, strip
 
 
 @kernel
-def _near(angle: float, to: float) -> float:
+def _unwrapped(angle: float, to: float) -> float:
     """The same angle, but for whole turns, within half a turn of another."""
     return angle - TWO_PI * math.floor((angle - to + math.pi) / TWO_PI)
 
 
 @kernel
-def _facing(node: int, ux: float, uy: float) -> float:
+def _contact_angle(node: int, ux: float, uy: float) -> float:
     """The angle on a directed arc that a line along (ux, uy) touches it at."""
     return math.atan2(-ux, uy) if node % 2 == 0 else math.atan2(ux, -uy)
 
 
 @kernel
-def _named(
+def _initial_arcs(
     u: int,
     v: int,
     bends: int,
@@ -354,7 +364,7 @@ def _named(
         bends -= 1  # that is its end
     on[0, NODE] = from_
     x, y = place[u, 0], place[u, 1]
-    _note(0, x, y, float(cell[u]), at)
+    _set_position(0, x, y, float(cell[u]), at)
     count = 1
     before = -1
     for c in range(bends):
@@ -385,22 +395,22 @@ def _named(
             ux, uy = 1.0 if rightward else -1.0, 0.0
             if far > 0.0:
                 ux, uy = (to_x - x) / far, (to_y - y) / far
-            new, _ = _standing_out(o, not ccw, x, y, ux, uy, -1, -1, of, row, disk)
-            angle = _facing(new, ux, uy)
+            new, _ = _farthest_arc(o, not ccw, x, y, ux, uy, -1, -1, of, row, disk)
+            angle = _contact_angle(new, ux, uy)
         on[count, NODE], at[count, ARRIVING], at[count, LEAVING] = new, angle, angle
-        _note(count, here_x, here_y, line + (0.0 if rightward else 1.0), at)
+        _set_position(count, here_x, here_y, line + (0.0 if rightward else 1.0), at)
         count += 1
         before = new
         x, y = here_x, here_y
         if count + 2 >= len(at):
             return 0
     on[count, NODE] = to
-    _note(count, place[v, 0], place[v, 1], float(cell[v]), at)
+    _set_position(count, place[v, 0], place[v, 1], float(cell[v]), at)
     return count + 1
 
 
 @kernel
-def _standing_out(
+def _farthest_arc(
     o: int,
     left: bool,
     x: float,
@@ -435,7 +445,7 @@ def _standing_out(
 
 
 @kernel
-def _between(
+def _arc_between(
     a: int,
     b: int,
     i: int,
@@ -495,14 +505,14 @@ def _between(
             shift = shift if solid[o, RANK] < at[i + 1, STRIP] else -shift
             rx, ry = solid[o, RAY_X] - at[i, X_OUT] - shift, solid[o, RAY_Y] - at[i, Y_OUT]
             left = sx * ry - sy * rx < 0.0
-        new, out = _standing_out(o, left, px, py, ux, uy, a, b, of, row, disk)
+        new, out = _farthest_arc(o, left, px, py, ux, uy, a, b, of, row, disk)
         if new >= 0 and out > farthest:
             best, farthest = new, out
-    return best, 0.0 if best < 0 else _facing(best, ux, uy)
+    return best, 0.0 if best < 0 else _contact_angle(best, ux, uy)
 
 
 @kernel
-def _proven(
+def _verified_length(
     u: int,
     v: int,
     count: int,
@@ -550,13 +560,15 @@ def _proven(
                 return NOT_PULLED
             at[i, SLID] = max(by, 0.0)
             total += disk[node, RADIUS] * at[i, SLID]
-            n = _append(whole[arrived, ARRIVAL], whole[arrived, AFTER_ARRIVAL], written, word, n)
+            n = _append_letters(
+                whole[arrived, ARRIVAL], whole[arrived, AFTER_ARRIVAL], written, word, n
+            )
             begin = whole[f, GAPS]
             for _ in range(turns):
-                n = _append(begin, span[node, AFTER_LETTERS], written, word, n)
+                n = _append_letters(begin, span[node, AFTER_LETTERS], written, word, n)
                 begin = span[node, LETTERS]
-            n = _append(begin, whole[e, GAPS], written, word, n)
-        n = _append(first, last, written, word, n)
+            n = _append_letters(begin, whole[e, GAPS], written, word, n)
+        n = _append_letters(first, last, written, word, n)
         total += real[e, LENGTH]
         if n < 0:
             return NOT_PULLED
@@ -576,7 +588,7 @@ def _proven(
 
 
 @kernel
-def _append(first: int, last: int, letters: Ints, word: Ints, n: int) -> int:
+def _append_letters(first: int, last: int, letters: Ints, word: Ints, n: int) -> int:
     """How many letters there are when some more are written; -1 if there is no room for them."""
     for k in range(first, last):
         a = letters[k]

@@ -15,10 +15,10 @@ from netsp.base.errors import LimitReachedError
 from netsp.base.ram import ask
 from netsp.gtsp.travel.graph import UNTIMED
 from netsp.hsignature import Word, concatenate, invert
-from netsp.roadmap.branches import OPEN, Branches, Lengths, branches_of, fill, spread
+from netsp.roadmap.branches import OPEN, Branches, Lengths, build_branches, fill, fill_parallel
 from netsp.roadmap.paths import TautPaths, UnknownPathError
-from netsp.roadmap.slits import Ends, flattened, slit_lengths
-from netsp.roadmap.taut_by_word import Path, path_along, pull_each
+from netsp.roadmap.slits import Ends, flatten_words, slit_lengths
+from netsp.roadmap.taut_by_word import Path, path_from_pieces, pull_each
 from netsp.roadmap.tethertree import GrowingTree, TetherTree
 
 ROUNDED_DOWN = 1.0 - 2.0**-23
@@ -69,13 +69,13 @@ class TautLegs:
             # one by one, whatever the time: to know where all tethers part takes a while
             asked = np.ones((len(vertices), len(vertices)), dtype=bool)
         if asked is not None and asked.sum() <= max(self.policy.max_single_legs, 2 * len(vertices)):
-            return self._few(vertices, asked)
-        return self._all(vertices, np.float64, 1.0, clock)
+            return self._selected(vertices, asked)
+        return self._matrix(vertices, np.float64, 1.0, clock)
 
     def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
         """(k, k) 3D leg lengths among the given vertices in single precision, rounded down; inf
         within a cluster. LimitReachedError as of `lengths`."""
-        return self._all(np.asarray(vertices, dtype=np.int64), np.float32, ROUNDED_DOWN, clock)
+        return self._matrix(np.asarray(vertices, dtype=np.int64), np.float32, ROUNDED_DOWN, clock)
 
     def blocks(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
@@ -85,9 +85,9 @@ class TautLegs:
         asked for; of some rows only, if they are given. LimitReachedError as of `lengths`."""
         vertices = np.asarray(vertices, dtype=np.int64)
         clock, n = clock or Clock(), len(vertices)
-        _found(clock, lambda: self._grown(clock.flag), n)
+        _measure_in_time(clock, lambda: self._tether_tree(clock.flag), n)
         size = max(self.policy.block_rows, self.policy.max_block_legs // max(n, 1))
-        branches = branches_of(self._grown(clock.flag), vertices)
+        branches = build_branches(self._tether_tree(clock.flag), vertices)
         places = np.arange(n) if rows is None else np.sort(branches.rank[rows])
         out: Floats = np.empty((min(size, len(places)), n), dtype=np.float32)  # type: ignore[assignment]
         for first in range(0, len(places), size):
@@ -99,11 +99,11 @@ class TautLegs:
             def some(row: Ints = row, block: Floats = block) -> None:
                 self._fill(vertices, ROUNDED_DOWN, block, clock.flag, branches, row)
 
-            _found(clock, some, n)
-            self._beyond_goals(vertices, own, ROUNDED_DOWN, block)
+            _measure_in_time(clock, some, n)
+            self._set_non_legs(vertices, own, ROUNDED_DOWN, block)
             yield own, block
 
-    def _all(
+    def _matrix(
         self, vertices: Ints, kind: type[np.floating], share: float, clock: Clock | None
     ) -> Floats:
         """All legs among vertices, branch by branch (`netsp.roadmap.branches`)."""
@@ -116,7 +116,7 @@ class TautLegs:
         out: Floats = np.empty((n, n), dtype=kind)  # type: ignore[assignment]
 
         def whole(stop: Flag) -> None:
-            branches = branches_of(self._grown(stop), vertices)
+            branches = build_branches(self._tether_tree(stop), vertices)
             self._fill(vertices, share, out, stop, branches, branches.order)
 
         # what takes a fraction of a second is measured all the same, or there would be no tour
@@ -124,11 +124,11 @@ class TautLegs:
             whole(NEVER)
         else:
             clock = clock or Clock()
-            _found(clock, lambda: whole(clock.flag), n)
-        self._beyond_goals(vertices, np.arange(n), share, out)
+            _measure_in_time(clock, lambda: whole(clock.flag), n)
+        self._set_non_legs(vertices, np.arange(n), share, out)
         return out
 
-    def _beyond_goals(self, vertices: Ints, rows: Ints, share: float, out: Floats) -> None:
+    def _set_non_legs(self, vertices: Ints, rows: Ints, share: float, out: Floats) -> None:
         """What is no leg between goals, into rows (r, k): legs of the base are tethers, and there
         are none within a goal."""
         point, tethers = self.cluster[vertices], share * self.to_base()[vertices]
@@ -148,7 +148,7 @@ class TautLegs:
                 return
             out[first : first + rows] = OPEN
         paths, (every, points) = self.paths, self._ends
-        letters, at = flattened([self.signatures[v] for v in vertices])
+        letters, at = flatten_words([self.signatures[v] for v in vertices])
         ends = Ends(every.place[vertices], every.cell[vertices], letters, at)
         point = points[vertices]
         lengths = Lengths(self.planar[vertices], self._z[point], share, out, row)
@@ -158,28 +158,30 @@ class TautLegs:
             if i >= len(vertices) or stop[0]:
                 return
             u, v = branches.order[sorted((i, j))].tolist()
-            found = self._searched(int(vertices[u]), int(vertices[v]), stop)
+            found = self._search_leg(int(vertices[u]), int(vertices[v]), stop)
             if found is None:
-                around = share * self._by_way_of_base(int(vertices[u]), int(vertices[v]))
+                around = share * self._through_base(int(vertices[u]), int(vertices[v]))
                 for x, y in ((u, v), (v, u)):
                     if row[branches.rank[x]] >= 0:
                         out[row[branches.rank[x]], y] = around
                 continue
             length, path = found
-            spread(u, v, length, len(path.whole) - 1, path.whole, path.real, branches, lengths)
+            fill_parallel(
+                u, v, length, len(path.whole) - 1, path.whole, path.real, branches, lengths
+            )
 
-    def _searched(self, u: int, v: int, stop: Flag) -> tuple[float, Path] | None:
+    def _search_leg(self, u: int, v: int, stop: Flag) -> tuple[float, Path] | None:
         """Search for a leg that could not be pulled. Return its planar length and its path, or None
         if it is not found; raise LimitReachedError if the flag is set first."""
         a, b = int(self.cluster[u]), int(self.cluster[v])
-        word, longest = self.relative_word(u, v), self._longest(u, v)
+        word, longest = self.relative_word(u, v), self._max_length(u, v)
         try:
             length, pieces = self.paths.pieces(a, b, word, longest, stop)
         except UnknownPathError:
             return None
-        return length, path_along(a, pieces, self.paths.tangents.target, self.paths.arcs)
+        return length, path_from_pieces(a, pieces, self.paths.tangents.target, self.paths.arcs)
 
-    def _by_way_of_base(self, u: int, v: int) -> float:
+    def _through_base(self, u: int, v: int) -> float:
         """Return the 3D length of the path back along one tether and out along another, and record
         the leg as left out."""
         self.left_out.add((min(u, v), max(u, v)))
@@ -196,7 +198,7 @@ class TautLegs:
         ]
         return np.array(rows).reshape(-1, 3)
 
-    def _grown(self, stop: Flag) -> TetherTree:
+    def _tether_tree(self, stop: Flag) -> TetherTree:
         """Where the tethers part, found out once; unfinished when the flag is set."""
         if self._tree is not None:
             return self._tree
@@ -205,12 +207,12 @@ class TautLegs:
         missing = growing.pull(ends, point, paths.slits, paths.arcs, stop).tolist()
         known: dict[int, Path] = {}
         if len(missing) > self.policy.min_joint_searches and not stop[0]:
-            known = self._tethers(missing, stop)
+            known = self._search_tethers(missing, stop)
         for v in missing:
             if stop[0]:
                 break
             path = known.get(v)
-            if path is None and (found := self._searched(0, v, stop)) is not None:
+            if path is None and (found := self._search_leg(0, v, stop)) is not None:
                 path = found[1]
             # a leg left out has no taut path, so it shares no part with other legs
             if path is not None:
@@ -220,7 +222,7 @@ class TautLegs:
             self._tree = tree
         return tree
 
-    def _tethers(self, vertices: list[int], stop: Flag) -> dict[int, Path]:
+    def _search_tethers(self, vertices: list[int], stop: Flag) -> dict[int, Path]:
         """The tethers of vertices, by one search; fewer when the flag is set."""
         paths, (_, point) = self.paths, self._ends
         found = paths.tethers(
@@ -230,7 +232,7 @@ class TautLegs:
             stop,
         )
         return {
-            v: path_along(0, pieces, paths.tangents.target, paths.arcs)
+            v: path_from_pieces(0, pieces, paths.tangents.target, paths.arcs)
             for v, pieces in zip(vertices, found, strict=True)
             if pieces is not None and not stop[0]
         }
@@ -289,7 +291,7 @@ class TautLegs:
         changes in proportion to planar length."""
         if u > v:  # searched once for both senses
             return self.path(v, u)[::-1].copy()
-        word, longest = self.relative_word(u, v), self._longest(u, v)
+        word, longest = self.relative_word(u, v), self._max_length(u, v)
         try:
             return self.paths.path(int(self.cluster[u]), int(self.cluster[v]), word, longest)
         except UnknownPathError:
@@ -297,13 +299,13 @@ class TautLegs:
                 raise
             return np.vstack([self.path(u, 0), self.path(0, v)[1:]])
 
-    def _longest(self, u: int, v: int) -> float:
+    def _max_length(self, u: int, v: int) -> float:
         """More than the planar length of a leg: back along one tether to where the other parts, as
         far as that is known."""
-        part = 0.0 if self._tree is None else self._tree.part(u, v)
+        part = 0.0 if self._tree is None else self._tree.shared_length(u, v)
         return float(self.planar[u] + self.planar[v] - 2.0 * part)
 
-    def _few(self, vertices: Ints, asked: Bools) -> Floats:
+    def _selected(self, vertices: Ints, asked: Bools) -> Floats:
         """As `lengths`, for a few legs; those that cannot be pulled are searches of their own."""
         out = np.full(asked.shape, np.inf)
         rows, columns = np.nonzero(np.triu(asked, 1) | np.tril(asked, -1).T)
@@ -315,7 +317,7 @@ class TautLegs:
 
     def pairs(self, us: Ints, vs: Ints) -> Floats:
         """(k,) 3D lengths of legs between vertices of different goals."""
-        planar = self._each(us, vs)
+        planar = self._pull_pairs(us, vs)
         around: dict[int, float] = {}
         for k in np.flatnonzero(planar < 0.0).tolist():
             u, v = int(us[k]), int(vs[k])
@@ -325,16 +327,16 @@ class TautLegs:
             a, b = int(self.cluster[u]), int(self.cluster[v])
             try:
                 planar[k] = self.paths.planar_length(
-                    a, b, self.relative_word(u, v), self._longest(u, v)
+                    a, b, self.relative_word(u, v), self._max_length(u, v)
                 )
             except UnknownPathError:
-                around[k] = self._by_way_of_base(u, v)
+                around[k] = self._through_base(u, v)
         out = np.hypot(planar, self._z[self.cluster[us]] - self._z[self.cluster[vs]])
         for k, length in around.items():
             out[k] = length
         return np.asarray(out)
 
-    def _each(self, us: Ints, vs: Ints) -> Floats:
+    def _pull_pairs(self, us: Ints, vs: Ints) -> Floats:
         """(k,) planar lengths of legs, negative where they could not be pulled."""
         paths, (ends, point) = self.paths, self._ends
         # strided arrays are another type, for which the kernel would be compiled anew
@@ -358,11 +360,11 @@ class TautLegs:
     def _ends(self) -> tuple[Ends, Ints]:
         """Of all vertices, and their points."""
         places, point = self.paths.outline.places, np.asarray(self.cluster, dtype=np.int64)
-        letters, row = flattened(self.signatures)
+        letters, row = flatten_words(self.signatures)
         return Ends(places[point], self.paths.slits.cells(places[:, 0])[point], letters, row), point
 
 
-def _found(clock: Clock, find: Callable[[], object], classes: int) -> None:
+def _measure_in_time(clock: Clock, find: Callable[[], object], classes: int) -> None:
     """Find legs until the clock is up; LimitReachedError if it was."""
     clock.interruptible(find)
     if clock.flag[0]:

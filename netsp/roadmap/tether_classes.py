@@ -17,11 +17,11 @@ from netsp.base.errors import NetspError
 from netsp.base.field_types import checked_argument
 from netsp.hsignature import Word, invert, reduce
 from netsp.model.problem import Goal, Problem
-from netsp.roadmap.explore import ALL, Found, run_explore
-from netsp.roadmap.outline import STAND_OFF, Outline, build_outline, pushed_out
+from netsp.roadmap.explore import ALL, FoundPaths, run_explore
+from netsp.roadmap.outline import STAND_OFF, Outline, build_outline, push_out
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.roadmap_policy import RoadmapPolicy
-from netsp.roadmap.tangents import TangentGraph, assembled, tangent_rows
+from netsp.roadmap.tangents import TangentGraph, assemble, tangent_rows
 from netsp.roadmap.trie import Trie
 
 
@@ -102,17 +102,17 @@ class Tethers:
         InputError
             No finite place.
         """
-        there = self._there(x, y, z)
-        if there is None:
+        place = self._place(x, y, z)
+        if place is None:
             return None
         if word is not None:
-            return there.of_class(reduce(tuple(word)))
-        limit = self.policy.tethers.first_ratio * there.apart
+            return place.tether_of_class(reduce(tuple(word)))
+        limit = self.policy.tethers.first_ratio * place.distance
         while True:
-            found = there.everything(min(limit, there.most))
+            found = place.all_paths(min(limit, place.max_planar))
             if len(found.goal):
-                return there.along(found, int(np.argmin(found.length)))
-            if limit >= there.most or found.capped:
+                return place.tether_along(found, int(np.argmin(found.length)))
+            if limit >= place.max_planar or found.capped:
                 return None
             limit *= self.policy.tethers.growth
 
@@ -138,17 +138,17 @@ class Tethers:
         InputError
             No finite place.
         """
-        there = self._there(x, y, z)
-        if there is None:
+        place = self._place(x, y, z)
+        if place is None:
             return []
-        found = there.everything(there.most)
+        found = place.all_paths(place.max_planar)
         out: dict[Word, TautTether] = {}
         for hit in np.argsort(found.length, kind="stable"):
-            tether = there.along(found, int(hit))
+            tether = place.tether_along(found, int(hit))
             out.setdefault(tether.word, tether)
         return list(out.values())
 
-    def _there(self, x: float, y: float, z: float) -> _Place | None:
+    def _place(self, x: float, y: float, z: float) -> _PlacePaths | None:
         values = ((n, v) for n, v in (("x", x), ("y", y), ("z", z)))
         px, py, pz = (checked_argument(n, v, -1e12) for n, v in values)
         problem = self.problem
@@ -160,7 +160,7 @@ class Tethers:
             if not (xmin <= px <= xmax and ymin <= py <= ymax):
                 return None
         xy = np.array([px, py]) - self._outline.origin
-        free = pushed_out(xy, self._outline.blockers, STAND_OFF * problem.scale)
+        free = push_out(xy, self._outline.blockers, STAND_OFF * problem.scale)
         outline = dataclasses.replace(
             self._outline,
             points=np.vstack([self._outline.points, free]),
@@ -174,12 +174,14 @@ class Tethers:
             since=1,
             policy=self.policy.sight,
         )
-        tangents = assembled(outline, self._arcs, self._full, np.vstack([self._rows, own]))
+        tangents = assemble(outline, self._arcs, self._full, np.vstack([self._rows, own]))
         goal = Goal.model_construct(position=(px, py, pz), name=None, choice=None, after=())
-        return _Place(problem.model_copy(update={"goals": (goal,)}), outline, tangents, self.policy)
+        return _PlacePaths(
+            problem.model_copy(update={"goals": (goal,)}), outline, tangents, self.policy
+        )
 
 
-class _Place(TautPaths):
+class _PlacePaths(TautPaths):
     """Taut paths between the base (point 0) and one place (point 1), whose tangents are there."""
 
     def __init__(
@@ -190,12 +192,12 @@ class _Place(TautPaths):
         self._longest = problem.tether_length
         self.margin = 100.0 * outline.margin
         self._z = problem.points[:, 2]
-        self._known = {}
+        self._cache = {}
         self.rise = float(self._z[1] - self._z[0])
-        self.apart = math.dist(*outline.points)
-        self.most = math.sqrt(max(problem.tether_length**2 - self.rise**2, 0.0))
+        self.distance = math.dist(*outline.points)
+        self.max_planar = math.sqrt(max(problem.tether_length**2 - self.rise**2, 0.0))
 
-    def everything(self, limit: float) -> Found:
+    def all_paths(self, limit: float) -> FoundPaths:
         """All taut paths from the place to the base, up to a planar length."""
         self._trie = Trie.root(limit)
         nowhere = np.zeros(len(self.tangents.target))
@@ -210,14 +212,14 @@ class _Place(TautPaths):
             cap=self.policy.tethers.max_states,
         )
 
-    def along(self, found: Found, hit: int) -> TautTether:
+    def tether_along(self, found: FoundPaths, hit: int) -> TautTether:
         """The tether of a path found."""
         word = invert(self._trie.word(int(found.word[hit])))
         xy = self._polyline(1, 0, found.pieces(hit))[::-1]
         length = math.hypot(float(found.length[hit]), self.rise)
-        return TautTether(tuple(word), length, self._raised(0, 1, xy))
+        return TautTether(tuple(word), length, self._with_heights(0, 1, xy))
 
-    def of_class(self, word: Word) -> TautTether | None:
+    def tether_of_class(self, word: Word) -> TautTether | None:
         """The tether of a class; None where there is none within the tether's length."""
         try:
             length = self.length(0, 1, word)

@@ -15,8 +15,8 @@ from netsp.base.clock import Flag
 from netsp.base.compiled.dynamic_array import more_int_rows, more_rows
 from netsp.base.compiled.kernel import kernel
 from netsp.roadmap.arcs import LENGTH, RADIUS, Arcs
-from netsp.roadmap.slits import Ends, Slits, longest_word, room_for
-from netsp.roadmap.taut_by_word import EDGE, NODE, SAME_ANGLE, SLID, Path, path_for, pull
+from netsp.roadmap.slits import Ends, Slits, empty_workspace, max_word_length
+from netsp.roadmap.taut_by_word import EDGE, NODE, SAME_ANGLE, SLID, Path, empty_path, pull
 
 AT, PARENT, CHILD, SIBLING = range(4)
 """Columns of the integers of a bend: its directed arc, the bend before (-1 at the root), the last
@@ -46,7 +46,7 @@ class TetherTree(NamedTuple):
     last: Ints
     slid: Floats
 
-    def part(self, u: int, v: int) -> float:
+    def shared_length(self, u: int, v: int) -> float:
         """The length that two tethers have in common."""
         s, t = int(self.last[u]), int(self.last[v])
         while s != t:  # a bend comes after its parent
@@ -76,7 +76,7 @@ class GrowingTree:
     def pull(self, ends: Ends, point: Ints, slits: Slits, arcs: Arcs, stop: Flag) -> Ints:
         """Add the tethers of all vertices, from vertex 0, the base, to each; those that could not
         be pulled. Unfinished when the flag is set."""
-        self._whole, self._real, self._size = _grown(
+        self._whole, self._real, self._size = _grow(
             ends,
             point,
             slits,
@@ -94,7 +94,7 @@ class GrowingTree:
 
     def add(self, vertex: int, path: Path, arcs: Arcs) -> None:
         """Add the tether of a vertex, a path of nodes and departures and the angles slid there."""
-        self._whole, self._real, self._size = _grafted(
+        self._whole, self._real, self._size = _graft(
             vertex,
             len(path.whole) - 1,
             path.whole,
@@ -121,7 +121,7 @@ class GrowingTree:
 
 
 @kernel
-def _grown(
+def _grow(
     ends: Ends,
     point: Ints,
     slits: Slits,
@@ -133,8 +133,8 @@ def _grown(
     slid: Floats,
     stop: Ints,
 ) -> tuple[Ints, Floats, int]:
-    longest = longest_word(ends.row)
-    room, path = room_for(longest, slits), path_for(longest, arcs.max_bends)
+    longest = max_word_length(ends.row)
+    room, path = empty_workspace(longest, slits), empty_path(longest, arcs.max_bends)
     for v in range(1, len(point)):
         if stop[0] != 0:
             break
@@ -142,14 +142,14 @@ def _grown(
         if length < 0.0:
             last[v] = -1
             continue
-        whole, real, size = _grafted(
+        whole, real, size = _graft(
             v, count, path.whole, path.real, arcs, whole, real, size, last, slid
         )
     return whole, real, size
 
 
 @kernel
-def _grafted(
+def _graft(
     v: int,
     count: int,
     on: Ints,

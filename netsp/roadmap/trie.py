@@ -41,7 +41,7 @@ class Trie:
         return trie
 
     @classmethod
-    def of_word(cls, word: tuple[int, ...], limit: float) -> Trie:
+    def from_word(cls, word: tuple[int, ...], limit: float) -> Trie:
         """The trie of one word and its prefixes; node k is the prefix of length k."""
         trie = cls.root(limit, capacity=max(256, 2 * len(word) + 2))
         for k, letter in enumerate(word):
@@ -52,7 +52,7 @@ class Trie:
         return trie
 
     @classmethod
-    def of_words(cls, words: Sequence[tuple[int, ...]], limit: float) -> tuple[Trie, list[int]]:
+    def from_words(cls, words: Sequence[tuple[int, ...]], limit: float) -> tuple[Trie, list[int]]:
         """The trie of words and their prefixes; and the node of each word."""
         rows, last, child_of = [[-1, 0, -1, -1, 1]], [], dict[tuple[int, int], int]()
         for word in words:

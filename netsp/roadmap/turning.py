@@ -27,7 +27,7 @@ TURNING_TOLERANCE = 1e-9
 """Tolerance of the sum of angles by which a tether turns, radians: a rounding."""
 
 
-def turnings(problem: Problem, graph: TravelGraph) -> Floats:
+def tether_turnings(problem: Problem, graph: TravelGraph) -> Floats:
     """How far the tether turns in every class.
 
     Parameters
@@ -63,7 +63,7 @@ def turnings(problem: Problem, graph: TravelGraph) -> Floats:
     return out
 
 
-def within_turning(problem: Problem, graph: TravelGraph, most: float) -> TravelGraph:
+def limit_turning(problem: Problem, graph: TravelGraph, most: float) -> TravelGraph:
     """The travel graph without the classes in which the tether turns farther than it may.
 
     Parameters
@@ -89,7 +89,7 @@ def within_turning(problem: Problem, graph: TravelGraph, most: float) -> TravelG
     """
     if math.isinf(most):
         return graph
-    turning = turnings(problem, graph)
+    turning = tether_turnings(problem, graph)
     part = graph.subgraph(np.flatnonzero(turning <= most + TURNING_TOLERANCE))
     # the limit is the problem's: no class that breaks it is in an admissible tour
     part.declared_scope = graph.scope

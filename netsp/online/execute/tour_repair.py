@@ -28,7 +28,7 @@ from netsp.online.execute.tether_reserve import ReservedLimit
 from netsp.plan.answer import to_solution
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.tour_plan import HOME, Leg, legs_of
-from netsp.roadmap.explain_unreachable import explain_unreached
+from netsp.roadmap.explain_unreachable import unreached_message
 from netsp.roadmap.from_state import GraphFromState, graph_from_state
 from netsp.roadmap.paths import TautPaths, UnknownPathError
 from netsp.roadmap.roadmap_policy import RoadmapPolicy
@@ -283,7 +283,7 @@ def reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple[
     plain = paths.problem
     beyond = [k for k in range(len(order)) if needs[k] > problem.tether_length + paths.margin]
     for k in beyond:
-        why = explain_unreached(plain, paths.outline, [k + 1])
+        why = unreached_message(plain, paths.outline, [k + 1])
         left_out.append((order[k], why.removeprefix(f"{plain.goal_label(k)} ")))
     return [g for k, g in enumerate(order) if k not in beyond], left_out
 

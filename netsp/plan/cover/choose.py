@@ -63,19 +63,19 @@ def choose(
         As few as were found.
     """
     policy = policy or CoverPolicy()
-    matrix, weights = merged(sees, areas)
+    matrix, weights = merge_patches(sees, areas)
     needed = share * float(weights.sum())
-    taken = pruned(matrix, weights, greedy(matrix, weights, needed), needed)
-    bound = simple_bound(matrix, weights, needed)
+    taken = prune(matrix, weights, choose_greedily(matrix, weights, needed), needed)
+    bound = counting_bound(matrix, weights, needed)
     if matrix.sum() <= policy.max_matrix_entries and not clock.up and bound < len(taken):
-        better, proven = by_program(matrix, weights, needed, clock)
+        better, proven = solve_program(matrix, weights, needed, clock)
         bound = max(bound, proven)
         if better is not None and len(better) < len(taken):
-            taken = pruned(matrix, weights, better, needed)
+            taken = prune(matrix, weights, better, needed)
     return Choice(np.sort(taken), min(bound, len(taken)))
 
 
-def merged(sees: Bools, areas: Floats) -> tuple[Bools, Floats]:
+def merge_patches(sees: Bools, areas: Floats) -> tuple[Bools, Floats]:
     """Patches that the same viewpoints see as one; those that none sees are left out.
 
     Parameters
@@ -99,7 +99,7 @@ def merged(sees: Bools, areas: Floats) -> tuple[Bools, Floats]:
     return sees[:, some][:, first], weights
 
 
-def greedy(matrix: Bools, weights: Floats, needed: float) -> Ints:
+def choose_greedily(matrix: Bools, weights: Floats, needed: float) -> Ints:
     """The viewpoint that shows most of what is not seen yet, again and again.
 
     Parameters
@@ -129,7 +129,7 @@ def greedy(matrix: Bools, weights: Floats, needed: float) -> Ints:
     return np.array(taken, dtype=np.int64)
 
 
-def pruned(matrix: Bools, weights: Floats, taken: Ints, needed: float) -> Ints:
+def prune(matrix: Bools, weights: Floats, taken: Ints, needed: float) -> Ints:
     """Without those that are not needed beside the others.
 
     Parameters
@@ -161,7 +161,7 @@ def pruned(matrix: Bools, weights: Floats, taken: Ints, needed: float) -> Ints:
     return np.array(kept, dtype=np.int64)
 
 
-def simple_bound(matrix: Bools, weights: Floats, needed: float) -> int:
+def counting_bound(matrix: Bools, weights: Floats, needed: float) -> int:
     """So many of those that show most, each for itself, would be needed if none showed twice.
 
     Parameters
@@ -184,7 +184,7 @@ def simple_bound(matrix: Bools, weights: Floats, needed: float) -> int:
     return int(np.searchsorted(np.cumsum(shown), needed * (1.0 - 1e-9))) + 1
 
 
-def by_program(
+def solve_program(
     matrix: Bools, weights: Floats, needed: float, clock: Clock
 ) -> tuple[Ints | None, int]:
     """The integer program, as far as time allows.

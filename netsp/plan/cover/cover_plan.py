@@ -15,8 +15,8 @@ from netsp.base.field_types import Point3, checked_argument
 from netsp.base.geometry import polylines
 from netsp.plan.cover.choose import Choice, choose
 from netsp.plan.cover.cover_policy import CoverPolicy
-from netsp.plan.cover.viewpoint_swaps import alternatives
-from netsp.plan.cover.viewpoints import Viewer, Viewpoints, coarser, viewpoints_of
+from netsp.plan.cover.viewpoint_swaps import find_alternatives
+from netsp.plan.cover.viewpoints import Viewer, Viewpoints, coarsen, find_viewpoints
 from netsp.world.mission.equipment import Camera
 from netsp.world.mission.mission import Mission, MissionWaypoint, Viewpoint
 from netsp.world.mission.mission_limits import check_bounds
@@ -161,7 +161,7 @@ def cover(
             "covering the surface with patches",
             lambda: patches_of(scene, field, camera.patch, np.array([anchor]), inspect),
         )
-        patches = coarser(fine, camera.patch)
+        patches = coarsen(fine, camera.patch)
         mission = Mission(
             scene="-",
             name=scene.name,
@@ -189,7 +189,7 @@ def cover(
             policy,
         )
         looking = clock.part(policy.search_time_share)
-        found = viewpoints_of(viewer, np.random.default_rng(seed), looking, tell)
+        found = find_viewpoints(viewer, np.random.default_rng(seed), looking, tell)
         if not len(found) or not found.sees.any():
             raise InputError(
                 "inspect: nothing of the surface can be seen from where the robot gets to; "
@@ -197,7 +197,7 @@ def cover(
             )
         tell(f"choosing among {len(found)} viewpoints")
         choice = choose(found.sees, patches.areas, share, clock, policy)
-        return _made(mission, scene, patches, found, choice, reach, share)
+        return _build_cover(mission, scene, patches, found, choice, reach, share)
 
 
 def _check(
@@ -295,7 +295,7 @@ class _Reach:
         return out
 
 
-def _made(
+def _build_cover(
     mission: Mission,
     scene: Scene,
     patches: Patches,
@@ -310,7 +310,7 @@ def _made(
         longest = float(reach.tethers(chosen.places).max())
         length = round(policy.tether_ratio * longest + policy.tether_spare, 2)
     needed = share * float(patches.areas[found.sees.any(axis=0)].sum())
-    others_of = alternatives(found, choice.chosen, patches.areas, needed, policy)
+    others_of = find_alternatives(found, choice.chosen, patches.areas, needed, policy)
     own = [_viewpoint(found, k) for k in choice.chosen]
     waypoints = tuple(
         MissionWaypoint(

@@ -9,7 +9,7 @@ from netsp.plan.cover.cover_policy import CoverPolicy
 from netsp.plan.cover.viewpoints import Viewpoints
 
 
-def alternatives(
+def find_alternatives(
     found: Viewpoints,
     chosen: Ints,
     areas: Floats,

@@ -183,7 +183,7 @@ class Viewer:
         )
 
 
-def viewpoints_of(
+def find_viewpoints(
     viewer: Viewer, rng: np.random.Generator, clock: Clock, tell: Callable[[str], None]
 ) -> Viewpoints:
     """Places before the whole structure.
@@ -206,7 +206,7 @@ def viewpoints_of(
     """
     patches, camera = viewer.patches, viewer.camera
     width = 2.0 * viewer.standoff * math.tan(math.radians(0.5 * camera.field_of_view))
-    targets = spread(patches.centres, viewer.policy.patch_spacing * width)
+    targets = spread_out(patches.centres, viewer.policy.patch_spacing * width)
     tell(f"looking at the structure from before {len(targets)} of {len(patches.areas)} patches")
     straight = np.zeros((len(targets), 3))
     places, before = viewer.before(targets, straight, np.full(len(targets), viewer.standoff))
@@ -249,7 +249,7 @@ def _around(viewer: Viewer, patches: Ints, rng: np.random.Generator) -> tuple[In
     return many, off, far
 
 
-def coarser(patches: Patches, size: float) -> Patches:
+def coarsen(patches: Patches, size: float) -> Patches:
     """Patches of one cube of space that face the same of six ways as one: tubes are drawn by
     slivers, of which a view shows hundreds. Its place is that of the patch in their middle.
 
@@ -285,7 +285,7 @@ def coarser(patches: Patches, size: float) -> Patches:
     return Patches(patches.centres[first], normals[first], areas, sides)
 
 
-def spread(points: Floats, apart: float) -> Ints:
+def spread_out(points: Floats, apart: float) -> Ints:
     """Points so far apart that balls about them hold all others: each is the one farthest from
     those taken before (Gonzalez 1985).
 

@@ -1,7 +1,8 @@
 """What is asked about a tour before it is flown: how long a tether, where to stand, what margin."""
 
+from netsp.base.deprecated import deprecated_names
 from netsp.plan.sizing.base_placement import BaseSearch, Candidate, best_base
-from netsp.plan.sizing.tether_margins import Margins, StopMargin, margins
+from netsp.plan.sizing.tether_margins import Margins, VisitMargin, margins
 from netsp.plan.sizing.tether_sizing import Step, TetherCurve, tether_curve
 
 __all__ = [
@@ -9,9 +10,11 @@ __all__ = [
     "Candidate",
     "Margins",
     "Step",
-    "StopMargin",
     "TetherCurve",
+    "VisitMargin",
     "best_base",
     "margins",
     "tether_curve",
 ]
+
+__getattr__ = deprecated_names(globals(), StopMargin="VisitMargin")

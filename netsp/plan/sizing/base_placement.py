@@ -146,7 +146,7 @@ class BaseSearch(Drawn):
     @property
     def best_problem(self) -> Problem | None:
         """The problem with its base at the best candidate."""
-        return None if self.best is None else _at(self.problem, self.best.position)
+        return None if self.best is None else _with_base(self.problem, self.best.position)
 
     def to_json(self) -> str:
         """The ranking as JSON.
@@ -264,14 +264,16 @@ def best_base(
     """
     if problem.state is not None:
         raise InputError("state: a base is chosen before the robot is out; expected none")
-    places = _places(problem, candidates, policy or SizingPolicy())
+    places = _checked_places(problem, candidates, policy or SizingPolicy())
     _check_crop(problem, places, names)
     with until_interrupt(time_limit) as clock:
-        rated = _rated(problem, places, names, clock, seed)
-        return _solved(problem, rated, clock, every=every, seed=seed, on_candidate=on_candidate)
+        rated = _rate_candidates(problem, places, names, clock, seed)
+        return _solve_candidates(
+            problem, rated, clock, every=every, seed=seed, on_candidate=on_candidate
+        )
 
 
-def _solved(
+def _solve_candidates(
     problem: Problem,
     rated: list[Candidate],
     clock: Clock,
@@ -287,10 +289,10 @@ def _solved(
         candidate = rated[k]
         if not candidate.possible:
             break
-        if clock.up or (best is not None and not every and _worse(candidate, best)):
+        if clock.up or (best is not None and not every and _is_worse(candidate, best)):
             continue
         try:
-            found = solve(_at(problem, candidate.position), time_limit=clock, seed=seed)
+            found = solve(_with_base(problem, candidate.position), time_limit=clock, seed=seed)
         except InfeasibleError as error:
             rated[k] = replace(candidate, status=Status.INFEASIBLE, why=str(error))
             continue
@@ -307,19 +309,19 @@ def _solved(
         ):
             best = found
         if on_candidate is not None:
-            on_candidate(rated[k], sum(not _worse(rated[j], best) for j in order[n + 1 :]))
+            on_candidate(rated[k], sum(not _is_worse(rated[j], best) for j in order[n + 1 :]))
     ranking = sorted(
         rated, key=lambda c: (not c.possible, c.length is None, c.length or c.lower_bound)
     )
     proven = (
         best is not None
-        and all(_worse(c, best) for c in ranking if c.possible and c.length != best.length)
+        and all(_is_worse(c, best) for c in ranking if c.possible and c.length != best.length)
         and ranking[0].status is Status.OPTIMAL
     )
     return BaseSearch(problem, tuple(ranking), best, proven)
 
 
-def _worse(candidate: Candidate, best: Solution | None) -> bool:
+def _is_worse(candidate: Candidate, best: Solution | None) -> bool:
     """Whether a candidate is proven to have no shorter tour."""
     length = None if best is None else best.length
     if length is None:
@@ -327,13 +329,13 @@ def _worse(candidate: Candidate, best: Solution | None) -> bool:
     return not candidate.possible or candidate.lower_bound >= length * (1.0 - OPTIMALITY_TOLERANCE)
 
 
-def _at(problem: Problem, position: Sequence[float]) -> Problem:
+def _with_base(problem: Problem, position: Sequence[float]) -> Problem:
     """The problem from another base. What its origin says holds of the old base only."""
     data = problem.model_dump(exclude={"origin"})
     return Problem.model_validate({**data, "base": tuple(position)})
 
 
-def _places(problem: Problem, candidates: npt.ArrayLike, policy: SizingPolicy) -> Floats:
+def _checked_places(problem: Problem, candidates: npt.ArrayLike, policy: SizingPolicy) -> Floats:
     """(k, 3) finite places."""
     try:
         given = np.atleast_2d(np.asarray(candidates, dtype=float))
@@ -370,11 +372,11 @@ def _check_crop(problem: Problem, places: Floats, names: Sequence[str | None] | 
         )
 
 
-def _rated(
+def _rate_candidates(
     problem: Problem, places: Floats, names: Sequence[str | None] | None, clock: Clock, seed: int
 ) -> list[Candidate]:
     """Candidates with their shortest tethers and bounds."""
-    blocked = [_blocked(problem, p) for p in places]
+    blocked = [_obstruction(problem, p) for p in places]
     free = [k for k, why in enumerate(blocked) if not why]
     tethers, between = shortest_paths(problem, places[free])
     labels = [names[k] if names is not None else None for k in range(len(places))]
@@ -386,7 +388,7 @@ def _rated(
             out.append(Candidate(position, name, np.inf, np.inf, why=blocked[k]))
             continue
         to = tethers[free.index(k)]
-        farthest = _hardest(problem, to)
+        farthest = _farthest_goal(problem, to)
         shortest = float(to[farthest])
         if shortest > problem.tether_length * (1.0 + 1e-12):
             goal = problem.goal_label(farthest)
@@ -402,7 +404,7 @@ def _rated(
     return out
 
 
-def _blocked(problem: Problem, place: Floats) -> str:
+def _obstruction(problem: Problem, place: Floats) -> str:
     """Why no base can be at a place."""
     if problem.bounds is not None:
         low, high = np.array(problem.bounds[:2]), np.array(problem.bounds[2:])
@@ -467,7 +469,7 @@ def shortest_paths(problem: Problem, places: Floats) -> tuple[Floats, Floats]:
     return lengths[:, len(goals) :].T.copy(), lengths[:, : len(goals)].copy()
 
 
-def _hardest(problem: Problem, to: Floats) -> int:
+def _farthest_goal(problem: Problem, to: Floats) -> int:
     """The goal that asks for the longest tether, where of every choice the nearest is taken."""
     nearest = [
         members[np.argmin(to[members])]

@@ -19,6 +19,7 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.data_frames import frame_of
+from netsp.base.deprecated import deprecated_method, deprecated_names
 from netsp.base.errors import InputError, NetspError
 from netsp.base.field_types import checked_argument
 from netsp.model.problem import Circle, Problem
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class StopMargin:
+class VisitMargin:
     """What is left at one visit.
 
     Parameters
@@ -78,7 +79,7 @@ class Margins:
         tether; what its body needs beyond its centre is in the problem's clearance.
     friction : float
         Coefficient that the tension ratios are for.
-    stops : tuple of StopMargin
+    visits : tuple of VisitMargin
         In the order of the visits.
     """
 
@@ -87,10 +88,11 @@ class Margins:
     tether: float
     cross_track: float
     friction: float
-    stops: tuple[StopMargin, ...]
+    visits: tuple[VisitMargin, ...]
+    stops = deprecated_method("stops", "visits")
 
     def to_frame(self) -> pandas.DataFrame:
-        """Return the visits as a pandas DataFrame, a column per field of `StopMargin`.
+        """Return the visits as a pandas DataFrame, a column per field of `VisitMargin`.
 
         Returns
         -------
@@ -102,7 +104,7 @@ class Margins:
         InputError
             pandas is not installed.
         """
-        return frame_of(self.stops)
+        return frame_of(self.visits)
 
     def to_json(self) -> str:
         """The margins as JSON.
@@ -114,6 +116,7 @@ class Margins:
             where a problem has no obstacles.
         """
         data = asdict(self)
+        data["stops"] = data.pop("visits")
         for part in (data, *data["stops"]):
             part.update({k: None for k, v in part.items() if v == math.inf})
         return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
@@ -158,31 +161,33 @@ def margins(
     if problem.state is not None:
         raise InputError("state: margins are those of a tour from the base; expected none")
     paths = TautPaths(problem)
-    stops = tuple(_stop(problem, paths, v.goal, v.signature, friction) for v in solution.tour)
-    slack = min(s.slack for s in stops)
+    visits = tuple(
+        _visit_margin(problem, paths, v.goal, v.signature, friction) for v in solution.tour
+    )
+    slack = min(v.slack for v in visits)
     if slack < -problem.tolerance:
         raise InputError(f"solution: its tether is {-slack:.6g} too short; expected one that fits")
-    least, limited_by = _obstacles(problem, solution, policy or SizingPolicy())
-    beside = _nearest(problem, np.array(solution.path))
+    least, limited_by = _max_growth(problem, solution, policy or SizingPolicy())
+    beside = _obstacle_distance(problem, np.array(solution.path))
     return Margins(
-        least, limited_by, max(slack, 0.0), max(min(beside, slack), 0.0), friction, stops
+        least, limited_by, max(slack, 0.0), max(min(beside, slack), 0.0), friction, visits
     )
 
 
-def _stop(
+def _visit_margin(
     problem: Problem, paths: TautPaths, goal: int, word: tuple[int, ...], friction: float
-) -> StopMargin:
+) -> VisitMargin:
     tether = paths.tether(goal, word)
     length = paths.length(0, goal + 1, word)
     turning = _turning(tether[:, :2])
-    return StopMargin(
+    return VisitMargin(
         goal,
         problem.goal_name(goal),
         length,
         problem.tether_length - length,
         turning,
         tension_ratio(friction, turning),
-        _nearest(problem, tether),
+        _obstacle_distance(problem, tether),
     )
 
 
@@ -197,7 +202,7 @@ def _turning(xy: Floats) -> float:
     return float(np.abs(turns).sum())
 
 
-def _nearest(problem: Problem, path: Floats) -> float:
+def _obstacle_distance(problem: Problem, path: Floats) -> float:
     """Least distance from a polyline to an obstacle, without the clearance; inf without any."""
     import shapely
 
@@ -212,7 +217,7 @@ def _nearest(problem: Problem, path: Floats) -> float:
     return out
 
 
-def _obstacles(problem: Problem, solution: Solution, policy: SizingPolicy) -> tuple[float, str]:
+def _max_growth(problem: Problem, solution: Solution, policy: SizingPolicy) -> tuple[float, str]:
     """The largest growth for which all tethers were measured to fit, and what ends it."""
     if not problem.obstacles:
         return math.inf, "there are no obstacles"
@@ -226,12 +231,12 @@ def _obstacles(problem: Problem, solution: Solution, policy: SizingPolicy) -> tu
     high *= 1.0 - 1e-9
     if high <= 0.0:
         return 0.0, reason
-    why = _complaint(problem, solution, high)
+    why = _misfit(problem, solution, high)
     if why is None:
         return high, reason
     for _ in range(policy.bisections):
         middle = 0.5 * (low + high)
-        found = _complaint(problem, solution, middle)
+        found = _misfit(problem, solution, middle)
         if found is None:
             low = middle
         else:
@@ -239,7 +244,7 @@ def _obstacles(problem: Problem, solution: Solution, policy: SizingPolicy) -> tu
     return low, why
 
 
-def _complaint(problem: Problem, solution: Solution, growth: float) -> str | None:
+def _misfit(problem: Problem, solution: Solution, growth: float) -> str | None:
     """What does not fit among obstacles grown by so much; None if all does."""
     try:
         paths = TautPaths(problem.grown(growth), problem.tether_length * (1.0 + 1e-9))
@@ -254,3 +259,6 @@ def _complaint(problem: Problem, solution: Solution, growth: float) -> str | Non
         if length > problem.tether_length * (1.0 + 1e-12):
             return f"{label}: its tether does not fit any more"
     return None
+
+
+__getattr__ = deprecated_names(globals(), StopMargin="VisitMargin")

@@ -10,7 +10,7 @@ Its steps are found from above: the shortest tour with the longest tether stays 
 the longest tether t that it needs; below t, the vertices with tethers of t and more are gone, and
 what is the shortest then is the next step. Every step takes one solve, and the last ends at the
 shortest sufficient tether, below which some goal is out of reach. Tethers beyond half of a known
-tour never matter (`_useful`), however long a tether is asked about.
+tour never matter (`_max_useful_tether`), however long a tether is asked about.
 """
 
 from __future__ import annotations
@@ -293,8 +293,8 @@ def _staircase(
     policy: SizingPolicy,
 ) -> TetherCurve:
     """Solve for shorter and shorter tethers, until the time is up or no tour is left."""
-    shortest = _of_choices(problem, shortest_tethers(problem))
-    useful = _useful(problem, float(shortest.max()), solver, clock, seed)
+    shortest = _nearest_of_choices(problem, shortest_tethers(problem))
+    useful = _max_useful_tether(problem, float(shortest.max()), solver, clock, seed)
     graph = travel_graph(problem.model_copy(update={"tether_length": useful}), time_limit=clock)
     curve: list[Step] = []
     limit, bound, whole = problem.tether_length, 0.0, False
@@ -311,7 +311,7 @@ def _staircase(
         if clock.up:
             break
         try:
-            result, vertices = _shortest(graph, fits, solver, clock, seed, limit)
+            result, vertices = _solve_step(graph, fits, solver, clock, seed, limit)
         except LimitReachedError:
             break
         if result.tour is None or result.length is None:
@@ -342,7 +342,7 @@ def _staircase(
     return TetherCurve(problem.name, problem.units, steps, float(shortest[k]), k, whole)
 
 
-def _of_choices(problem: Problem, tethers: Floats) -> Floats:
+def _nearest_of_choices(problem: Problem, tethers: Floats) -> Floats:
     """0 for every goal with an alternative that is nearer."""
     out = tethers.copy()
     for c in range(1, problem.visits + 1):
@@ -351,7 +351,9 @@ def _of_choices(problem: Problem, tethers: Floats) -> Floats:
     return out
 
 
-def _useful(problem: Problem, shortest: float, solver: str, clock: Clock, seed: int) -> float:
+def _max_useful_tether(
+    problem: Problem, shortest: float, solver: str, clock: Clock, seed: int
+) -> float:
     """The longest tether that can matter. A tour goes out to its longest tether and back, so that
     one with a tether longer than half of a known tour is longer than that tour; and a tour is known
     from the shortest sufficient tether."""
@@ -366,7 +368,7 @@ def _useful(problem: Problem, shortest: float, solver: str, clock: Clock, seed: 
     return min(max(0.5 * known * (1.0 + REQUEST_TOLERANCE), least), problem.tether_length)
 
 
-def _shortest(
+def _solve_step(
     graph: TravelGraph, fits: np.ndarray, solver: str, clock: Clock, seed: int, limit: float
 ) -> tuple[Result, np.ndarray]:
     """The shortest tour over some vertices, with what holds for all classes of such tethers."""
