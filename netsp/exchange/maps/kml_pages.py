@@ -1,7 +1,7 @@
-"""KML and KMZ (OGC 12-007r2), read without any other library: folders, links and altitude modes.
+"""Reader of KML and KMZ (OGC 12-007r2): folders, links and altitude modes.
 
-An archive's page is ``doc.kml`` at its root. Pages that it links to in the archive, or beside a
-KML file, are read; links to other places are named and never fetched.
+The page of an archive is ``doc.kml`` at its root. Pages that it links to, in the archive or beside
+a KML file, are read; links to other places are named and never fetched.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ PLACES = ("coordinates", "coord")
 """Elements that hold places."""
 
 BESIDES = ("Camera", "LookAt", "Region")
-"""Elements of a placemark that say how it is looked at."""
+"""Elements of a placemark that describe its view."""
 
 ABOVE_FLOOR = ("relativeToSeaFloor", "clampToSeaFloor")
 """Altitude modes that count from the sea floor."""
@@ -63,24 +63,17 @@ HIDDEN = "hidden in the viewer (visibility 0): read like those that are shown"
 
 
 def read_kml(file: str | Path, crs: str | None = None, policy: ReadPolicy = DEFAULT_READ) -> Map:
-    """Return a KML or KMZ file as a map, with the pages that it links to.
+    """Return a KML or KMZ file as a map whose layers are folders, with the pages that it links to.
 
     Parameters
     ----------
-    file : str or Path
-        The file.
     crs : str, optional
-        Coordinate system given by the user; None takes degrees, as KML has it.
-
-    Returns
-    -------
-    Map
-        Layers are folders; in degrees.
+        Coordinate system that the user states; None for degrees, as in KML.
 
     Raises
     ------
     InputError
-        Not KML, or too large.
+        The file is not KML, or too large.
     """
     reader = _Reader(file, degrees=crs is None, policy=policy)
     reader.seen.add(f"\n{Path(file).resolve()}")
@@ -142,14 +135,14 @@ class _Archive:
 
 
 def _is_resource_fork(path: str) -> bool:
-    """Return whether a file of an archive is of the kind that Macs add."""
+    """Return whether a file of an archive is one that macOS adds."""
     parts = path.split("/")
     return "__MACOSX" in parts or parts[-1].startswith("._")
 
 
 @dataclass(frozen=True)
 class _Page:
-    """Page: its text, and where its links lead from."""
+    """Page with its text, and the folder or archive that its links start from."""
 
     name: str
     data: bytes
@@ -167,7 +160,7 @@ class _Position:
 
     @property
     def layer(self) -> str:
-        """Path of the folders; without the whole document, unless it is all there is."""
+        """Path of the folders, without the document unless it is the only one."""
         return "/".join(self.folders[1:] or self.folders)
 
 
@@ -202,7 +195,7 @@ class _Reader:
     def read_archive(
         self, archive: _Archive, page: str, folders: tuple[str, ...], folder: Path
     ) -> None:
-        """Read a page of an archive, and name those that nothing links to."""
+        """Read a page of an archive; name pages that nothing links to."""
         name = Path(archive.file).name
         self.seen.add(f"{archive.file}\n{page}")
         self.read_page(
@@ -252,7 +245,7 @@ class _Reader:
             self.feature(root, position, page, called)
 
     def feature(self, element: Element, at: _Position, page: _Page, called: str) -> None:
-        """Read a feature: a container with all in it, a placemark, a link, or what is named."""
+        """Read a feature: a container and its contents, a placemark, a link, or another element."""
         tag = element.tag
         hidden = at.is_hidden or (_text(element, "visibility") or "").lower() in ("0", "false")
         if tag in CONTAINERS:
@@ -275,7 +268,7 @@ class _Reader:
             self.leave_out(at, f"an element {tag} that KML does not have")
 
     def where(self, at: _Position) -> str:
-        """Count a feature of a folder, and return what messages call it."""
+        """Count a feature of a folder, and return its name in messages."""
         layer = at.layer
         number = self.numbers.get(layer, 0)
         self.numbers[layer] = number + 1
@@ -293,7 +286,7 @@ class _Reader:
         self.unread.append(Unread(self.where(at), at.layer, reason, shape))
 
     def placemark(self, element: Element, at: _Position, called: str, *, hidden: bool) -> None:
-        """Read a placemark; parts of a collection are features of their own."""
+        """Read a placemark; the parts of a collection become features of their own."""
         geometries = [child for child in element if child.tag in GEOMETRIES]
         strays = list(_strays(element))
         for stray in strays:
@@ -336,7 +329,7 @@ class _Reader:
             )
 
     def link(self, element: Element, at: _Position, page: _Page) -> None:
-        """Read the page of a link, or name the link."""
+        """Read the page of a link, or name a link that is not read."""
         holder = next((child for child in element if child.tag in ("Link", "Url")), None)
         href = (_text(holder, "href") or "").strip() if holder is not None else ""
         target = _target(href, page)
@@ -389,7 +382,7 @@ def _target(href: str, page: _Page) -> tuple[_Archive | None, str | Path, Path] 
 
 
 def _parsed(data: bytes, called: str, max_depth: int) -> Element:
-    """Return the root of a page, names without their prefixes."""
+    """Return the root of a page, with names without prefixes."""
     builder = TreeBuilder()
     depth = 0
 
@@ -428,7 +421,7 @@ def _text(element: Element | None, name: str) -> str | None:
 
 
 def _properties(element: Element) -> dict[str, Any]:
-    """Return the properties of a placemark: its own, and its extended data."""
+    """Return the properties of a placemark: its own texts, and its extended data."""
     out: dict[str, Any] = {}
     for tag in ("name", "description", "address"):
         if (value := _text(element, tag)) is not None:
@@ -447,7 +440,7 @@ def _properties(element: Element) -> dict[str, Any]:
 
 
 def _holds(element: Element, tags: Container[str]) -> bool:
-    """Return whether an element is or holds one of some names."""
+    """Return whether an element has one of some names, or holds such an element."""
     return any(e.tag in tags for e in element.iter())
 
 
@@ -531,7 +524,7 @@ def _ring(element: Element, *, degrees: bool) -> np.ndarray:
 
 
 def _numbers(places: list[str], *, degrees: bool) -> np.ndarray:
-    """Return places as longitude, latitude and height; NaN for no height."""
+    """Return places as longitude, latitude and height, with NaN for a missing height."""
     out = np.full((len(places), 3), math.nan)
     for k, place in enumerate(places):
         values = place.rstrip(",").split(",")
@@ -552,7 +545,7 @@ def _numbers(places: list[str], *, degrees: bool) -> np.ndarray:
 def _heights(
     rings: list[np.ndarray], element: Element, changes: list[str]
 ) -> tuple[list[np.ndarray], bool]:
-    """Return places with heights above the water by the altitude mode of their geometry."""
+    """Return places with heights by the altitude mode, and whether they count from the floor."""
     mode = _text(element, "altitudeMode")
     heights = np.concatenate([ring[:, 2] for ring in rings])
     has_heights = bool((np.nan_to_num(heights) != 0.0).any())

@@ -1,6 +1,6 @@
-"""Items of MAVLink's missions: which commands are places to visit, and how high they are.
+"""Items of MAVLink missions: which commands visit a place, and how high it is.
 
-Numbers and names: MAVLink's common message set (MAV_CMD, MAV_FRAME).
+Numbers and names are those of MAVLink's common message set (MAV_CMD, MAV_FRAME).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ VISITED = {
     31: "NAV_LOITER_TO_ALT",
     82: "NAV_SPLINE_WAYPOINT",
 }
-"""Commands that visit a place: they are goals."""
+"""Commands that visit a place; they are goals."""
 
 NOT_VISITED = {
     21: ("NAV_LAND", "where the vehicle lands"),
@@ -41,7 +41,7 @@ NOT_VISITED = {
     5000: ("NAV_FENCE_RETURN_POINT", "where the vehicle goes after a breach of the fence"),
     5100: ("NAV_RALLY_POINT", "a rally point, for emergencies"),
 }
-"""Commands with a place that is no goal, and what that is."""
+"""Commands with a place that is no goal, and the meaning of the place."""
 
 WITHOUT_PLACE = {
     20: "NAV_RETURN_TO_LAUNCH", 30: "NAV_CONTINUE_AND_CHANGE_ALT", 92: "NAV_GUIDED_ENABLE",
@@ -87,8 +87,11 @@ FENCE, RALLY, HOME = "fence", "rally points", "home"
 """Layers of a mission file."""
 
 INSIDE = {"kind": "bounds", "fence": "inclusion"}
-"""Properties of a fence within which the vehicle stays; of several fences it stays within all, as
-ArduPilot takes them unless its option for the union of inclusion areas is set."""
+"""Properties of an inclusion fence.
+
+The vehicle stays within all inclusion fences, as in ArduPilot unless its option for their union is
+set.
+"""
 
 
 @dataclass(frozen=True)
@@ -98,15 +101,15 @@ class MissionItem:
     Attributes
     ----------
     where
-        Name in messages, as "items[3]".
+        Name in messages, such as "items[3]".
     command, frame
-        Numbers of MAV_CMD and MAV_FRAME.
+        Codes of MAV_CMD and MAV_FRAME.
     params
         The four parameters of the command.
     place
         Latitude, longitude (degrees) and altitude (m); None for what is not stated.
     mark
-        What netsp wrote about the item: ``kind`` and ``name``.
+        Data of netsp about the item: ``kind`` and ``name``.
     """
 
     where: str
@@ -136,6 +139,8 @@ class ItemFeatures:
 
     Attributes
     ----------
+    policy
+        Policy of the import.
     features, unread
         As in `netsp.exchange.maps.feature.Map`.
     complaints, notes
@@ -162,21 +167,16 @@ def features_of_items(
     home: tuple[float, float] | None = None,
     policy: ImportPolicy = DEFAULT_IMPORT,
 ) -> ItemFeatures:
-    """Return the features of mission items: goals, fences, and what is neither.
+    """Return the features of mission items: goals, fences, and the rest.
+
+    All corners of a polygon make one feature, every other item makes one.
 
     Parameters
     ----------
-    items : sequence of MissionItem
-        In the order of the mission.
     home_altitude : float or None
-        Altitude of home above mean sea level, m; None where it is not stated.
+        Altitude of home above mean sea level, m; None if it is not stated.
     home : (float, float), optional
         Longitude and latitude of home, degrees.
-
-    Returns
-    -------
-    ItemFeatures
-        One feature for each item; one for all corners of a polygon.
     """
     out = ItemFeatures(policy)
     stops = [i for i in items if i.command in VISITED and i.lonlat is not None]
@@ -237,8 +237,8 @@ def _passing_rule(
     """Return the rule that tells bends from goals by the seconds for which the vehicle holds.
 
     A tour of netsp ends at home, where it holds as long as at its first waypoint and at every bend,
-    and never as long at a goal. In other missions the vehicle passes waypoints of a second or less,
-    if it holds longer anywhere.
+    and never as long at a goal. In other missions the vehicle passes waypoints with a hold of at
+    most `policy.max_pass_s`, if it holds longer anywhere.
     """
     holds = [i.hold_s for i in stops]
     last = stops[-1].lonlat if stops else None
@@ -339,18 +339,12 @@ def add_polygon(
     *,
     is_inclusion: bool,
 ) -> None:
-    """Add a polygon of a fence: bounds where the vehicle stays inside, else an obstacle.
+    """Add a polygon of a fence: bounds if the vehicle stays inside, else an obstacle.
 
     Parameters
     ----------
-    out : ItemFeatures
-        Takes the feature.
-    where : str
-        Name in messages.
     corners : iterable of (float, float)
         Longitudes and latitudes, degrees.
-    is_inclusion : bool
-        Whether the vehicle stays inside.
     """
     import shapely
 
@@ -370,20 +364,14 @@ def add_circle(
     *,
     is_inclusion: bool,
 ) -> None:
-    """Add a circle of a fence: bounds where the vehicle stays inside, else an obstacle.
+    """Add a circle of a fence: bounds if the vehicle stays inside, else an obstacle.
 
     Parameters
     ----------
-    out : ItemFeatures
-        Takes the feature.
-    where : str
-        Name in messages.
     center : (float, float) or None
         Longitude and latitude, degrees.
     radius : float or None
         Radius, m.
-    is_inclusion : bool
-        Whether the vehicle stays inside.
     """
     import shapely
 
@@ -407,18 +395,14 @@ def add_circle(
 def add_home(
     out: ItemFeatures, where: str, lonlat: tuple[float, float] | None, **properties: Any
 ) -> None:
-    """Add the planned home: the base, at the water's surface.
+    """Add the planned home as the base at the water's surface.
 
     Parameters
     ----------
-    out : ItemFeatures
-        Takes the feature.
-    where : str
-        Name in messages.
     lonlat : (float, float) or None
-        Degrees; None where it is not set.
+        Degrees; None if home is not set.
     **properties
-        Properties of the base.
+        Properties of the base; those that are None are left out.
     """
     import shapely
 

@@ -1,8 +1,8 @@
-"""Occupancy images, as ROS's map server writes them: a picture of cells, and a few lines of YAML.
+"""Reader of occupancy images as ROS's map server writes them: a picture of cells, and a YAML file.
 
 A pixel's value v becomes the probability p = (255 - v) / 255 that its cell is occupied (v / 255 if
-`negate`); above `occupied_thresh` it is, below `free_thresh` it is free, between it is unknown.
-In the mode "trinary" an alpha channel is averaged in as if it were a colour, in the mode "scale" a
+`negate`). Above `occupied_thresh` it is occupied, below `free_thresh` free, and between them
+unknown. In the mode "trinary" an alpha channel is averaged in like a colour; in the mode "scale" a
 cell that is not opaque is unknown (docs.ros.org, nav2_map_server, `MapMode`).
 """
 
@@ -38,7 +38,7 @@ MODES = ("1", "L", "LA", "P", "RGB", "RGBA", "I", "I;16", "I;16B", "I;16L")
 
 
 class MapFile(Model):
-    """What the YAML file of a map says; other fields are passed over."""
+    """YAML file of a map; other fields are ignored."""
 
     image: Annotated[str, Field(description="file of the image, beside this file")]
     resolution: Annotated[Positive, Field(description="size of a cell, m")]
@@ -72,40 +72,31 @@ def read_occupancy(
     on_note: Callable[[str], None] | None = None,
     policy: ImportPolicy = DEFAULT_IMPORT,
 ) -> Problem:
-    """The problem of an occupancy image, in metres of the map's own coordinates.
+    """Return the problem of an occupancy image, in metres of the map's own coordinates.
+
+    Obstacles are simple polygons, and the bounds are the edge of the image.
 
     Parameters
     ----------
     file : str or Path
         YAML file of the map, or its image (PNG, PGM) with a resolution.
-    base : (x, y) or (x, y, z)
-        Of the tether.
     goals : sequence
-        As a problem has them.
-    tether : float
-        Length, metres.
-    clearance : float
-        Kept from obstacles, metres.
+        Goals as in a problem.
     resolution : float, optional
-        Size of a cell, metres, where there is no YAML file; the lower left corner is then (0, 0).
+        Size of a cell, metres, for an image alone; its lower left corner is then (0, 0).
     tolerance : float, optional
-        Obstacles hold all occupied cells, and go no farther beyond them; default: a cell.
+        Largest distance by which obstacles reach beyond occupied cells, metres; default: one cell.
     unknown_is_free : bool
-        What cells are that the map does not know; default: obstacles.
+        Whether unknown cells are free; by default they are obstacles.
     name : str, optional
-        Of the problem; default: the file's.
+        Name of the problem; default: the file's.
     on_note : callable, optional
-        Called with what was assumed, one line each.
-
-    Returns
-    -------
-    Problem
-        Its obstacles are simple polygons, its bounds the image.
+        Called with assumptions, one line each.
 
     Raises
     ------
     InputError
-        Not readable, too large, or not a problem.
+        The image cannot be read, is too large, or gives no valid problem.
     """
     said, image = _opened(file, resolution)
     cell = said.resolution
@@ -162,7 +153,7 @@ def _place(goal: Any) -> Any:
 
 
 def _opened(file: str | Path, resolution: float | None) -> tuple[MapFile, Path]:
-    """What is said of the map, and where its image is."""
+    """Return the fields of the map's YAML file, and the path of its image."""
     path = Path(file)
     if path.suffix.lower() in IMAGES:
         if resolution is None:
@@ -204,7 +195,7 @@ def _opened(file: str | Path, resolution: float | None) -> tuple[MapFile, Path]:
 
 
 def _numbers(value: Any) -> Any:
-    """Text as numbers, where it is some; yes and no as 1 and 0."""
+    """Return texts as numbers if they are, and yes and no as 1 and 0."""
     if isinstance(value, list):
         return [_numbers(v) for v in value]
     if isinstance(value, str) and value.lower() in ("true", "false", "yes", "no"):
@@ -226,8 +217,10 @@ def _rasterio() -> Any:
 
 
 def _values(image: Path, max_cells: int) -> tuple[Floats, Floats | None]:
-    """Return the means of the colours, (rows, columns) from 0 (black) to 255, the first row at the
-    top, and how opaque each cell is, from 0 to 255; None where all are."""
+    """Return the means of the colours, and how opaque each cell is (None if all are).
+
+    Both have shape (rows, columns), from 0 (black, transparent) to 255, the first row at the top.
+    """
     check_file(image)
     from PIL import Image, UnidentifiedImageError
 
@@ -281,8 +274,10 @@ def _kinds(values: Floats, alpha: Floats | None, said: MapFile) -> tuple[Bools, 
 
 
 def _placing(said: MapFile, rows: int) -> tuple[float, ...]:
-    """The affine map (a, b, c, d, e, f) from (column, row) to x = a column + b row + c, y = …;
-    rows count upwards from the lower left corner, or, with so many rows, downwards."""
+    """Return the affine map (a, b, c, d, e, f): x = a column + b row + c, y = d column + e row + f.
+
+    Rows count upwards from the lower left corner; if their number is given, downwards from the top.
+    """
     size, (x, y, turn) = said.resolution, said.origin
     right = size * np.array([math.cos(turn), math.sin(turn)])
     up = size * np.array([-math.sin(turn), math.cos(turn)])
@@ -306,7 +301,7 @@ def _polygons(
     points: Sequence[Any],
     policy: ImportPolicy,
 ) -> tuple[list[shapely.Polygon], list[str]]:
-    """Simple polygons about the occupied cells, and what is to be said of them."""
+    """Return simple polygons around the occupied cells, and notes on them."""
     import shapely
 
     rasterio = _rasterio()
@@ -350,7 +345,7 @@ def _polygons(
 def _simplified(
     grown: shapely.Polygon, cells: shapely.Geometry, tolerance: float, shares: tuple[float, ...]
 ) -> shapely.Geometry:
-    """An outline with fewer corners that holds its cells and goes no farther than the tolerance."""
+    """Return an outline with fewer corners that holds its cells and stays within the tolerance."""
     most = cells.buffer(tolerance, quad_segs=16)
     for share, whole in itertools.product(shares, (False, True)):
         out = grown.simplify(share * tolerance, preserve_topology=whole)

@@ -1,4 +1,4 @@
-"""Options of an import: what a user says of a map."""
+"""Options of an import that a user states about a map."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from netsp.exchange.maps.selection import Selection
 
 @dataclass(frozen=True)
 class Looking:
-    """How every obstacle is looked at (`netsp.model.shorthand.Inspection`).
+    """Inspection of every obstacle (`netsp.model.shorthand.Inspection`).
 
     Attributes
     ----------
     viewpoints
-        About each, at every depth.
+        Number of viewpoints around each obstacle, at every depth.
     standoff
-        Metres.
+        Distance from its surface, metres.
     depths
         Heights z, metres.
     chosen
-        Obstacles that are looked at; all by default.
+        Obstacles to inspect; default: all.
     """
 
     viewpoints: int
@@ -36,46 +36,46 @@ class Looking:
 
 @dataclass(frozen=True)
 class SiteOptions:
-    """What the user says of a map besides.
+    """Options of an import.
 
     Attributes
     ----------
     tether
-        Length, metres; None for the file's own.
+        Length of the tether, metres; None for the file's.
     clearance
-        Metres; None for the file's own, or none.
+        Clearance, metres; None for the file's, or none.
     radius
-        Of obstacles that are points and have none, metres.
+        Radius of point obstacles that state none, metres.
     crs
-        Coordinate system, as ``EPSG:32632``; ``local`` for a plane of its own.
+        Coordinate system, such as ``EPSG:32632``; ``local`` for a plane without a place on the
+        earth.
     units
-        Of lengths in the file, one of `netsp.base.axes.UNITS`; not of coordinates on the earth.
-        None takes the unit that the file states, or metres.
+        Unit of lengths in the file, one of `netsp.base.axes.UNITS`, but not of coordinates on the
+        earth; None for the unit that the file states, or metres.
     maps
-        Pairs of ours and theirs: ``("obstacle", layer)``, ``("name", property)``.
+        Kinds of layers and names of properties: ``("obstacle", layer)``, ``("name", property)``.
     looking
-        How every obstacle is looked at.
+        Inspection of obstacles.
     skip_unreachable
-        Goals farther off than the tether is long are left out.
+        Whether goals farther from the base than the tether is long are left out.
     line_width
-        Width of open lines that are obstacles and have none of their own, metres; None refuses
-        them.
+        Width of open lines that are obstacles and state none, metres; None refuses them.
     join_tolerance
-        Ends of lines that are no farther apart are joined to one outline, metres; positive.
+        Largest distance of ends of lines that are joined to one outline, metres; positive.
     crop
-        Whether obstacles beyond the tether's reach are left out; None does so for charts only.
+        Whether obstacles beyond the tether's reach are left out; None for charts only.
     goals
         Table of goals (`netsp.exchange.maps.csv_table.from_table`).
     candidates
         Table of places where the base may stand; the cropped map holds the reach from each.
     draught
-        Areas of a chart that may be shallower become obstacles, metres; None for none.
+        Depth, metres, below which areas of a chart become obstacles; None for none.
     floor
         Whether the sea floor of a chart is made.
     floor_cell
-        Side of its cells, metres; None takes the number of cells of the policy.
+        Side of the floor's cells, metres; None for the number of cells of the policy.
     crop_margin
-        Share of the tether's length by which the cropped map is larger than its reach; 0 or more.
+        Share of the tether's length by which the cropped map exceeds its reach; 0 or more.
     policy
         Limits and rules of the import.
     """

@@ -1,7 +1,6 @@
-"""Read paths from tables, GeoJSON, GPX and solutions, in the frame of a problem.
+"""Reader of paths from tables, GeoJSON, GPX and solutions, in the frame of a problem.
 
-Positions in degrees are projected into the problem's plane with its origin; positions in metres
-stay as they are.
+Positions in degrees are projected into the problem's plane; positions in metres stay as they are.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from netsp.exchange.maps.time_stamps import NO_VALUES, TimeStamps, seconds_of
 from netsp.model.problem import Problem
 
 ENDINGS = (".csv", ".csv.gz", ".txt", ".json", ".geojson", ".gpx")
-"""Endings of files with paths."""
+"""Endings of the names of files with paths."""
 
 FRAMES = ("local", "global")
 
@@ -40,16 +39,16 @@ Line = tuple[str, list[list[float]], Mapping[str, Any]]
 class FoundPath:
     """Path from a file.
 
-    Parameters
+    Attributes
     ----------
-    name : str
+    name
         Name of the path in the file, or the name of the file.
-    points : ndarray, shape (k, 2) or (k, 3)
-        Points in the frame of the problem.
-    times : ndarray, shape (k,), optional
+    points
+        ndarray of shape (k, 2) or (k, 3), in the frame of the problem.
+    times
         Time stamps of the points, s.
-    notes : tuple of str
-        What was assumed and left out, one line each.
+    notes
+        Assumptions and omissions, one line each.
     """
 
     name: str
@@ -64,23 +63,18 @@ def read_paths(
     frame: str | None = None,
     policy: ReadPolicy = DEFAULT_READ,
 ) -> list[FoundPath]:
-    """Read the paths of a file.
+    """Return the paths of a file, in its order.
 
     Parameters
     ----------
     file : str or Path
-        A table (x, y and perhaps z or depth; or lon, lat; perhaps t), GeoJSON with lines, GPX with
-        tracks or routes, a solution, or a JSON list of points.
+        Table (x, y and perhaps z or depth; or lon, lat; perhaps t), GeoJSON with lines, GPX with
+        tracks or routes, solution, or JSON list of points.
     problem : Problem
         Problem in whose plane the points are returned.
     frame : str, optional
         Frame of GeoJSON: "local" (metres of the problem's plane) or "global" (degrees). By default
         the frame that the file states, else global if the problem has an origin.
-
-    Returns
-    -------
-    list of FoundPath
-        Paths in the order of the file.
 
     Raises
     ------
@@ -214,7 +208,7 @@ def _of_table(file: str | Path, problem: Problem, stem: str, policy: ReadPolicy)
 def _is_gap(table: Table, row: int, quantities: list[Quantity], *, is_global: bool) -> bool:
     """Return whether a row has no position: an empty cell, or degrees without a GPS fix.
 
-    A row that is cut off after one of two coordinates is none: that is a damaged file.
+    A row that ends after the first of two coordinates is no gap but a damaged file.
     """
     cells = [table.plain(row, name) for name in quantities]
     if sum(not cell for cell in cells[:2]) == 1:
@@ -310,8 +304,7 @@ def _of_geojson(
 
 
 def _times_of(properties: Mapping[str, Any], count: int, where: str) -> Floats | None:
-    """Return the times of a line from its property `coordTimes` or `times`; None unless there is
-    one for each point."""
+    """Return the times of a line (`coordTimes` or `times`); None unless each point has one."""
     given = properties.get("coordTimes", properties.get("times"))
     if not isinstance(given, list) or len(given) != count:
         return None
@@ -375,17 +368,13 @@ def path_to_geojson(name: str, points: Floats, problem: Problem) -> str:
 
     Parameters
     ----------
-    name : str
-        Name of the path.
     points : ndarray, shape (k, 2) or (k, 3)
         Points in the problem's frame.
-    problem : Problem
-        The problem.
 
     Returns
     -------
     str
-        A FeatureCollection with one LineString. Without an origin its member "frame" says "local".
+        FeatureCollection with one LineString; its member "frame" is "local" without an origin.
     """
     projection = Projection.of(problem)
     xy = np.asarray(points, dtype=float)

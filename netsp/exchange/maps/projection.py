@@ -1,4 +1,4 @@
-"""Between a problem's plane and the earth: azimuthal equidistant, centred on the base.
+"""Projection between a problem's plane and the earth: azimuthal equidistant, centred on the base.
 
 Distances and directions from the base are exact on the WGS 84 ellipsoid; over 500 m the radial
 error is below a micrometre (UTM is off by metres there, through its grid convergence).
@@ -26,25 +26,23 @@ QUARTER_MERIDIAN = 1e7
 
 
 class Projection:
-    """Metres in a problem's plane to degrees and back.
+    """Projection of metres in a problem's plane to degrees and back.
 
     Parameters
     ----------
-    latitude : float
-        Of the base, degrees.
-    longitude : float
-        Of the base, degrees.
+    latitude, longitude : float
+        Position of the base, degrees.
     heading : float
-        Degrees clockwise from true north that the problem's y axis points to.
+        Direction of the problem's y axis, degrees clockwise from true north.
     base : tuple of float
         (x, y) of the base in the problem's plane, metres.
     name : str
-        What messages call the origin.
+        Name of the origin in messages.
 
     Raises
     ------
     InputError
-        An origin outside the range, or pyproj is not installed.
+        The origin is out of range, or pyproj is not installed.
     """
 
     def __init__(
@@ -67,26 +65,12 @@ class Projection:
     def parse(
         cls, text: str, base: tuple[float, float] = (0.0, 0.0), name: str = "origin"
     ) -> Projection:
-        """A projection from ``lat,lon`` or ``lat,lon,heading``.
-
-        Parameters
-        ----------
-        text : str
-            Degrees, separated by commas.
-        base : tuple of float
-            (x, y) of the base in the problem's plane, metres.
-        name : str
-            What messages call the origin.
-
-        Returns
-        -------
-        Projection
-            The projection.
+        """Return the projection of a text ``lat,lon`` or ``lat,lon,heading`` in degrees.
 
         Raises
         ------
         InputError
-            Something else than two or three numbers, or out of range.
+            The text is not two or three numbers, or they are out of range.
         """
         if not isinstance(text, str):
             raise InputError(f"{name}: expected lat,lon or lat,lon,heading, got {shown(text)}")
@@ -100,18 +84,7 @@ class Projection:
 
     @classmethod
     def of(cls, problem: Problem) -> Projection | None:
-        """The projection of a problem that knows where on the earth it is.
-
-        Parameters
-        ----------
-        problem : Problem
-            The problem.
-
-        Returns
-        -------
-        Projection or None
-            About its base; None if it has no origin.
-        """
+        """Return the projection around the base of a problem; None if the problem has no origin."""
         if problem.origin is None:
             return None
         o = problem.origin
@@ -131,7 +104,7 @@ class Projection:
         return Transformer.from_crs("EPSG:4326", local, always_xy=True)
 
     def to_earth(self, xy: npt.ArrayLike) -> Floats:
-        """Latitudes and longitudes of points.
+        """Return the latitudes and longitudes of points.
 
         Parameters
         ----------
@@ -146,7 +119,7 @@ class Projection:
         Raises
         ------
         InputError
-            No pairs of finite numbers, or points that are farther off than the projection reaches.
+            `xy` is not pairs of finite numbers, or points are beyond the range of the projection.
         """
         d = _pairs("xy", xy) - self.base
         if len(d) and not np.abs(d).max() <= QUARTER_MERIDIAN:
@@ -160,7 +133,7 @@ class Projection:
         return np.column_stack([latitude, longitude])
 
     def to_plane(self, latlon: npt.ArrayLike) -> Floats:
-        """Points of latitudes and longitudes.
+        """Return the points of latitudes and longitudes.
 
         Parameters
         ----------
@@ -175,7 +148,7 @@ class Projection:
         Raises
         ------
         InputError
-            No pairs of finite numbers, or off the globe.
+            `latlon` is not pairs of finite numbers, or off the globe.
         """
         p = _pairs("latlon", latlon)
         if len(p) and not (np.abs(p) <= (90.0, 360.0)).all():
@@ -188,7 +161,7 @@ class Projection:
 
 
 def _pairs(name: str, value: npt.ArrayLike) -> Floats:
-    """An argument as an array (n, 2) of finite numbers."""
+    """Return an argument as an array (n, 2) of finite numbers."""
     try:
         given = np.asarray(value)
         pairs = np.atleast_2d(given).astype(float)

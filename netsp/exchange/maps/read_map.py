@@ -86,7 +86,7 @@ EARTH_READERS = {
     ".fen": read_fence_list,
     ".ral": read_rally_list,
 }
-"""Readers of formats that are in degrees always, by extension."""
+"""Readers of formats that are always in degrees, by extension."""
 
 
 @dataclass(frozen=True)
@@ -96,17 +96,17 @@ class ImportedSite:
     Attributes
     ----------
     problem
-        The problem; its `site` records what became of every feature.
+        The problem; its `site` records the use of every feature.
     left_out
-        Shapes of the features that were left out, in the problem's plane, for the picture.
+        Shapes of the features left out, in the problem's plane, for the picture.
     notes
-        What was assumed, changed or left out, one line each.
+        Assumptions, changes and omissions, one line each.
     viewpoints
-        Names of the goals that stand for obstacles to be looked at.
+        Names of the goals that are viewpoints of obstacles.
     floor
-        The sea floor, where one was asked for.
+        Sea floor, if one was asked for.
     goal_features
-        Feature of each goal of the problem; None for viewpoints about obstacles.
+        Feature of each goal of the problem; None for viewpoints.
     """
 
     problem: Problem
@@ -124,12 +124,7 @@ class ImportedSite:
         problem : Problem
             The same problem with some of its goals, in their order.
         reason : str
-            Why the others are left out.
-
-        Returns
-        -------
-        ImportedSite
-            Its record counts these features as left out.
+            Reason to leave out the others.
         """
         import shapely
 
@@ -166,29 +161,28 @@ def import_site(
     options: SiteOptions | None = None,
     name: str | None = None,
 ) -> ImportedSite:
-    """Import the problem of a map, in metres from its base, y to the projection's heading.
+    """Return the problem of a map, in metres from its base, y towards the projection's heading.
 
     Parameters
     ----------
     file : str or Path
-        GeoJSON, GPX, .plan, .waypoints, KML, KMZ, shapefile, GeoPackage, DXF, S-57, or what else
-        GDAL reads.
+        GeoJSON, GPX, .plan, .waypoints, KML, KMZ, shapefile, GeoPackage, DXF, S-57, or another
+        format that GDAL reads.
     projection : Projection, optional
-        About the base; None takes the map's own base, y to its heading or to the north.
-    options : SiteOptions, optional
-        What the user says of the map.
+        Projection around the base; None for the map's own base, with y towards its heading or
+        north.
     name : str, optional
         Name of the problem; default: the file's.
 
     Returns
     -------
     ImportedSite
-        The problem; where the map has a place on the earth, with its origin.
+        Its problem has an origin if the map has a place on the earth.
 
     Raises
     ------
     InputError
-        Not readable, or not a site: `SeveralErrors` where more than one thing is wrong.
+        The file cannot be read or is no site; `SeveralErrors` if more than one thing is wrong.
     """
     said = options or SiteOptions()
     if said.units is not None and said.units not in UNITS:
@@ -228,32 +222,21 @@ def read_site(
     on_note: Callable[[str], None] | None = None,
     **more: Any,
 ) -> Problem:
-    """Return the problem of a map, as `import_site`.
+    """Return the problem of a map, as `import_site`; its `site` records the use of every feature.
 
     Parameters
     ----------
-    file : str or Path
-        The map.
-    projection : Projection, optional
-        About the base.
     options : SiteOptions, optional
-        What the user says of the map; its fields may be given by name instead.
-    name : str, optional
-        Name of the problem.
+        Options of the import; its fields may be given by name instead.
     on_note : callable, optional
-        Called with what was assumed, changed or left out, one line each.
+        Called with assumptions, changes and omissions, one line each.
     **more
         Fields of `SiteOptions`.
-
-    Returns
-    -------
-    Problem
-        The problem; its `site` records what became of every feature.
 
     Raises
     ------
     InputError
-        As of `import_site`.
+        As `import_site`.
     """
     found = import_site(file, projection, options=options or SiteOptions(**more), name=name)
     if on_note is not None:
@@ -268,26 +251,19 @@ def read_map(
     units: str | None = None,
     policy: ImportPolicy = DEFAULT_IMPORT,
 ) -> Map:
-    """Return a map of any format.
+    """Return a map of any format; the file's extension and content decide which.
 
     Parameters
     ----------
-    file : str or Path
-        The file; its extension tells GeoJSON from the others.
     crs : str, optional
-        Coordinate system, ``local`` for a plane.
+        Coordinate system, ``local`` for a plane without a place on the earth.
     units : str, optional
-        Unit of lengths that the user says; None takes the file's.
-
-    Returns
-    -------
-    Map
-        Features, and what could not be read.
+        Unit of lengths that the user states; None for the file's.
 
     Raises
     ------
     InputError
-        Not readable.
+        The file cannot be read.
     """
     suffix = Path(file).suffix.lower()
     reader = EARTH_READERS.get(suffix)
@@ -319,7 +295,7 @@ SKIP_OPTION = "; leave out what is out of reach with --skip-unreachable"
 
 @dataclass
 class _Site:
-    """A map on its way to a problem."""
+    """Map that becomes a problem."""
 
     file: str | Path
     map: Map
@@ -420,7 +396,7 @@ class _Site:
         )
 
     def _made(self, data: dict[str, Any], goals: list[Any], obstacles: list[Any]) -> Problem:
-        """A problem; what it complains of is told by the map's own names."""
+        """Return the problem of checked data; its errors name features of the map."""
         try:
             return Problem.model_validate(data)
         except ValidationError as error:
@@ -473,7 +449,7 @@ class _Site:
     def _chart_depths(
         self, parts: dict[str, list[Feature]], places: Mapping[str, Any], reach: CropWindow | None
     ) -> None:
-        """Make obstacles of shallow areas, and the sea floor, where they are asked for."""
+        """Make obstacles of shallow areas, and the sea floor, if the options ask for them."""
         free = [f for f in self.map.features if self.kinds.get(f.layer.lower()) != "ignore"]
         left_out = [
             f for f in free if self.ledger.is_left_out(f) and f.layer.lower() not in self.kinds
@@ -514,7 +490,7 @@ class _Site:
     def _check_depth(
         self, shallow: list[Feature], places: Mapping[str, Any], draught: float
     ) -> None:
-        """Report a base or goals that lie in water that may be too shallow."""
+        """Complain of a base or goals that lie in water that may be too shallow."""
         import shapely
 
         areas = [self._plane(feature.shape) for feature in shallow]
@@ -570,7 +546,7 @@ class _Site:
         return tuple(self._plane(shape) for shape in self.ledger.left_out_shapes)
 
     def _base(self, parts: dict[str, list[Feature]]) -> tuple[Any, Feature | None] | None:
-        """Where the tether is fixed, and the feature that says so; sets the projection."""
+        """Return the place of the tether's anchor and its feature; set the projection."""
         bases = parts["base"]
         if len(bases) > 1:
             self._complain(
@@ -615,13 +591,13 @@ class _Site:
 
     @property
     def _unit(self) -> float:
-        """Return the metres per unit of the file; the unit in the options overrides the file's."""
+        """Metres per unit of the file; the unit of the options overrides the file's."""
         if self.is_chart:  # its reader converts them
             return 1.0
         return UNITS[self.said.units] if self.said.units else self.map.metres or 1.0
 
     def _plane(self, shape: shapely.Geometry) -> Any:
-        """A shape in metres in the problem's plane."""
+        """Return a shape in metres in the problem's plane."""
         import shapely
 
         flat = shapely.force_2d(shape)
@@ -636,8 +612,10 @@ class _Site:
         return (float(at.x), float(at.y), self._height(feature, point))
 
     def _height(self, feature: Feature, point: Any = None) -> float:
-        """Return z in metres: of a depth, else of the point itself, whose height on the earth is
-        in metres by its format."""
+        """Return z in metres, of a depth or else of the point itself.
+
+        The height of a point on the earth is in metres by its format.
+        """
         depth = self._depth(feature)
         at = point if point is not None else feature.shape
         if depth is not None:
@@ -730,7 +708,7 @@ class _Site:
         return goals
 
     def _obstacles(self, features: list[Feature], free: list[Any]) -> list[dict[str, Any]]:
-        """Circles and polygons, in whose holes places that must stay free are."""
+        """Return the obstacles of features; holes in which a place must stay free are cut open."""
         import shapely
 
         spots = shapely.MultiPoint([p[:2] for p in free])
@@ -861,7 +839,7 @@ class _Site:
     def _with_rim(
         self, outline: shapely.Geometry, pieces: list[tuple[Feature, shapely.LineString]]
     ) -> shapely.Geometry:
-        """Return an outline with the area of those of its lines that state a width."""
+        """Return an outline together with the area of its lines that state a width."""
         import shapely
 
         rims = [
@@ -889,7 +867,7 @@ class _Site:
         return abs(width) * (1.0 if metres else self._unit) or None
 
     def _named(self, things: list[dict[str, Any]]) -> list[dict[str, Any]]:
-        """Give obstacles the names of their features, numbered where a feature has several."""
+        """Return obstacles named after their features, numbered if a feature has several."""
         size = Counter(thing["feature"].where for thing in things)
         number: Counter[str] = Counter()
         out = []
@@ -951,7 +929,7 @@ class _Site:
         return own if own is not None else self.said.radius
 
     def _note_other_height(self, feature: Feature, at: Any, depth: float) -> None:
-        """Note that the depth of a feature is taken, where its point has another height."""
+        """Add a note if the depth of a feature is used and its point has another height."""
         if self.is_chart or at.geom_type != "Point" or not at.has_z:
             return
         z = float(at.z) * (1.0 if self.map.geographic else self._unit)
@@ -963,7 +941,7 @@ class _Site:
             )
 
     def _note_unread(self, feature: Feature, names: list[Any], expected: str) -> None:
-        """Note once a layer that properties which look like a height or a size are not read."""
+        """Add one note a layer on properties that look like a height or a size and are not read."""
         for name in names:
             if self.is_chart or feature.properties[name] is None:
                 continue
@@ -973,7 +951,7 @@ class _Site:
                 self.notes.append(note)
 
     def _complain_of_points(self, features: list[Feature]) -> None:
-        """Complain of points without a radius, a line for each layer."""
+        """Complain of points without a radius, one line a layer."""
         by_layer: dict[str, list[str]] = {}
         for feature in features:
             by_layer.setdefault(feature.layer, []).append(feature.where)
@@ -998,7 +976,7 @@ class _Site:
     def _inspections(
         self, obstacles: list[dict[str, Any]], anchor: Any, tether: float | None, clearance: float
     ) -> list[dict[str, Any]]:
-        """The goals about obstacles that are to be looked at."""
+        """Return the viewpoints of the obstacles to be inspected."""
         from netsp.model.shorthand import Inspection
 
         goals: list[dict[str, Any]] = []
@@ -1033,7 +1011,7 @@ class _Site:
         return goals
 
     def _chosen(self, obstacles: list[dict[str, Any]]) -> set[int]:
-        """Return which obstacles the user wants to have looked at."""
+        """Return the indices of the obstacles that the user wants to inspect."""
         import shapely
 
         look = self.said.looking
@@ -1198,7 +1176,7 @@ class _Site:
     # What is checked of the whole
 
     def _check_names(self, things: list[dict[str, Any]], what: str) -> None:
-        """Number the names that several goals or obstacles share, and say so."""
+        """Number the names that several goals or obstacles share, and add a note."""
         _number_parts(things)
         numbered = _number_names(things)
         if numbered:
@@ -1217,7 +1195,7 @@ class _Site:
         anchor: Any,
         tether: float,
     ) -> None:
-        """A plane in which a tether would reach everything many times over is one of degrees."""
+        """Complain of coordinates in a plane that look like degrees, for the tether's length."""
         if self.map.geographic or not goals:
             return
         places = np.array([anchor, *(g["position"] for g in goals)])[:, :2] / self._unit
@@ -1235,8 +1213,7 @@ class _Site:
     def _within_reach(
         self, goals: list[dict[str, Any]], anchor: Any, tether: float
     ) -> list[dict[str, Any]]:
-        """Goals that a tether could reach if nothing were in the way; the others are complained of,
-        or left out."""
+        """Return the goals within a straight tether; complain of the others, or leave them out."""
         near: list[dict[str, Any]] = []
         far: list[tuple[float, dict[str, Any]]] = []
         for goal in goals:
@@ -1273,7 +1250,7 @@ class _Site:
         return near
 
     def _cause(self, goal: dict[str, Any], tether: float) -> str:
-        """Why a goal may be so far off."""
+        """Return a likely cause for a goal that is far away, or an empty text."""
         if self.projection is None:
             return ""
         ((lat, lon),) = self.projection.to_earth([goal["position"][:2]])
@@ -1294,7 +1271,7 @@ class _Site:
         return {"origin": {"latitude": p.latitude, "longitude": p.longitude, "heading": p.heading}}
 
     def _complain(self, text: str, option: str = "", ask: str | None = None) -> None:
-        """Note what is wrong; the options that help on the command line stand apart."""
+        """Add a complaint; options of the command line that help stand apart."""
         self.complaints.append((f"{self.file}: {text.removeprefix(f'{self.file}: ')}", option))
         if ask is not None:
             self.asks.append(ask)
@@ -1310,14 +1287,14 @@ def _blocks_of(shape: shapely.Geometry) -> list[shapely.Geometry]:
 
 
 def _marked(feature: Feature) -> Feature:
-    """Return a goal or a base as a point: one drawn as a symbol stands where the symbol marks."""
+    """Return a goal or a base as a point; a symbol stands where it marks."""
     if feature.marker is None or "Point" in feature.shape.geom_type:
         return feature
     return replace(feature, shape=feature.marker)
 
 
 def _bare(thing: dict[str, Any]) -> dict[str, Any]:
-    """Without where it came from, nor a name that it does not have."""
+    """Return the data of a goal or obstacle without its origin, and without a missing name."""
     ours = ("where", "feature", "source", "layer")
     return {k: v for k, v in thing.items() if k not in ours and v is not None}
 
@@ -1349,7 +1326,7 @@ def _distance(places: np.ndarray, obstacles: list[dict[str, Any]]) -> np.ndarray
 
 
 def _first_of(places: list[str]) -> str:
-    """Return the first of some places and how many more there are."""
+    """Return the first of some names and how many more there are."""
     return places[0] + (f" and {len(places) - 1} more" if len(places) > 1 else "")
 
 
@@ -1375,7 +1352,7 @@ def _number_parts(things: list[dict[str, Any]]) -> None:
 
 
 def _number_names(things: list[dict[str, Any]]) -> list[tuple[str, str, str]]:
-    """Number names that stand more than once ("pier", "pier 2"); return old, new and place."""
+    """Number names that occur more than once ("pier", "pier 2"); return old, new and place."""
     taken = {thing["name"] for thing in things}
     seen: Counter[str] = Counter()
     changed = []
@@ -1422,6 +1399,6 @@ def _real(value: Any) -> float:
 
 
 def _list(value: Any) -> list[float]:
-    """Heights of a list, or of text with commas, as tables have them."""
+    """Return the heights of a list, or of a text with commas or spaces as in tables."""
     values = value.replace(",", " ").split() if isinstance(value, str) else value
     return [_real(v) for v in (values if isinstance(values, list) else [values])]

@@ -27,16 +27,12 @@ NO_HEIGHT = -9999.0
 
 @dataclass(frozen=True)
 class DepthArea:
-    """Area of a chart with a range of depths.
+    """Area of a chart with a range of depths, in the problem's plane.
 
     Attributes
     ----------
-    shape
-        In the problem's plane.
-    least
-        Least depth, metres downwards; None where the chart does not give it.
-    greatest
-        Greatest depth.
+    least, greatest
+        Depths, metres downwards; None if the chart does not give them.
     """
 
     shape: shapely.Geometry
@@ -46,14 +42,12 @@ class DepthArea:
 
 @dataclass(frozen=True)
 class Danger:
-    """Rock, wreck or obstruction with the depth of its top.
+    """Rock, wreck or obstruction with the depth of its top, in the problem's plane.
 
     Attributes
     ----------
-    shape
-        Point, line or area in the problem's plane.
     depth
-        Depth of its top, metres downwards; negative where it dries.
+        Depth of its top, metres downwards; negative if it dries.
     """
 
     shape: shapely.Geometry
@@ -67,7 +61,7 @@ class SeaFloor:
     Attributes
     ----------
     west, south
-        Corner of the grid, in the problem's plane, metres.
+        Corner of the grid in the problem's plane, metres.
     cell
         Side of a cell, metres.
     heights
@@ -82,15 +76,10 @@ class SeaFloor:
     def save(self, file: str | Path) -> None:
         """Write the grid to a file that a scene takes as its floor.
 
-        Parameters
-        ----------
-        file : str or Path
-            Its extension is one of `SUFFIXES`.
-
         Raises
         ------
         InputError
-            Another extension, or it cannot be written.
+            The file's extension is none of `SUFFIXES`, or it cannot be written.
         """
         check_suffix(file)
         filled = np.where(np.isfinite(self.heights), self.heights, NO_HEIGHT)
@@ -108,7 +97,7 @@ class SeaFloor:
 
 
 def check_suffix(file: str | Path) -> None:
-    """Raise an `InputError` unless a sea floor can be written to a file of this name."""
+    """Raise InputError unless the name of a file ends like a sea floor's (`SUFFIXES`)."""
     if Path(file).suffix.lower() not in SUFFIXES:
         raise InputError(
             f"floor: expected a name that ends in {', '.join(SUFFIXES)}, got {shown(str(file))}"
@@ -129,34 +118,23 @@ def sea_floor(
     """Return the sea floor that a chart's depths give.
 
     Depths are interpolated between soundings and contours, and kept within the range of depths of
-    the area that they lie in, the shallower where areas overlap. Beyond all soundings and contours
-    an area has its least depth. Land is at the datum.
+    the area around them, the shallower where areas overlap. Beyond all soundings and contours an
+    area has its least depth. Land is at the datum.
 
-    The floor is never deeper than a sounding or the top of a danger within it, also between the
-    middles of cells, where a scene interpolates. A sounding shallower than its area raises the
-    floor as far as the neighbouring soundings and contours.
+    The floor is never deeper than a sounding or the top of a danger, also between the centres of
+    cells, where a scene interpolates. A sounding shallower than its area raises the floor up to the
+    neighbouring soundings and contours.
 
     Parameters
     ----------
-    areas : sequence of DepthArea
-        Areas with depths.
     contours : ndarray, shape (k, 3)
         Corners of contours: x, y and depth downwards.
-    land : sequence of shapely.Geometry
-        Areas of land.
     box : (xmin, ymin, xmax, ymax)
         Extent that the grid must hold.
     cell : float
         Side of a cell, metres.
     soundings : ndarray, shape (k, 3), optional
         x, y and depth downwards.
-    dangers : sequence of Danger
-        Rocks, wrecks and obstructions whose depth is known.
-
-    Returns
-    -------
-    SeaFloor
-        The grid.
 
     Raises
     ------
@@ -203,7 +181,7 @@ def sea_floor(
 
 
 def _is_shoal(soundings: Floats, areas: Sequence[DepthArea]) -> np.ndarray:
-    """Return which soundings are shallower than the least depth of every area that they lie in."""
+    """Return a mask of soundings shallower than the least depth of every area around them."""
     import shapely
 
     least = np.full(len(soundings), np.inf)
@@ -216,7 +194,7 @@ def _is_shoal(soundings: Floats, areas: Sequence[DepthArea]) -> np.ndarray:
 
 
 def _cap(depth: Floats, soundings: Floats, corner: tuple[float, float], cell: float) -> None:
-    """Keep the floor above soundings: each limits the depth of the four cells about it."""
+    """Keep the floor above soundings: each limits the depth of the four cells around it."""
     rows, columns = depth.shape
     left, low = (np.floor((soundings[:, k] - corner[k]) / cell - 0.5).astype(int) for k in (0, 1))
     for row, column in ((low, left), (low, left + 1), (low + 1, left), (low + 1, left + 1)):
@@ -240,7 +218,7 @@ def _cap_danger(
 
 
 def _covered(shape: shapely.Geometry, x: Floats, y: Floats) -> np.ndarray:
-    """Return which middles of cells lie in a shape."""
+    """Return a mask of the cells whose centres lie in a shape."""
     import shapely
 
     low_x, low_y, high_x, high_y = shape.bounds
@@ -258,7 +236,7 @@ def _covered(shape: shapely.Geometry, x: Floats, y: Floats) -> np.ndarray:
 def _interpolated(
     contours: Floats, soundings: Floats, is_shoal: np.ndarray, x: Floats, y: Floats
 ) -> tuple[Floats, np.ndarray]:
-    """Return depths interpolated linearly (NaN outside), and a mask of those that use a shoal."""
+    """Return depths interpolated linearly (NaN outside), and a mask of cells that use a shoal."""
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import Delaunay, QhullError
 

@@ -1,4 +1,4 @@
-"""Choice of the features of a map that are to be inspected: by layer, name or box."""
+"""Selection of the features of a map to inspect: by layer, name or box."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ if TYPE_CHECKING:
 Box = tuple[float, float, float, float]
 
 WORDS = ("layer", "name", "box", "earth")
-"""Words of a choice: ``earth`` is a box in degrees, ``box`` one in the problem's plane."""
+"""Words of a rule: ``box`` is in the problem's plane, ``earth`` in degrees."""
 
 
 @dataclass(frozen=True)
 class Selection:
-    """Choice of obstacles; a feature that fits one of each kind of rule is chosen.
+    """Selection of obstacles; a feature that fits one rule of each kind is selected.
 
     Attributes
     ----------
     layers
-        Names of layers, in lower case, with ``*`` and ``?`` as in names of files.
+        Names of layers, in lower case, with the wildcards ``*`` and ``?``.
     names
         Names of features, likewise.
     boxes
-        ``(xmin, ymin, xmax, ymax)`` in the problem's plane; a feature within or across is chosen.
+        ``(xmin, ymin, xmax, ymax)`` in the problem's plane; a feature within or across fits.
     earth_boxes
         ``(south, west, north, east)`` in degrees.
 
@@ -48,22 +48,12 @@ class Selection:
 
     @classmethod
     def parse(cls, rules: Sequence[tuple[str, str]]) -> Selection:
-        """Return the choice that pairs of a word and a value stand for.
-
-        Parameters
-        ----------
-        rules : sequence of (str, str)
-            As ``("layer", "SLCONS")`` or ``("box", "0,0,50,20")``.
-
-        Returns
-        -------
-        Selection
-            The choice.
+        """Return the selection of rules such as ``("layer", "SLCONS")``, ``("box", "0,0,50,20")``.
 
         Raises
         ------
         InputError
-            An unknown word, or a box that is none.
+            A word is unknown, or a box is wrong.
         """
         for word, _ in rules:
             if word not in WORDS:
@@ -82,38 +72,18 @@ class Selection:
         )
 
     def takes(self, layer: str, name: str | None) -> bool:
-        """Return whether layer and name of a feature fit.
-
-        Parameters
-        ----------
-        layer : str
-            Its layer.
-        name : str or None
-            Its name.
-
-        Returns
-        -------
-        bool
-            Whether they do; whatever they are where the choice says nothing of them.
-        """
+        """Return whether layer and name of a feature fit."""
         return (not self.layers or _fits(layer, self.layers)) and (
             not self.names or (name is not None and _fits(name, self.names))
         )
 
     def holds(self, shape: shapely.Geometry, areas: Sequence[shapely.Geometry]) -> bool:
-        """Return whether a shape lies in or across one of the boxes.
+        """Return whether a shape lies in or across one of the boxes; True without boxes.
 
         Parameters
         ----------
-        shape : shapely.Geometry
-            In the problem's plane.
         areas : sequence of shapely.Geometry
-            All boxes in the same plane.
-
-        Returns
-        -------
-        bool
-            Whether it does; True without boxes.
+            All boxes, in the plane of the shape.
         """
         return not areas or any(shape.intersects(area) for area in areas)
 

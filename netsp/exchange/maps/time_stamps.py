@@ -14,7 +14,7 @@ from netsp.exchange.maps.import_policy import DEFAULT_READ, ReadPolicy
 from netsp.exchange.maps.word_tables import words
 
 NO_VALUES = words("nan -nan null none na n/a <null> #n/a #nv inf +inf -inf - -- ---") | {""}
-"""Cells, in lower case, that hold nothing."""
+"""Cells, in lower case, without a value."""
 
 FINER = ((1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds"))
 """Units of times since 1970 that are finer than seconds."""
@@ -29,8 +29,10 @@ DATES = (
     (re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})"), (3, 2, 1)),
     (re.compile(r"(\d{4})[/.](\d{1,2})[/.](\d{1,2})"), (1, 2, 3)),
 )
-"""Dates besides ISO 8601, with the places of year, month and day. A date such as 11/12/2026 is
-refused, because the order of day and month is ambiguous."""
+"""Dates besides ISO 8601, with the positions of year, month and day.
+
+A date such as 11/12/2026 is refused, because the order of day and month is ambiguous.
+"""
 
 
 class TimeStamps:
@@ -41,7 +43,7 @@ class TimeStamps:
     meaning : Column
         Meaning of the column of times; a unit in its name decides.
     on_note : callable
-        Called with what is assumed, one line each.
+        Called with assumptions, one line each.
 
     Examples
     --------
@@ -65,21 +67,19 @@ class TimeStamps:
         self._days, self._last = 0, 0.0
 
     def seconds(self, text: str, where: str, date: str = "") -> float:
-        """Return a time in seconds, since 1970 where the table states dates.
+        """Return a time in seconds, since 1970 if the table states dates.
 
         Parameters
         ----------
-        text : str
-            Cell of the time.
         where : str
             Name of the cell in messages.
         date : str
-            Cell of the date, where the table has a column of dates.
+            Cell of the date, if the table has a column of dates.
 
         Raises
         ------
         InputError
-            No time, or a time of another kind than those before.
+            The cell is no time, or of another kind than earlier cells.
         """
         number = _number(text)
         clock = CLOCK.fullmatch(text)
@@ -118,24 +118,19 @@ class TimeStamps:
 
 
 def seconds_of(text: str, where: str) -> float:
-    """Return the seconds since 1970 of a date with a time; without a time zone it is UTC.
+    """Return the seconds since 1970 of a date with a time, in UTC unless it states a time zone.
 
     Parameters
     ----------
     text : str
-        ISO 8601, or a date as 01.05.2026 or 2026/05/01 with a time after it.
+        ISO 8601, or a date such as 01.05.2026 or 2026/05/01 with a time after it.
     where : str
         Name of the value in messages.
-
-    Returns
-    -------
-    float
-        Seconds since 1970.
 
     Raises
     ------
     InputError
-        No such time.
+        The text is no such time.
 
     Examples
     --------
@@ -172,19 +167,7 @@ def _number(text: str) -> float | None:
 
 
 def unit_of_time(value: float, policy: ReadPolicy = DEFAULT_READ) -> tuple[float, str]:
-    """Return the unit of a time whose column names none.
-
-    Parameters
-    ----------
-    value : float
-        The first time of a table.
-
-    Returns
-    -------
-    scale : float
-        Seconds of the unit.
-    name : str
-        Name of a unit since 1970; empty for seconds.
+    """Return the unit of a time whose column names none: its length, s, and its name (empty for s).
 
     Examples
     --------

@@ -1,6 +1,6 @@
-"""Maps through GDAL's readers: shapefiles, GeoPackages, S-57 charts and what else GDAL reads.
+"""Reader of maps through GDAL: shapefiles, GeoPackages, S-57 charts and other formats.
 
-pyogrio brings GDAL with it. Geometries that Shapely does not read are repaired or named
+pyogrio contains GDAL. Geometries that Shapely does not read are repaired or named
 (`netsp.exchange.maps.wkb_shapes`).
 """
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import shapely
 
 PLANE_SYSTEMS = ("LOCAL_CS", "ENGCRS", "ENGINEERINGCRS")
-"""First words of systems without a place on the earth, in well-known text."""
+"""First words, in well-known text, of systems without a place on the earth."""
 
 OSM_SUFFIXES = (".osm", ".pbf")
 """Extensions of OpenStreetMap's own formats."""
@@ -44,41 +44,35 @@ SQLITE = b"SQLite format 3\0"
 GML_MEMBER = re.compile(
     rb"<(?:[\w.-]+:)?(?:featureMembers?|member)\b[^>]*>\s*<(?:[\w.-]+:)?([\w.-]+)"
 )
-"""Feature of GML: the name of its element is its layer's."""
+"""Feature of GML, whose element is named like its layer."""
 
 SOURCE_PLACE = re.compile(r"^\S+\.(?:cpp|c|h), \d+: ")
-"""Place in GDAL's own code, with which some of its messages begin."""
+"""Place in GDAL's source code with which some of its messages begin."""
 
 UNSUPPORTED = "Geometry type is not supported"
 """Words of pyogrio for layers that are declared to hold faces."""
 
 MIXED_TYPES = "Unrecognized geometry type"
-"""Words of pyogrio for layers whose geometries are of several types, some with heights."""
+"""Words of pyogrio for layers with several types of geometries, some with heights."""
 
 LOCAL = "local"
-"""The coordinate system of a map without a place on the earth."""
+"""Coordinate system of a map without a place on the earth."""
 
 
 def read_vector(file: str | Path, crs: str | None, policy: ReadPolicy = DEFAULT_READ) -> Map:
-    """Return a file of any format that GDAL reads as a map.
+    """Return a file of any format that GDAL reads as a map, in degrees or in the file's own plane.
 
     Parameters
     ----------
-    file : str or Path
-        The file.
     crs : str, optional
-        Coordinate system of layers that name none, ``local`` for a plane of its own.
-
-    Returns
-    -------
-    Map
-        In degrees, or in the file's own plane.
+        Coordinate system of layers that name none, ``local`` for a plane without a place on the
+        earth.
 
     Raises
     ------
     InputError
-        Not readable, too large, some layers with a place on the earth and some without, or pyogrio
-        is not installed.
+        The file cannot be read or is too large, only some layers have a place on the earth, or
+        pyogrio is not installed.
     """
     check_file(file)
     with _readable(file) as plain:
@@ -88,26 +82,14 @@ def read_vector(file: str | Path, crs: str | None, policy: ReadPolicy = DEFAULT_
 def read_plain(
     file: str | Path, plain: str | Path, crs: str | None, policy: ReadPolicy = DEFAULT_READ
 ) -> Map:
-    """Return a file as a map from a copy of it that GDAL reads.
+    """Return a file as a map, as `read_vector`, from a copy of it that GDAL reads.
 
     Parameters
     ----------
     file : str or Path
         The user's file, for messages.
     plain : str or Path
-        Where it is read.
-    crs : str, optional
-        Coordinate system, as of `read_vector`.
-
-    Returns
-    -------
-    Map
-        As of `read_vector`.
-
-    Raises
-    ------
-    InputError
-        As of `read_vector`.
+        File that is read.
     """
     found = _Found(file, policy)
     places: dict[str, bool] = {}
@@ -158,13 +140,11 @@ class GdalLayer:
     Attributes
     ----------
     crs
-        Its coordinate system, None without one.
+        Its coordinate system; None without one.
     numbers
         Numbers of its features.
     shapes
-        Well-known binary of each feature; None for one without geometry.
-    properties
-        Name to value, for each feature.
+        Well-known binary of each feature; None without a geometry.
     texts
         Numbers of the features that are texts.
     """
@@ -177,21 +157,16 @@ class GdalLayer:
 
 
 def gdal_layers(file: str | Path, plain: str | Path, notes: list[str]) -> list[tuple[str, Any]]:
-    """Return the layers of a file, with the type of their geometries; None for tables.
+    """Return the layers of a file and the types of their geometries, which are None for tables.
 
     Parameters
     ----------
     file : str or Path
         The user's file, for messages.
     plain : str or Path
-        Where it is read.
+        File that is read.
     notes : list of str
-        Gets what GDAL warns of.
-
-    Returns
-    -------
-    list of (str, str or None)
-        In the order of the file.
+        Extended by GDAL's warnings.
     """
     layers = _call(file, notes, _pyogrio().list_layers, plain)
     return [(str(name), kind) for name, kind in layers]
@@ -200,28 +175,12 @@ def gdal_layers(file: str | Path, plain: str | Path, notes: list[str]) -> list[t
 def read_layer(
     file: str | Path, plain: str | Path, layer: str, notes: list[str], policy: ReadPolicy
 ) -> GdalLayer:
-    """Read one layer with GDAL.
-
-    Parameters
-    ----------
-    file : str or Path
-        The user's file, for messages.
-    plain : str or Path
-        Where it is read.
-    layer : str
-        Name of the layer.
-    notes : list of str
-        Gets what GDAL warns of.
-
-    Returns
-    -------
-    GdalLayer
-        All of its features.
+    """Return one layer as GDAL reads it; for the parameters see `gdal_layers`.
 
     Raises
     ------
     InputError
-        Not readable, or too many features.
+        The layer cannot be read, or has too many features.
     """
     meta, ids, shapes, columns = _call(
         file, notes, _pyogrio().raw.read, plain, layer=layer, return_fids=True, force_2d=False
@@ -266,28 +225,12 @@ def _texts(file: str | Path, plain: str | Path, layer: str) -> frozenset[int]:
 def read_rows(
     file: str | Path, plain: str | Path, layer: str, notes: list[str]
 ) -> list[dict[str, Any]]:
-    """Read the rows of a table without places with GDAL.
-
-    Parameters
-    ----------
-    file : str or Path
-        The user's file, for messages.
-    plain : str or Path
-        Where it is read.
-    layer : str
-        Name of the table.
-    notes : list of str
-        Gets what GDAL warns of.
-
-    Returns
-    -------
-    list of dict
-        Column to value, for each row.
+    """Return the rows of a table without places; for the parameters see `gdal_layers`.
 
     Raises
     ------
     InputError
-        Not readable.
+        The table cannot be read.
     """
     meta, _, _, columns = _call(
         file, notes, _pyogrio().raw.read, plain, layer=layer, read_geometry=False
@@ -299,18 +242,7 @@ def read_rows(
 
 @contextmanager
 def gdal_options(options: Mapping[str, str]) -> Iterator[None]:
-    """Set options of GDAL for a while.
-
-    Parameters
-    ----------
-    options : mapping
-        Name to value.
-
-    Yields
-    ------
-    None
-        While they hold.
-    """
+    """Set options of GDAL while the body runs."""
     pyogrio = _pyogrio()
     before = {name: pyogrio.get_gdal_config_option(name) for name in options}
     pyogrio.set_gdal_config_options(dict(options))
@@ -322,7 +254,7 @@ def gdal_options(options: Mapping[str, str]) -> Iterator[None]:
 
 @contextmanager
 def _readable(file: str | Path) -> Iterator[str | Path]:
-    """Yield where a file can be read: layers that are declared to hold faces through a virtual one.
+    """Yield a file that pyogrio reads; for layers declared to hold faces this is a virtual file.
 
     pyogrio refuses such layers (PolyhedralSurface, TIN, Triangle) whatever they hold.
     """
@@ -348,7 +280,7 @@ def _readable(file: str | Path) -> Iterator[str | Path]:
 
 
 def _layer_names(file: str | Path) -> dict[str, str]:
-    """Return the layers of a GeoPackage or of GML, elsewhere that of the file, and their types."""
+    """Return the layers and types of a GeoPackage or of GML, else one layer named like the file."""
     data = read_bytes(file)
     if data.startswith(SQLITE):
         with closing(sqlite3.connect(f"{Path(file).resolve().as_uri()}?mode=ro", uri=True)) as base:
@@ -382,7 +314,7 @@ class _Found:
         self.unread += [Unread(f"{name}[{k}]", name, "a table without places") for k in range(rows)]
 
     def add_layer(self, name: str, layer: GdalLayer, move: Mover) -> None:
-        """Add the features of a layer, or why they cannot be used."""
+        """Add the features of a layer, or the reasons why they cannot be used."""
         self.layers.setdefault(name, 0)
         for k, data, properties in zip(layer.numbers, layer.shapes, layer.properties, strict=True):
             where = f"{name}[{k}]"
@@ -434,7 +366,7 @@ class _Found:
 
 
 def _shore(shape: shapely.Geometry) -> shapely.Geometry:
-    """Return the outlines of areas as closed lines in their sense; other shapes as they are."""
+    """Return the outlines of areas as closed lines in their direction; other shapes unchanged."""
     if "Polygon" not in shape.geom_type:
         return shape
     import shapely
@@ -445,20 +377,7 @@ def _shore(shape: shapely.Geometry) -> shapely.Geometry:
 
 
 def shape_from_gdal(data: bytes, policy: ReadPolicy) -> tuple[shapely.Geometry, tuple[str, ...]]:
-    """Return a shape that GDAL gives, whatever its type, and what was changed in it.
-
-    Parameters
-    ----------
-    data : bytes
-        Well-known binary.
-
-    Returns
-    -------
-    shape : shapely.Geometry
-        Without measures.
-    changes : tuple of str
-        As of `netsp.exchange.maps.wkb_shapes.shape_of`.
-    """
+    """Return a shape of any type that GDAL gives, without measures, and the changes made to it."""
     import shapely
 
     with np.errstate(invalid="ignore"):  # places that are no numbers are refused below
@@ -474,21 +393,9 @@ def shape_from_gdal(data: bytes, policy: ReadPolicy) -> tuple[shapely.Geometry, 
 
 
 def parts_of(shape: shapely.Geometry, where: str) -> Iterator[tuple[str, shapely.Geometry]]:
-    """Yield the geometries of a collection that are not empty, with what messages call them.
+    """Yield the non-empty geometries of a feature, with their names in messages.
 
-    Parameters
-    ----------
-    shape : shapely.Geometry
-        Any.
-    where : str
-        Name of the feature.
-
-    Yields
-    ------
-    where : str
-        As ``piles[3].geometries[0]``, or the feature's own for one that is no collection.
-    shape : shapely.Geometry
-        No `GeometryCollection`.
+    The parts of a collection ``piles[3]`` are named like ``piles[3].geometries[0]``.
     """
     if shape.is_empty:
         return
@@ -500,11 +407,11 @@ def parts_of(shape: shapely.Geometry, where: str) -> Iterator[tuple[str, shapely
 
 
 Mover = Callable[["shapely.Geometry"], "shapely.Geometry"]
-"""Change of a shape from the file's system to degrees."""
+"""Function that moves a shape from the file's system to degrees."""
 
 
 def _mover(crs: str, where: str) -> Mover:
-    """Return what moves shapes to degrees, or leaves them where the system is local."""
+    """Return the function that moves shapes to degrees; for a local system it changes nothing."""
     import shapely
 
     transform = None if crs == LOCAL else _to_degrees(crs, where)
@@ -550,7 +457,7 @@ def _is_same_system(crs: str, other: str) -> bool:
 
 
 def _to_degrees(crs: str, where: str) -> Any:
-    """A transformer to longitude and latitude on WGS 84; None where they are so already."""
+    """Return a transformer to longitude and latitude on WGS 84; None if it would change nothing."""
     try:
         from pyproj import CRS, Transformer
         from pyproj.exceptions import ProjError
@@ -569,21 +476,9 @@ def _to_degrees(crs: str, where: str) -> Any:
 
 
 def in_degrees(map_: Map, crs: str, file: str | Path) -> Map:
-    """A map whose shapes are in a system given by the user.
+    """Return a map in degrees from one whose shapes are in a system that the user states.
 
-    Parameters
-    ----------
-    map_ : Map
-        Its shapes as the file has them.
-    crs : str
-        Their system, or ``local``.
-    file : str or Path
-        For messages.
-
-    Returns
-    -------
-    Map
-        In degrees, or the same where the system is local.
+    With the system ``local`` the shapes stay in their plane.
     """
     move = _mover(crs, str(file))
     features: list[Feature] = []
@@ -603,7 +498,7 @@ def in_degrees(map_: Map, crs: str, file: str | Path) -> Map:
 
 
 def _plain(value: Any) -> Any:
-    """A value of a column as Python has it."""
+    """Return a value of a column as a Python object; None for NaN."""
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float) and math.isnan(value):
@@ -612,7 +507,7 @@ def _plain(value: Any) -> Any:
 
 
 def _call(file: str | Path, notes: list[str], function: Any, *args: Any, **more: Any) -> Any:
-    """Call GDAL, whose readers raise what they like; what it warns of becomes a note."""
+    """Call a function of GDAL; its errors become an InputError, and its warnings notes."""
     import warnings
 
     try:
@@ -632,9 +527,9 @@ def _call(file: str | Path, notes: list[str], function: Any, *args: Any, **more:
 
 
 def _user_text(text: str, file: str | Path, args: Sequence[Any]) -> str:
-    """Return the first line of what GDAL says, by the user's file and without places in its code.
+    """Return the first line of GDAL's message, for the user's file, without places in GDAL's code.
 
-    Lines of a temporary file are not those of the user's.
+    Line numbers of a temporary file are replaced, because they are not those of the user's file.
     """
     first = SOURCE_PLACE.sub("", text.splitlines()[0].split("; It might")[0])
     for plain in (str(arg) for arg in args if isinstance(arg, Path) and str(arg) != str(file)):

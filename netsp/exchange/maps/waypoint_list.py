@@ -24,34 +24,20 @@ COLUMN_COUNT = 12
 
 
 def is_waypoint_list(file: str | Path) -> bool:
-    """Tell whether a text file begins as a waypoint list does.
-
-    Parameters
-    ----------
-    file : str or Path
-        The file.
-    """
+    """Return whether a text file begins as a waypoint list does."""
     first = read_text(file).lstrip().partition("\n")[0]
     return HEAD.fullmatch(first) is not None
 
 
 def read_waypoint_list(file: str | Path, policy: ImportPolicy = DEFAULT_IMPORT) -> Map:
-    """Read a waypoint list as a map.
+    """Return a waypoint list, also of a fence or of rally points, as a map in degrees.
 
-    Parameters
-    ----------
-    file : str or Path
-        List of QGroundControl or Mission Planner; also one of a fence or of rally points.
-
-    Returns
-    -------
-    Map
-        In degrees: waypoints as goals, row 0 as home, which is the base.
+    Waypoints are goals, and row 0 is home, which is the base.
 
     Raises
     ------
     InputError
-        No such list.
+        The file is no such list.
     """
     lines = [(k, line.strip()) for k, line in enumerate(read_text(file).splitlines(), 1)]
     lines = [(k, line) for k, line in lines if line and not line.startswith("#")]

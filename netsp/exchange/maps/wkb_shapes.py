@@ -1,4 +1,4 @@
-"""Well-known binary of all geometry types (ISO 19125-1, SQL/MM part 3) as shapes of Shapely.
+"""Shapes of Shapely from well-known binary of all geometry types (ISO 19125-1, SQL/MM part 3).
 
 Shapely reads points, lines and polygons only. Curves become lines of short steps, faces of surfaces
 the outline of what they cover from above, and rings that are not closed are closed.
@@ -60,7 +60,7 @@ class ShapeError(Exception):
 
 
 class NotFiniteError(ShapeError):
-    """Shape with a place that is no number, which is a defect of the file."""
+    """Shape with coordinates that are not finite, which is a defect of the file."""
 
     def __init__(self) -> None:
         super().__init__("expected finite coordinates")
@@ -69,7 +69,7 @@ class NotFiniteError(ShapeError):
 def shape_of(
     data: bytes, policy: ReadPolicy = DEFAULT_READ
 ) -> tuple[shapely.Geometry, tuple[str, ...]]:
-    """Return the shape of well-known binary of any type.
+    """Return the shape of well-known binary of any type, without measures (M).
 
     Parameters
     ----------
@@ -79,15 +79,14 @@ def shape_of(
     Returns
     -------
     shape : shapely.Geometry
-        Point, line, polygon, one of their collections, or a `GeometryCollection`; measures (M) are
-        dropped.
+        Point, line, polygon, one of their collections, or a `GeometryCollection`.
     changes : tuple of str
-        What was changed, as `CLOSED`.
+        Changes such as `CLOSED`.
 
     Raises
     ------
     ShapeError
-        Damaged, or a type that is none of these.
+        The data are damaged, or of another type.
 
     Examples
     --------
@@ -111,20 +110,7 @@ def shape_of(
 
 
 def ring_of(points: Floats, changes: list[str]) -> Floats:
-    """Return the corners of a ring with the first repeated at the end.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n, 2 or 3)
-        Corners.
-    changes : list of str
-        Gets `CLOSED` where the ring was not closed.
-
-    Returns
-    -------
-    ndarray
-        Closed.
-    """
+    """Return the corners of a ring, closed; if it was open, `CLOSED` is appended to the changes."""
     if len(points) and not np.array_equal(points[0, :2], points[-1, :2]):
         changes.append(CLOSED)
         return np.vstack([points, points[:1]])
@@ -132,19 +118,9 @@ def ring_of(points: Floats, changes: list[str]) -> Floats:
 
 
 def area_of(rings: list[Floats], changes: list[str]) -> shapely.Geometry:
-    """Return the polygon of rings; a line or a point where the outer one has no three corners.
+    """Return the polygon of rings, the outer one first, perhaps empty.
 
-    Parameters
-    ----------
-    rings : list of ndarray
-        The outer ring first.
-    changes : list of str
-        Gets what was changed.
-
-    Returns
-    -------
-    shapely.Geometry
-        A polygon, perhaps empty; a line that stands for a ring of two corners.
+    An outer ring with two distinct corners gives a line. Changes are appended to `changes`.
     """
     import shapely
 
@@ -166,19 +142,9 @@ def area_of(rings: list[Floats], changes: list[str]) -> shapely.Geometry:
 
 
 def outline_of_faces(faces: list[shapely.Geometry], changes: list[str]) -> shapely.Geometry:
-    """Return what faces in space cover from above.
+    """Return the area that faces in space cover from above, or the line of an upright wall.
 
-    Parameters
-    ----------
-    faces : list of shapely.Geometry
-        Polygons in space.
-    changes : list of str
-        Gets `FROM_ABOVE`.
-
-    Returns
-    -------
-    shapely.Geometry
-        A polygon or several; the line of a wall whose faces are all upright.
+    `FROM_ABOVE` is appended to the changes.
     """
     import shapely
 
@@ -196,17 +162,20 @@ def outline_of_faces(faces: list[shapely.Geometry], changes: list[str]) -> shape
 
 
 def arc_points(start: Floats, middle: Floats, end: Floats, max_step: float) -> Floats:
-    """Return points along the arc through three points, both ends among them.
+    """Return points along the arc through three points, both ends included.
 
     Parameters
     ----------
     start, middle, end : ndarray, shape (2,) or (3,)
-        In the order of the arc; a full circle ends where it starts, with the middle opposite.
+        Points in the order of the arc; a full circle ends where it starts, with the middle
+        opposite.
+    max_step : float
+        Maximum angle between consecutive points, radians.
 
     Returns
     -------
     ndarray
-        Points no farther apart than `MAX_ARC_STEP`; three points of one line are returned as such.
+        Points of the arc; three points on one line are returned unchanged.
     """
     a, b, c = start[:2], middle[:2], end[:2]
     if np.array_equal(a, c):
@@ -236,7 +205,7 @@ def arc_points(start: Floats, middle: Floats, end: Floats, max_step: float) -> F
 
 
 def _has_area(polygon: shapely.Geometry) -> bool:
-    """Return whether a face is seen from above: more than rounding of its upright sides."""
+    """Return whether a face is visible from above, beyond the rounding of upright sides."""
     return bool(polygon.area > 1e-9 * polygon.length**2)
 
 
@@ -334,18 +303,7 @@ class _Reader:
 
 
 def collected(parts: list[shapely.Geometry]) -> shapely.Geometry:
-    """Return geometries as one: a collection of one type where they are of one.
-
-    Parameters
-    ----------
-    parts : list of shapely.Geometry
-        Any.
-
-    Returns
-    -------
-    shapely.Geometry
-        A multipart geometry, or a `GeometryCollection` where types differ.
-    """
+    """Return geometries as one: a multipart geometry, or a `GeometryCollection` if types differ."""
     import shapely
 
     simple = [p for part in parts for p in getattr(part, "geoms", [part])]
@@ -384,7 +342,7 @@ def _along_arcs(points: Floats, max_step: float) -> Floats:
 
 
 def _joined(pieces: list[Floats]) -> Floats:
-    """Return pieces of a curve as one, where each starts at the end of the one before."""
+    """Return pieces of a curve as one, each starting at the end of the previous one."""
     if not pieces:
         return np.empty((0, 2))
     rest = [

@@ -1,8 +1,7 @@
 """Mission files of Blue Robotics' Cockpit (.cmp), as its mission library imports them.
 
-On upload, Cockpit adds a home item before the waypoints, and after the first waypoint it sets the
-file's cruise speed. It has no fences. Each waypoint has a place and a list of commands, which are
-carried out at that place.
+On upload, Cockpit adds a home item before the waypoints, and sets the file's cruise speed after the
+first waypoint. It has no fences. Each waypoint has a place and a list of commands for that place.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ def cockpit_mission(
     speed: float | None,
     policy: ExportPolicy = DEFAULT_EXPORT,
 ) -> str:
-    """Return the text of a Cockpit mission file.
+    """Return the text of a Cockpit mission file (JSON).
 
     Parameters
     ----------
@@ -60,11 +59,6 @@ def cockpit_mission(
         Projection from (x, y) to degrees.
     speed : float or None
         Cruise speed, m/s; None keeps the vehicle's own.
-
-    Returns
-    -------
-    str
-        JSON.
     """
     places = projection.to_earth([p.position[:2] for p in points])
     title = name or "netsp tour"

@@ -1,4 +1,4 @@
-"""A tour with all goals at one depth, for export."""
+"""Tour with all goals at one depth, for export."""
 
 from __future__ import annotations
 
@@ -13,16 +13,12 @@ from netsp.model.solution import Solution
 def at_depth(problem: Problem, solution: Solution, depth: float) -> tuple[Problem, Solution]:
     """Return a problem and its tour with all goals at one depth.
 
-    The robot dives on the way to the first goal, keeps to the depth between goals, and rises on the
-    way home. Obstacles stand through all depths, so the tether's class at each goal, and its taut
-    length in the plane, stay as they are.
+    The robot dives on the leg to the first goal, keeps the depth between goals, and rises on the
+    leg home. Obstacles stand through all depths, so the tether's class and its taut length in the
+    plane do not change at any goal.
 
     Parameters
     ----------
-    problem : Problem
-        Problem that was solved.
-    solution : Solution
-        Its solution.
     depth : float
         Distance below z = 0, in the problem's units.
 

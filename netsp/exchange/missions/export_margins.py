@@ -1,4 +1,4 @@
-"""Is a plan too tight for a real vehicle?"""
+"""Warnings about plans that are too tight for a real vehicle."""
 
 from __future__ import annotations
 
@@ -10,7 +10,15 @@ from netsp.model.solution import Solution
 def warnings(
     problem: Problem, solution: Solution, points: list[Waypoint], slack: float, clearance: float
 ) -> list[str]:
-    """What may go wrong because the plan is too tight."""
+    """Return warnings about goals with little tether left and lines close to obstacles.
+
+    Parameters
+    ----------
+    slack : float
+        Tether left at a goal below which a warning is due, in the problem's units.
+    clearance : float
+        Distance from obstacles below which a warning is due, in the problem's units.
+    """
     out = []
     longest = max(solution.tour, key=lambda v: v.tether_length, default=None)
     if longest is not None and problem.tether_length - longest.tether_length < slack:

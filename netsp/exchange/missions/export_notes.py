@@ -21,14 +21,14 @@ from netsp.model.problem import Problem
 
 @dataclass(frozen=True)
 class ExportNotes:
-    """Notes on a file that was written.
+    """Notes on an exported file, one line each.
 
     Attributes
     ----------
     warnings
-        Possible problems in use, one line each.
+        Possible problems in use.
     notes
-        Changes, assumptions and omissions, one line each.
+        Changes, assumptions and omissions.
     """
 
     warnings: tuple[str, ...]
@@ -42,14 +42,8 @@ def export_notes(
 
     Parameters
     ----------
-    problem : Problem
-        Problem that was solved.
-    points : list of Waypoint
-        Waypoints that were written.
     kind : str
         One of `netsp.exchange.missions.FORMATS`.
-    settings : ExportSettings
-        ExportSettings of the file.
     """
     warnings, notes = [], []
     if kind != "csv" and (text := not_written(problem, kind)):
@@ -74,15 +68,7 @@ def export_notes(
 
 
 def bend_note(points: list[Waypoint], settings: ExportSettings) -> str | None:
-    """Return a note if the vehicle holds longer at bends than the settings say; None otherwise.
-
-    Parameters
-    ----------
-    points : list of Waypoint
-        Waypoints that were written.
-    settings : ExportSettings
-        ExportSettings of the file.
-    """
+    """Return a note if the vehicle holds longer at bends than the settings state, else None."""
     seconds = told_apart(points, settings).bend_hold_s
     if seconds <= settings.bend_hold_s:
         return None
@@ -94,21 +80,7 @@ def bend_note(points: list[Waypoint], settings: ExportSettings) -> str | None:
 
 
 def fence_warnings(problem: Problem, fence: Fence) -> list[str]:
-    """Return warnings about obstacles that the fence of a plan simplifies or leaves out, and about
-    zones that the tour touches.
-
-    Parameters
-    ----------
-    problem : Problem
-        Problem with the obstacles.
-    fence : Fence
-        Fence of the plan.
-
-    Returns
-    -------
-    list of str
-        One line for each kind of warning.
-    """
+    """Return warnings about obstacles simplified or left out, and about zones on the tour."""
     lines = []
     if fence.simplified:
         most = max(z.growth for z in fence.simplified)

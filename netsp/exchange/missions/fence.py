@@ -1,9 +1,9 @@
 """Fence of a plan: obstacles as exclusion zones that fit into the vehicle's storage.
 
-ArduPilot stores a fence as one record of bytes per zone between a header and an end mark. A
-circle takes its kind, two coordinates and a radius; a polygon takes its kind, its number of corners
-and two coordinates per corner. So the limit counts bytes, not points: a flight controller of the
-Pixhawk family without a memory card stores 51 circles, or one polygon of 83 corners.
+ArduPilot stores a fence as one record of bytes for each zone between a header and an end mark. A
+circle takes its kind, two coordinates and a radius; a polygon its kind, its number of corners and
+two coordinates a corner. So the limit counts bytes, not points: a flight controller of the Pixhawk
+family without a memory card stores 51 circles, or one polygon of 83 corners.
 """
 
 from __future__ import annotations
@@ -82,33 +82,11 @@ class FencePolicy:
         return self.head_bytes + self.circle_bytes
 
     def size(self, zones: Sequence[Zone]) -> int:
-        """Return the number of bytes of a fence.
-
-        Parameters
-        ----------
-        zones : sequence of Zone
-            Zones of the fence.
-
-        Returns
-        -------
-        int
-            Bytes, with header and end mark.
-        """
+        """Return the number of bytes of a fence, with header and end mark."""
         return self.head_bytes + sum(self.size_of(z) for z in zones)
 
     def size_of(self, zone: Zone) -> int:
-        """Return the number of bytes of a zone.
-
-        Parameters
-        ----------
-        zone : Zone
-            Zone of a fence.
-
-        Returns
-        -------
-        int
-            Bytes, without header and end mark.
-        """
+        """Return the number of bytes of a zone, without header and end mark."""
         if isinstance(zone.shape, Circle):
             return self.circle_bytes
         return self.polygon_bytes + self.corner_bytes * len(zone.shape.polygon)
@@ -166,25 +144,16 @@ def fence_of(
 ) -> Fence:
     """Return a fence around the obstacles of a problem that fits into the vehicle's storage.
 
-    If the exact obstacles take too many bytes, polygons are simplified: a polygon with fewer
-    corners, or a circle, replaces each. A simplified zone contains its obstacle, reaches beyond it
-    by a share of the clearance at most, and does not touch the path. The share is the smallest of
+    If the exact obstacles take too many bytes, a polygon with fewer corners, or a circle, replaces
+    each polygon. A simplified zone contains its obstacle, reaches beyond it by a share of the
+    clearance at most, and does not touch the path. The share is the smallest of
     `policy.growth_steps` shares at which the fence fits. If none fits, the fence takes obstacles by
-    their distance from the path, the nearest first, and leaves out those that do not fit any more.
+    their distance from the path, the nearest first, as long as they fit.
 
     Parameters
     ----------
-    problem : Problem
-        Problem with obstacles.
     path : sequence of (x, y)
         Vertices of the tour, in the problem's units.
-    policy : FencePolicy, optional
-        Storage of the vehicle and limits of the zones.
-
-    Returns
-    -------
-    Fence
-        Zones of the fence, and obstacles without one.
 
     Examples
     --------
@@ -210,8 +179,7 @@ def fence_of(
 
 
 def _fitting_zones(problem: Problem, line: shapely.LineString, policy: FencePolicy) -> list[Zone]:
-    """Return zones that grow as little as it takes to fit; zones of the largest growth if none
-    fit."""
+    """Return zones that grow as little as it takes to fit, or else as much as they may."""
 
     def grown(step: int) -> list[Zone]:
         most = policy.max_growth * problem.clearance * step / policy.growth_steps
@@ -257,8 +225,7 @@ def _simplified(
     line: shapely.LineString,
     policy: FencePolicy,
 ) -> Zone:
-    """Return the zone of the fewest bytes found that contains an obstacle and reaches beyond it by
-    `most` at most."""
+    """Return the smallest zone found, in bytes, around an obstacle; it grows by `most` at most."""
     if isinstance(obstacle, Circle) or most <= 0.0:
         return zone
     body = shapely.Polygon(obstacle.polygon)

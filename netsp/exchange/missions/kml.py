@@ -1,7 +1,7 @@
 """Tours as KML 2.2 (OGC 07-147r2) for Google Earth and other globes.
 
-Elements stand in the order of the KML schema. Altitudes are absolute, so that what is below the
-water is drawn there. A member `kind` in the data of each placemark lets `netsp import` read the
+Elements stand in the order of the KML schema. Altitudes are absolute, so that globes draw what is
+below the water there. A member `kind` in the data of each placemark lets `netsp import` read the
 file back.
 """
 
@@ -45,20 +45,13 @@ def kml_of(
 ) -> str:
     """Return a tour as a KML document.
 
+    It has folders for the base, goals, obstacles, the path and, switched off, the taut tether at
+    every visit.
+
     Parameters
     ----------
-    problem : Problem
-        Problem that the tour solves.
     points : sequence of Waypoint
         Waypoints, the start first.
-    projection : Projection
-        From the problem's plane to degrees.
-
-    Returns
-    -------
-    str
-        Document with folders for the base, goals, obstacles, the path and, switched off, the taut
-        tether at every stop.
     """
     page = _Page(projection)
     base = page.placemark(
@@ -118,18 +111,7 @@ def kml_of(
 
 
 def kmz_of(page: str) -> bytes:
-    """Return an archive (KMZ) that holds a KML page.
-
-    Parameters
-    ----------
-    page : str
-        KML document.
-
-    Returns
-    -------
-    bytes
-        Archive with the page as ``doc.kml`` at its root; equal pages give equal archives.
-    """
+    """Return an archive (KMZ) with a KML page as ``doc.kml``; equal pages give equal archives."""
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
         entry = zipfile.ZipInfo("doc.kml")  # dated 1980
@@ -157,7 +139,7 @@ def _outline(obstacle: Any, n_corners: int) -> list[tuple[float, float]]:
 def _tethers(
     problem: Problem, points: Sequence[Waypoint]
 ) -> Iterable[tuple[int, int, Floats | None]]:
-    """Yield number, goal and taut tether of each stop; nothing where the solids are unknown."""
+    """Yield number, goal and taut tether of each visit; nothing if the words belong to a scene."""
     from netsp.roadmap.paths import TautPaths
 
     stops = [p for p in points if _is_stop(p)]

@@ -1,11 +1,11 @@
-"""Times of straight legs as ArduSub flies them.
+"""Times of straight legs as ArduSub travels them.
 
 ArduSub plans a leg from rest to rest with limited speed, acceleration and jerk (`SmoothMove`); the
-slower of the plan and the depth decides. A reference runs along that curve and the vehicle follows:
-its thrust grows with the square of the speed that is missing, so that against its drag the vehicle
-falls behind until the integral of the controller has made up for the drag. The time of the
-reference slows down meanwhile. On a leg of 10 m at 0.5 m/s that takes 2 to 4 s, more after a turn,
-because the integral still pushes in the direction of the leg before.
+slower of the plan and the depth decides. A reference runs along that curve and the vehicle follows.
+Its thrust grows with the square of the missing speed, so that drag delays the vehicle until the
+integral of the controller makes up for it. The time of the reference slows down meanwhile. On a leg
+of 10 m at 0.5 m/s that takes 2 to 4 s, more after a turn, because the integral still pushes in the
+direction of the previous leg.
 
 In AUTO a waypoint is reached when the reference is at its end and the vehicle within the acceptance
 radius; then comes the hold. In GUIDED the next target is sent as soon as the vehicle is within
@@ -115,7 +115,7 @@ class VehicleMotion:
 
 
 class SmoothMove:
-    """A straight move from rest to rest with limited speed, acceleration and jerk.
+    """Straight move from rest to rest with limited speed, acceleration and jerk.
 
     Acceleration rises and falls in straight ramps. A ramp to an acceleration a takes a / jerk plus
     the time in which the jerk itself rises and falls.
@@ -214,7 +214,7 @@ class _Follower:
         self.reference = origin
 
     def go_on(self, goal: Point3) -> None:
-        """Begin a leg where the one before ends."""
+        """Begin a leg at the end of the previous one."""
         self._begin(self.goal, goal)
 
     def plan_anew(self, goal: Point3) -> None:
@@ -225,13 +225,13 @@ class _Follower:
         self.integral, self.rate = self.command, 1.0
 
     def is_at(self, goal: Point3, radius: float) -> bool:
-        """Return whether the vehicle is within a radius, or has had time enough to get there."""
+        """Return whether the vehicle is within a radius, or has had enough time to get there."""
         waited_s = self.track_s - self.move.duration_s
         return math.dist(self.place, goal) <= radius or waited_s > self.motion.max_followed_s
 
     @property
     def is_there(self) -> bool:
-        """True once the reference is at its end and the vehicle in the acceptance radius."""
+        """True if the reference is at its end and the vehicle in the acceptance radius."""
         return self.track_s >= self.move.duration_s and self.is_at(
             self.goal, self.motion.acceptance_radius
         )
@@ -308,11 +308,9 @@ def leg_times(
     places : sequence of (x, y, z)
         Waypoints, metres, z up; the vehicle is at rest at the first one.
     holds : sequence of float
-        Hold at each waypoint, s; that at the first one is in no leg.
+        Hold at each waypoint, s; the hold at the first one is part of no leg.
     speed : float
         Horizontal speed, m/s.
-    motion : VehicleMotion, optional
-        Motion of the vehicle.
     """
     motion = motion or VehicleMotion()
     vehicle = _Follower(places[0], speed, motion)
@@ -348,12 +346,10 @@ def target_times(
         Distance to a target at which the next one is sent, m.
     speed : float
         Horizontal speed, m/s.
-    motion : VehicleMotion, optional
-        Motion of the vehicle.
     notice_s : float
         Time from being within reach until the vehicle has the next target, s.
     repeat_s : float
-        Time after which a target is sent again, s: the vehicle plans anew then.
+        Time after which a target is sent again and the vehicle plans anew, s.
     """
     motion = motion or VehicleMotion()
     vehicle = _Follower(places[0], speed, motion)
@@ -376,7 +372,7 @@ def target_times(
 
 
 def _over(limit: float, share: float) -> float:
-    """Return the limit along a leg of which a share lies in the limited direction."""
+    """Return the limit along a leg, of which a share lies in the limited direction."""
     return limit / share if share > 0.0 else math.inf
 
 

@@ -1,9 +1,8 @@
-"""A planned mission as a mission file of a ground station: what
-`netsp.exchange.missions.mission_files` writes of tours in the plane, of tours in space.
+"""Mission files of tours in space, in the formats of `netsp.exchange.missions.mission_files`.
 
-The straight lines between waypoints are asked once more: free of solids, also where a vehicle cuts
-corners, of the planned classes, and within the tether. Solids are not written: fences of ground
-stations are upright, and would forbid what is above and below.
+The straight lines between waypoints are checked: free of solids, also where a vehicle cuts corners,
+of the planned classes, and within the tether. Solids are not written, because fences of ground
+stations are upright and would forbid the water above and below.
 """
 
 from __future__ import annotations
@@ -39,16 +38,16 @@ from netsp.world.scene.scene import Scene
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written.
+    """Mission that was written.
 
-    Parameters
+    Attributes
     ----------
-    points : list of Waypoint
-        The start first; heights above the surface.
-    longest : float
-        Metres of taut tether along the lines between them.
-    room : float
-        Metres from these lines to the nearest solid.
+    points
+        Waypoints, the start first; heights above the surface.
+    longest
+        Longest taut tether along the lines between waypoints, metres.
+    room
+        Distance from these lines to the nearest solid, metres.
     """
 
     points: list[Waypoint]
@@ -71,33 +70,22 @@ def export_mission(
 
     Parameters
     ----------
-    mission : Mission
-        With a tour.
-    file : str or Path
-        The file.
     kind : str
         One of `netsp.exchange.missions.FORMATS`.
     projection : Projection, optional
-        From (x, y) to degrees; needed by all but csv.
+        Projection from (x, y) to degrees; only csv needs none.
     acceptance : float
-        The vehicle's acceptance radius, metres.
-    settings : ExportSettings, optional
-        Speed, seconds at waypoints and more of the format.
+        Acceptance radius of the vehicle, metres.
     surface : float
         z of the water's surface, metres.
     scene : Scene, optional
-        When it is at hand.
-
-    Returns
-    -------
-    Exported
-        What was written.
+        Scene of the mission, if it is loaded already.
 
     Raises
     ------
     InputError
-        A mission without a tour; waypoints above the surface; corners that a vehicle could cut
-        through a solid; lines that are not of the planned classes, or take more tether.
+        The mission has no tour, waypoints are above the surface, a vehicle could cut a corner
+        through a solid, or the lines are not of the planned classes or take more tether.
     """
     if mission.tour is None:
         raise InputError("tour: the mission has none; expected one that `netsp solve` has planned")
@@ -137,7 +125,7 @@ def export_mission(
 
 
 def _waypoints(mission: Mission, projection: Projection | None) -> list[Waypoint]:
-    """The start, bends, waypoints, and home; a bend that turns by nothing is none."""
+    """Return the start, bends, waypoints, and home; a bend without a turn is left out."""
     tour = mission.tour
     assert tour is not None
     north = 0.0 if projection is None else projection.heading
@@ -160,7 +148,7 @@ def _waypoints(mission: Mission, projection: Projection | None) -> list[Waypoint
 
 
 def _bends(path: tuple[Point3, ...]) -> list[Waypoint]:
-    """Where a path turns between its ends; a point that it comes to twice in a row is no bend."""
+    """Return the places where a path turns between its ends; repeated points are no bends."""
     line = np.array(path)
     line = line[np.r_[True, (np.diff(line, axis=0) != 0.0).any(axis=1)]]
     return [
@@ -171,20 +159,16 @@ def _bends(path: tuple[Point3, ...]) -> list[Waypoint]:
 
 
 def pursued(line: Floats, radius: float) -> Floats:
-    """Where a vehicle goes that heads for each waypoint until it is within a radius of it, and then
-    for the next; of bends that are nearer to one another it may pass several at once.
+    """Return the path of a vehicle that heads for each waypoint until it is within a radius of it.
+
+    It may pass several bends at once that are near to one another.
 
     Parameters
     ----------
     line : ndarray, shape (k, 3)
-        The waypoints, metres.
+        Waypoints, metres.
     radius : float
-        Its acceptance radius, metres.
-
-    Returns
-    -------
-    ndarray, shape (m, 3)
-        Metres.
+        Acceptance radius, metres.
     """
     out = [line[0]]
     for k, target in enumerate(line[1:], 1):
@@ -210,8 +194,10 @@ def _check_free(field: DistanceField, line: Floats, radius: float) -> None:
 
 
 def _checked(context: PlanningContext, points: list[Waypoint], line: Floats, exact: bool) -> float:
-    """The longest taut tether along a line, whose word at the end is empty as in the plan; where it
-    goes exactly through the waypoints, those at the stops are asked, too."""
+    """Return the longest taut tether along a line whose word at the end is empty, as in the plan.
+
+    For the exact path, the words at the waypoints are checked as well.
+    """
     words, tether = context.words, context.present_tether
     word, broken = words.try_word(np.vstack([tether.nodes, line, context.start_tether.nodes[::-1]]))
     if broken is not None or word != ():
@@ -242,7 +228,7 @@ def _sunk(p: Waypoint, surface: float) -> Waypoint:
 
 
 def _stand_in(mission: Mission, surface: float) -> Problem:
-    """A problem with the mission's places, which the formats ask for names and the base."""
+    """Return a problem with the mission's places, from which formats take names and the base."""
     x, y, z = mission.start
     goals = tuple(
         Goal(position=(a, b, c - surface), name=f"waypoint {k}")

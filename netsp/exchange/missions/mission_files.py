@@ -1,13 +1,13 @@
-"""Mission files: QGroundControl plans, waypoint lists and Cockpit missions for ArduSub, GeoJSON,
-KML and CSV.
+"""Mission files: QGroundControl plans, waypoint lists, Cockpit missions, GeoJSON, KML and CSV.
 
-Formats: QGroundControl's plan files and MAVLink's mission items; RFC 7946 for GeoJSON, which has no
-circle, so that obstacles are points with `radius_m`. ArduSub: depth is a negative altitude relative
-to the surface, never 0 (0 has meant "keep the present one"); there is no take-off; the plan ends at
-the base and not with return-to-launch; waypoints without a hold are flown through, so bends are
-held. The first item is a held waypoint where the tour starts, because the vehicle goes straight to
-the first item from wherever it was armed. A speed is an item of its own: those of a plan's head
-change nothing on the vehicle, and before the first waypoint neither does the item.
+Sources: QGroundControl's plan files and MAVLink's mission items; RFC 7946 for GeoJSON, which has no
+circle, so that round obstacles are points with `radius_m`. ArduSub: depth is a negative altitude
+relative to the surface, never 0 (0 has meant "keep the present one"); there is no take-off; the
+plan ends at the base and not with return-to-launch; the vehicle goes through waypoints without a
+hold, so bends are held. The first item is a held waypoint at the start of the tour, because the
+vehicle goes straight to the first item from wherever it was armed. A speed is an item of its own:
+the speeds of a plan's head change nothing on the vehicle, and neither does the item before the
+first waypoint.
 """
 
 from __future__ import annotations
@@ -65,21 +65,23 @@ VEHICLE_SUBMARINE = 12
 
 @dataclass(frozen=True)
 class ExportSettings:
-    """What a mission file is to say.
+    """Settings of a mission file.
 
     Attributes
     ----------
-    hold
-        Whole seconds at goals.
-    bend
-        Whole seconds at bends, at the start and at the end, at least 1; longer if the vehicle holds
-        that long at a goal (`told_apart`).
+    goal_hold_s
+        Hold at goals, whole seconds; None for the waypoint's own, or the policy's.
+    bend_hold_s
+        Hold at bends, at the start and at the end, whole seconds, at least 1; longer if the vehicle
+        holds that long at a goal (`told_apart`).
     speed
-        m/s; None leaves it to the vehicle.
+        Speed, m/s; None leaves it to the vehicle.
     max_waypoints
-        Waypoints.
+        Maximum number of waypoints. ArduSub stores 655 mission items, home and the speed included.
     fence
-        Policy of what the fence of a plan may take.
+        Limits of the fence of a plan.
+    policy
+        Policy of the export.
     """
 
     goal_hold_s: int | None = None
@@ -100,35 +102,23 @@ def export(
     acceptance: float = 0.0,
     settings: ExportSettings | None = None,
 ) -> list[Waypoint]:
-    """Write a solution as a mission file.
+    """Write a solution as a mission file, and return its waypoints, the start first.
 
     Parameters
     ----------
-    problem : Problem
-        What was solved.
-    solution : Solution
-        Its solution.
-    file : str or Path
-        The file.
     kind : str
         One of `FORMATS`.
     projection : Projection, optional
-        From the plane to degrees; by default that of the problem's origin. Needed by all but csv.
+        Projection from the plane to degrees; default: that of the problem's origin. Only csv needs
+        none.
     acceptance : float
-        The vehicle's acceptance radius, metres.
-    settings : ExportSettings, optional
-        Speed, dwell and more of the format.
-
-    Returns
-    -------
-    list of Waypoint
-        The waypoints written, the start first.
+        Acceptance radius of the vehicle, metres.
 
     Raises
     ------
     InputError
-        An unknown kind, units other than metres, no projection, more waypoints than the format
-        allows, waypoints that would not be of the plan's class.
+        The kind is unknown, units are not metres, there is no projection, waypoints are more than
+        the vehicle takes, or would not be of the plan's class.
     """
     checked_instance("problem", problem, Problem)
     checked_instance("solution", solution, Solution)
@@ -164,15 +154,6 @@ def export(
 def write_page(file: str | Path, kind: str, text: str) -> None:
     """Write the text of a format to a file; for ``kmz``, into an archive.
 
-    Parameters
-    ----------
-    file : str or Path
-        The file.
-    kind : str
-        One of `FORMATS`.
-    text : str
-        Contents in that format.
-
     Raises
     ------
     InputError
@@ -185,19 +166,12 @@ def write_page(file: str | Path, kind: str, text: str) -> None:
 
 
 def check_settings(kind: str, settings: ExportSettings) -> None:
-    """What a mission file is to say, asked before anything is written.
-
-    Parameters
-    ----------
-    kind : str
-        One of `FORMATS`.
-    settings : ExportSettings
-        Of the file.
+    """Check a format and the settings of a mission file before anything is written.
 
     Raises
     ------
     InputError
-        An unknown kind; a speed, seconds or a number of waypoints out of range.
+        The kind is unknown; a speed, a hold or a number of waypoints is out of range.
     """
     if not isinstance(kind, str) or kind not in FORMATS:
         raise InputError(f"format: expected {', '.join(FORMATS)}, got {kind!r}")
@@ -217,7 +191,7 @@ def check_settings(kind: str, settings: ExportSettings) -> None:
 
 
 def start_of(problem: Problem, solution: Solution) -> Waypoint:
-    """Where the tour starts: the base, or the problem's state."""
+    """Return the start of the tour: the base, or the place of the problem's state."""
     x, y, z = solution.path[0] if problem.state is not None else problem.base
     return Waypoint((float(x), float(y), float(z)), None, start=True)
 
@@ -231,10 +205,8 @@ def predicted_s(
     ----------
     points : list of Waypoint
         Waypoints of the mission, the start first.
-    settings : ExportSettings
-        Speed and holds.
     motion : VehicleMotion, optional
-        Motion of the vehicle; by default that of ArduSub as it comes.
+        Motion of the vehicle; default: that of an unchanged ArduSub.
     """
     if settings.speed is None:
         return None
@@ -245,20 +217,12 @@ def predicted_s(
 
 
 def fence_of_points(problem: Problem, points: list[Waypoint], settings: ExportSettings) -> Fence:
-    """Return the fence that a plan of these waypoints has."""
+    """Return the fence of a plan with these waypoints."""
     return fence_of(problem, [p.position[:2] for p in points], settings.fence)
 
 
 def not_written(problem: Problem, kind: str) -> str | None:
-    """Return a note on the parts of a problem that a format cannot store; None if it stores all.
-
-    Parameters
-    ----------
-    problem : Problem
-        Problem that was solved.
-    kind : str
-        One of `FORMATS`.
-    """
+    """Return a note on the parts of a problem that a format cannot store; None if it stores all."""
     lost = []
     if kind in ("wpl", "cockpit"):
         lost += ["the tether's length", "the clearance"]
@@ -272,7 +236,7 @@ def not_written(problem: Problem, kind: str) -> str | None:
 
 
 def altitude(z: float, policy: ExportPolicy = DEFAULT_EXPORT) -> float:
-    """The relative altitude that stands for a height."""
+    """Return the altitude relative to the surface that is written for a height."""
     return round(min(z, -policy.min_depth), 3)
 
 
@@ -280,14 +244,7 @@ def told_apart(points: Sequence[Waypoint], settings: ExportSettings) -> ExportSe
     """Return the settings with a hold at bends that differs from the hold at every goal.
 
     An import tells goals from bends by these times, because a ground station keeps no other mark of
-    a waypoint when it saves the file.
-
-    Parameters
-    ----------
-    points : sequence of Waypoint
-        Waypoints that are written.
-    settings : ExportSettings
-        ExportSettings of the file; their hold at bends is the minimum.
+    a waypoint when it saves the file. The hold at bends in the settings is the minimum.
     """
     holds = {_hold(p, settings) for p in points if p.goal not in (None, HOME)}
     free = (
@@ -391,7 +348,7 @@ def _plan(
 
 
 def _mark(problem: Problem, point: Waypoint) -> dict[str, Any]:
-    """Return what a waypoint is, so that `netsp import` tells goals from bends."""
+    """Return the kind of a waypoint, so that `netsp import` tells goals from bends."""
     if point.start:
         return {"kind": "start"}
     if point.goal is None:
@@ -470,7 +427,7 @@ def _cell(value: Any) -> str:
 
 
 def _degrees(value: float) -> float:
-    """To nine places: a tenth of a millimetre."""
+    """Return degrees with nine decimal places: a tenth of a millimetre."""
     return round(float(value), 9)
 
 
@@ -533,7 +490,7 @@ def _geojson(
 
 
 def _counter_clockwise(corners: Any) -> Any:
-    """RFC 7946 wants outer rings so."""
+    """Return corners counter-clockwise, as RFC 7946 requires of outer rings."""
     c = np.array(corners)
     x, y = c[:, 0], c[:, 1]
     area = float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
@@ -598,12 +555,17 @@ EXTENSIONS = {
     ".kmz": "kmz",
     ".csv": "csv",
 }
-"""Which format a file's name asks for."""
+"""Format of a file by the extension of its name."""
 
 
 def format_of(file: str, asked: str | None) -> str:
-    """The format by the file's extension, or that asked for; InputError where they disagree or
-    neither says."""
+    """Return the format that is asked for, or that of the file's extension.
+
+    Raises
+    ------
+    InputError
+        The two disagree, or neither states a format.
+    """
     extension = os.path.splitext(file)[1].lower()
     own = EXTENSIONS.get(extension)
     if asked is not None and asked not in FORMATS:

@@ -1,9 +1,9 @@
-"""A tour as waypoints that are joined by straight lines, safe with a vehicle that cuts corners.
+"""Tour as waypoints joined by straight lines, safe for a vehicle that cuts corners.
 
 A vehicle goes on to the next waypoint when it is within its acceptance radius of one. So at a bend
-it may cut off the triangle between the bend and the points that far before and after it. Where an
-obstacle reaches into that triangle the bend is moved outward; if that does not help, the radius is
-too large for the site, and that is said.
+it may cut off the triangle between the bend and the points at that distance before and after it. If
+an obstacle reaches into that triangle, the bend is moved outwards; if that does not help, the
+radius is too large for the site, which raises an error.
 """
 
 from __future__ import annotations
@@ -31,24 +31,24 @@ TURN_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Waypoint:
-    """A place to pass.
+    """Waypoint of an exported tour.
 
     Parameters
     ----------
     position : tuple of float
         (x, y, z), z up, in the problem's units.
     goal : int or None
-        The goal visited here, HOME (-1) for the base at the end; None for a bend and for the start.
+        Goal visited here, HOME (-1) for the base at the end; None for a bend and for the start.
     word : Word
-        Of the taut tether at a goal.
+        Word of the taut tether at a goal.
     tether : float
         Length of the taut tether at a goal, in the problem's units.
     start : bool
         Whether it is the start.
     heading : float, optional
-        Degrees clockwise from north; None where it does not matter.
+        Degrees clockwise from north; None for any.
     stay : int, optional
-        Seconds that are asked for there; None where nothing is said of it.
+        Hold that the mission states, s; None if it states none.
     """
 
     position: tuple[float, float, float]
@@ -66,27 +66,18 @@ def waypoints_of(
     radius: float = 0.0,
     policy: ExportPolicy = DEFAULT_EXPORT,
 ) -> list[Waypoint]:
-    """The waypoints of a solution, without the start.
+    """Return the waypoints of a solution in the order of the tour, without the start.
 
     Parameters
     ----------
-    problem : Problem
-        What was solved.
-    solution : Solution
-        Its solution.
     radius : float
         Acceptance radius of the vehicle, in the problem's units.
-
-    Returns
-    -------
-    list of Waypoint
-        In the order in which they are passed.
 
     Raises
     ------
     InputError
-        With this radius corners could be cut through an obstacle, or the class of the straight
-        lines is not the plan's.
+        With this radius a vehicle could cut a corner through an obstacle, or the class of the
+        straight lines is not the plan's.
     """
     legs = legs_of(problem, solution)
     solids = [o.shape() for o in problem.obstacles]
@@ -128,7 +119,7 @@ def waypoints_of(
 
 
 def clearance_of(problem: Problem, points: list[Waypoint]) -> float:
-    """How near the straight lines between waypoints come to any obstacle (not grown)."""
+    """Return the distance of the lines between waypoints from the nearest obstacle, not grown."""
     line = shapely.LineString([p.position[:2] for p in points])
     return min(
         (
@@ -181,14 +172,16 @@ def _coarsened(
 
 
 def _side(a: Floats, b: Floats, c: Floats) -> float:
-    """Signed angle in the plan by which a path turns at b."""
+    """Return the signed angle in the plane by which a path turns at b."""
     u, v = (b - a)[:2], (c - b)[:2]
     return float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))
 
 
 def _meeting(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats | None:
-    """Where the line from a through b meets the line through c to d, between b and c; None if it
-    does not. Its height is between theirs."""
+    """Return the point between b and c where the line a b meets the line c d; None if they do not.
+
+    Its height is between those of b and c.
+    """
     u, v, w = (b - a)[:2], (d - c)[:2], (c - a)[:2]
     cross = u[0] * v[1] - u[1] * v[0]
     if abs(cross) < 1e-12:
@@ -200,21 +193,12 @@ def _meeting(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats | None:
 
 
 def turn(a: Floats, b: Floats, c: Floats) -> float:
-    """Angle by which a path turns.
+    """Return the angle by which a path turns at b, radians; pi if two points coincide.
 
     Parameters
     ----------
-    a : ndarray, shape (k,)
-        A point of it.
-    b : ndarray, shape (k,)
-        The next.
-    c : ndarray, shape (k,)
-        The one after it.
-
-    Returns
-    -------
-    float
-        Radians; pi where two of them are one.
+    a, b, c : ndarray, shape (k,)
+        Consecutive points.
     """
     u, v = b - a, c - b
     lu, lv = np.linalg.norm(u), np.linalg.norm(v)
@@ -230,7 +214,7 @@ def _widened(
     radius: float,
     shifts: tuple[float, ...],
 ) -> Floats:
-    """The bends moved outward where a vehicle could cut through something."""
+    """Return a path with bends moved outwards where a vehicle could cut through an obstacle."""
     if radius <= 0.0 or not solids:
         return line
     tree = shapely.STRtree(solids)
@@ -264,7 +248,7 @@ def _widened(
 
 
 def _cuts(tree: shapely.STRtree, line: Floats, k: int, radius: float) -> bool:
-    """Whether an obstacle reaches into the triangle that may be cut off at bend k."""
+    """Return whether an obstacle reaches into the triangle that may be cut off at bend k."""
     a, b, c = line[k - 1, :2], line[k, :2], line[k + 1, :2]
     u, v = a - b, c - b
     lu, lv = float(np.linalg.norm(u)), float(np.linalg.norm(v))
@@ -275,7 +259,7 @@ def _cuts(tree: shapely.STRtree, line: Floats, k: int, radius: float) -> bool:
 
 
 def _check_class(problem: Problem, solution: Solution, line: Floats, marks: list[Mark]) -> None:
-    """The word of the straight lines at every goal is the plan's, and empty at the end."""
+    """Check that the straight lines have the plan's word at every goal, and none at the end."""
     rays = problem.representative_points
     tether = np.array(solution.start_tether).reshape(-1, 3)
     word = signature(tether[:, :2], rays) if len(tether) else ()
