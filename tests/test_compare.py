@@ -21,7 +21,7 @@ from netsp.study.compare import pool
 from netsp.study.compare.rows import RowsFile, combine, read_rows
 from netsp.study.compare.study import Study, shard
 from netsp.study.compare.study_run import compare
-from netsp.study.compare.trial import MOST_POINTS, run, thinned, world_of
+from netsp.study.compare.trial import MAX_PROGRESS_ROWS, run, thinned, world_of
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -200,7 +200,7 @@ def test_solvers_that_crash_hang_or_eat_cost_one_row_each(tmp_path, monkeypatch)
     (tmp_path / "sitecustomize.py").write_text(textwrap.dedent(patch))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(pool, "GRACE_S", 10.0)
+    monkeypatch.setattr(pool, "HUNG_GRACE_S", 10.0)
     for name in names:
         monkeypatch.setitem(SOLVERS, name, Solver(name, f"badsolvers:{name}"))
     study = Study.checked(
@@ -309,7 +309,7 @@ def test_flags_make_the_same_study_as_a_file(tmp_path, capsys):
 @given(st.integers(1, 2000))
 def test_a_thinned_history_keeps_its_ends(n):
     out = thinned(list(range(n)))
-    assert len(out) == min(n, MOST_POINTS)
+    assert len(out) == min(n, MAX_PROGRESS_ROWS)
     assert (out[0], out[-1]) == (0, n - 1)
     assert out == sorted(set(out))
 
@@ -366,7 +366,7 @@ def test_a_dask_cluster_gives_the_same_rows_though_a_worker_is_killed(dask_clust
 def test_a_scheduler_that_is_not_there_is_told_in_one_line(tmp_path, capsys, monkeypatch):
     from netsp.study.compare import cluster
 
-    monkeypatch.setattr(cluster, "CONNECT", 1.0)
+    monkeypatch.setattr(cluster, "CONNECT_S", 1.0)
     (tmp_path / "s.toml").write_text(TOML)
     command = ["compare", str(tmp_path / "s.toml"), "-o", str(tmp_path / "r.jsonl")]
     assert main([*command, "--scheduler", "tcp://127.0.0.1:9"]) == 2

@@ -276,7 +276,7 @@ def test_a_function_that_fails_costs_its_rows_only(small, tour, tmp_path, capsys
 
 def test_what_answers_late_does_not_count(small, tour, monkeypatch):
     with_records(small, tour)
-    monkeypatch.setattr(rank, "LATE_S", 0.0)
+    monkeypatch.setattr(rank, "MAX_OVERTIME_S", 0.0)
 
     def slow(problem, path, limit, should_stop):
         time.sleep(0.3)

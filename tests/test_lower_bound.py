@@ -413,7 +413,7 @@ def told_to_the_page(problem, time_limit, monkeypatch):
     monkeypatch.setattr(
         by_name, "travel_graph", lambda p, *name, **o: whole(p, *name, **{"max_classes": 4, **o})
     )
-    monkeypatch.setattr(solving, "TELL", 0.0)
+    monkeypatch.setattr(solving, "TOUR_INTERVAL_S", 0.0)
     ours, theirs = Pipe()
     solving._solve(theirs, 1, problem.to_json(), time_limit, None)
     said = []

@@ -21,8 +21,8 @@ ROOT = Path(__file__).parent.parent
 
 @pytest.fixture
 def at_once(monkeypatch):
-    monkeypatch.setattr(patience, "QUIET_S", 0.001)
-    monkeypatch.setattr(patience, "EVERY_S", 0.02)
+    monkeypatch.setattr(patience, "FIRST_LINE_S", 0.001)
+    monkeypatch.setattr(patience, "LINE_INTERVAL_S", 0.02)
 
 
 def test_what_is_quickly_done_says_nothing():

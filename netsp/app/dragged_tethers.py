@@ -13,8 +13,8 @@ from netsp.hsignature.rays import crossings
 from netsp.model.problem import Problem
 from netsp.roadmap.tether_classes import TautTether, Tethers
 
-MOST_CLASSES = 30
-"""Classes of a goal that are shown."""
+MAX_DRAWN_CLASSES = 30
+"""Maximum number of a goal's classes that the page draws."""
 
 
 class Cursor:
@@ -72,7 +72,7 @@ class Cursor:
         """The shortest classes of a goal, and how many there are."""
         x, y, z = self.problem.goals[goal].position
         every = self.tethers.classes(x, y, z)
-        return {"classes": [_told(t) for t in every[:MOST_CLASSES]], "count": len(every)}
+        return {"classes": [_told(t) for t in every[:MAX_DRAWN_CLASSES]], "count": len(every)}
 
     def along(self, share: float) -> dict[str, Any]:
         """The tether in the class that the tour has at a share of its length."""

@@ -16,7 +16,7 @@ from netsp.roadmap.tether_classes import Tethers
 from netsp.study.compare.path_comparison import order_length
 from netsp.study.paths import PathMeasures, measure_path
 
-MAX_POINTS = 5000
+MAX_DRAWN_POINTS = 5000
 """Largest number of points of a drawn path; a message with 5000 points has 0.2 MB."""
 
 ORDER_LIMIT_S = 20.0
@@ -41,8 +41,8 @@ def drawn_points(value: object) -> list[list[float]]:
     InputError
         Not a list of pairs of numbers, or too many.
     """
-    if not isinstance(value, list) or len(value) > MAX_POINTS:
-        raise InputError(f"drawn: expected a list of at most {MAX_POINTS} points")
+    if not isinstance(value, list) or len(value) > MAX_DRAWN_POINTS:
+        raise InputError(f"drawn: expected a list of at most {MAX_DRAWN_POINTS} points")
     out = []
     for k, point in enumerate(value):
         if not isinstance(point, list) or len(point) != 2:

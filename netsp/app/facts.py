@@ -17,8 +17,8 @@ from netsp.model.solution import Solution
 from netsp.plan.sizing.base_placement import shortest_paths
 from netsp.plan.sizing.tether_margins import margins
 
-SAMPLES = 120
-"""Places along the tour at which the tether is told, its visits besides."""
+TETHER_SAMPLES = 120
+"""Number of places along the tour, besides its visits, at which the tether is measured."""
 
 
 def facts(
@@ -46,7 +46,7 @@ def facts(
     path = np.array(solution.path)
     visited = [cursor.share_at(p) for p in _places(problem, solution)]
     rows = []
-    for share in sorted({*np.linspace(0.0, 1.0, SAMPLES + 1).tolist(), *visited}):
+    for share in sorted({*np.linspace(0.0, 1.0, TETHER_SAMPLES + 1).tolist(), *visited}):
         if should_stop():
             return None
         told = cursor.along(share)

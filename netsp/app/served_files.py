@@ -16,11 +16,11 @@ from netsp.base.validated import shown
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
 
-LONGEST_NAME = 200
-"""Bytes: file systems take 255, and what is not saved yet is kept under a longer one."""
+MAX_FILE_NAME = 200
+"""Maximum length of a file name, bytes. File systems accept 255; unsaved work adds an ending."""
 
-MOST_BYTES = 64 * 2**20
-"""Of a file that comes in."""
+MAX_FILE_BYTES = 64 * 2**20
+"""Maximum size of an uploaded file, bytes."""
 
 MAPS = (
     ".geojson",
@@ -70,9 +70,9 @@ def bare_name(name: str) -> str:
     last = PurePosixPath(PureWindowsPath(name).name).name
     if not last or last.startswith(".") or not last.isprintable():
         raise InputError(f"file: expected a name, got {shown(name)}")
-    if len(last.encode()) > LONGEST_NAME:
+    if len(last.encode()) > MAX_FILE_NAME:
         raise InputError(
-            f"file: expected a name of at most {LONGEST_NAME} bytes, got {len(last.encode())}"
+            f"file: expected a name of at most {MAX_FILE_NAME} bytes, got {len(last.encode())}"
         )
     return last
 
@@ -218,8 +218,8 @@ def imported(
     """
     last = bare_name(name)
     ending = Path(last).suffix.lower()
-    if len(content) > MOST_BYTES:
-        raise InputError(f"{last}: {len(content)} bytes; expected at most {MOST_BYTES}")
+    if len(content) > MAX_FILE_BYTES:
+        raise InputError(f"{last}: {len(content)} bytes; expected at most {MAX_FILE_BYTES}")
     notes: list[str] = []
     with tempfile.TemporaryDirectory(prefix="netsp-") as folder:
         file = Path(folder) / last

@@ -34,7 +34,7 @@ from netsp.app.served_files import (
     imported,
     without_options,
 )
-from netsp.app.served_files import MOST_BYTES as MOST_FILE
+from netsp.app.served_files import MAX_MESSAGE_BYTES as MOST_FILE
 from netsp.app.shown import Shown
 from netsp.app.solving import Worker
 from netsp.app.state import Document
@@ -46,8 +46,8 @@ from netsp.model.solution import Solution
 
 STATIC = Path(__file__).parent / "static"
 
-MOST_BYTES = 4 * 2**20
-"""Of one message."""
+MAX_MESSAGE_BYTES = 4 * 2**20
+"""Maximum size of one message from the page, bytes."""
 
 MAX_PAGE_NAME = 40
 """Largest number of letters of the name by which a page signs its drawings."""

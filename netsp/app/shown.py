@@ -18,8 +18,8 @@ from netsp.model.problem import Problem
 from netsp.model.solution import Solution
 from netsp.world.scene.scene import Scene, scene_of
 
-FRAMES = 240
-"""Moments of a run that are shown."""
+SHOWN_FRAMES = 240
+"""Number of moments of a run on the page's slider."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ def _of_execution(place: Path, problem: Problem, solution: Solution) -> Shown:
         '{"frames": ' + read_text(place / "tethers.json") + "}", str(place / "tethers.json")
     )["frames"]
     frames = []
-    for frame in kept[:: max(1, len(kept) // FRAMES)]:
+    for frame in kept[:: max(1, len(kept) // SHOWN_FRAMES)]:
         k = min(int(np.searchsorted(stamps, frame["time"])), len(rows) - 1)
         frames.append(_frame(np.array(frame["nodes"], dtype=float), rows[k]))
     answer = {
@@ -194,7 +194,7 @@ def _of_mission(place: Path) -> Shown:
     scene_field = scene.field()
     model = GeodesicTether(scene_field, mission.delta)
     state = present_tether(mission, scene_field, model, grid_of(mission, scene, scene_field))
-    track, frames, every = Track.of(mission), [], max(1, len(rows) // FRAMES)
+    track, frames, every = Track.of(mission), [], max(1, len(rows) // SHOWN_FRAMES)
     for k, row in enumerate(rows):
         anchor = None if track is None else track(float(row["time"]))
         state = model.update(state, path[k], anchor)

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from netsp.model.problem import Problem
     from netsp.model.solution import Solution, Status
 
-TELL = 0.15
-"""Shortest time between two tours that are told, seconds."""
+TOUR_INTERVAL_S = 0.15
+"""Minimum time between two tours that are sent to the page, s."""
 
 Told = Callable[[dict[str, Any]], None]
 
@@ -153,7 +153,7 @@ def _solve(
         graph = graphs[-1]
         if row.tour is None or row.incumbent is None:
             return
-        if row.incumbent == told[1] or time.monotonic() < told[0] + TELL:
+        if row.incumbent == told[1] or time.monotonic() < told[0] + TOUR_INTERVAL_S:
             return
         told[:] = time.monotonic(), row.incumbent
         said = told_bound(Status.FEASIBLE, row.incumbent, row.bound)

@@ -35,8 +35,8 @@ LISTS = ("goals", "obstacles")
 MAPPED = ("base", "bounds", *LISTS)
 """Fields that an import takes from a map; editing one sets `site.edited`."""
 
-MOST_VERSIONS = 10_000
-"""Versions that can be gone back to; each shares with the one before what did not change."""
+MAX_VERSIONS = 10_000
+"""Maximum number of versions that can be undone. Versions share what did not change."""
 
 
 class Document:
@@ -212,7 +212,7 @@ class Document:
         self._keep(data)
         del self._versions[self._at + 1 :]
         self._versions.append(data)
-        del self._versions[: max(0, len(self._versions) - MOST_VERSIONS)]
+        del self._versions[: max(0, len(self._versions) - MAX_VERSIONS)]
         self._at = len(self._versions) - 1
         self.version += 1
 

@@ -41,10 +41,17 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--quiet", action="store_true", help="no progress")
 
 
-MOST_SIDE_BY_SIDE, PAGE = 3, ".html"
+MAX_SIDE_BY_SIDE = 3
+"""Maximum number of runs in one film."""
 
-MOST_SECONDS, MOST_FPS = 600, 60
-"""Of a film."""
+PAGE = ".html"
+"""Ending of films that are pages."""
+
+MAX_SECONDS = 600
+"""Maximum duration of a film, s."""
+
+MAX_FPS = 60
+"""Maximum number of frames per second."""
 
 
 def run(args: argparse.Namespace) -> int:
@@ -56,14 +63,14 @@ def run(args: argparse.Namespace) -> int:
     if Path(args.output).suffix.lower() not in kinds:
         raise InputError(f"{args.output}: expected a name ending in {', '.join(kinds)}")
     for name, value, most in (
-        ("--seconds", args.seconds, MOST_SECONDS),
-        ("--fps", args.fps, MOST_FPS),
+        ("--seconds", args.seconds, MAX_SECONDS),
+        ("--fps", args.fps, MAX_FPS),
     ):
         if value > most:
             raise InputError(f"{name}: expected at most {most}, got {value}")
-    if len(args.source) > MOST_SIDE_BY_SIDE:
+    if len(args.source) > MAX_SIDE_BY_SIDE:
         raise InputError(
-            f"SOURCE: {len(args.source)} of them; expected {MOST_SIDE_BY_SIDE} or fewer"
+            f"SOURCE: {len(args.source)} of them; expected {MAX_SIDE_BY_SIDE} or fewer"
         )
     if Path(args.output).suffix.lower() == PAGE:
         return _page(args)
@@ -96,9 +103,9 @@ def _page(args: argparse.Namespace) -> int:
     """A page that plays."""
     in_space = [_in_space(source) for source in args.source]
     if all(in_space):
-        from netsp.view.pictures.film_page import FRAMES, save_page
+        from netsp.view.pictures.film_page import PAGE_FRAMES, save_page
 
-        films = [_film(source, args.problem, FRAMES) for source in args.source]
+        films = [_film(source, args.problem, PAGE_FRAMES) for source in args.source]
         names = dict.fromkeys(film.title.split("\n")[0] for film in films)
         save_page(films, " and ".join(names), args.output)
     elif any(in_space):

@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
         import uvicorn
     except ImportError:
         raise InputError("the map needs uvicorn: pip install 'netsp[app]'") from None
-    from netsp.app.server import MOST_BYTES, Session, application
+    from netsp.app.server import MAX_MESSAGE_BYTES, Session, application
     from netsp.app.state import Document
 
     looked_at, notes = None, list[str]()
@@ -125,7 +125,7 @@ def run(args: argparse.Namespace) -> int:
         config = uvicorn.Config(
             application(session, token, port),
             log_level="warning",
-            ws_max_size=MOST_BYTES,
+            ws_max_size=MAX_MESSAGE_BYTES,
             access_log=False,
             server_header=False,
         )

@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
     from netsp.model.solution import Solution
     from netsp.study.compare.path_comparison import compare_paths
     from netsp.study.paths import PathPolicy
-    from netsp.study.paths.path_measures import SPEED
+    from netsp.study.paths.path_measures import DEFAULT_SPEED
     from netsp.view.pictures import style
 
     if args.json and args.output == STANDARD:
@@ -122,7 +122,7 @@ def run(args: argparse.Namespace) -> int:
             problem,
             paths,
             solution,
-            speed=args.speed or SPEED,
+            speed=args.speed or DEFAULT_SPEED,
             policy=PathPolicy(radius=args.radius),
             time_limit=args.time_limit,
             seed=args.seed,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from netsp.base.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 from netsp.command import json_output as told
 from netsp.command.clearance_flags import clearance_flags, warn_of_problem
-from netsp.command.guard import PORT
+from netsp.command.guard import GUARD_PORT
 from netsp.command.types import length, natural, seconds, system_id
 
 if TYPE_CHECKING:
@@ -120,9 +120,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--page",
         nargs="?",
         type=natural,
-        const=PORT,
+        const=GUARD_PORT,
         metavar="PORT",
-        help=f"serve a page on this machine, which takes events too; default port {PORT}",
+        help=f"serve a page on this machine, which takes events too; default port {GUARD_PORT}",
     )
     p.add_argument(
         "--planning-limit",

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 EXAMPLE = "netsp guard problems/wharf.json --link udpin:14550 --page"
 
-PORT = 8650
-"""Of the page."""
+GUARD_PORT = 8650
+"""Default port of the guard's page."""
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
@@ -89,9 +89,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--page",
         nargs="?",
         type=natural,
-        const=PORT,
+        const=GUARD_PORT,
         metavar="PORT",
-        help=f"serve a page on this machine; default port {PORT}",
+        help=f"serve a page on this machine; default port {GUARD_PORT}",
     )
     p.add_argument(
         "-o",

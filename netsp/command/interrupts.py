@@ -18,8 +18,8 @@ from netsp.base.errors import interrupted
 
 T = TypeVar("T")
 
-AGAIN = 0.05
-"""Seconds until an interrupt that was lost is sent again."""
+SIGNAL_INTERVAL_S = 0.05
+"""Time after which an interrupt that got lost is sent again, s."""
 
 
 @contextmanager
@@ -38,7 +38,7 @@ def interrupts_are_heard() -> Iterator[None]:
         if unraisable.exc_value is None or not interrupted(unraisable.exc_value):
             before(unraisable)
             return
-        again = threading.Timer(AGAIN, _interrupt)
+        again = threading.Timer(SIGNAL_INTERVAL_S, _interrupt)
         again.daemon = True
         again.start()
 

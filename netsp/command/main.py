@@ -87,9 +87,9 @@ def _main(argv: Sequence[str] | None) -> int:
             background_warm_up.begin(wanted)
         return code
     except SeveralErrors as error:
-        for complaint in error.complaints[:MOST_COMPLAINTS]:
+        for complaint in error.complaints[:MAX_COMPLAINTS]:
             messages.error(complaint)
-        if (more := len(error.complaints) - MOST_COMPLAINTS) > 0:
+        if (more := len(error.complaints) - MAX_COMPLAINTS) > 0:
             messages.error(f"and {more} more")
         return error.exit_code
     except NetspError as error:
@@ -156,8 +156,8 @@ class _Parser(argparse.ArgumentParser):
         (file or sys.stderr).write(message)  # argparse swallows the errors of a full disk
 
 
-MOST_COMPLAINTS = 20
-"""Lines about one input; the others are counted."""
+MAX_COMPLAINTS = 20
+"""Maximum number of lines about one input; further complaints are counted."""
 
 VECTORS = ("--origin", "--base", "--current")
 """Flags whose values may begin with a minus and are no numbers to argparse."""

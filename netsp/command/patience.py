@@ -9,8 +9,11 @@ from typing import TextIO
 
 from netsp.base.progress import heard_by
 
-QUIET_S, EVERY_S = 3.0, 5.0
-"""Seconds until it is told at first, and then between two lines."""
+FIRST_LINE_S = 3.0
+"""Time of silence before the first line, s."""
+
+LINE_INTERVAL_S = 5.0
+"""Time between two lines, s."""
 
 
 class Patience:
@@ -49,9 +52,9 @@ class Patience:
         self._done, self._total = done, total
 
     def _watch(self) -> None:
-        wait = QUIET_S
+        wait = FIRST_LINE_S
         while not self._over.wait(wait):
-            wait = EVERY_S
+            wait = LINE_INTERVAL_S
             print(self.line, file=self._stream, flush=True)
 
     @property

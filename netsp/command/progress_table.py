@@ -16,11 +16,11 @@ _HEADER = (
     f"{'vertices':>8} {'legs':>9} {'iteration':>11}"
 )
 
-QUIET_S = 3.0
-"""Seconds of silence after which the table says what takes so long."""
+TABLE_DELAY_S = 3.0
+"""Time of silence after which the table names the step at work, s."""
 
-EVERY = 0.2
-"""Least seconds between two rows that bring nothing but a better bound."""
+ROW_INTERVAL_S = 0.2
+"""Minimum time between two rows that show only a better bound, s."""
 
 
 class Named(Protocol):
@@ -46,7 +46,7 @@ class ProgressTable:
         self._held: tuple[float, Progress] | None = None
         self._begin = time.monotonic()
         self._slow = ""
-        self._patience = threading.Timer(QUIET_S, self._explain)
+        self._patience = threading.Timer(TABLE_DELAY_S, self._explain)
         self._patience.daemon = True
 
     def begin(self, problem: Named, slow: str = "building the roadmap …") -> None:
@@ -55,7 +55,7 @@ class ProgressTable:
         Parameters
         ----------
         slow
-            What is said if nothing else is for `QUIET_S` seconds.
+            What is said if nothing else is for `TABLE_DELAY_S` seconds.
         """
         self._slow = slow
         self._begin = time.monotonic()
@@ -74,7 +74,7 @@ class ProgressTable:
         )
         # the solver's own time does not count the roadmap, which the summary does
         now = time.monotonic()
-        if news or now - self._shown >= EVERY:
+        if news or now - self._shown >= ROW_INTERVAL_S:
             self._show(now - self._begin, row)
         else:
             self._held = now - self._begin, row

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from netsp.world.mission.mission import Mission
     from netsp.world.scene.scene import Scene
 
-TIME_LIMIT = 60.0
-"""Seconds, where no limit is given."""
+MISSION_TIME_LIMIT_S = 60.0
+"""Default time limit for missions, s."""
 
 FOR_PROBLEMS = {
     "roadmap": "--roadmap",
@@ -94,7 +94,7 @@ def solve(
     from netsp.plan.space.mission_policy import MissionPolicy
     from netsp.plan.space.mission_solver import solve_mission
 
-    clock = command_clock(time_limit or TIME_LIMIT)
+    clock = command_clock(time_limit or MISSION_TIME_LIMIT_S)
     begin = time.monotonic()
     mission = clock.bounded("reading the mission", lambda: Mission.load(file))
     stages = None if quiet else Stages(sys.stderr, clock.left)
@@ -161,8 +161,8 @@ def draw(found: SolvedMission, scene: Scene, file: str) -> None:
         save_mission(found.mission, scene, file)
 
 
-MOST_NAMED = 16
-"""Waypoints of an order that is told whole."""
+MAX_NAMED_WAYPOINTS = 16
+"""Maximum number of waypoints of an order that is printed in full."""
 
 
 def summary(
@@ -211,8 +211,8 @@ def summary(
             f"{of_all.percent(tour.length, 1)}"
         )
     names = [f"#{n}" for n in found.order[: len(tour.stops)]]
-    if len(names) > MOST_NAMED:
-        names = [*names[: MOST_NAMED // 2], "…", *names[-MOST_NAMED // 2 :]]
+    if len(names) > MAX_NAMED_WAYPOINTS:
+        names = [*names[: MAX_NAMED_WAYPOINTS // 2], "…", *names[-MAX_NAMED_WAYPOINTS // 2 :]]
     lines.append(f"order    start → {' → '.join(names)} → start")
     lines.append(f"tether   longest {tour.longest_tether:.4g} of {mission.tether_length:g} {units}")
     if found.run is not None:
@@ -231,8 +231,8 @@ def summary(
             "class, too; an empty one still is that of a free tether"
         )
     if found.left_out:
-        named = ", ".join(f"#{n}" for n in found.left_out[:MOST_NAMED])
-        more = len(found.left_out) - MOST_NAMED
+        named = ", ".join(f"#{n}" for n in found.left_out[:MAX_NAMED_WAYPOINTS])
+        more = len(found.left_out) - MAX_NAMED_WAYPOINTS
         lines.append(
             f"left out {named}{f' and {more} more' if more > 0 else ''}: not reached by any tether "
             f"within the limit that was found{_perhaps(found)}"

@@ -7,8 +7,8 @@ from typing import TextIO
 
 from netsp.command.patience import span
 
-EVERY = 5.0
-"""Seconds between two lines of one stage where nobody watches a terminal."""
+STAGE_INTERVAL_S = 5.0
+"""Time between two lines of one stage if the output is not a terminal, s."""
 
 
 class Stages:
@@ -18,13 +18,15 @@ class Stages:
     def __init__(self, stream: TextIO, limit: float | None = None) -> None:
         self._stream, self._begin, self._limit = stream, time.monotonic(), limit
         self._watched = stream.isatty()
-        self._stage, self._shown = "", -EVERY
+        self._stage, self._shown = "", -STAGE_INTERVAL_S
 
     def __call__(self, text: str) -> None:
         """Show it, if it is a new stage or some time has passed."""
         now = time.monotonic()
         stage = text.split(",")[0].split(" from ")[0]
-        if stage == self._stage and now - self._shown < (0.1 if self._watched else EVERY):
+        if stage == self._stage and now - self._shown < (
+            0.1 if self._watched else STAGE_INTERVAL_S
+        ):
             return
         if stage != self._stage and not self._watched:
             text = stage  # how far it is will be told of those that take long

@@ -80,11 +80,11 @@ def option(text: str) -> tuple[str, str]:
     return name, value
 
 
-MAX_SYSTEM = 255
+MAX_SYSTEM_ID = 255
 """Highest system id of MAVLink."""
 
-LARGEST = 2**62
-"""Largest whole number that is taken."""
+MAX_WHOLE_NUMBER = 2**62
+"""Maximum whole number of an option."""
 
 
 def natural(text: str) -> int:
@@ -93,9 +93,9 @@ def natural(text: str) -> int:
         value = int(text)
     except ValueError:
         value = -1
-    if not 0 <= value <= LARGEST:
+    if not 0 <= value <= MAX_WHOLE_NUMBER:
         raise argparse.ArgumentTypeError(
-            f"expected a whole number from 0 to {LARGEST}, got {text!r}"
+            f"expected a whole number from 0 to {MAX_WHOLE_NUMBER}, got {text!r}"
         )
     return value
 
@@ -106,9 +106,9 @@ def system_id(text: str) -> int:
         value = int(text)
     except ValueError:
         value = 0
-    if not 1 <= value <= MAX_SYSTEM:
+    if not 1 <= value <= MAX_SYSTEM_ID:
         raise argparse.ArgumentTypeError(
-            f"expected a system id from 1 to {MAX_SYSTEM}, got {text!r}"
+            f"expected a system id from 1 to {MAX_SYSTEM_ID}, got {text!r}"
         )
     return value
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from netsp.base.errors import InputError
-from netsp.study.compare.pool import GRACE_S, crashed
+from netsp.study.compare.pool import HUNG_GRACE_S, crashed
 from netsp.study.compare.rows import TrialRow
 from netsp.study.compare.study import Trial
 from netsp.study.compare.study_run import Executor
@@ -18,11 +18,11 @@ from netsp.study.compare.study_run import Executor
 if TYPE_CHECKING:
     from distributed import Client
 
-CONNECT = 10.0
-"""Seconds in which the scheduler must answer."""
+CONNECT_S = 10.0
+"""Time limit for the scheduler's first answer, s."""
 
-AHEAD = 4
-"""Trials handed to the scheduler for every thread of the cluster, so that none waits."""
+QUEUED_PER_WORKER = 4
+"""Number of trials queued for each thread of the cluster, so that no thread waits."""
 
 
 def dask_executor(address: str) -> Executor:
@@ -37,7 +37,7 @@ def dask_executor(address: str) -> Executor:
             'a scheduler needs Dask; install it with: pip install "netsp[cluster]"'
         ) from None
     try:
-        client = Client(address, timeout=CONNECT)
+        client = Client(address, timeout=CONNECT_S)
     except (OSError, ValueError, TypeError) as error:
         raise InputError(
             f"scheduler: no Dask scheduler at {address!r} ({type(error).__name__}); expected "
@@ -68,7 +68,7 @@ def _execute(client: Client, trials: list[Trial]) -> Iterator[tuple[Trial, Trial
         return client.submit(guarded, trial, key=f"netsp-{trial.id}", pure=False, retries=0)
 
     threads = max(sum(client.nthreads().values()), 1)
-    first = [f for f in (submit() for _ in range(AHEAD * threads)) if f is not None]
+    first = [f for f in (submit() for _ in range(QUEUED_PER_WORKER * threads)) if f is not None]
     pending = as_completed(first)
     for future in pending:
         trial = running.pop(future.key.removeprefix("netsp-"))
@@ -106,7 +106,7 @@ def guarded(trial: Trial) -> TrialRow:
     thread = threading.Thread(target=body, daemon=True)
     thread.start()
     limit = trial.solver["time_limit"]
-    thread.join(None if limit is None else 2.0 * limit + GRACE_S)
+    thread.join(None if limit is None else 2.0 * limit + HUNG_GRACE_S)
     if not outcome:
         return {"status": "timeout", "message": "the solver did not come back"}
     return outcome[0]

@@ -23,10 +23,10 @@ from netsp.model.solution import Solution, Status
 from netsp.plan.solve_problem import solve
 from netsp.roadmap.tether_classes import Tethers
 from netsp.study.paths import PathMeasures, PathPolicy, measure_path
-from netsp.study.paths.path_measures import SPEED
+from netsp.study.paths.path_measures import DEFAULT_SPEED
 
-ORDER_SHARE = 0.2
-"""Least share of the time limit for each path's order, even if the tour has used all of it."""
+ORDER_TIME_SHARE = 0.2
+"""Minimum share of the time limit for each path's order, even if the tour used it all."""
 
 COLUMNS = (
     "path",
@@ -280,7 +280,7 @@ def compare_paths(
     paths: Sequence[FoundPath],
     solution: Solution | None = None,
     *,
-    speed: float = SPEED,
+    speed: float = DEFAULT_SPEED,
     policy: PathPolicy | None = None,
     time_limit: float | None = None,
     seed: int = 0,
@@ -361,8 +361,8 @@ def compare_paths(
             note, is_infeasible = str(error), isinstance(error, InfeasibleError)
 
     def left() -> float | None:
-        """Return the seconds for one more solve, at least the share `ORDER_SHARE`."""
-        return None if time_limit is None else max(clock.left, ORDER_SHARE * time_limit)
+        """Return the seconds for one more solve, at least the share `ORDER_TIME_SHARE`."""
+        return None if time_limit is None else max(clock.left, ORDER_TIME_SHARE * time_limit)
 
     known: dict[tuple[int, ...], tuple[float | None, str]] = {}
     out = []

@@ -22,9 +22,9 @@ from netsp.base.errors import PluginError
 from netsp.study.compare.rows import LOST, TrialRow
 from netsp.study.compare.study import Trial
 
-GRACE_S = 60.0
-"""Seconds beyond its time limit, twice over, after which a trial counts as hung: roadmaps are built
-and kernels compiled in that time too."""
+HUNG_GRACE_S = 60.0
+"""Time after twice its limit after which a trial counts as hung, s. Roadmaps are built and kernels
+compiled in that time, too."""
 
 
 @dataclass
@@ -91,7 +91,7 @@ def _feed(worker: _Worker, queue: list[Trial]) -> None:
         worker.trial = queue.pop()
         limit = worker.trial.solver["time_limit"]
         if limit is not None:
-            worker.deadline = time.monotonic() + 2.0 * limit + GRACE_S
+            worker.deadline = time.monotonic() + 2.0 * limit + HUNG_GRACE_S
         with contextlib.suppress(OSError):  # a worker that is dead already is found by its pipe
             worker.pipe.send(worker.trial)
 

@@ -25,8 +25,8 @@ Whole = Annotated[Integer, Field(ge=1, le=100_000)]
 Natural = Annotated[Integer, Field(ge=0, le=2**62)]
 
 
-MOST_TRIALS = 500_000
-"""Of one study."""
+MAX_TRIALS = 500_000
+"""Maximum number of trials of a study."""
 
 
 class Worlds(Model):
@@ -165,8 +165,8 @@ class Study(Model):
                 raise ValueError(f"{what}: {again[0]:g} appears twice; expected each once")
         count = self.worlds.count * len(self.goals) * len(self.tether_lengths)
         count *= len(self.roadmaps) * len(self.solvers) * len(self.seeds)
-        if count > MOST_TRIALS:
-            raise ValueError(f"{count} trials; expected at most {MOST_TRIALS}")
+        if count > MAX_TRIALS:
+            raise ValueError(f"{count} trials; expected at most {MAX_TRIALS}")
         return self
 
     @classmethod

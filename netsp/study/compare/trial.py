@@ -23,8 +23,8 @@ from netsp.model.solution import Status
 from netsp.study.compare.rows import SCHEMA, TrialRow
 from netsp.study.compare.study import Trial
 
-MOST_POINTS = 200
-"""Most points of a trial's history of bests that a row keeps."""
+MAX_PROGRESS_ROWS = 200
+"""Maximum number of incumbents of a trial that its row keeps."""
 
 
 @functools.lru_cache(maxsize=4)
@@ -107,11 +107,11 @@ def _cpu_s() -> float:
 
 
 def thinned(history: list[Any]) -> list[Any]:
-    """At most `MOST_POINTS`, evenly, the first and the last among them."""
+    """At most `MAX_PROGRESS_ROWS`, evenly, the first and the last among them."""
     n = len(history)
-    if n <= MOST_POINTS:
+    if n <= MAX_PROGRESS_ROWS:
         return history
-    return [history[k * (n - 1) // (MOST_POINTS - 1)] for k in range(MOST_POINTS)]
+    return [history[k * (n - 1) // (MAX_PROGRESS_ROWS - 1)] for k in range(MAX_PROGRESS_ROWS)]
 
 
 def full_row(trial: Trial, outcome: TrialRow, study: str, study_name: str) -> TrialRow:

@@ -28,14 +28,17 @@ from netsp.base.validated import Model, read_model
 from netsp.judge import verify
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
-from netsp.study.library.records import SAME, Library
+from netsp.study.library.records import SAME_LENGTH_TOLERANCE, Library
 
-LATE, LATE_S = 1.1, 5.0
-"""What takes longer than so many times its limit, and so many seconds (of loading what it needs),
-does not count."""
+MAX_OVERTIME_RATIO = 1.1
+"""Ratio of time to time limit above which a late result does not count, if it is also later than
+`MAX_OVERTIME_S`."""
 
-GRACE = 10.0
-"""Seconds beyond twice its limit after which a command is killed."""
+MAX_OVERTIME_S = 5.0
+"""Overtime above which a late result does not count, s; it allows for loading libraries."""
+
+RANK_GRACE_S = 10.0
+"""Time after twice its limit after which a command is killed, s."""
 
 
 class Row(Model):
@@ -123,7 +126,7 @@ def by_command(command: str) -> Solve:
             try:
                 done = subprocess.run(
                     filled,
-                    timeout=2.0 * limit + GRACE,
+                    timeout=2.0 * limit + RANK_GRACE_S,
                     stdout=subprocess.DEVNULL,
                     stderr=subprocess.PIPE,
                     text=True,
@@ -132,7 +135,7 @@ def by_command(command: str) -> Solve:
             except OSError as error:
                 raise InputError(f"--command: {words[0]}: {error.strerror or error}") from None
             except subprocess.TimeoutExpired:
-                raise NetspError(f"did not end within {2.0 * limit + GRACE:g} s") from None
+                raise NetspError(f"did not end within {2.0 * limit + RANK_GRACE_S:g} s") from None
             if not out.exists():
                 last = (done.stderr.strip().splitlines() or ["nothing said"])[-1]
                 raise NetspError(f"wrote no solution; exit code {done.returncode}: {last[:120]}")
@@ -191,7 +194,7 @@ def _run(library: Library, name: str, label: str, solve: Solve, limit: float, cl
     try:
         solution = solve(problem, library.paths[name], limit, lambda: clock.stopped)
         row["seconds"] = round(time.perf_counter() - begin, 3)
-        if row["seconds"] > LATE * limit + LATE_S:
+        if row["seconds"] > MAX_OVERTIME_RATIO * limit + MAX_OVERTIME_S:
             row["message"] = f"late: answered after {row['seconds']:.1f} s of {limit:g}"
         elif solution.length is None:
             row["message"] = solution.status.value
@@ -268,7 +271,7 @@ def ranking(library: Library, rows: Iterable[Row]) -> list[dict[str, Any]]:
                 "limit": limit,
                 "problems": len(some),
                 "verified": sum(row.verified for row in some),
-                "best": sum(a <= SAME for a in above),
+                "best": sum(a <= SAME_LENGTH_TOLERANCE for a in above),
                 "above": statistics.fmean(above),
                 "worst": max(above),
                 "seconds": statistics.median(row.seconds for row in some),

@@ -24,8 +24,8 @@ from netsp.model.solution import Solution
 
 RECORDS = "records.json"
 
-SAME = 1e-6
-"""Lengths that differ by no larger share are the same."""
+SAME_LENGTH_TOLERANCE = 1e-6
+"""Tolerance of two lengths that count as the same, relative."""
 
 
 class Record(Model):
@@ -109,7 +109,7 @@ class Comparison:
         """Whether it is a tour shorter than any known, and passed the judge."""
         if not self.verification or self.length is None:
             return False
-        return self.above is None or self.above < -SAME
+        return self.above is None or self.above < -SAME_LENGTH_TOLERANCE
 
 
 class Library:

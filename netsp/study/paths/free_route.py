@@ -31,8 +31,8 @@ INSET_SHARE = 0.25
 between 0 and 1, so that a path along the outline clears the judge's obstacles, and a path along the
 true outline stays as it is."""
 
-SAME_PLACE = 1e-9
-"""Largest distance between two places on a path that count as one, in segments."""
+SAME_PLACE_TOLERANCE = 1e-9
+"""Tolerance of two places on a path that count as one, in segments."""
 
 DEPTH_SAMPLES = 64
 """Number of places, besides corners, at which the depth of a part in an obstacle is measured."""
@@ -147,7 +147,7 @@ class FreeSpace:
         points, lengths = [xy[:1]], [along[:1]]
         done = 0.0  # place on the path, in segments
         for start, end in self._outside(line):
-            inner = np.arange(int(np.floor(done)) + 1, int(np.ceil(start - SAME_PLACE)))
+            inner = np.arange(int(np.floor(done)) + 1, int(np.ceil(start - SAME_PLACE_TOLERANCE)))
             points.append(xy[inner])
             lengths.append(along[inner])
             s = np.array([_at(along, start), _at(along, end)])
@@ -162,7 +162,7 @@ class FreeSpace:
             points.append(way + self.origin)
             lengths.append(s[0] + share * (s[1] - s[0]))
             done = end
-        inner = np.arange(int(np.floor(done + SAME_PLACE)) + 1, len(line))
+        inner = np.arange(int(np.floor(done + SAME_PLACE_TOLERANCE)) + 1, len(line))
         points.append(xy[inner])
         lengths.append(along[inner])
         out, s_out = np.vstack(points), np.concatenate(lengths)
@@ -321,7 +321,7 @@ def _shares(line: Floats, k: int, part: shapely.Geometry) -> list[tuple[float, f
         if len(ends) < 2 or not size:
             continue
         share = np.clip((ends[[0, -1], :2] - line[k]) @ step / size, 0.0, 1.0)
-        if abs(share[1] - share[0]) > SAME_PLACE:
+        if abs(share[1] - share[0]) > SAME_PLACE_TOLERANCE:
             out.append((k + float(share.min()), k + float(share.max())))
     return out
 
@@ -330,7 +330,7 @@ def _merged(parts: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """Join the parts that follow one another without a gap."""
     out: list[tuple[float, float]] = []
     for start, end in sorted(parts):
-        if out and start <= out[-1][1] + SAME_PLACE:
+        if out and start <= out[-1][1] + SAME_PLACE_TOLERANCE:
             out[-1] = (out[-1][0], max(out[-1][1], end))
         else:
             out.append((start, end))

@@ -24,7 +24,7 @@ from netsp.study.paths.carried_tether import CarriedTether
 from netsp.study.paths.free_route import FreeSpace, Route, Stretch
 from netsp.study.paths.goal_visits import Passing, passings
 
-SPEED = 0.5
+DEFAULT_SPEED = 0.5
 """Default speed of a path without time stamps, in the problem's units per second; the default of
 `netsp execute`, too."""
 
@@ -256,7 +256,7 @@ def measure_path(
     path: npt.ArrayLike,
     *,
     times: npt.ArrayLike | None = None,
-    speed: float = SPEED,
+    speed: float = DEFAULT_SPEED,
     policy: PathPolicy | None = None,
     tether: npt.ArrayLike | None = None,
 ) -> PathMeasures:

@@ -23,17 +23,23 @@ from netsp.view.pictures.waypoint_marks import WaypointMarks
 
 FORMATS = (".gif", ".mp4")
 
-COLOURS = 64
-"""Of a GIF: pictures have few, and edges of lines need some between."""
+GIF_COLOURS = 64
+"""Number of colours of a GIF. Pictures have few; edges of lines need shades between them."""
 
-WIDTH, DPI = 6.4, 100
-"""Inches of a panel, and pixels in each."""
+FILM_WIDTH = 6.4
+"""Width of a panel, inches."""
 
-HIGH = 5.6
-"""Inches of a panel in space."""
+FILM_DPI = 100
+"""Resolution of a film, pixels per inch."""
 
-LEGEND, COLUMNS = 0.25, 5
-"""Inches of each line of what the marks mean, below the panels, and marks of a line and panel."""
+MAX_FILM_HEIGHT = 5.6
+"""Maximum height of a panel in space, inches."""
+
+LEGEND_HEIGHT = 0.25
+"""Height of one line of the legend below the panels, inches."""
+
+LEGEND_COLUMNS = 5
+"""Number of marks in one line of the legend, for each panel."""
 
 ROBOT = {"marker": "o", "ms": 9, "color": style.ROBOT, "mec": style.BASE, "mew": 0.8}
 
@@ -44,11 +50,11 @@ MARKS: tuple[tuple[str, dict[str, Any]], ...] = (
 )
 """What has become of goals and waypoints."""
 
-LETTERS = 62
-"""Of a line of a panel's title."""
+CAPTION_LETTERS = 62
+"""Maximum number of letters in a line of a panel's title."""
 
 HOLD_S = 1.5
-"""Seconds that the last picture stays."""
+"""Time for which the last picture stays, s."""
 
 
 def save_animation(
@@ -111,9 +117,9 @@ def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    handles, columns = _legend(films), COLUMNS * len(films)
-    height = max(map(_height, films)) + LEGEND * -(-len(handles) // columns)
-    figure = Figure(figsize=(WIDTH * len(films), height), dpi=DPI, layout="constrained")
+    handles, columns = _legend(films), LEGEND_COLUMNS * len(films)
+    height = max(map(_height, films)) + LEGEND_HEIGHT * -(-len(handles) // columns)
+    figure = Figure(figsize=(FILM_WIDTH * len(films), height), dpi=FILM_DPI, layout="constrained")
     canvas = FigureCanvasAgg(figure)
     panels: list[Any] = [
         figure.add_subplot(1, len(films), k, projection="3d" if film.scene else None)
@@ -207,7 +213,9 @@ def _draw_space(ax: Any, film: Film) -> None:
 
 def _title(film: Film) -> str:
     """In lines that fit, with room below for what is said of the moment."""
-    lines = [part for line in film.title.split("\n") for part in textwrap.wrap(line, LETTERS)]
+    lines = [
+        part for line in film.title.split("\n") for part in textwrap.wrap(line, CAPTION_LETTERS)
+    ]
     return "\n".join([*lines, ""])
 
 
@@ -239,9 +247,9 @@ def _view(film: Film) -> tuple[float, float, float, float]:
 def _height(film: Film) -> float:
     """Inches, so that the map fills its panel."""
     if film.scene is not None:
-        return HIGH
+        return MAX_FILM_HEIGHT
     xmin, ymin, xmax, ymax = _view(film)
-    return float(np.clip(WIDTH * (ymax - ymin) / (xmax - xmin) + 0.8, 2.5, 2.0 * WIDTH))
+    return float(np.clip(FILM_WIDTH * (ymax - ymin) / (xmax - xmin) + 0.8, 2.5, 2.0 * FILM_WIDTH))
 
 
 def _palette(picture: Any) -> Any:
@@ -263,7 +271,7 @@ def _palette(picture: Any) -> Any:
     out.paste(picture)
     for k, colour in enumerate(roles):
         out.paste(Image.new("RGB", (picture.width, 20), colour), (0, picture.height + 20 * k))
-    return out.quantize(COLOURS)
+    return out.quantize(GIF_COLOURS)
 
 
 def _write_gif(file: Path, pictures: Iterator[Any], fps: int) -> None:

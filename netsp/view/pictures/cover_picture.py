@@ -11,11 +11,11 @@ from netsp.plan.cover import Cover
 from netsp.view.pictures import style
 from netsp.world.scene.scene import Scene
 
-ARROW = 0.5
-"""Metres of the lines that show where a waypoint looks."""
+ARROW_LENGTH = 0.5
+"""Length of the lines that show where the camera looks, metres."""
 
-MOST_DRAWN = 6000
-"""Patches that are drawn."""
+MAX_DRAWN_PATCHES = 6000
+"""Maximum number of patches that are drawn."""
 
 
 def save(found: Cover, scene: Scene, file: str | Path) -> None:
@@ -35,7 +35,7 @@ def save(found: Cover, scene: Scene, file: str | Path) -> None:
     unit, places = scene.units, found.viewpoints.places
     patches, sees = found.patches, found.viewpoints.sees
     seen = sees.any(axis=0)
-    step = max(1, len(patches.areas) // MOST_DRAWN)
+    step = max(1, len(patches.areas) // MAX_DRAWN_PATCHES)
     kinds = (
         (seen, style.OBSTACLE, "seen"),
         (~seen & found.visible_patches, style.LIMIT, "left out"),
@@ -45,7 +45,7 @@ def save(found: Cover, scene: Scene, file: str | Path) -> None:
         there = patches.centres[chosen][::step]
         if len(there):
             space.scatter(*there.T, s=1.5, color=colour, label=label, depthshade=False)
-    ahead = ARROW * np.column_stack(
+    ahead = ARROW_LENGTH * np.column_stack(
         [np.cos(found.viewpoints.headings), np.sin(found.viewpoints.headings)]
     )
     space.scatter(*places.T, s=10, color=style.TETHER, label="waypoints", depthshade=False)

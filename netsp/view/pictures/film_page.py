@@ -23,11 +23,14 @@ from netsp.view.pictures.moments import LEFT_OUT, VISITED, Moment
 from netsp.view.pictures.scene_picture import parts_of
 from netsp.world.scene.surfaces import extent
 
-FRAMES, FILM_MS = 120, 12_000
-"""Moments that the slider knows, and milliseconds in which they go by."""
+PAGE_FRAMES = 120
+"""Number of moments on the slider."""
 
-LETTERS = 150
-"""Of a line of a title, over all panels."""
+FILM_MS = 12_000
+"""Duration of the film when it plays, ms."""
+
+PAGE_CAPTION_LETTERS = 150
+"""Maximum number of letters in a line of the title."""
 
 
 def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
@@ -56,7 +59,7 @@ def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
         "<br>".join(
             html.escape(part)
             for line in film.title.split("\n")[film.title.startswith(f"{title}\n") :]
-            for part in textwrap.wrap(line, LETTERS // columns)
+            for part in textwrap.wrap(line, PAGE_CAPTION_LETTERS // columns)
         )
         for film in films
     ]
@@ -68,7 +71,7 @@ def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
         horizontal_spacing=0.01,
     )
     figure.update_annotations(font={"size": 13}, yanchor="bottom")
-    what, found = steps_of(films, FRAMES)
+    what, found = steps_of(films, PAGE_FRAMES)
     changing: list[list[dict[str, Any]]] = [[] for _ in found]
     numbers: list[int] = []
     for k, film in enumerate(films):
@@ -143,7 +146,7 @@ def _marks(film: Film, name: str, which: list[int], **marker: Any) -> dict[str, 
 def _play() -> dict[str, Any]:
     """Buttons that have the frames go by."""
     on = {
-        "frame": {"duration": FILM_MS // FRAMES, "redraw": True},
+        "frame": {"duration": FILM_MS // PAGE_FRAMES, "redraw": True},
         "fromcurrent": True,
         "transition": {"duration": 0},
     }

@@ -24,14 +24,14 @@ from netsp.view.pictures.waypoint_marks import WaypointMarks
 from netsp.world.scene.scene import Scene
 from netsp.world.scene.surfaces import Triangles, drawn_points
 
-SEEN = 1e-3
-"""Of the size of a picture: what a line is off by less is not seen."""
+VISIBLE_SHARE = 1e-3
+"""Smallest visible deviation of a line, as a share of the picture's size."""
 
 EYE = {"x": 1.5, "y": -1.6, "z": 1.0}
 """Where a scene is looked at from, in its own size: from the south-east, as figures are."""
 
-DIGITS = 3
-"""Decimals of coordinates."""
+COORDINATE_DIGITS = 3
+"""Number of decimals of coordinates in pages."""
 
 PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
@@ -113,11 +113,15 @@ def _plain(value: Any) -> Any:
     if isinstance(value, dict):
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, np.ndarray):
-        value = np.round(value, DIGITS).tolist() if value.dtype.kind == "f" else value.tolist()
+        value = (
+            np.round(value, COORDINATE_DIGITS).tolist()
+            if value.dtype.kind == "f"
+            else value.tolist()
+        )
     if isinstance(value, list | tuple):
         return [_plain(v) for v in value]
     if isinstance(value, float):
-        return round(value, DIGITS)
+        return round(value, COORDINATE_DIGITS)
     return value
 
 
@@ -205,7 +209,7 @@ def mesh_trace(name: str, vertices: Floats, faces: npt.NDArray[np.int64]) -> Any
 def seen(points: Floats) -> Ints:
     """Numbers of those points (k, 3) of a line that can be told on a picture of it."""
     size = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
-    return np.flatnonzero(polylines.telling(points, SEEN * size))
+    return np.flatnonzero(polylines.telling(points, VISIBLE_SHARE * size))
 
 
 def line_trace(name: str, points: Floats, colour: str, width: float) -> dict[str, Any]:

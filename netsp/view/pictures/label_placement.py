@@ -19,13 +19,13 @@ WIDTH_PER_LETTER = 0.62
 HEIGHT_PER_LINE = 1.25
 """Height of a line as a share of the size of the font."""
 
-GAP = 8.0
+LABEL_GAP = 8.0
 """Distance from the middle of a marker to the near end of a label beside it, points."""
 
-RISE = 7.8
+LABEL_RISE = 7.8
 """Distance from the middle of a marker up or down to the middle of a label, points."""
 
-SIDES = ((1, -1), (1, 0), (1, 1), (0, -1), (0, 1), (-1, -1), (-1, 0), (-1, 1))
+LABEL_SIDES = ((1, -1), (1, 0), (1, 1), (0, -1), (0, 1), (-1, -1), (-1, 0), (-1, 1))
 """Directions from a marker to its label, the preferred first."""
 
 ALIGNMENTS: dict[int, Alignment] = {1: "left", 0: "center", -1: "right"}
@@ -94,9 +94,9 @@ def place_labels(
     for place, text in zip(places, texts, strict=True):
         half = 0.5 * font_size * np.array([WIDTH_PER_LETTER * len(text), HEIGHT_PER_LINE])
         chosen = None
-        for side in SIDES if text else ():
-            above = RISE if side[0] else marker_radius + half[1]
-            offset = (GAP * side[0], float(above * side[1]))
+        for side in LABEL_SIDES if text else ():
+            above = LABEL_RISE if side[0] else marker_radius + half[1]
+            offset = (LABEL_GAP * side[0], float(above * side[1]))
             middle = place + offset + (half[0] * side[0], 0.0)
             box = np.concatenate([middle - half, middle + half])
             filled = np.vstack(boxes)

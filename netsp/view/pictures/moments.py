@@ -23,8 +23,8 @@ from netsp.world.simulator.mission_run import grid_of
 from netsp.world.tether import GeodesicTether
 from netsp.world.tether.resolution import suggested_delta
 
-THIN = 400
-"""Points of what a run has gone so far, about."""
+MAX_MOMENTS = 400
+"""Approximate maximum number of points of the path so far in one picture."""
 
 VISITED, LEFT_OUT, CANCELLED = "visited", "left out", "cancelled"
 """What may have become of a goal or waypoint."""
@@ -160,7 +160,7 @@ def moments_of_run(
             f"{frame['time']:.4g} s; tether {float(row['tether']):.4g} of {float(row['limit']):g} "
             f"{problem.units}; {where}"
         )
-        gone = np.vstack([path[: k : max(1, k // THIN)], nodes[-1:]])
+        gone = np.vstack([path[: k : max(1, k // MAX_MOMENTS)], nodes[-1:]])
         now = frame["time"] if k < len(rows) - 1 else np.inf
         fates = {
             fate: tuple(g for g, when in begins.items() if when <= now)
@@ -205,7 +205,7 @@ def moments_of_flight(run: Run, scene: Scene, count: int) -> list[Moment]:
             f"{r.time:.4g} s; tether {r.tether:.4g} of {r.limit:g} {units}; "
             f"{len(fates[VISITED])} of {len(run.mission.waypoints)} visited"
         )
-        gone = np.vstack([path[: row : max(1, row // THIN)], path[row]])
+        gone = np.vstack([path[: row : max(1, row // MAX_MOMENTS)], path[row]])
         nodes = np.vstack([tether.nodes[:-1], path[row]])
         out.append(Moment(nodes, gone, text, fates=fates))
     return out

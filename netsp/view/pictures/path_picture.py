@@ -19,7 +19,7 @@ ROW_HEIGHT = 4.6
 MAX_TITLE = 150
 """Largest number of letters of the title that fit the width of the picture."""
 
-MAX_NAMES = 40
+MAX_NAMED_GOALS = 40
 """Largest number of goals or obstacles with names in the picture; more names would overlap."""
 
 
@@ -76,7 +76,7 @@ def draw_path_map(found: PathComparison, path: ComparedPath, *, ax: Any = None) 
     problem, m = found.problem, path.measures
     if ax is None:
         ax = Figure(figsize=(7, 6), layout="constrained").subplots()
-    label = problem.obstacle_name if len(problem.obstacles) <= MAX_NAMES else None
+    label = problem.obstacle_name if len(problem.obstacles) <= MAX_NAMED_GOALS else None
     draw_obstacles(ax, problem, label=label, wrapped=m.entangled)
     if problem.bounds is not None:
         xmin, ymin, xmax, ymax = problem.bounds
@@ -114,7 +114,7 @@ def draw_path_map(found: PathComparison, path: ComparedPath, *, ax: Any = None) 
         place = goal.position[:2]
         if k in number:
             ax.annotate(str(number[k]), place, ha="center", va="center", fontsize=7, zorder=6)
-        if len(problem.goals) <= MAX_NAMES and goal.name:
+        if len(problem.goals) <= MAX_NAMED_GOALS and goal.name:
             ax.annotate(
                 goal.name,
                 place,
@@ -164,7 +164,7 @@ def draw_tether_along(m: PathMeasures, *, ax: Any = None) -> Any:
             ls="none",
             label="at a goal",
         )
-    if len(problem.goals) <= MAX_NAMES:
+    if len(problem.goals) <= MAX_NAMED_GOALS:
         for v in m.visits:
             if v.tether is not None:
                 ax.annotate(

@@ -28,16 +28,16 @@ MAX_LABELLED = 40
 LABEL_SIZE = 6.0
 """Size of the font of names, points."""
 
-SMALL = 0.012
-"""Radius of the smallest circle that bears its own name, in units of the map."""
+MIN_VISIBLE_SHARE = 0.012
+"""Minimum radius of a circle whose name is written in it, as a share of the map."""
 
 
 HIDDEN_RIM = 0.002
 """Distance from an obstacle's outline, as a share of the picture's width, up to which an outline of
 something left out is not drawn."""
 
-TEXTURE = 1000.0
-"""Edges that are drawn at full strength."""
+FULL_STRENGTH_EDGES = 1000.0
+"""Number of edges of a roadmap above which edges are drawn fainter."""
 
 
 def save(problem: Problem, solution: Solution | None, path: str | Path) -> None:
@@ -173,7 +173,7 @@ def save_roadmap(problem: Problem, roadmap: str, options: dict[str, Any], path: 
             f"{len(t.arcs)} arcs, {len(lines) // 2} tangents, {len(built.cluster) - 1} classes"
         )
     # thousands of edges are a texture, and obstacles, goals and milestones are seen through it
-    alpha = float(np.clip(TEXTURE / max(len(lines), 1), 0.04, 0.35))
+    alpha = float(np.clip(FULL_STRENGTH_EDGES / max(len(lines), 1), 0.04, 0.35))
     ax.add_collection(
         LineCollection(list(lines), colors=style.PATH, lw=0.35, alpha=alpha, zorder=2)
     )
@@ -472,7 +472,7 @@ def draw_obstacles(
     from matplotlib.patches import Polygon as Patch
 
     xmin, ymin, xmax, ymax = view(problem, None)
-    small = SMALL * max(xmax - xmin, ymax - ymin)
+    small = MIN_VISIBLE_SHARE * max(xmax - xmin, ymax - ymin)
     corners: list[tuple[float, float]] = []
     for i, o in enumerate(progress.each(problem.obstacles)):
         look: dict[str, Any] = {"fc": style.OBSTACLE, "ec": style.EDGE, "lw": 0.6, "zorder": 1}

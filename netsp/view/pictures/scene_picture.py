@@ -20,12 +20,14 @@ from netsp.world.tether import Tether
 
 INTERACTIVE = ".html"
 
-TALL, TICK = 1.5, 0.45
-"""Height over width of a scene whose side views stand beside one another, and inches of the number
-of a tick."""
+TALL_RATIO = 1.5
+"""Minimum ratio of height to width of a scene whose side views are drawn side by side."""
 
-MOST_NUMBERED = 30
-"""Waypoints whose numbers are drawn."""
+TICK_SPACING = 0.45
+"""Minimum distance of two ticks with numbers, inches."""
+
+MAX_NUMBERED = 30
+"""Maximum number of waypoints whose numbers are drawn."""
 
 
 def save(
@@ -128,7 +130,7 @@ def _figure(
     names = ("x", "y", "z")
     views = ((0, 1, "from above"), (0, 2, "from the south"), (1, 2, "from the east"))
     size = high - low
-    if size[2] > TALL * max(size[0], size[1]):
+    if size[2] > TALL_RATIO * max(size[0], size[1]):
         wide = {"width_ratios": [size[a] for a, _, _ in views]}
         panels, room = right.subplots(1, 3, **wide), (1.3, 5.5)
     else:
@@ -145,7 +147,7 @@ def _figure(
         panel.set(xlim=(low[a], high[a]), ylim=(low[b], high[b]), aspect="equal")
         scale = min(room[0] / size[a], room[1] / size[b])  # inches
         for axis, along in ((panel.xaxis, a), (panel.yaxis, b)):
-            count = int(np.clip(scale * size[along] / TICK, 2, 5))
+            count = int(np.clip(scale * size[along] / TICK_SPACING, 2, 5))
             axis.set_major_locator(MaxNLocator(count))
         panel.set_title(name, fontsize=9)
         panel.set(xlabel=f"{names[a]} ({unit})", ylabel=f"{names[b]} ({unit})")
@@ -206,7 +208,7 @@ def draw_stops(ax: Any, stops: WaypointMarks, axes: tuple[int, ...]) -> None:
         there = stops.places[chosen][:, columns]
         if len(there):
             ax.plot(*there.T, ls="none", label=label, **look)
-    if len(columns) == 2 and len(stops.places) <= MOST_NUMBERED:
+    if len(columns) == 2 and len(stops.places) <= MAX_NUMBERED:
         for k, (x, y) in enumerate(stops.places[:, columns]):
             ax.annotate(
                 str(k),

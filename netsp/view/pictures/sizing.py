@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from netsp.plan.sizing.base_placement import BaseSearch
     from netsp.plan.sizing.tether_sizing import TetherCurve
 
-MOST_LABELS = 12
-"""Steps that are labelled."""
+MAX_LABELS = 12
+"""Maximum number of steps with labels."""
 
 
 def draw_tether_curve(curve: TetherCurve, *, ax: Axes | None = None) -> Any:
@@ -45,7 +45,7 @@ def draw_tether_curve(curve: TetherCurve, *, ax: Axes | None = None) -> Any:
             ax.fill_between(
                 [s.tether, s.until], s.lower_bound, s.length, color=style.PLAN, alpha=0.25, lw=0
             )
-        if len(curve.steps) <= MOST_LABELS:
+        if len(curve.steps) <= MAX_LABELS:
             ax.annotate(
                 f"{s.tether:.4g}: {s.length:.5g}",
                 (s.tether, s.length),
@@ -71,11 +71,11 @@ def draw_tether_curve(curve: TetherCurve, *, ax: Axes | None = None) -> Any:
     return ax
 
 
-MOST_NAMES = 24
-"""Places that are named."""
+MAX_NAMES = 24
+"""Maximum number of places with names."""
 
-LEVELS = 12
-"""Contours of a map."""
+CONTOUR_LEVELS = 12
+"""Number of contours of a map."""
 
 
 def draw_base_search(search: BaseSearch, *, ax: Any = None) -> Any:
@@ -105,7 +105,7 @@ def draw_base_search(search: BaseSearch, *, ax: Any = None) -> Any:
         zorder=4,
         label="proven worse without a tour" if search.proven else "not solved",
     )
-    if len(xy) <= MOST_NAMES:
+    if len(xy) <= MAX_NAMES:
         for c in search.candidates:
             left.annotate(c.name, c.position[:2], (4, 4), textcoords="offset points", fontsize=7)
     best = search.best
@@ -149,7 +149,7 @@ def _map(ax: Axes, problem: Any, xy: Any, values: Any, possible: Any, label: str
     spread = np.linalg.svd(xy[ok] - xy[ok].mean(0))[1] if ok.sum() >= 4 else np.zeros(2)
     if ok.sum() >= 4 and spread[1] > 1e-3 * size and np.ptp(values[ok]) > 0.0:
         drawn = ax.tricontour(
-            *xy[ok].T, values[ok], levels=LEVELS, cmap="viridis", linewidths=1.2, zorder=1
+            *xy[ok].T, values[ok], levels=CONTOUR_LEVELS, cmap="viridis", linewidths=1.2, zorder=1
         )
         ax.clabel(drawn, fontsize=7, fmt="%.4g")
     if ok.any():

@@ -38,13 +38,13 @@ LIMIT, EVENT, RECOVERY = "#333333", "#8a939c", "#f7f0b8"
 """The tether's length; what happened; times of tether recovery."""
 
 SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-"""Solvers side by side, in their order."""
+"""Colours of solvers side by side, in order."""
 
 RUNS = (PATH, TETHER)
-"""Two runs side by side."""
+"""Colours of two runs side by side."""
 
-LONGEST_WORD = 40
-"""Letters of one word that a picture shows."""
+MAX_WORD_LETTERS = 40
+"""Maximum number of letters of one word in a picture; longer words end in an ellipsis."""
 
 FORMATS = (".png", ".svg", ".pdf")
 
@@ -162,7 +162,7 @@ def literal(figure: Any) -> Any:
         content = text.get_text()
         if not content.isascii():
             text.set_fontfamily(["DejaVu Sans", *_fonts_of_other_scripts()])
-        text.set_text(re.sub(rf"(\S{{{LONGEST_WORD}}})\S+", r"\1…", content))
+        text.set_text(re.sub(rf"(\S{{{MAX_WORD_LETTERS}}})\S+", r"\1…", content))
     return figure
 
 

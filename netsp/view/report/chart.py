@@ -18,20 +18,30 @@ from netsp.online.execute.temporary_obstacles import Maps, lasting, passing
 from netsp.view.pictures import style
 from netsp.view.pictures.film import Film
 
-WIDTH = 900.0
-LEFT, HEAD, FOOT = 52.0, 44.0, 46.0
-"""Room for the numbers of the y axis, for scale bar and north, and for the x axis."""
+CHART_WIDTH = 900.0
+"""Width of the map, pixels."""
 
-FATE = 6
-"""Letters beside a name, where a goal was left out or cancelled, less those in the margin."""
+LEFT_MARGIN = 52.0
+"""Space for the numbers of the y axis, pixels."""
 
-MANY = 40
-"""With more goals or obstacles, names would cover each other."""
+TOP_MARGIN = 44.0
+"""Space for scale bar and north arrow, pixels."""
+
+BOTTOM_MARGIN = 46.0
+"""Space for the numbers of the x axis, pixels."""
+
+FATE_LETTERS = 6
+"""Number of letters beside the name of a goal that was left out or cancelled, less those that fit
+into the margin."""
+
+MAX_CHART_NAMES = 40
+"""Maximum number of goals or obstacles with names; more names would cover each other."""
 
 LEGEND = (
     (f'<path d="M8 1 10 6 15 6 11 9 13 15 8 11 3 15 5 9 1 6 6 6Z" fill="{style.BASE}"/>', "base"),
     (
-        f'<circle cx="8" cy="8" r="6" fill="{style.GOAL}" stroke="{style.PATH}" stroke-width="1.5"/>'
+        f'<circle cx="8" cy="8" r="6" fill="{style.GOAL}" stroke="{style.PATH}" '
+        'stroke-width="1.5"/>'
         '<text x="8" y="11" font-size="8" text-anchor="middle">1</text>',
         "goal, with the number of its visit",
     ),
@@ -84,17 +94,19 @@ class View:
         low, high = every.min(axis=0), every.max(axis=0)
         room = 0.04 * float((high - low).max()) + 1e-9
         self.low, self.high = low - room, high + room
-        if len(problem.goals) <= MANY:  # names stand to the right of goals
-            letters = max((len(goal.name or "") for goal in problem.goals), default=0) + FATE
+        if len(problem.goals) <= MAX_CHART_NAMES:  # names stand to the right of goals
+            letters = (
+                max((len(goal.name or "") for goal in problem.goals), default=0) + FATE_LETTERS
+            )
             self.high[0] += min(0.007 * letters, 0.2) * float((high - low).max())
         lack = 0.25 * float((self.high - self.low).max()) - (self.high - self.low)
         self.low, self.high = (
             self.low - np.maximum(lack, 0.0) / 2,
             self.high + np.maximum(lack, 0.0) / 2,
         )
-        self.scale = (WIDTH - LEFT - 8.0) / float(self.high[0] - self.low[0])
-        self.bottom = HEAD + float(self.high[1] - self.low[1]) * self.scale
-        self.height = self.bottom + FOOT
+        self.scale = (CHART_WIDTH - LEFT_MARGIN - 8.0) / float(self.high[0] - self.low[0])
+        self.bottom = TOP_MARGIN + float(self.high[1] - self.low[1]) * self.scale
+        self.height = self.bottom + BOTTOM_MARGIN
 
     @classmethod
     def of(cls, problem: Problem, film: Film) -> View:
@@ -118,8 +130,8 @@ class View:
         """Where a place is in the picture."""
         x, y = np.asarray(p, dtype=float)[:2]
         return [
-            round(LEFT + float(x - self.low[0]) * self.scale, 2),
-            round(HEAD + float(self.high[1] - y) * self.scale, 2),
+            round(LEFT_MARGIN + float(x - self.low[0]) * self.scale, 2),
+            round(TOP_MARGIN + float(self.high[1] - y) * self.scale, 2),
         ]
 
     def points(self, line: Floats) -> str:
@@ -181,7 +193,7 @@ def draw(
     )
     shapes.append(f'<circle class="robot" r="6" fill="{style.ROBOT}" stroke="{style.BASE}"/>')
     return (
-        f'<svg class="map" viewBox="0 0 {WIDTH:g} {view.height:.1f}" role="img" '
+        f'<svg class="map" viewBox="0 0 {CHART_WIDTH:g} {view.height:.1f}" role="img" '
         f'aria-label="map">{"".join(shapes)}</svg>'
     )
 
@@ -307,7 +319,7 @@ def _obstacles(problem: Problem, view: View) -> list[str]:
                 out.append(f'<polygon points="{view.points(ring)}" {around}/>')
             corners = view.points(np.array(o.polygon))
             out.append(f'<polygon points="{corners}" {look}>{title}</polygon>')
-        if len(problem.obstacles) <= MANY:
+        if len(problem.obstacles) <= MAX_CHART_NAMES:
             out.append(
                 f'<text x="{x}" y="{y + 4}" class="name" text-anchor="middle">'
                 f"{html.escape(problem.obstacle_name(i))}</text>"
@@ -364,7 +376,7 @@ def _tour(path: Floats, view: View) -> list[str]:
 def _goals(
     problem: Problem, visit: Mapping[int, int], view: View, fates: dict[int, str]
 ) -> list[str]:
-    named = len(problem.goals) <= MANY
+    named = len(problem.goals) <= MAX_CHART_NAMES
     out = []
     for k, goal in enumerate(problem.goals):
         x, y = view.point(goal.position)

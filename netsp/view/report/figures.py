@@ -11,8 +11,8 @@ from netsp.study.compare.rows import TrialRow
 from netsp.view.pictures import style
 from netsp.view.report.stats import Cell, Summary, gap_over_time, over_best, profile, summary
 
-LEVEL = 1.0
-"""Least height of a linear axis: less of a per cent, or of an obstacle, is no difference to see."""
+MIN_AXIS_HEIGHT = 1.0
+"""Minimum height of a linear axis: one per cent, or one obstacle, is a difference worth showing."""
 
 LINES, MARKERS = ("-", "--", "-.", ":"), "os^Dv<>"
 
@@ -72,8 +72,8 @@ def by_goals(
         panel.grid(alpha=0.3)
         if log:
             panel.set_yscale("log")
-        elif panel.get_ylim()[1] < LEVEL:
-            panel.set_ylim(-0.05 * LEVEL, LEVEL)
+        elif panel.get_ylim()[1] < MIN_AXIS_HEIGHT:
+            panel.set_ylim(-0.05 * MIN_AXIS_HEIGHT, MIN_AXIS_HEIGHT)
     axes[0][0].set_ylabel(label)
     if axes[0][-1].get_legend_handles_labels()[0]:
         _legend(axes[0][-1])
@@ -156,7 +156,7 @@ def anytime(by_method: dict[str, list[TrialRow]], best: dict[str, float]) -> Any
     panel.yaxis.set_major_locator(FixedLocator([0.0, *(10.0**k for k in range(-1, 7))]))
     panel.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     panel.yaxis.set_minor_locator(NullLocator())
-    panel.set_ylim(bottom=-0.02, top=max(panel.get_ylim()[1], LEVEL))
+    panel.set_ylim(bottom=-0.02, top=max(panel.get_ylim()[1], MIN_AXIS_HEIGHT))
     panel.grid(alpha=0.3)
     if panel.get_legend_handles_labels()[0]:
         _legend(panel)

@@ -10,8 +10,8 @@ from netsp.view.pictures.film import Film, steps_of
 from netsp.view.pictures.moments import VISITED, Moment
 from netsp.view.report.chart import View
 
-FRAMES = 240
-"""Places of the slider."""
+MOVING_FRAMES = 240
+"""Number of positions of the slider."""
 
 CONTROLS = (
     '<div class="noprint"><button id="play" type="button">▶ play</button>'
@@ -102,7 +102,7 @@ def script(films: Sequence[Film], views: Sequence[View]) -> str:
     str
         Elements.
     """
-    steps = steps_of(films, FRAMES + 1)[1]
+    steps = steps_of(films, MOVING_FRAMES + 1)[1]
     shown = [
         {
             "moments": [_frame(moment, view) for moment in film.moments],

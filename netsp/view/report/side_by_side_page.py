@@ -32,7 +32,7 @@ def save_beside(opened: Sequence[Opened], output: str | Path) -> None:
     InputError
         A file of a run is damaged; the page cannot be written.
     """
-    films = [one.film(moving.FRAMES) for one in opened]
+    films = [one.film(moving.MOVING_FRAMES) for one in opened]
     views = [chart.View.of(one.problem, film) for one, film in zip(opened, films, strict=True)]
     names = list(dict.fromkeys(one.problem.name for one in opened))
     title = f"{' and '.join(names)}: {len(opened)} side by side"
@@ -51,7 +51,8 @@ def save_beside(opened: Sequence[Opened], output: str | Path) -> None:
             f'<title>{html.escape(title)}</title><link rel="icon" href="data:,">'
             f"<style>{STYLE}{moving.STYLE}{BESIDE}</style></head><body>"
             f"<h1>{html.escape(title)}</h1>{moving.CONTROLS}"
-            f'<div class="beside">{sections}</div>{chart.legend(run=any(one.run for one in opened))}'
+            f'<div class="beside">{sections}</div>'
+            f"{chart.legend(run=any(one.run for one in opened))}"
             f"{moving.script(films, views)}</body></html>\n"
         ),
     )

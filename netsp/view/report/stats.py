@@ -13,15 +13,15 @@ from netsp.model.bound_scope import LowerBound, Scope
 from netsp.model.solution import Status, scope_of
 from netsp.study.compare.rows import FAILED, TrialRow
 
-ROUNDING = 1e-6
-"""Per cent over the best that are taken for none: the same tour, summed in another order."""
+SAME_RESULT_TOLERANCE = 1e-6
+"""Tolerance of two lengths of the same tour, summed in another order, per cent."""
 
 MAX_CLOSED_GAP = 1e-5
-"""Largest gap, as a share of the length, at which a tour counts as proven; also that of the judge,
-because a path from the robot's state is proven to that share only."""
+"""Tolerance of the gap of a proven tour, as a share of the length: paths from a robot's state are
+proven to this share only."""
 
 CONFIDENCE = 0.95
-"""Of the intervals about medians."""
+"""Confidence level of the intervals around medians."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def over_best(row: TrialRow, best: dict[str, float]) -> float | None:
     if row.get("length") is None or key not in best:
         return None
     over = float(100.0 * (row["length"] / best[key] - 1.0))
-    return over if abs(over) > ROUNDING else 0.0
+    return over if abs(over) > SAME_RESULT_TOLERANCE else 0.0
 
 
 def summary(values: Sequence[float]) -> Summary | None:

@@ -78,7 +78,7 @@ def page(what: Opened) -> str:
         A file of the run is damaged.
     """
     problem, solution, run = what.problem, what.solution, what.run
-    film, fates = what.film(moving.FRAMES), what.fates
+    film, fates = what.film(moving.MOVING_FRAMES), what.fates
     view = chart.View.of(problem, film)
     title = f"{problem.name}: {'a run' if run else 'a tour'}"
     own = problem.sha256 == solution.problem.sha256
