@@ -1,1 +1,1 @@
-"""From a problem's geometry to its travel graph."""
+"""Roadmaps: from the geometry of a problem to its travel graph."""

@@ -1,9 +1,9 @@
-"""Tabulates the detours in any class between base, goals and sub-goals beside the obstacles.
+"""Detours in any class between base, goals and sub-goals beside the obstacles.
 
 McCammon & Hollinger 2016, section III-B, change the class of a path by planning it again "through
 an additional sub-goal placed on the opposite side of an obstacle", and leave open where exactly.
-Here every obstacle offers the free ones of eight places around it, a little off its boundary; the
-far side of a path is the one most opposite to where the path comes nearest to the obstacle.
+Here every obstacle offers those of eight places around it that are free, a little off its boundary.
+The far side of a path is the place most opposite to where the path comes nearest to the obstacle.
 """
 
 from __future__ import annotations
@@ -34,14 +34,17 @@ def taut_detours(
     clock: Clock | None = None,
     policy: RoadmapPolicy | None = None,
 ) -> Detours:
-    """The detours over tangents and arcs: exact shortest paths.
+    """Return the detours over tangents and arcs, which are exact shortest paths.
 
     Parameters
     ----------
     check
-        May raise to stop.
-    clock
-        The clock of the run; when it is up, LimitReachedError is raised.
+        Called now and then; may raise to stop.
+
+    Raises
+    ------
+    LimitReachedError
+        The clock was up.
     """
     policy = policy or RoadmapPolicy()
     places, side = sub_goals(problem, with_sub_goals, policy.detours)
@@ -62,8 +65,8 @@ def taut_detours(
 def sub_goals(
     problem: Problem, wanted: bool = True, policy: DetourPolicy | None = None
 ) -> tuple[Floats, Ints]:
-    """Places (k, 2) beside the obstacles, relative to the base, and the obstacle of each; none if
-    they are not wanted."""
+    """Return the places (k, 2) beside the obstacles, relative to the base, and the obstacle of
+    each; none if they are not wanted."""
     if not wanted:
         return np.zeros((0, 2)), np.zeros(0, dtype=np.int64)
     policy = policy or DetourPolicy()
@@ -104,12 +107,12 @@ def tabulate_detours(
     side: Ints,
     check: Callable[[], None] = lambda: None,
 ) -> Detours:
-    """All detours from base and goals to base, goals and sub-goals over a graph of shortest paths.
+    """Return all detours from base and goals to base, goals and sub-goals over a graph.
 
     Parameters
     ----------
     terminals
-        (m + 1 + k,) node of the graph for base, goals and sub-goals.
+        (m + 1 + k,) nodes of base, goals and sub-goals.
     side
         (k,) obstacle of each sub-goal.
     check
@@ -161,7 +164,8 @@ def tabulate_detours(
 def _far_sides(
     xy: Floats, middles: Floats, places: Floats, side: Ints, first: int
 ) -> tuple[Floats, Ints]:
-    """Distance of a path from every obstacle's middle, and the sub-goal most opposite to it."""
+    """Return the distance of a path from every obstacle's middle, and the sub-goal most opposite to
+    it."""
     n = len(middles)
     near = np.full(n, np.inf)
     far = np.full(n, -1, dtype=np.int64)

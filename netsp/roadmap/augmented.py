@@ -1,9 +1,9 @@
-"""The homotopy-augmented graph of Bhattacharya, Likhachev & Kumar 2012 over any roadmap.
+"""Homotopy-augmented graph of Bhattacharya, Likhachev & Kumar 2012 over any roadmap.
 
-Its vertices are (milestone, word): the milestone together with the class of the path from the base.
-As in McCammon & Hollinger 2017, section IV-A, a vertex exists only if the tether reaches it along
-the roadmap and if its word does not loop. An edge of the roadmap becomes one edge for every word at
-its tail, leading to the word with the edge's crossings appended and reduced.
+A vertex is (milestone, word): a milestone with the class of the path from the base. As in McCammon
+& Hollinger 2017, section IV-A, a vertex exists only if the tether reaches it along the roadmap and
+its word does not loop. An edge of the roadmap becomes one edge for every word at its tail; it leads
+to the word with the edge's crossings appended and reduced.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class AugmentedGraph:
-    """Vertices (milestone, word) with the edges between them; vertex 0 is (base, empty word).
+    """Graph over vertices (milestone, word); vertex 0 is (base, empty word).
 
     Attributes
     ----------
-    milestone, node, length
-        (n,) milestone, word (as a trie node), shortest length from the base.
-    complete
-        Whether nothing was left out for want of time.
-    start, target, cost
-        Compressed rows of the edges, both ways.
     points
-        (milestones, 3).
+        (milestones, 3) places.
+    milestone, node, length
+        (n,) milestone, word (as a trie node), and shortest length from the base.
+    start, target, cost
+        Edges in both directions, in compressed rows.
+    complete
+        Whether the time sufficed for all vertices.
     """
 
     points: Floats
@@ -58,7 +58,7 @@ class AugmentedGraph:
         return len(self.milestone)
 
     def word(self, v: int) -> Word:
-        """The word of a vertex."""
+        """Return the word of a vertex."""
         return self.trie.word(int(self.node[v]))
 
     @cached_property
@@ -71,7 +71,8 @@ class AugmentedGraph:
     def distances(
         self, sources: Ints, targets: Ints, check: Callable[[], None] = lambda: None
     ) -> Floats:
-        """(sources, targets) shortest lengths within the graph, by Dijkstra; inf if not joined.
+        """Return the (sources, targets) shortest lengths within the graph; inf if they are not
+        joined.
 
         Parameters
         ----------
@@ -89,15 +90,15 @@ class AugmentedGraph:
         return out
 
     def tree(self, source: int) -> Ints:
-        """(n,) the vertex before each on a shortest path from a source."""
+        """Return the (n,) predecessors on shortest paths from a source."""
         from scipy.sparse.csgraph import dijkstra
 
         _, before = dijkstra(self._matrix, directed=True, indices=source, return_predecessors=True)
         return np.asarray(before, dtype=np.int64)
 
     def path(self, u: int, v: int, method: Literal["astar", "dijkstra"] = "astar") -> list[int]:
-        """Vertices of a shortest path from u to v. A* is guided by the straight-line distance,
-        which never exceeds the path along edges, so both methods find the same length."""
+        """Return the vertices of a shortest path from u to v. A* is guided by the straight
+        distance, which never exceeds the path, so both methods find the same length."""
         goal = self.points[self.milestone[v]]
         guide = np.zeros(len(self.points))
         if method == "astar":
@@ -125,8 +126,8 @@ class AugmentedGraph:
         raise NetspError(f"internal: vertices {u} and {v} of the augmented graph are not joined")
 
     def to_networkx(self) -> networkx.Graph:
-        """A networkx Graph for study: nodes are (milestone, word), with ``pos`` and ``length``;
-        edges have ``weight``."""
+        """Return a networkx Graph: nodes are (milestone, word), with ``pos`` and ``length``; edges
+        have ``weight``."""
         try:
             import networkx
         except ImportError:
@@ -158,11 +159,11 @@ def augment(
     edges
         (k, 2) pairs of milestones.
     letters
-        The edges' ray crossings, and row starts into them.
-    cap
-        Most vertices; more is an InputError.
+        Ray crossings of all edges, and row starts into them.
+    max_vertices
+        Maximum number of vertices; more raise InputError.
     stop
-        Of a clock; the vertices nearest to the base are there when it is set.
+        Flag of a clock; the graph then holds the vertices nearest to the base.
     """
     n = len(points)
     cost = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
@@ -200,8 +201,8 @@ def augment(
 def _word_after_edge(
     node: int, k: int, letters: Ints, row: Ints, trie: Ints, size: int
 ) -> tuple[int, int]:
-    """The trie node after edge k (negative: backwards); -1 where the word loops. Makes nodes up to
-    the capacity of the trie when size >= 0, else only finds them. Returns node, size."""
+    """Return the trie node after edge k (negative: backwards), and the size of the trie. Nodes are
+    added if size >= 0; otherwise the node is -1 where the word is not in the trie."""
     backward = k < 0
     if backward:
         k = -1 - k
@@ -246,7 +247,7 @@ def _reach_vertices(
     max_vertices: int,
     stop: Ints,
 ) -> tuple[Ints, Ints, Floats, Ints, int, bool, bool]:
-    """Dijkstra over (milestone, word) from (0, empty word), up to the tether length."""
+    """Search (milestone, word) by Dijkstra from (0, empty word), up to the tether length."""
     trie = np.full((256, 5), -1, dtype=np.int64)
     trie[0, LETTER] = 0
     size = 1
@@ -378,7 +379,7 @@ def _sift_up(heap_d: Floats, heap_v: Ints, at: int, d: float, v: int) -> None:
 
 @kernel
 def _sift_down(heap_d: Floats, heap_v: Ints, heap: int) -> None:
-    """Put the last entry in the place of the first."""
+    """Put the last entry of the heap in the place of the first."""
     d, v = heap_d[heap], heap_v[heap, 0]
     at = 0
     while True:
@@ -406,7 +407,8 @@ def _expand_edges(
     trie: Ints,
     n: int,
 ) -> tuple[Ints, Ints, Ints]:
-    """Edges among the augmented vertices, as compressed rows; `edge` is the undirected number."""
+    """Return the edges among augmented vertices: row starts, targets and undirected edge
+    numbers."""
     count = len(milestone)
     slots = 4
     while slots < 2 * count + 2:

@@ -1,16 +1,17 @@
-"""All legs at once: one taut leg tells those between two whole branches of the tree of tethers.
+"""All legs at once: one taut leg gives all legs between two branches of the tree of tethers.
 
-A leg leaves the tether of its start at some bend p, crosses over, and joins that of its end at some
-bend q. From any other class beyond p, back along its own tether, over the same crossing and on
-along another tether beyond q leads a path of tangents as well. It slides forwards on every arc, but
-perhaps at p and q, where it is known how far; if it does there, too, it is taut, and a class of
-paths holds one taut path (docs/theory.md). So, with T the lengths of tethers,
+A leg leaves the tether of its start at a bend p, crosses over, and joins the tether of its end at a
+bend q. Take any other class beyond p and any other class beyond q: back along the first tether,
+over the same crossing and on along the second tether leads a path of tangents, too. It slides
+forwards on every arc except perhaps at p and q, where the angle is known. If it slides forwards
+there, it is taut, and a class holds one taut path (docs/theory.md). So, with T the lengths of
+tethers,
 
     leg(u, v) = T(u) + T(v) - c(p, q)
 
 for all u and v beyond p and q that leave their arcs late enough. (c is twice the Gromov product of
-u and v.) Millions of legs have some ten thousand crossings: of each one leg is pulled
-(`netsp.roadmap.taut_by_word`), the others are sums.
+u and v.) Millions of legs have some ten thousand crossings. For each crossing one leg is pulled
+(`netsp.roadmap.taut_by_word`); the others are sums.
 """
 
 from __future__ import annotations
@@ -36,22 +37,22 @@ OPEN = -1.0
 
 
 class Branches(NamedTuple):
-    """Some vertices in the order of the tree of their tethers: those beyond a bend follow one
-    another, and among them those that leave its arc from some angle on.
+    """Vertices in the order of the tree of their tethers. Those beyond a bend are contiguous, and
+    so are those among them that leave its arc from some angle on.
 
     Attributes
     ----------
     node, parent, turned
-        As of `TetherTree`.
+        Arrays of `TetherTree`.
     last, slid
-        (k,) the same of these vertices.
+        (k,) arrays of `TetherTree`, for these vertices.
     order, rank
-        (k,) vertices in order, and the place of each.
+        (k,) vertices in order, and the place of each vertex.
     end
-        (bends,) the place after those beyond a bend.
+        (bends,) place after the last vertex beyond each bend.
     row, angle, begin
-        What leaves a bend, bends and vertices, by the angle slid there: rows row[b] to row[b + 1]
-        of angles, and of the places that each begins at.
+        Bends and vertices that leave each bend, by the angle slid there: rows row[b] to row[b + 1]
+        of the angles, and of the places at which each begins.
     """
 
     node: Ints
@@ -68,18 +69,18 @@ class Branches(NamedTuple):
 
 
 class Lengths(NamedTuple):
-    """Legs between some vertices, being found.
+    """Matrix of legs that is being filled.
 
     Attributes
     ----------
     planar, height
-        (k,) planar lengths of their tethers, and heights.
+        (k,) planar lengths of the tethers, and heights.
     share
-        Of each length that is held: a little less than 1 where lengths are rounded down.
+        Factor on each stored length, a little less than 1 where lengths are rounded down.
     out
-        (r, k) the lengths in space, `OPEN` where not known yet.
+        (r, k) 3D lengths, `OPEN` where not known yet.
     row
-        (k,) the row of the vertex at each place in the order; -1 for those that have none.
+        (k,) row of the vertex at each place in the order; -1 for vertices without a row.
     """
 
     planar: Floats
@@ -90,7 +91,7 @@ class Lengths(NamedTuple):
 
 
 def build_branches(tree: TetherTree, vertices: Ints) -> Branches:
-    """The branches of some vertices of a tree."""
+    """Return the branches of vertices of a tree."""
     last, slid = tree.last[vertices], tree.slid[vertices]
     size = _subtree_sizes(tree.parent, last)
     # what leaves a bend: bends with vertices beyond them, as negative numbers (the root leaves
@@ -121,7 +122,7 @@ def build_branches(tree: TetherTree, vertices: Ints) -> Branches:
 
 @kernel
 def _subtree_sizes(parent: Ints, last: Ints) -> Ints:
-    """How many vertices are beyond each bend."""
+    """Return the number of vertices beyond each bend."""
     size = np.zeros(len(parent), dtype=np.int64)
     for v in range(len(last)):
         size[last[v]] += 1
@@ -132,7 +133,7 @@ def _subtree_sizes(parent: Ints, last: Ints) -> Ints:
 
 @kernel
 def _order_vertices(what: Ints, row: Ints, size: Ints, count: int) -> tuple[Ints, Ints, Ints]:
-    """`Branches.order`, `begin` and `end`."""
+    """Return `Branches.order`, `begin` and `end`."""
     order = np.empty(count, dtype=np.int64)
     begin = np.empty(len(what), dtype=np.int64)
     start, end = np.zeros_like(size), np.zeros_like(size)
@@ -162,15 +163,16 @@ def fill(
     i: int,
     j: int,
 ) -> tuple[int, int]:
-    """Find the legs between vertices of different goals in all rows, those of the vertices at
-    places i and j in the order first, and then what is open after these; the next pair of places
-    whose leg cannot be pulled, or more places than there are. What is within a goal may be
-    anything, and so may legs of the base (point 0).
+    """Find the legs between different goals in all rows: from places i and j in the order on, what
+    is still open. Return the next pair of places whose leg cannot be pulled, or more places than
+    there are.
+
+    Entries within a goal and legs of the base (point 0) stay undefined.
 
     Parameters
     ----------
     point
-        (k,) that each vertex is at.
+        (k,) point at which each vertex is.
     """
     order, out, row = branches.order, lengths.out, lengths.row
     whole = len(out) == len(order)  # then what comes before is known from the other end
@@ -244,8 +246,8 @@ def fill_parallel(
     branches: Branches,
     lengths: Lengths,
 ) -> None:
-    """Note all legs that cross over as that from u to v does, whose planar length is given, and its
-    number of tangents (`Path.whole` and `Path.real`)."""
+    """Fill in all legs with the same crossing as the leg from u to v, given its planar length and
+    its path of `count` tangents (`Path.whole` and `Path.real`)."""
     i0, i1, j0, j1 = _parallel_ranges(u, v, count, on, at, branches)
     order, planar, row = branches.order, lengths.planar, lengths.row
     saved = planar[u] + planar[v] - length
@@ -262,8 +264,8 @@ def fill_parallel(
 def _write_legs(
     out: Floats, a: int, begin: int, end: int, saved: float, order: Ints, lengths: Lengths
 ) -> None:
-    """The legs from one vertex to those of places in the order, so much shorter than both tethers;
-    into its row."""
+    """Write the legs from vertex a to the vertices at places begin … end - 1 into its row: `saved`
+    less than both tethers."""
     planar, height, share = lengths.planar, lengths.height, lengths.share
     for y in range(begin, end):
         b = order[y]
@@ -304,8 +306,8 @@ def _fill_parallel_in_numpy(
 def _parallel_ranges(
     u: int, v: int, count: int, on: Ints, at: Floats, branches: Branches
 ) -> tuple[int, int, int, int]:
-    """From and to which places the vertices are whose legs cross over as that of u and v does:
-    those on the side of u, and those on the side of v."""
+    """Return the ranges of places of the vertices whose legs have the same crossing as that of u
+    and v: on the side of u, and on the side of v."""
     p, p_least, p_place = _find_fork(u, 1, 1, 1, count, on, at, branches)
     q, q_least, q_place = _find_fork(v, count - 1, -1, 0, count, on, at, branches)
     i0, j0 = branches.rank[u], branches.rank[v]
@@ -328,10 +330,10 @@ def _parallel_ranges(
 def _find_fork(
     v: int, first: int, step: int, flip: int, count: int, on: Ints, at: Floats, branches: Branches
 ) -> tuple[int, float, int]:
-    """The bend at which a leg leaves the tether of its end v, -1 if it is nowhere along it; the
-    angle from which on what leaves that bend has the same crossing; and which node of the leg it
-    is. The nodes are gone through from the given one on. From its start a leg goes along a tether
-    backwards, and around arcs the other way (flip 1)."""
+    """Return the bend at which a leg leaves the tether of its end v (-1 if there is none), the
+    smallest angle at which what leaves that bend has the same crossing, and the leg's node there.
+    Nodes are visited from `first` on by `step`. From its start a leg follows a tether backwards,
+    and arcs in the other sense (flip 1)."""
     bend, slid = branches.last[v], branches.slid[v]
     found, least, place = -1, 0.0, -1
     k = first
@@ -346,7 +348,7 @@ def _find_fork(
 
 @kernel
 def _first_place(bend: int, least: float, branches: Branches) -> int:
-    """The place at which what leaves a bend from an angle on begins."""
+    """Return the first place of what leaves a bend at an angle or later."""
     k, after = branches.row[bend], branches.row[bend + 1]
     while k < after and branches.angle[k] < least - SLIDE_TOLERANCE:
         k += 1

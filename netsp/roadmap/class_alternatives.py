@@ -1,4 +1,4 @@
-"""The travel graph of a problem in which goals have alternatives."""
+"""Travel graph of a problem in which goals have alternatives."""
 
 from __future__ import annotations
 
@@ -15,46 +15,28 @@ from netsp.roadmap.reachable_goals import REACH_TOLERANCE
 
 
 def nearest_places(problem: Problem) -> list[int]:
-    """Of every goal the place that the shortest tether reaches: for solvers that walk between
-    places, and cannot choose among them.
-
-    Parameters
-    ----------
-    problem : Problem
-        Some of its goals are alternatives.
-
-    Returns
-    -------
-    list of int
-        Indices of goals, one of each cluster, in order.
-    """
+    """Return the indices, in order, of the alternative of each goal that the shortest tether
+    reaches. Solvers that cannot choose among places visit these."""
     tethers, clusters = shortest_tethers(problem), problem.clusters
     members = (np.flatnonzero(clusters == c) for c in range(1, problem.visits + 1))
     return sorted(int(m[np.argmin(tethers[m])]) for m in members)
 
 
 def graph_of_choices(problem: Problem, build: Callable[[Problem], TravelGraph]) -> TravelGraph:
-    """Build over all places in reach, then take alternatives together.
+    """Return the travel graph over all places in reach, with alternatives in one cluster.
 
     Parameters
     ----------
-    problem : Problem
-        Some of its goals are alternatives.
     build : callable
         Makes the travel graph of a problem without alternatives.
-
-    Returns
-    -------
-    TravelGraph
-        Its clusters are those of the problem.
 
     Raises
     ------
     InfeasibleError
         Some goal is out of the tether's reach with all its alternatives.
     InputError
-        The robot is already out: which alternatives were visited is then known, and the others are
-        to be left out.
+        The robot is already out. It is then known which alternatives were visited, and the others
+        should be left out.
     """
     if problem.state is not None:
         raise InputError(

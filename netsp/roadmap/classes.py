@@ -1,9 +1,10 @@
-"""Which classes reach each goal: all whose taut tether fits, or the shortest of too many.
+"""Classes that reach each goal: all whose taut tether fits, or the shortest if there are too many.
 
 All classes come from one search from the base up to the tether length. Thin obstacles or a long
 tether can make their number explode. Then each goal is searched for by itself, guided by the exact
-shortest length that is left to it, up to a length that its own number of classes sets: the classes
-found are its shortest, and no class left out has a shorter tether than the longest of them.
+shortest length that is left to it. The limit of length is adapted to the number of classes of this
+goal. The classes found are its shortest, and no class left out has a shorter tether than the
+longest of them.
 """
 
 from __future__ import annotations
@@ -24,12 +25,14 @@ from netsp.roadmap.trie import Trie
 
 @dataclass(frozen=True)
 class Classes:
-    """Augmented goals, base first: cluster (V,), word and planar tether length of each.
+    """Augmented goals, base first.
 
     Attributes
     ----------
+    cluster, signatures, planar
+        (V,) goal, word and planar tether length of each.
     least_left_out
-        No class that is not here has a shorter tether (in space); inf if all are here.
+        Lower bound on the 3D tether of every class left out; inf if none is.
     """
 
     cluster: Ints
@@ -39,12 +42,12 @@ class Classes:
 
     @property
     def complete(self) -> bool:
-        """Whether every class is here."""
+        """Return whether no class was left out."""
         return self.least_left_out == math.inf
 
 
 def find_classes(paths: TautPaths, rule: int, most: int, clock: Clock) -> Classes:
-    """The classes of every goal, at most about `most` in all; fewer when the time is up.
+    """Return the classes of every goal: about `most` in all, fewer when the time is up.
 
     Raises InfeasibleError for a goal that no tether within the limit reaches.
     """
@@ -73,11 +76,11 @@ class _Search:
         self.within[0] = -1.0
 
     def load_kernel(self) -> None:
-        """Load the kernel, or compile it: that takes none of the share."""
+        """Load the kernel, or compile it, so that this takes none of the share of time."""
         run_explore(self.paths.tangents, 0, Trie.root(0.0), margin=self.paths.outline.margin, cap=0)
 
     def find_all(self) -> Classes | None:
-        """All classes; None if they are too many, or the time is too short."""
+        """Return all classes; None if there are too many, or the time is too short."""
         trie = Trie.root(self.limit)
         found = self.clock.interruptible(
             lambda: run_explore(
@@ -104,8 +107,8 @@ class _Search:
         return _collect(rows, math.inf)
 
     def find_shortest(self) -> Classes:
-        """The shortest classes of every goal, about as many of each; at least one, whatever the
-        time."""
+        """Return the shortest classes of every goal, about as many for each. Each goal has one at
+        least, whatever the time."""
         share = max(1, self.most // self.goals)
         contacts = self.paths.contacts
         planar, before = contacts.tree(0)
@@ -129,8 +132,8 @@ class _Search:
         return _collect(rows, left_out)
 
     def _shortest_of_goal(self, g: int, share: int) -> tuple[list[tuple[float, Word]], float]:
-        """The shortest classes of one goal, in order, and the planar length up to which they are
-        all (inf if there are no more within the tether)."""
+        """Return the shortest classes of one goal, in order, and the planar length up to which none
+        is missing (inf if all within the tether were found)."""
         rest = self.paths.contacts.remaining_lengths(g)
         least, most = float(rest.source), float(self.within[g])
         known: list[tuple[float, Word]] = []
@@ -164,7 +167,7 @@ class _Search:
     def _classes_up_to(
         self, g: int, rest: Floats, reach: float, share: int
     ) -> tuple[FoundPaths | None, list[tuple[float, Word]]]:
-        """The classes of a goal up to a planar length; None if there are too many to look at."""
+        """Return the classes of a goal up to a planar length; None if there are too many."""
         trie = Trie.root(reach)
         within = np.full(self.goals + 1, -1.0)
         within[g] = reach
@@ -190,7 +193,7 @@ class _Search:
         return found, sorted(rows)
 
     def _shortest_by_class(self, found: FoundPaths) -> dict[tuple[int, int], float]:
-        """Shortest length by (goal, word) among the hits within the tether."""
+        """Return the shortest length by (goal, word) among the hits within the tether."""
         reach = np.hypot(found.length, self.dz[found.goal])
         rows = np.flatnonzero((found.goal > 0) & (reach <= self.limit))
         best: dict[tuple[int, int], float] = {}

@@ -1,5 +1,4 @@
-"""How long a tether each goal needs, and why one is out of reach: the shortest tether that would
-do, or what encloses it."""
+"""Tether that each goal needs, and why a goal is out of reach."""
 
 from __future__ import annotations
 
@@ -26,21 +25,15 @@ def shortest_tethers(
     clock: Clock | None = None,
     policy: RoadmapPolicy | None = None,
 ) -> Floats:
-    """Return the shortest tether that reaches each goal, in any class.
+    """Return the 3D lengths (n,) of the shortest tethers to the goals, in any class.
+
+    The lengths are inf for goals that cannot be reached. The problem's tether length does not
+    count.
 
     Parameters
     ----------
-    problem : Problem
-        Its tether length does not matter.
     outline : Outline, optional
-        Of the problem, if it is at hand.
-    clock : Clock, optional
-        The clock of the run.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Lengths in 3D; inf where a goal cannot be reached.
+        Outline of the problem, if it is at hand.
 
     Raises
     ------
@@ -70,7 +63,7 @@ def shortest_tethers(
 
 
 def unreached_message(problem: Problem, outline: Outline, missing: list[int]) -> str:
-    """One line on goals (as point numbers, base 0) that no admissible tether reaches."""
+    """Return one line on goals (as point numbers, base 0) that no admissible tether reaches."""
     return str(find_unreached_error(problem, outline, missing))
 
 
@@ -81,14 +74,15 @@ def find_unreached_error(
     clock: Clock | None = None,
     policy: RoadmapPolicy | None = None,
 ) -> InfeasibleError:
-    """Return the error about goals (as point numbers, base 0) that no admissible tether reaches;
-    LimitReachedError when the clock is up before it is known why."""
+    """Return the error about goals (as point numbers, base 0) that no admissible tether reaches.
+    Raise LimitReachedError when the clock is up before the reason is known."""
     needed = shortest_tethers(problem, outline, clock, policy)
     return unreached_error(problem, needed, [g - 1 for g in missing])
 
 
 def unreached_error(problem: Problem, needed: Floats, missing: list[int]) -> InfeasibleError:
-    """The error about goals that no admissible tether reaches, given the shortest for each goal."""
+    """Return the error about goals that no admissible tether reaches, given the shortest tether of
+    each goal."""
     parts: list[str] = []
     enclosing: tuple[int, ...] = ()
     missing = sorted(missing, key=lambda g: -needed[g])  # the largest need first
@@ -115,7 +109,8 @@ def unreached_error(problem: Problem, needed: Floats, missing: list[int]) -> Inf
 
 
 def _enclosure(problem: Problem, g: int) -> tuple[str, tuple[int, ...]]:
-    """Which obstacles stand between the base and a goal that no path joins."""
+    """Return what stands between the base and a goal that no path joins: a phrase, and
+    obstacles."""
     import shapely
 
     grown = [
@@ -140,7 +135,8 @@ def _ring_around(
     box: shapely.Polygon | None,
     problem: Problem,
 ) -> tuple[tuple[int, ...], bool]:
-    """The obstacles about the free pocket of a point, and whether bounds help them."""
+    """Return the obstacles around the free pocket of a point, and whether bounds help to close
+    it."""
     import shapely
 
     tolerance = 1e-6 * problem.scale

@@ -1,15 +1,15 @@
-"""Enumeration of taut paths by depth-first search over the tangent graph, guided by words.
+"""Depth-first search for taut paths over the tangent graph, guided by words.
 
-One kernel serves two questions. *Which classes reach a goal within the tether?* — the trie of words
-grows as the search goes, holding all words, or the non-looping ones. *How long are the legs between
-given classes?* — the trie is given, holding the wanted words and their prefixes. These are the
-trie's *core*. Each taut path is generated once, and in its class it is the only one
+One kernel serves two questions. *Which classes reach a goal within the tether?* The trie of words
+grows with the search and holds all words, or all that do not loop. *How long are the legs between
+given classes?* The trie is given and holds their words with all prefixes. These words are the
+*core* of the trie. Each taut path is generated once, and is the only one of its class
 (docs/theory.md).
 
-A ray that passes through another obstacle can be crossed and crossed back by one taut path, so the
-word of its beginnings may leave the core for a while. Such *pending* letters are followed exactly
-as long as they can still be cancelled: the path stays in the hull of the ray and of what the ray
-cuts off other obstacles (the lemma on pending letters).
+A taut path can cross a ray and cross it back where the ray passes through another obstacle, so the
+word of its beginnings may leave the core for a while. Such *pending* letters are followed as long
+as they can still be cancelled: the path then stays in the hull of the ray and of what the ray cuts
+off other obstacles (lemma on pending letters).
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ GIVEN, NON_LOOPING, ALL = range(3)
 
 
 class TangentArrays(NamedTuple):
-    """The arrays of a `TangentGraph` that the kernel walks.
+    """Arrays of a `TangentGraph` that the kernel walks.
 
     Attributes
     ----------
     arc_nodes
-        How many nodes are directed arcs; points follow.
+        Number of nodes that are directed arcs; points follow.
     longest
-        Most letters that one step can write.
+        Maximum number of letters that one step can write.
     """
 
     start: Ints
@@ -67,9 +67,19 @@ class TangentArrays(NamedTuple):
 
 
 class WordRules(NamedTuple):
-    """How words grow: the letters that rows point into, the boxes in which letters may be pending
-    (with the margin of positions), which new words join the core, and within which two lengths of
-    one arrival are the same."""
+    """Rules by which words grow.
+
+    Attributes
+    ----------
+    letters
+        Letters that the rows of `TangentArrays` point into.
+    pending
+        Boxes in which letters may be pending, grown by the margin of positions.
+    rule
+        Which new words join the core: `GIVEN`, `NON_LOOPING` or `ALL`.
+    same
+        Difference of lengths up to which two arrivals are one.
+    """
 
     letters: Letters
     pending: Floats
@@ -78,23 +88,23 @@ class WordRules(NamedTuple):
 
 
 class SearchRequest(NamedTuple):
-    """What is sought.
+    """Request for paths.
 
     Attributes
     ----------
     keep
-        Whether to keep the search tree, so that paths can be written out.
+        Whether the search tree is kept, so that paths can be written out.
     cap
-        Most departures to look at.
+        Maximum number of departures expanded.
     rest
-        Per tangent, the least length from its end to where the search is going (0 where it goes
-        everywhere).
+        (e,) lower bound on the length from the end of each tangent to the target; 0 without a
+        target.
     aim
-        The one point asked for, -1 for all.
+        The target point; -1 for all points.
     within
-        Per point, the longest path that is reported.
+        (points,) length of the longest path that is reported.
     most
-        So many reports end the search.
+        Number of reports that ends the search.
     """
 
     keep: bool
@@ -116,8 +126,7 @@ before the departure taken."""
 
 @kernel
 def _can_cancel(node: int, x: float, y: float, trie: Ints, pending: Floats) -> bool:
-    """Whether the letters that lead out of the core can all still be cancelled from a bend at
-    (x, y)."""
+    """Return whether all letters outside the core can still be cancelled from a bend at (x, y)."""
     v = node
     while trie[v, CORE] == 0:
         a = trie[v, LETTER]
@@ -149,7 +158,7 @@ def _in_box(a: int, x: float, y: float, pending: Floats) -> bool:
 
 @kernel
 def _joins_core(node: int, a: int, rule: int, trie: Ints) -> bool:
-    """Whether the word of a node with one letter more is one of those that are sought."""
+    """Return whether the word of a core node, with one more letter, joins the core."""
     if rule == GIVEN or trie[node, CORE] == 0:
         return False
     if rule == NON_LOOPING:
@@ -175,8 +184,8 @@ def _follow_letters(
     limit: Floats,
     size: int,
 ) -> tuple[int, int]:
-    """The trie node after the letters lo … hi of the segment to a bend at (x, y), made where it may
-    exist; -1 if no wanted word can follow. Returns node, size."""
+    """Return the trie node after the letters lo … hi of the segment to a bend at (x, y), and the
+    size of the trie. Missing nodes are added; the node is -1 if no wanted word can follow."""
     for k in range(lo, hi):
         a = int(letters[k])
         if node > 0 and trie[node, LETTER] == -a:
@@ -199,8 +208,8 @@ def _follow_letters(
 
 @kernel
 def _is_new_arrival(code: int, mark: float, same: float, key: Ints, length: Floats) -> bool:
-    """Whether no arrival with this code (word and directed arc) had this length; it is noted.
-    Collinear tangents give one path several spellings."""
+    """Return whether no arrival with this code (word and directed arc) had this length, and record
+    it. Collinear tangents give one path several spellings."""
     slots = len(key)
     slot = (code * 0x9E3779B1) % slots
     while key[slot] >= 0:
@@ -225,17 +234,22 @@ def explore(
     size: int,
     stop: Ints,
 ) -> tuple[tuple[Ints, Floats, int], tuple[Ints, Floats], tuple[Ints, Floats], bool]:
-    """All taut paths from node `source` whose words stay in (or pend from) the core of the trie,
-    which has `size` nodes, each with the limit of its paths.
-
-    Returns trie, limit, size; per hit (goal point, trie node, state, departure) and (length, angle
-    slid before the departure); the tree as rows of states (`NODE` …, `TURN` …); whether the cap
-    stopped the search.
+    """Find all taut paths from node `source` whose words stay in the core of the trie, or pend from
+    it.
 
     Parameters
     ----------
+    limit
+        (capacity,) longest path for each of the `size` nodes of the trie.
     stop
-        Ends it when its first number is not 0.
+        Flag of a clock; the search ends when it is set.
+
+    Returns
+    -------
+    tuple
+        Trie, limit and size; for each hit (point, trie node, state, departure) and (length, angle
+        slid before the departure); the search tree as rows of states; whether the search was cut
+        short.
     """
     # taken out once: to take an array out of a tuple costs a count of its references
     start, target, length, ends = net.start, net.target, net.length, net.ends
@@ -371,8 +385,19 @@ def explore(
 
 @dataclass(frozen=True)
 class FoundPaths:
-    """What a search hit: goal points, trie nodes of their words, lengths; and the search tree if it
-    was kept: per state (arrival) the rows of the kernel, length at arrival, angle slid before."""
+    """Result of a search: hits, and the search tree if it was kept.
+
+    Attributes
+    ----------
+    goal, word, length, state, departure, slid
+        For each hit: point, trie node of its word, length, last state, last departure and the angle
+        slid before it.
+    tree, tree_length, tree_slid
+        For each state: its integers, the length at arrival, and the angle slid before the
+        departure.
+    capped
+        Whether the search was cut short.
+    """
 
     goal: Ints
     word: Ints
@@ -386,7 +411,7 @@ class FoundPaths:
     capped: bool
 
     def pieces(self, hit: int) -> list[tuple[int, float]]:
-        """(departure, angle slid before it) along the path of a hit, from the source on."""
+        """Return (departure, angle slid before it) along the path of a hit, from the source on."""
         out = [(int(self.departure[hit]), float(self.slid[hit]))]
         s = int(self.state[hit])
         while self.tree[s, BEFORE] >= 0:
@@ -409,19 +434,17 @@ def run_explore(
     most: int | None = None,
     stop: Flag = NEVER,
 ) -> FoundPaths:
-    """Run the kernel from point `source`; updates the trie.
+    """Run the kernel from point `source`; the trie is updated.
 
     Parameters
     ----------
     toward
-        A point, and per tangent the least length from its end to that point: only paths to it are
-        sought.
+        A point, and for each tangent a lower bound on the length from its end to that point. Only
+        paths to the point are sought.
     within
-        (points,) longest path to each that counts.
+        (points,) length of the longest path to each point that counts.
     most
-        Hits, about.
-    stop
-        Of a clock.
+        Approximate maximum number of hits.
     """
     no_limit = np.iinfo(np.int64).max
     aim, rest = toward or (-1, np.zeros(len(graph.target)))

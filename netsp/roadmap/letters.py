@@ -1,7 +1,7 @@
 """Ray crossings of segments and arcs, compiled; the same rules as `netsp.hsignature.rays`.
 
-Sides are decided by comparing the stored x of a piece's two ends with the x of the ray, so the
-letters of consecutive pieces that share an end fit together exactly.
+Sides are decided by comparing the stored x of both ends of a piece with the x of the ray, so that
+the letters of consecutive pieces that share an end fit together exactly.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def segment_letters(
     out: npt.NDArray[np.integer[Any]],
     n: int,
 ) -> int:
-    """Append the letters of a straight segment to `out`; returns the new count."""
+    """Append the letters of a straight segment to `out`; return the new count."""
     k = len(order)
     rightward = bx > ax
     for step in range(k):
@@ -56,12 +56,15 @@ def arc_letters(
     out: npt.NDArray[np.int32],
     n: int,
 ) -> int:
-    """Append the letters of an arc from angle `start` through the signed angle `turn`.
+    """Append the letters of an arc from angle `start` through the signed angle `turn`; return the
+    new count.
+
+    The arc is split at the quadrants into pieces that are monotone in x.
 
     Parameters
     ----------
     ax, bx
-        Stored x of the two ends. The arc is split at the quadrants into pieces monotone in x.
+        Stored x of the two ends.
     """
     k = len(order)
     quarter = 0.5 * math.pi

@@ -1,8 +1,8 @@
-"""Ways between goals, told apart by the rays that they cross an odd number of times.
+"""Paths between goals, told apart by the rays that they cross an odd number of times.
 
-A search from every goal (`netsp.roadmap.explore`) finds all taut paths up to a length; of those
-that cross the same rays an odd number of times the shortest counts. Classes by the thousand are few
-such ways, for a path twice around is no other than one that goes straight.
+A search from every goal (`netsp.roadmap.explore`) finds all taut paths up to a length. Of those
+that cross the same rays an odd number of times the shortest counts. Thousands of classes are few
+such paths, because going round an obstacle twice counts as not going round it.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.trie import LETTER, PARENT, Trie
 
 ParityRows = tuple[Ints, Floats, npt.NDArray[np.uint64]]
-"""(k,) other goals, (k,) lengths in the plan, (k, w) bits."""
+"""(k,) other goals, (k,) planar lengths, (k, w) bits."""
 
 
 def ways_by_parity(paths: TautPaths, up: Callable[[], bool]) -> WaysByParity | None:
-    """The ways between goals, as long ones as there are not too many of, and those from the base as
-    long as the tether; None where that takes too long."""
+    """Return the paths between goals up to a length that yields not too many, and those from the
+    base up to the tether length; None if that takes too long."""
     points, tether = paths.outline.points, paths.problem.tether_length
     apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
     np.fill_diagonal(apart, np.inf)
@@ -46,8 +46,8 @@ def ways_by_parity(paths: TautPaths, up: Callable[[], bool]) -> WaysByParity | N
 def _paths_up_to(
     paths: TautPaths, reach: float, from_base: ParityRows, first: bool, up: Callable[[], bool]
 ) -> WaysByParity | None:
-    """All ways up to a length in the plan; None if there are too many, unless they are the first,
-    or there is no time."""
+    """Return all paths up to a planar length; None if the time is up, or if they are too many and
+    not the first."""
     each, count = [from_base], 0
     for a in range(1, len(paths.outline.points) - 1):
         found = None if up() else _paths_from(paths, a, reach)
@@ -68,8 +68,8 @@ def _paths_up_to(
 
 
 def _paths_from(paths: TautPaths, a: int, reach: float) -> tuple[ParityRows, int] | None:
-    """The ways from a goal to those of higher numbers, and how many paths there are; None where
-    there are too many."""
+    """Return the paths from a goal to those of higher numbers, and the number of taut paths; None
+    if there are too many."""
     words = max(1, -(-len(paths.outline.rays) // BITS))
     trie = Trie.root(reach)
     found = run_explore(
@@ -94,7 +94,8 @@ def _paths_from(paths: TautPaths, a: int, reach: float) -> tuple[ParityRows, int
 
 @kernel
 def _odd_letters(trie: Ints, size: int, words: int) -> npt.NDArray[np.uint64]:
-    """(size, words) bits of the obstacles of which a node's word has an odd number of letters."""
+    """Return the (size, words) bits of the obstacles of which a node's word has an odd number of
+    letters."""
     out = np.zeros((size, words), dtype=np.uint64)
     for k in range(1, size):
         for j in range(words):

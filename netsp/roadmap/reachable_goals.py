@@ -1,4 +1,4 @@
-"""Which goals a tether reaches among the obstacles, in some class."""
+"""Goals that a tether reaches among the obstacles, in any class."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from netsp.roadmap.explain_unreachable import shortest_tethers, unreached_error
 from netsp.roadmap.roadmap_policy import RoadmapPolicy
 
 UNREACHED = "out of the tether's reach among the obstacles"
-"""Reason to leave a goal out, in the record of an import."""
+"""Reason for leaving a goal out, in the record of an import."""
 
 REACH_TOLERANCE = 1e-6
 """Tolerance of the tether that a goal needs, relative: nearer calls are left to the roadmap."""
@@ -23,23 +23,16 @@ def keep_reachable_goals(
     removable: Collection[str] | None = None,
     policy: RoadmapPolicy | None = None,
 ) -> tuple[Problem, list[str]]:
-    """The problem without the goals that its tether cannot reach.
+    """Return the problem without the goals that its tether cannot reach, and a line for each of
+    those.
+
+    Goals that came after a goal left out lose that condition. The same problem is returned if all
+    goals are in reach.
 
     Parameters
     ----------
-    problem : Problem
-        Any.
     removable : collection of str, optional
-        Goals that may be left out; default all.
-    policy : RoadmapPolicy, optional
-        Policy of the search for paths, and how many enclosed goals are explained.
-
-    Returns
-    -------
-    problem : Problem
-        The same if all are in reach; goals that come after one left out do so no more.
-    why : list of str
-        A line for every goal left out.
+        Names of the goals that may be left out; by default all.
 
     Raises
     ------
@@ -72,22 +65,8 @@ def keep_reachable_goals(
 
 
 def unreached_note(before: Sequence[Goal], after: Sequence[Goal], max_names: int = 5) -> str:
-    """Return one line on viewpoints that a tether cannot reach.
-
-    Parameters
-    ----------
-    before : sequence of Goal
-        All of them.
-    after : sequence of Goal
-        Those in reach.
-    max_names : int
-        Maximum number of names in the line.
-
-    Returns
-    -------
-    str
-        Their number and the first of their names.
-    """
+    """Return one line on the goals of `before` that are not in `after`: their number and the first
+    of their names."""
     kept = {goal.name for goal in after}
     names = [str(goal.name) for goal in before if goal.name not in kept]
     shown = ", ".join(names[:max_names]) + (", …" if len(names) > max_names else "")

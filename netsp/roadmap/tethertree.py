@@ -1,6 +1,6 @@
 """Tethers as paths in a tree of bends.
 
-All tethers begin at the base, and on the cover two that have parted never meet again. So a bend of
+All tethers begin at the base, and in the cover two that have parted never meet again. So a bend of
 the tree stands for all tethers that come to it the same way.
 """
 
@@ -27,14 +27,14 @@ TURNED, REACHED = range(2)
 
 
 class TetherTree(NamedTuple):
-    """Some tethers as paths in a tree of bends, the first of which is the base.
+    """Tethers as paths in a tree of bends whose root is the base.
 
     Attributes
     ----------
     node, parent
         (bends,) directed arc, and the bend before, which is earlier in the arrays; -1 at the base.
     turned, length
-        (bends,) angle slid on the arc before on the way to a bend, and length of tether up to it.
+        (bends,) angle slid on the arc before a bend, and length of tether up to it.
     last, slid
         (V,) last bend of each tether, and the angle slid there.
     """
@@ -47,7 +47,7 @@ class TetherTree(NamedTuple):
     slid: Floats
 
     def shared_length(self, u: int, v: int) -> float:
-        """The length that two tethers have in common."""
+        """Return the length that two tethers have in common."""
         s, t = int(self.last[u]), int(self.last[v])
         while s != t:  # a bend comes after its parent
             if s > t:
@@ -58,12 +58,12 @@ class TetherTree(NamedTuple):
 
 
 class GrowingTree:
-    """A tree of bends to which tethers are added.
+    """Tree of bends to which tethers are added.
 
     Parameters
     ----------
     vertices
-        How many tethers there will be. Where nothing is known of one, it bends at the base alone.
+        Number of tethers. A tether that is never added bends at the base alone.
     """
 
     def __init__(self, vertices: int) -> None:
@@ -74,8 +74,8 @@ class GrowingTree:
         self._slid = np.zeros(vertices)
 
     def pull(self, ends: Ends, point: Ints, slits: Slits, arcs: Arcs, stop: Flag) -> Ints:
-        """Add the tethers of all vertices, from vertex 0, the base, to each; those that could not
-        be pulled. Unfinished when the flag is set."""
+        """Add the tethers from vertex 0, the base, to all vertices. Return the vertices whose
+        tether could not be pulled. Vertices are missing when the flag is set."""
         self._whole, self._real, self._size = _grow(
             ends,
             point,
@@ -93,7 +93,7 @@ class GrowingTree:
         return missing
 
     def add(self, vertex: int, path: Path, arcs: Arcs) -> None:
-        """Add the tether of a vertex, a path of nodes and departures and the angles slid there."""
+        """Add the tether of a vertex, given as a path."""
         self._whole, self._real, self._size = _graft(
             vertex,
             len(path.whole) - 1,
@@ -108,7 +108,7 @@ class GrowingTree:
         )
 
     def tree(self) -> TetherTree:
-        """What has grown."""
+        """Return the tree as it is."""
         whole, real = self._whole[: self._size], self._real[: self._size]
         return TetherTree(
             whole[:, AT].copy(),
@@ -161,8 +161,8 @@ def _graft(
     last: Ints,
     slid: Floats,
 ) -> tuple[Ints, Floats, int]:
-    """The tree with the tether of vertex v, which takes so many tangents: `Path.whole` and
-    `Path.real`."""
+    """Add the tether of vertex v, a path of `count` tangents (`Path.whole` and `Path.real`), and
+    return the tree."""
     bend, by, reached = 0, 0.0, 0.0
     for k in range(1, count):
         reached += by * arcs.disk[on[k - 1, NODE], RADIUS] + arcs.real[on[k - 1, EDGE], LENGTH]

@@ -1,4 +1,4 @@
-"""The trie of words that paths write."""
+"""Trie of the words that paths write."""
 
 from __future__ import annotations
 
@@ -12,19 +12,21 @@ from netsp.base.arrays import Floats, Ints
 from netsp.base.compiled.kernel import kernel
 
 PARENT, LETTER, CHILD, SIBLING, CORE = range(5)
-"""Columns of a trie's nodes. SIBLING chains the children of one parent."""
+"""Columns of a node. SIBLING chains the children of one parent."""
 
 
 @dataclass
 class Trie:
-    """Words as a tree; node 0 is the empty word. Arrays are over-allocated, `size` is the count.
+    """Words as a tree whose node 0 is the empty word. Arrays have spare capacity.
 
     Attributes
     ----------
     nodes
         (capacity, 5) columns PARENT … CORE.
     limit
-        Longest path allowed at or below a node.
+        (capacity,) longest path allowed at or below each node.
+    size
+        Number of nodes.
     """
 
     nodes: Ints
@@ -34,7 +36,7 @@ class Trie:
 
     @classmethod
     def root(cls, limit: float, capacity: int = 256) -> Trie:
-        """The trie that holds the empty word only."""
+        """Return the trie that holds the empty word only."""
         trie = cls(np.full((capacity, 5), -1, dtype=np.int64), np.zeros(capacity))
         trie.nodes[0] = (-1, 0, -1, -1, 1)
         trie.limit[0] = limit
@@ -42,7 +44,7 @@ class Trie:
 
     @classmethod
     def from_word(cls, word: tuple[int, ...], limit: float) -> Trie:
-        """The trie of one word and its prefixes; node k is the prefix of length k."""
+        """Return the trie of one word and its prefixes; node k is the prefix of length k."""
         trie = cls.root(limit, capacity=max(256, 2 * len(word) + 2))
         for k, letter in enumerate(word):
             trie.nodes[k, CHILD] = k + 1
@@ -53,7 +55,7 @@ class Trie:
 
     @classmethod
     def from_words(cls, words: Sequence[tuple[int, ...]], limit: float) -> tuple[Trie, list[int]]:
-        """The trie of words and their prefixes; and the node of each word."""
+        """Return the trie of words and their prefixes, and the node of each word."""
         rows, last, child_of = [[-1, 0, -1, -1, 1]], [], dict[tuple[int, int], int]()
         for word in words:
             node = 0
@@ -71,7 +73,7 @@ class Trie:
         return trie, last
 
     def word(self, node: int) -> tuple[int, ...]:
-        """The word of a node."""
+        """Return the word of a node."""
         above = [node]
         while above[-1] and above[-1] not in self.words:
             above.append(int(self.nodes[above[-1], PARENT]))
@@ -83,7 +85,7 @@ class Trie:
 
 @kernel
 def trie_child(node: int, a: int, trie: Ints) -> int:
-    """The child of a node along letter a, or -1."""
+    """Return the child of a node along letter a; -1 if there is none."""
     c = trie[node, CHILD]
     while c >= 0 and trie[c, LETTER] != a:
         c = trie[c, SIBLING]
@@ -92,7 +94,7 @@ def trie_child(node: int, a: int, trie: Ints) -> int:
 
 @kernel
 def add_child(node: int, a: int, core: int, size: int, trie: Ints) -> None:
-    """Make the child of a node along letter a at the row `size`."""
+    """Add the child of a node along letter a in row `size`."""
     trie[size, PARENT], trie[size, LETTER], trie[size, CORE] = node, a, core
     trie[size, CHILD] = -1
     trie[size, SIBLING] = trie[node, CHILD]

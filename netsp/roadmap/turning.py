@@ -1,7 +1,8 @@
-"""How far a tether turns about obstacles, and the classes in which it turns no farther than it may.
+"""Turning of the tether about obstacles, and the classes in which it stays within a limit.
 
 A tether on obstacles is held by friction: a pull at the anchor arrives at the robot divided by
-exp(mu * turning) (Euler and Eytelwein's capstan). Where that has a limit, so has the turning.
+exp(mu * turning) (the capstan equation of Euler and Eytelwein). A limit on this ratio limits the
+turning.
 
 Along a leg the tether turns no farther than at one of its ends. The tethers to both ends and the
 leg bound a geodesic triangle: up to where the two tethers part they are one, and from there they
@@ -28,25 +29,15 @@ TURNING_TOLERANCE = 1e-9
 
 
 def tether_turnings(problem: Problem, graph: TravelGraph) -> Floats:
-    """How far the tether turns in every class.
+    """Return the sums of angles in the plan by which the tether turns in every class, radians.
 
-    Parameters
-    ----------
-    problem : Problem
-        That the graph is of.
-    graph : TravelGraph
-        Its vertices; its clock ends the work.
-
-    Returns
-    -------
-    ndarray, shape (V,)
-        Sums of angles in the plan, radians: with depth a tether turns no farther than in the plan.
-        NaN, with a warning, where the taut path was not found.
+    With depth a tether turns no farther than in the plan. Classes whose taut path is not found are
+    NaN, with a warning.
 
     Raises
     ------
     LimitReachedError
-        The clock was up.
+        The graph's clock was up.
     """
     paths = TautPaths(problem, clock=graph.clock)
     out = np.zeros(len(graph))
@@ -64,21 +55,15 @@ def tether_turnings(problem: Problem, graph: TravelGraph) -> Floats:
 
 
 def limit_turning(problem: Problem, graph: TravelGraph, most: float) -> TravelGraph:
-    """The travel graph without the classes in which the tether turns farther than it may.
+    """Return the travel graph without the classes in which the tether turns farther than allowed.
 
     Parameters
     ----------
-    problem : Problem
-        That the graph is of.
     graph : TravelGraph
-        From the base.
+        Graph from the base.
     most : float
-        Sum of angles, radians; inf for no limit.
-
-    Returns
-    -------
-    TravelGraph
-        The same where there is no limit. Classes in which the turning is unknown are left out.
+        Largest sum of angles, radians; inf returns the same graph. Classes of unknown turning are
+        left out.
 
     Raises
     ------
