@@ -1,8 +1,8 @@
-"""The tangent graph as paths are pulled over it: by pairs of nodes, obstacle by obstacle.
+"""Tangent graph in the form over which paths are pulled: by pairs of nodes, obstacle by obstacle.
 
-`netsp.roadmap.tangents` has the departures of a node in order, which is what a search asks for. A
-path that is pulled asks for the tangent between two given nodes, for the arcs of an obstacle, and
-for the letters between two departures of an arc.
+`netsp.roadmap.tangents` holds the departures of a node in order, which is what a search needs. A
+path that is pulled needs the tangent between two given nodes, the arcs of an obstacle, and the
+letters between two departures of an arc.
 """
 
 from __future__ import annotations
@@ -37,13 +37,15 @@ of the segment, of the arc to that departure, and of the arc before itself."""
 
 XMIN, YMIN, XMAX, YMAX, ROUND, RAY_X, RAY_Y, RANK = range(8)
 FIRST_EDGE, AFTER_EDGES, GROWTH, MIDDLE_X, MIDDLE_Y = range(8, 13)
-"""Columns of an obstacle: its box; radius of a circle, negative for a polygon; representative
-point and rank of its line; its edges, and by how much they are grown; centre of a circle."""
+"""Columns of an obstacle: its box; radius of a circle, negative for a polygon; representative point
+and rank of its line; its edges, and by how much they are grown; centre of a circle."""
 
 
 class Arcs(NamedTuple):
-    """The tangent graph as paths are pulled over it. There are few arrays and many columns, for
-    compiled functions hand each array over in seven parts and more.
+    """Tangent graph in the form over which paths are pulled.
+
+    There are few arrays with many columns, because compiled functions hand each array over in seven
+    parts or more.
 
     Attributes
     ----------
@@ -56,11 +58,11 @@ class Arcs(NamedTuple):
     real, whole
         (e, 5) and (e, 6) columns LENGTH … and FIRST … of the departures.
     letters
-        Of segments and arcs.
+        Letters of segments and arcs.
     solid
         (n, 13) columns XMIN ….
     edges
-        (k, 4) of polygons.
+        (k, 4) edges of polygons.
     points
         Number of nodes that are directed arcs; points follow.
     max_bends, max_backward_turn
@@ -89,7 +91,7 @@ def build_arcs(
     slits: Slits,
     policy: PathPolicy | None = None,
 ) -> Arcs:
-    """What paths are pulled over."""
+    """Return the tangent graph in the form over which paths are pulled."""
     policy = policy or PathPolicy()
     arcs, nodes = len(graph.arcs), len(graph.start) - 1
     disk = np.zeros((nodes, 5))
@@ -148,7 +150,7 @@ def build_arcs(
 
 
 def _angles_along(graph: TangentGraph) -> Floats:
-    """(e,) angle from the first departure of an arc to each."""
+    """Return the (e,) angles from the first departure of an arc to each."""
     step = np.maximum(graph.gap, 0.0)
     before = np.concatenate([[0.0], np.cumsum(step)])
     first = np.repeat(graph.start[:-1], np.diff(graph.start))
@@ -156,8 +158,8 @@ def _angles_along(graph: TangentGraph) -> Floats:
 
 
 def _gap_letters(graph: TangentGraph) -> tuple[Ints, Ints, Ints]:
-    """The letters of whole arcs, each in one row, to come after those of the graph; (e,) where in
-    them each departure is; and (nodes, 2) where those of each node begin and end."""
+    """Return the letters of whole arcs, each in one row, to come after those of the graph; (e,)
+    where in them each departure is; and (nodes, 2) where those of each node begin and end."""
     count = graph.gap_row[:, 1] - graph.gap_row[:, 0]
     base = len(graph.letters)
     begin = base + np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
@@ -169,7 +171,7 @@ def _gap_letters(graph: TangentGraph) -> tuple[Ints, Ints, Ints]:
 
 @kernel
 def _first_slot(code: int, slots: int) -> int:
-    """Where to look first: Knuth's multiplicative hashing."""
+    """Return the first slot for a code, by Knuth's multiplicative hashing."""
     return int(((code * 0x9E3779B1) >> 7) & (slots - 1))
 
 
@@ -185,7 +187,7 @@ def _fill_table(code: Ints, table: Ints) -> None:
 
 @kernel
 def find_tangent(code: int, table: Ints) -> int:
-    """The departure of a code; -1 if there is none."""
+    """Return the departure of a code; -1 if there is none."""
     slots = len(table)
     slot = _first_slot(code, slots)
     while table[slot, 0] >= 0:

@@ -37,7 +37,7 @@ between them takes no length but rounding, and would go on for ever with a small
 Letters = npt.NDArray[np.int32]
 
 GIVEN, NON_LOOPING, ALL = range(3)
-"""Codes of the words that may join the trie: only the given ones, those that do not loop, all."""
+"""Codes of the words that may join the trie: only the given words, words that do not loop, all."""
 
 
 class TangentArrays(NamedTuple):

@@ -1,11 +1,11 @@
-"""The travel graph of a problem that starts in the middle: from the robot's present state.
+"""Travel graph of a problem that starts in the middle: from the robot's present state.
 
-The state is one more augmented goal, with the one class that the tether has now. Sought is a
-path from it through all goals to the base; solvers look for closed tours through the base. So the
-edge between base and state costs nothing, and every other edge at either of them costs a surcharge
-more. A tour takes two edges at the base and two at the state: with the free edge it pays the
-surcharge twice, without it four times. Twice the surcharge is more than some path costs, so the
-shortest tour has the free edge, and is the shortest path and twice the surcharge.
+The state is one more augmented goal, with the one class that the tether has now. Wanted is a path
+from it through all goals to the base; solvers look for closed tours through the base. So the edge
+between base and state costs nothing, and every other edge at either of them costs a surcharge more.
+A tour takes two edges at the base and two at the state: with the free edge it pays the surcharge
+twice, without it four times. Twice the surcharge is more than some path costs, so the shortest tour
+has the free edge, and is the shortest path plus twice the surcharge.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ PATH_GAP_TOLERANCE = 10.0 * OPTIMALITY_TOLERANCE
 
 
 class GraphFromState(TravelGraph):
-    """A travel graph whose tours start at the base, go on to the state for nothing, and from there
+    """Travel graph whose tours start at the base, go on to the state for nothing, and from there
     through the goals.
 
     Attributes
@@ -49,11 +49,11 @@ class GraphFromState(TravelGraph):
     start
         Vertex of the state.
     surcharge
-        See above.
+        Added cost of the other edges at base and state.
     within
-        The legs as they are.
+        Travel graph without the surcharge.
     start_tether
-        (n, 3) the taut tether at the start.
+        (n, 3) taut tether at the start.
     """
 
     def __init__(
@@ -79,13 +79,14 @@ class GraphFromState(TravelGraph):
         self.declared_scope = within.declared_scope
 
     def as_tour(self, order: tuple[int, ...]) -> tuple[int, ...]:
-        """A closed tour with the state right after the base, whichever way round it was found."""
+        """Return a closed tour with the state right after the base, in whichever sense it was
+        found."""
         if len(order) > 1 and order[-1] == self.start and order[1] != self.start:
             return (0, *reversed(order[1:]))
         return order
 
     def between_goals(self, up: Callable[[], bool] = lambda: False) -> Floats:
-        """As of `TravelGraph`, with the surcharge."""
+        """Return the bounds of `TravelGraph`, with the surcharge."""
         places = np.arange(self.goal_count + 1)
         ends = int(self.cluster[self.start or 0])
         return add_surcharge(self.within.between_goals(up), places, places, ends, self.surcharge)
@@ -116,7 +117,7 @@ class GraphFromState(TravelGraph):
         )
 
     def as_asked(self, result: Result) -> Result:
-        """Return a solver's result on this graph as one about the path from the state."""
+        """Return a solver's result on this graph as a result for the path from the state."""
         own = self._path_bound(result.bound)
         low = self._path_bound(self.bound_as_asked(result.bound, anywhere=result.tour is not None))
         result = dataclasses.replace(
@@ -169,8 +170,8 @@ class GraphFromState(TravelGraph):
         return least + 2.0 * self.surcharge
 
     def least_by_way_of(self, tether: float) -> float:
-        """No path by way of a class with so long a tether is shorter than the way home from there;
-        the surcharge counts as in every tour."""
+        """Return a lower bound on paths by way of a class whose tether is at least so long: the
+        path home from there, with the surcharge of every tour."""
         return tether + 2.0 * self.surcharge
 
     def progress_listener(self, listener: OnProgress | None) -> OnProgress | None:
@@ -191,17 +192,16 @@ class GraphFromState(TravelGraph):
 
 
 def add_surcharge(table: Floats, rows: Ints, columns: Ints, start: int, surcharge: float) -> Floats:
-    """Lengths with the surcharge on all legs of the base and the start, but for the one between
-    them, which is for nothing.
+    """Return lengths with the surcharge on all legs of the base and the start, and 0 between them.
 
     Parameters
     ----------
     table
         (k, l) lengths.
     rows, columns
-        (k,), (l,) vertices or clusters that they are of.
+        (k,), (l,) vertices or clusters.
     start
-        That of the start.
+        Vertex or cluster of the start.
     """
     out, ends = np.array(table), (0, start)
     out += surcharge * np.isin(rows, ends)[:, None]
@@ -289,7 +289,7 @@ def graph_from_state(
     time_limit: TimeLimit = None,
     limits_paths: bool = True,
 ) -> GraphFromState:
-    """Return the travel graph of a problem with a state; options as of `TautRoadmap`.
+    """Return the travel graph of a problem with a state; options are those of `TautRoadmap`.
 
     Raises
     ------
@@ -298,7 +298,7 @@ def graph_from_state(
     InputError
         No taut tether to the state has its word, or what `TautRoadmap` raises.
     LimitReachedError
-        As of `TautRoadmap`.
+        The time was up, as in `TautRoadmap`.
     """
     state = problem.state
     assert state is not None
@@ -357,22 +357,15 @@ def graph_from_state(
 def from_state(
     graph: TravelGraph, start: int, start_tether: npt.NDArray[np.float64] | None = None
 ) -> GraphFromState:
-    """A travel graph one of whose vertices is where the robot is now.
+    """Return a travel graph one of whose vertices is the robot's present state.
 
     Parameters
     ----------
     graph : TravelGraph
-        With the state as one of its vertices, alone in its cluster; the ways from all vertices to
-        the base are finite.
-    start : int
-        That vertex.
+        Graph with the state as one of its vertices, alone in its cluster; paths from all vertices
+        to the base are finite.
     start_tether : ndarray, shape (n, 3), optional
-        The taut tether there.
-
-    Returns
-    -------
-    GraphFromState
-        Its tours lead from the state through all other clusters to the base.
+        Taut tether at the state.
     """
     home = graph.costs_to_base
     own = graph.cluster[start]

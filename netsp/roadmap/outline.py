@@ -1,14 +1,13 @@
-"""The outline of free space: what blocks a segment and which arcs a taut path can bend around.
+"""Outline of free space: what blocks a segment, and the arcs around which a taut path can bend.
 
-A circle of radius r, grown by the clearance, is a disk; a polygon grown by the clearance has a disk
-at each convex vertex, of which only the part between the normals of the two edges shows. So a
-circle is the one-vertex polygon, and every bend of a taut path is an arc of some disk. Where
-grown obstacles overlap, the covered part of an arc is cut away.
+A circle grown by the clearance is a disk. A polygon grown by the clearance has a disk at each
+convex vertex, of which only the part between the normals of the two edges shows. So a circle is the
+one-vertex polygon, and every bend of a taut path is an arc of some disk. Where grown obstacles
+overlap, the covered part of an arc is cut away.
 
-Coordinates are relative to the base. Every obstacle is grown by a further `margin` (a fraction
-1e-10 of the problem's size): what
-touches, overlaps, so no path slips through a gap of no width, and a polygon without clearance still
-has arcs. Lengths change by at most the margin times the turning.
+Coordinates are relative to the base. Every obstacle is grown by a further `margin`: what touches,
+overlaps, so that no path slips through a gap of no width, and a polygon without clearance still has
+arcs. Lengths change by at most the margin times the turning.
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ conditioned, and no length changes by more."""
 
 @kernel
 def depths(x: float, y: float, blockers: Blockers) -> Floats:
-    """(n,) depth of a point in each grown obstacle, negative outside."""
+    """Return the (n,) depths of a point in the grown obstacles, negative outside."""
     out = np.empty(len(blockers.grow))
     for o in range(len(out)):
         out[o] = depth_in_obstacle(x, y, o, blockers)
@@ -63,7 +62,7 @@ def depths(x: float, y: float, blockers: Blockers) -> Floats:
 
 
 def is_free(points: Floats, blockers: Blockers) -> bool:
-    """Whether a polyline (k, 2 or 3) enters no grown obstacle."""
+    """Return whether a polyline (k, 2 or 3) enters no grown obstacle."""
     xy = np.asarray(points, dtype=float)[:, :2]
     return not any(segment_blocked(p[0], p[1], q[0], q[1], blockers) for p, q in pairwise(xy))
 
@@ -75,21 +74,22 @@ class Outline:
     Attributes
     ----------
     blockers
-        What a segment must not enter.
+        Grown obstacles, which a segment must not enter.
     arcs
         (a, 5) centre x, y, radius, start angle, end angle (counter-clockwise, end > start).
     full
         (a,) whether the arc is a whole circle.
     origin
-        (2,) the base, which all coordinates here are relative to.
+        (2,) the base, which is the origin of all coordinates here.
     places
         (1 + m, 2) base and goals.
     points
-        The same, but those nearer to a grown boundary than `STAND_OFF` moved to that distance.
+        The same places; those nearer to a grown boundary than `STAND_OFF` are moved to that
+        distance.
     rays
         (n, 2) representative points.
     margin
-        The extra growth of all obstacles.
+        Extra growth of all obstacles.
     """
 
     blockers: Blockers
@@ -104,13 +104,6 @@ class Outline:
 
 def build_outline(problem: Problem, clock: Clock | None = None) -> Outline:
     """Return the outline of a problem's free space in the plane.
-
-    Parameters
-    ----------
-    problem : Problem
-        Its obstacles, clearance and bounds, and the points of base and goals.
-    clock : Clock, optional
-        The clock of the run.
 
     Raises
     ------
@@ -136,7 +129,8 @@ def build_outline(problem: Problem, clock: Clock | None = None) -> Outline:
 
 
 def _grow(problem: Problem, origin: Floats, growth: float, eps: float) -> tuple[Blockers, Floats]:
-    """Blockers and disks (x, y, r, cone start, cone end); a whole circle's cone is 0 to 2 pi."""
+    """Return the blockers, and disks (x, y, r, cone start, cone end); a whole circle's cone is 0 to
+    2 pi."""
     circles, edges, edge_start, box = [], [], [0], []
     disks: list[tuple[float, float, float, float, float]] = []
     for obstacle in problem.obstacles:
@@ -167,7 +161,8 @@ def _grow(problem: Problem, origin: Floats, growth: float, eps: float) -> tuple[
 
 
 def _vertex_disks(v: Floats, growth: float) -> list[tuple[float, float, float, float, float]]:
-    """Disks at the convex vertices of a counter-clockwise polygon with their normal cones."""
+    """Return the disks at the convex vertices of a counter-clockwise polygon, with their normal
+    cones."""
     incoming = v - np.roll(v, 1, axis=0)
     outgoing = np.roll(v, -1, axis=0) - v
     disks = []
@@ -180,7 +175,7 @@ def _vertex_disks(v: Floats, growth: float) -> list[tuple[float, float, float, f
 
 
 def push_out(point: Floats, blockers: Blockers, distance: float) -> Floats:
-    """Move a point that lies on a grown boundary, or nearly, to a distance from it."""
+    """Return a point moved off a grown boundary to a distance, if it lies on it, or nearly."""
     p = np.array(point, dtype=float)
     for _ in range(32):
         depth = depths(p[0], p[1], blockers)
@@ -197,7 +192,8 @@ def push_out(point: Floats, blockers: Blockers, distance: float) -> Floats:
 
 
 def _push_out_of_polygon(p: Floats, o: int, blockers: Blockers, stand_off: float) -> Floats:
-    """Away from the nearest point of the outline; along the normal when it lies on it."""
+    """Return a point moved away from the nearest point of the outline; along the normal if it lies
+    on it."""
     e = blockers.edges[blockers.edge_start[o] : blockers.edge_start[o + 1]]
     a, d = e[:, :2], e[:, 2:] - e[:, :2]
     t = np.clip(((p - a) * d).sum(axis=1) / (d**2).sum(axis=1), 0.0, 1.0)
@@ -234,7 +230,7 @@ def is_disjoint(cx: float, cy: float, r: float, boxes: Floats, k: int) -> bool:
 @kernel
 def _visible_arcs(disks: Floats, blockers: Blockers, bounds: Floats, stop: Ints) -> Floats:
     """Return the parts of each disk's cone that no other obstacle covers and that lie within
-    bounds; some are missing when the flag of a clock is set."""
+    bounds. Some are missing when the flag of a clock is set."""
     circles, edges, grow, eps = blockers.circles, blockers.edges, blockers.grow, blockers.eps
     part, part_box, skip = blockers.part, blockers.part_box, blockers.tree.skip
     tree_box, tree_first, tree_stop = blockers.tree.box, blockers.tree.first, blockers.tree.stop

@@ -1,4 +1,4 @@
-"""Single taut paths, by their words: materialised as tangents and circumscribed arcs."""
+"""Single taut paths, by their words: tangents and circumscribed arcs."""
 
 from __future__ import annotations
 
@@ -40,12 +40,10 @@ class TautPaths:
     Parameters
     ----------
     longest
-        Limit on their planar length; by default that of a leg between two admissible classes, and
-        then only what the tether can touch is looked at.
+        Largest planar length of a path; by default that of a leg between two admissible classes,
+        and then only what the tether can touch is looked at.
     clock
-        The clock of the run; without a clock, no work is cut short.
-    policy
-        Policy of the roadmap.
+        Clock of the run; without a clock, no work is cut short.
 
     Raises
     ------
@@ -73,7 +71,7 @@ class TautPaths:
 
     @cached_property
     def contacts(self) -> ContactGraph:
-        """Shortest paths in any class over the same tangents."""
+        """Return the graph of shortest paths in any class over the same tangents."""
         return ContactGraph(self.outline, self.tangents, policy=self.policy)
 
     def bounds_in_any_class(self, up: Callable[[], bool]) -> Floats:
@@ -88,34 +86,21 @@ class TautPaths:
 
     @cached_property
     def arcs(self) -> Arcs:
-        """What a path of a word is pulled over."""
+        """Return the tangent graph in the form over which paths are pulled."""
         return build_arcs(self.problem, self.outline, self.tangents, self.slits, self.policy.paths)
 
     @cached_property
     def slits(self) -> Slits:
-        """What bounds lengths from below."""
+        """Return the slits, which bound lengths from below."""
         return build_slits(self.problem)
 
     def length(self, a: int, b: int, word: Word) -> float:
-        """3D length of the taut path of a word from point a to point b."""
+        """Return the 3D length of the taut path of a word from point a to point b."""
         return math.hypot(self.planar_length(a, b, word), float(self._z[b] - self._z[a]))
 
     def lengths(self, a: Sequence[int], b: Sequence[int], words: Sequence[Word]) -> Floats:
-        """3D lengths of many taut paths at once.
-
-        Parameters
-        ----------
-        a, b
-            (k,) numbers of the points from and to which they lead.
-        words
-            (k,) of each.
-
-        Returns
-        -------
-        ndarray, shape (k,)
-            In the problem's units; inf, with a warning, for each path that was not found within the
-            longest that this was made for.
-        """
+        """Return the 3D lengths (k,) of many taut paths at once; inf, with a warning, for each path
+        that is not found."""
         from_, to = np.asarray(a, dtype=np.int64), np.asarray(b, dtype=np.int64)
         ends_of = list(zip(from_.tolist(), to.tolist(), words, strict=True))
         for p, q, word in ends_of:
@@ -137,18 +122,13 @@ class TautPaths:
         return np.asarray(np.hypot(out, self._z[to] - self._z[from_]))
 
     def planar_length(self, a: int, b: int, word: Word, longest: float | None = None) -> float:
-        """Length in the plan of the taut path of a word from point a to point b.
-
-        Parameters
-        ----------
-        longest
-            That it is known not to exceed.
-        """
+        """Return the planar length of the taut path of a word from point a to point b, which is
+        known not to exceed `longest`."""
         return self.pieces(a, b, word, longest)[0]
 
     def planar_length_within(self, a: int, b: int, word: Word, longest: float) -> float | None:
-        """Length in the plan of the taut path of a word from point a to point b; None if it is
-        longer than so much."""
+        """Return the planar length of the taut path of a word from point a to point b; None if it
+        exceeds `longest`."""
         key = (a, b, tuple(word))
         if key not in self._cache:
             found = self._find(a, b, word, longest)
@@ -159,30 +139,25 @@ class TautPaths:
         return planar if planar <= longest + self.margin else None
 
     def slit_length(self, a: int, b: int, word: Word) -> float:
-        """No more than the length in the plan of the taut path of a word from point a to point
-        b."""
+        """Return a lower bound on the planar length of the taut path of a word from point a to
+        point b."""
         places, cluster = self.outline.places, np.array([a, b])
         return float(slit_lengths(self.slits, places, cluster, [(), tuple(word)])[0, 1])
 
     def turning(self, a: int, b: int, word: Word) -> float:
-        """Sum of the angles (radians) by which the taut path of a word from point a to point b
-        turns in the plan."""
+        """Return the sum of the angles in the plan by which the taut path of a word turns,
+        radians."""
         _, pieces = self.pieces(a, b, word)
         return float(sum(slid for _, slid in pieces[1:]))
 
     def path(self, a: int, b: int, word: Word, longest: float | None = None) -> Floats:
-        """(n, 3) polyline of the taut path of a word from point a to point b (0 is the base).
-
-        Parameters
-        ----------
-        longest
-            A planar length that it is known not to exceed.
-        """
+        """Return the (n, 3) polyline of the taut path of a word from point a to point b, whose
+        planar length is known not to exceed `longest`."""
         _, pieces = self.pieces(a, b, word, longest)
         return self._with_heights(a, b, self._polyline(a, b, pieces))
 
     def _with_heights(self, a: int, b: int, xy: Floats) -> Floats:
-        """(n, 3) of a planar polyline from point a to point b, rising evenly."""
+        """Return the (n, 3) polyline of a planar one from point a to point b, rising evenly."""
         steps = np.hypot(*np.diff(xy, axis=0).T)
         total = float(steps.sum())
         fraction = np.concatenate([[0.0], np.cumsum(steps)]) / total if total else steps
@@ -194,8 +169,11 @@ class TautPaths:
         return out
 
     def tether(self, goal: int, word: Word) -> Floats:
-        """(n, 3) polyline of the taut tether to a goal (0-based), as a solution states it;
-        InputError if there is no such goal or class."""
+        """Return the (n, 3) polyline of the taut tether to a goal (0-based), as a solution states
+        it.
+
+        Raises InputError if there is no such goal or class.
+        """
         known = len(self.problem.obstacles)
         if goal < len(self.problem.goals) and all(1 <= abs(a) <= known for a in word):
             try:
@@ -207,7 +185,7 @@ class TautPaths:
         )
 
     def tether_if_found(self, goal: int, word: Word) -> Floats | None:
-        """Return the tether as `tether` does; None, with a warning, where the search for its path
+        """Return the tether as `tether` does; None, with a warning, if the search for its path
         fails."""
         try:
             return self.path(0, goal + 1, tuple(word))
@@ -221,15 +199,10 @@ class TautPaths:
     def pieces(
         self, a: int, b: int, word: Word, longest: float | None = None, stop: Flag = NEVER
     ) -> tuple[float, list[tuple[int, float]]]:
-        """Length in the plan, and (departure, angle slid before it) along the taut path of a word
-        from point a to point b.
+        """Return the planar length, and (departure, angle slid before it) along the taut path of a
+        word from point a to point b, whose planar length is known not to exceed `longest`.
 
-        Parameters
-        ----------
-        longest
-            That it is known not to exceed.
-        stop
-            Flag of a clock; LimitReachedError when it is set before the path is found.
+        Raises LimitReachedError when the flag of a clock is set before the path is found.
         """
         key = (a, b, tuple(word))
         if key not in self._cache:
@@ -251,7 +224,7 @@ class TautPaths:
     def _find(
         self, a: int, b: int, word: Word, longest: float | None, stop: Flag = NEVER
     ) -> tuple[float, list[tuple[int, float]]] | None:
-        """Length and pieces; None if there is no path so short."""
+        """Return length and pieces; None if there is no path so short."""
         if not self._has_obstacles_of(word):
             return None
         length, edges, slid = self._pull(a, b, word)
@@ -321,16 +294,9 @@ class TautPaths:
     def tethers(
         self, goals: Sequence[int], words: Sequence[Word], longest: float, stop: Flag
     ) -> list[list[tuple[int, float]] | None]:
-        """The pieces of the taut paths from the base to goals, found by one search.
+        """Return the pieces of the taut paths from the base to goals, found by one search.
 
-        Parameters
-        ----------
-        goals, words
-            (k,) of each.
-        longest
-            That no planar length exceeds.
-        stop
-            Of a clock; None for each path that was not found till then.
+        Paths are None if they are longer than `longest`, or not found before the flag is set.
         """
         trie, node = Trie.from_words(words, longest + self.margin)
         found = run_explore(
@@ -345,11 +311,11 @@ class TautPaths:
         return [None if k is None else found.pieces(k) for k in at]
 
     def _has_obstacles_of(self, word: Word) -> bool:
-        """Whether there is an obstacle for every letter."""
+        """Return whether there is an obstacle for every letter."""
         return all(abs(letter) <= len(self.outline.rays) for letter in word)
 
     def _pull(self, a: int, b: int, word: Word) -> tuple[float, Ints, Floats]:
-        """As of `netsp.roadmap.taut_by_word.pull_one`."""
+        """Pull the path of a word as `netsp.roadmap.taut_by_word.pull_one` does."""
         points = np.array([a, b])
         letters, row = flatten_words([(), word])
         places = self.outline.places[points]
@@ -357,7 +323,7 @@ class TautPaths:
         return pull_one(ends, points, self.slits, self.arcs)
 
     def _polyline(self, a: int, b: int, pieces: Sequence[tuple[int, float]]) -> Floats:
-        """Tangents and circumscribed arcs as one polyline, finer where a gap is narrow."""
+        """Return tangents and circumscribed arcs as one polyline, finer where a gap is narrow."""
         step = self.policy.paths.max_chord_turn
         for _ in range(12):
             xy = self._draw(a, b, pieces, step)

@@ -1,11 +1,11 @@
-"""The sampled roadmap of the 2017 paper: PRM* (OMPL) with homotopy augmentation.
+"""Sampled roadmap of the 2017 paper: PRM* (OMPL) with homotopy augmentation.
 
 McCammon & Hollinger 2017, section IV-A: milestones are sampled uniformly in free space, joined by
 the PRM* rule (Karaman & Frazzoli 2011), and augmented with the homotopy class of the path from the
 base (Bhattacharya et al. 2012). Words come from the projection on the plane, lengths are 3D.
 
-OMPL samples motions at a resolution, so it is asked to check the ends only and every edge is
-checked exactly here. Base and goals join the milestones by the same k-nearest rule.
+OMPL samples motions at a resolution, so it checks the ends only, and every edge is checked exactly
+here. Base and goals join the milestones by the same k-nearest rule.
 """
 
 from __future__ import annotations
@@ -43,11 +43,14 @@ class PrmRoadmap:
     Parameters
     ----------
     samples
-        Milestones to sample.
+        Number of milestones; by default that of the policy.
     seed
-        Of the sampling; same seed, same roadmap.
+        Seed of the sampling. The same seed gives the same roadmap.
     shortcut
-        Pull every leg taut within its class, so that only the set of classes is sampled.
+        Whether every leg is pulled taut within its class, so that only the set of classes is
+        sampled.
+    max_augmented
+        Maximum number of vertices of the augmented graph; by default that of the policy.
 
     Attributes
     ----------
@@ -56,9 +59,9 @@ class PrmRoadmap:
     edges
         (k, 2) pairs of milestones.
     augmented
-        The graph over (milestone, word).
+        Graph over (milestone, word).
     complete
-        Whether the time sufficed for all the samples and all of that graph.
+        Whether the time sufficed for all samples and all of the augmented graph.
 
     Raises
     ------
@@ -125,8 +128,8 @@ class PrmRoadmap:
         self._taut = TautLegs(self.paths, self.cluster, self.signatures, planar)
 
     def to_travel_graph(self) -> TravelGraph:
-        """The travel graph over this roadmap. Tethers are the taut ones of their classes; that
-        they fit was decided by the length along the roadmap, which is no shorter."""
+        """Return the travel graph over this roadmap. Tethers are the taut ones of their classes.
+        Whether they fit is decided by the length along the roadmap, which is no shorter."""
         return TravelGraph(
             self.cluster,
             self.signatures,
@@ -185,7 +188,8 @@ class PrmRoadmap:
     def _detours(
         self, with_sub_goals: bool, check: Callable[[], None], clock: Clock | None = None
     ) -> Detours:
-        """Detours in any class along the milestones; sub-goals are joined as base and goals are."""
+        """Return the detours in any class along the milestones. Sub-goals are joined as base and
+        goals are."""
         del clock  # nothing compiled takes long here
         places, side = sub_goals(self.problem, with_sub_goals, self.policy.detours)
         outline = self.paths.outline
@@ -201,7 +205,8 @@ class PrmRoadmap:
         return tabulate_detours(self.problem, outline, graph, terminals, places, side, check)
 
     def _classes(self) -> tuple[Ints, list[Word], Ints]:
-        """Augmented goals: those augmented vertices that stand on a goal, base first."""
+        """Return the augmented vertices that are at goals, base first: goals, words and
+        vertices."""
         g = self.augmented
         goals = len(self.problem.goals)
         rows = np.flatnonzero((g.milestone >= 1) & (g.milestone <= goals))
@@ -231,8 +236,10 @@ class PrmRoadmap:
     def lengths(
         self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
-        """(k, k) leg lengths among the given vertices, along the augmented graph; inf within a
-        cluster. LimitReachedError when the clock is up before many are measured."""
+        """Return the (k, k) leg lengths along the augmented graph; inf within a cluster.
+
+        Raises LimitReachedError when the clock is up before many are measured.
+        """
         vertices = np.asarray(vertices, dtype=np.int64)
         if self.shortcut:
             return self._taut.lengths(vertices, asked, clock)
@@ -249,7 +256,7 @@ class PrmRoadmap:
         return np.asarray(out)
 
     def to_base(self) -> Floats:
-        """(V,) lengths of the legs from the base."""
+        """Return the (V,) lengths of the legs from the base."""
         if self.shortcut:
             return self._taut.to_base()
         return np.asarray(self.augmented.length[self._vertex])
@@ -257,18 +264,19 @@ class PrmRoadmap:
     def lower_bounds(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
     ) -> Floats:
-        """(k, k) lower bounds on leg lengths: a leg along the roadmap is no shorter than the taut
-        leg, for which see `TautLegs.lower_bounds`."""
+        """Return (k, k) lower bounds on leg lengths: those of `TautLegs.lower_bounds`, as a leg
+        along the roadmap is no shorter than the taut leg."""
         return self._taut.lower_bounds(vertices, rows, clock)
 
     @property
     def quick(self) -> bool:
-        """Whether a leg by itself is quickly measured: not by a search of the whole graph."""
+        """Return whether a single leg is measured without a search of the whole graph."""
         return self.shortcut
 
     @cached_property
     def _before(self) -> Ints:
-        """(n,) the augmented vertex before each on its shortest path from the base."""
+        """Return the (n,) predecessors of the augmented vertices on their shortest paths from the
+        base."""
         return self.augmented.tree(int(self._vertex[0]))
 
     def _from_base(self, row: int) -> list[int]:
@@ -278,7 +286,7 @@ class PrmRoadmap:
         return out[::-1]
 
     def path(self, u: int, v: int) -> Floats:
-        """(n, 3) polyline of the leg from vertex u to vertex v."""
+        """Return the (n, 3) polyline of the leg from vertex u to vertex v."""
         if self.shortcut:
             return self._taut.path(u, v)
         a, b = int(self._vertex[u]), int(self._vertex[v])
@@ -304,8 +312,8 @@ def _import_ompl() -> Any:
 
 
 def sampling_box(problem: Problem) -> tuple[Floats, Floats]:
-    """Lower and upper corner (3,) of where milestones are drawn: the bounds, or what holds base,
-    goals and obstacles with a tenth to spare, within reach of the tether."""
+    """Return the lower and upper corner (3,) of the box in which milestones are drawn: the bounds,
+    or what holds base, goals and obstacles with a tenth to spare, within reach of the tether."""
     points = problem.points
     if problem.bounds is not None:
         low2, high2 = np.array(problem.bounds[:2]), np.array(problem.bounds[2:])
@@ -329,7 +337,7 @@ def sampling_box(problem: Problem) -> tuple[Floats, Floats]:
 def _sample(
     problem: Problem, outline: Outline, samples: int, seed: int, clock: Clock
 ) -> tuple[Floats, list[tuple[int, int]]]:
-    """Milestones (n, 3) and edges of OMPL's PRM*."""
+    """Return the milestones (n, 3) and edges of OMPL's PRM*."""
     ob, og, ou = _import_ompl()
     ou.noOutputHandler()
     # the generator is the process's own, but each planner's is seeded from it when made
@@ -376,8 +384,8 @@ def _sample(
 
 
 def _nearest_edges(milestones: Floats, fixed: int) -> Ints:
-    """Edges from base and goals to their k nearest milestones, k by the PRM* rule in d dimensions,
-    k = e (1 + 1/d) ln n (Karaman & Frazzoli 2011, section 3.3)."""
+    """Return edges from base and goals to their k nearest milestones, with k by the PRM* rule in d
+    dimensions, k = e (1 + 1/d) ln n (Karaman & Frazzoli 2011, section 3.3)."""
     from scipy.spatial import KDTree
 
     n = len(milestones)
@@ -390,7 +398,7 @@ def _nearest_edges(milestones: Floats, fixed: int) -> Ints:
 
 
 def _exactly_free(edges: Ints, milestones: Floats, outline: Outline) -> Ints:
-    """The edges whose segment enters no grown obstacle."""
+    """Return the edges whose segment enters no grown obstacle."""
     return np.asarray(edges[_free_edges(edges, milestones, outline.blockers)])
 
 
@@ -419,7 +427,7 @@ def _free_edges(pairs: Ints, points: Floats, blockers: Blockers) -> Bools:
 
 
 def _edge_letters(edges: Ints, milestones: Floats, rays: Floats) -> tuple[Ints, Ints]:
-    """Letters of all edges in one array, and the row starts into it."""
+    """Return the letters of all edges in one array, and the row starts into it."""
     order = np.argsort(rays[:, 0], kind="stable")
     out, start = _all_letters(edges, milestones, rays, order)
     return out, start

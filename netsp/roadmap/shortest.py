@@ -16,17 +16,17 @@ from netsp.roadmap.tangents import JOINING, TangentGraph, build_tangents
 
 
 class ShortestPaths(Protocol):
-    """Shortest planar paths between numbered nodes, coordinates relative to the base."""
+    """Shortest planar paths between numbered nodes, in coordinates relative to the base."""
 
     def tree(self, source: int) -> tuple[Floats, Ints]:
-        """Length to every node (inf if there is no path) and the node before it."""
+        """Return the length to every node (inf if there is no path) and its predecessor."""
 
     def draw(self, source: int, target: int, before: Ints) -> Floats:
-        """(k, 2) polyline of the path from the source to a target along a tree."""
+        """Return the (k, 2) polyline of the path from the source to a target along a tree."""
 
 
 def _positions_by_number(numbers: Ints, count: int) -> list[Ints]:
-    """Where each of the first so many numbers stands, in order."""
+    """Return the positions, in order, of each number below `count`."""
     order = np.argsort(numbers, kind="stable")
     return np.split(order, np.searchsorted(numbers[order], np.arange(1, count + 1)))[:count]
 
@@ -37,9 +37,9 @@ class RemainingLengths(NamedTuple):
     Attributes
     ----------
     source
-        From the base.
+        Length from the base.
     to_end
-        (e,) from the end of every tangent.
+        (e,) lengths from the end of every tangent.
     """
 
     source: float
@@ -49,7 +49,7 @@ class RemainingLengths(NamedTuple):
 class ContactGraph:
     """Exact shortest paths: tangents join contact points across free space, arcs along the outline.
 
-    Nodes 0 … points-1 are the outline's points (base, goals); then two for every tangent.
+    Nodes 0 … points - 1 are the outline's points (base, goals); then follow two for every tangent.
     """
 
     def __init__(
@@ -108,7 +108,8 @@ class ContactGraph:
         self._edge_of = np.concatenate([np.full(points, -1), np.repeat(np.arange(edges), 2)])
 
     def lengths(self, sources: Sequence[int] | None = None) -> Floats:
-        """(sources, points) shortest lengths between the outline's points (default from all)."""
+        """Return the (sources, points) shortest lengths between the outline's points, by default
+        from all."""
         from scipy.sparse.csgraph import dijkstra
 
         rows = np.arange(self.points) if sources is None else np.asarray(sources)
@@ -116,14 +117,8 @@ class ContactGraph:
         return np.asarray(found[:, : self.points])
 
     def distance_bounds(self, height: Floats, up: Callable[[], bool]) -> Floats:
-        """(points, points) no more than the 3D length of any path between two points, in any class;
-        straight lines for those that were not looked at when the time was up.
-
-        Parameters
-        ----------
-        height
-            (points,).
-        """
+        """Return (points, points) lower bounds on 3D paths between points of given heights, in any
+        class. They are straight distances for points not looked at when the time was up."""
         planar = np.zeros((self.points, self.points))
         count = self.policy.contacts.sources_per_check
         for first in range(0, self.points, count):
@@ -138,7 +133,7 @@ class ContactGraph:
         return np.asarray(np.hypot(planar, np.subtract.outer(height, height)))
 
     def remaining_lengths(self, goal: int) -> RemainingLengths:
-        """What is left to a point from the base and from the end of every tangent."""
+        """Return lower bounds on the lengths to a point."""
         from scipy.sparse.csgraph import dijkstra
 
         found = dijkstra(self._graph, directed=False, indices=goal)
@@ -151,7 +146,7 @@ class ContactGraph:
         return RemainingLengths(float(found[0]), np.asarray(found[ends]) * (1.0 - 1e-12))
 
     def tree(self, source: int, limit: float = np.inf) -> tuple[Floats, Ints]:
-        """Length to every node and the node before it; inf for those beyond a limit."""
+        """Return the length to every node and its predecessor; inf for nodes beyond a limit."""
         from scipy.sparse.csgraph import dijkstra
 
         d, before = dijkstra(
@@ -165,7 +160,7 @@ class ContactGraph:
         return [*(ratio * straight for ratio in ratios if straight > 0.0), np.inf]
 
     def tree_to(self, source: int, target: int) -> Ints:
-        """The node before each on shortest paths from a point, as far as another point."""
+        """Return the predecessors on shortest paths from a point, as far as another point."""
         straight = math.dist(self.outline.points[source], self.outline.points[target])
         for limit in self._limits(straight):
             length, before = self.tree(source, limit)
@@ -174,7 +169,7 @@ class ContactGraph:
         return before
 
     def tree_to_nearest(self, source: int, most: int) -> tuple[Floats, Ints]:
-        """As `tree`, with so many of the points, itself among them, within the limit."""
+        """Return `tree`, limited so that it holds at least `most` points, the source among them."""
         if most >= self.points:
             return self.tree(source)
         straight = np.sort(np.hypot(*(self.outline.points - self.outline.points[source]).T))
@@ -185,7 +180,8 @@ class ContactGraph:
         return length, before
 
     def draw(self, source: int, target: int, before: Ints) -> Floats:
-        """(k, 2) polyline; arcs as circumscribed chords, finer where a gap is narrow."""
+        """Return the (k, 2) polyline, with arcs as circumscribed chords, finer where a gap is
+        narrow."""
         nodes = _walk_back(source, target, before)
         step = self.policy.paths.max_chord_turn
         for _ in range(12):
@@ -241,14 +237,14 @@ class MilestoneGraph:
         )
 
     def tree(self, source: int) -> tuple[Floats, Ints]:
-        """Length to every node and the node before it."""
+        """Return the length to every node and its predecessor."""
         from scipy.sparse.csgraph import dijkstra
 
         d, before = dijkstra(self._graph, directed=False, indices=source, return_predecessors=True)
         return d, before.astype(np.int64)
 
     def draw(self, source: int, target: int, before: Ints) -> Floats:
-        """(k, 2) polyline of the path from the source to a target along a tree."""
+        """Return the (k, 2) polyline of the path from the source to a target along a tree."""
         return np.asarray(self.places[_walk_back(source, target, before)])
 
 

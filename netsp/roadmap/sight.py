@@ -54,8 +54,13 @@ class Horizons(NamedTuple):
 
 
 class Targets(NamedTuple):
-    """Arcs and points in spatial order, with the tree over the boxes of their disks, and the
-    greatest number in each subtree."""
+    """Arcs and points in spatial order, with a tree over the boxes of their disks.
+
+    Attributes
+    ----------
+    last
+        Largest number in each subtree.
+    """
 
     order: Ints
     tree: BoxTree
@@ -63,7 +68,7 @@ class Targets(NamedTuple):
 
 
 def build_targets(place: Floats) -> Targets:
-    """Return the targets of arcs and points (n, 5), which are numbered as they stand there."""
+    """Return the targets of arcs and points (n, 5), numbered by row."""
     r = place[:, 2:3]
     boxes = np.hstack([place[:, :2] - r, place[:, :2] + r])
     order = spatial_order(boxes)
@@ -106,8 +111,8 @@ def empty_horizons(place: Floats, arc_count: int, full: Bools, policy: SightPoli
 def _lower_sectors(
     begin: float, angle: float, far: float, pencil: int, farthest: Singles, width: float
 ) -> None:
-    """Put the horizon of all sectors wholly within an angle, which begins so far after the first
-    sector, no farther than a length."""
+    """Lower the horizon of all sectors wholly within an angle to a length. The angle begins at
+    `begin` after the first sector."""
     sectors = farthest.shape[1]
     far *= 1.0 + HORIZON_TOLERANCE
     begin %= TWO_PI
@@ -152,8 +157,9 @@ def _lower_horizons(
     width: float,
     max_shift_share: float,
 ) -> None:
-    """Lower horizons to what a connected set blocks that has the disks of a radius about p and q in
-    it and stays clear of the pencil's own disk.
+    """Lower horizons to what a connected set blocks.
+
+    The set holds the disks of a radius about p and q, and stays clear of the pencil's own disk.
 
     Parameters
     ----------
@@ -195,7 +201,7 @@ def find_horizons(
     end: int,
     stop: Ints,
 ) -> None:
-    """Lower the horizons of pencils `begin` to `end` - 1 to what blocks them; some stay too far
+    """Lower the horizons of pencils `begin` to `end` - 1 to what blocks them. Some stay too far
     when the flag of a clock is set."""
     farthest, lows, widths = horizons.farthest, horizons.low, horizons.width
     min_clearance_ratio = horizons.min_clearance_ratio
@@ -311,8 +317,8 @@ def _box_distance(cx: float, cy: float, box: Floats, k: int) -> float:
 
 @kernel
 def _subtended(cx: float, cy: float, box: Floats, k: int) -> tuple[float, float]:
-    """Return the direction in which a box begins, counter-clockwise, seen from a point outside, and
-    the angle that it subtends."""
+    """Return the direction in which a box begins, counter-clockwise, seen from a point outside it,
+    and the angle that it subtends."""
     x0, y0, x1, y1 = box[k, 0] - cx, box[k, 1] - cy, box[k, 2] - cx, box[k, 3] - cy
     # corners of the silhouette: begin (ax, ay), end (bx, by)
     ax = x1 if y0 > 0.0 else x0
@@ -350,7 +356,7 @@ def pairs_in_sight(
     stop: Ints,
 ) -> Ints:
     """Return the pairs (n, 2) of places i < j, i from `begin` to `end` - 1, that horizons do not
-    rule out, without order; some are missing when the flag of a clock is set."""
+    rule out, in no order. Some are missing when the flag of a clock is set."""
     order, last = targets.order, targets.last
     box, skip = targets.tree.box, targets.tree.skip
     tree_first, tree_stop = targets.tree.first, targets.tree.stop

@@ -1,19 +1,19 @@
 """Lower bounds on leg lengths from obstacles shrunk to vertical slits.
 
 Replace every obstacle by the vertical chord through its representative point. Less stands in the
-way, the words stay the same, so the shortest path of a class gets no longer, and it can be had
+way and the words stay the same, so the shortest path of a class gets no longer, and it is found
 without any search. The vertical lines through the points cut the plane into strips. A path of a
 given reduced word passes from strip to strip through *gates*: above the slit where the word has a
 letter, below it where it must pass the line without one. No strip is entered and left through the
-same gate (the word is reduced), and the cover's strips and gates form a tree, so the gates and
+same gate (the word is reduced), and the strips and gates of the cover form a tree, so the gates and
 their order are known from the word and the two ends alone.
 
 Unfold the path at its turns: let s be the distance travelled in x. Then every gate is a half-line
 over a place s, from the slit's top up or from its bottom down, and the shortest path is the taut
 string through them, found in one sweep. Unfolding reflects strips, so it keeps lengths.
 
-On random worlds the bound is a few per cent below the leg; it costs a fraction of a microsecond
-where the leg costs a search. So most legs of a long tether never need to be measured.
+On random worlds the bound is a few per cent below the leg. It costs a fraction of a microsecond
+where the leg costs a search, so most legs of a long tether never need to be measured.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from netsp.roadmap.roadmap_policy import LegPolicy
 
 
 class Slits(NamedTuple):
-    """Vertical chords of the obstacles, coordinates relative to the base.
+    """Vertical chords of the obstacles, in coordinates relative to the base.
 
     Attributes
     ----------
@@ -53,19 +53,19 @@ class Slits(NamedTuple):
     top: Floats
 
     def cells(self, x: Floats) -> Ints:
-        """The strips that points lie in: how many lines are at or left of each."""
+        """Return the strips in which points lie: the number of lines at or left of each."""
         return np.searchsorted(self.x, x, side="right").astype(np.int64)
 
 
 class Workspace(NamedTuple):
-    """Where the string between two ends is worked out.
+    """Arrays in which the string between two ends is worked out.
 
     Attributes
     ----------
     gate
         (g, 4) columns `PLACE` … `LINE`.
     corner
-        (g, 2) the gates that it bends at, and whether at their `HIGH` end.
+        (g, 2) gates at which the string bends, and whether at their `HIGH` end.
     """
 
     gate: Floats
@@ -78,8 +78,15 @@ line plus 1, negative where it is passed from right to left."""
 
 
 class Ends(NamedTuple):
-    """Where legs end: place (V, 2) and strip (V,) of every vertex, and its word as a row of
-    `letters` from row[v] to row[v + 1]."""
+    """Ends of legs.
+
+    Attributes
+    ----------
+    place, cell
+        (V, 2) place and (V,) strip of every vertex.
+    letters, row
+        Word of vertex v: letters row[v] to row[v + 1].
+    """
 
     place: Floats
     cell: Ints
@@ -88,7 +95,7 @@ class Ends(NamedTuple):
 
 
 def build_slits(problem: Problem) -> Slits:
-    """The vertical chords through the representative points, grown by the clearance."""
+    """Return the vertical chords through the representative points, grown by the clearance."""
     origin = problem.points[0, :2]
     points = problem.representative_points - origin
     ends = np.zeros((len(points), 2))
@@ -121,18 +128,17 @@ def slit_lengths(
     stop: Flag = NEVER,
     policy: LegPolicy | None = None,
 ) -> Floats:
-    """(V, V) planar lengths among slits of the legs between vertices; 0 within a cluster.
+    """Return the (V, V) planar lengths among slits of the legs between vertices; 0 within a
+    cluster.
 
     Parameters
     ----------
     places
         (m + 1, 2) base and goals.
-    cluster, signatures
-        Of the vertices.
     rows
-        (r,) only the legs from so many of the vertices, then (r, V).
+        (r,) vertices whose legs are wanted; the result is then (r, V).
     stop
-        Of a clock; unfinished when it is set.
+        Flag of a clock; lengths are missing when it is set.
     """
     policy = policy or LegPolicy()
     n = len(cluster)
@@ -154,7 +160,7 @@ def slit_lengths(
 
 
 def flatten_words(signatures: Sequence[Word]) -> tuple[Ints, Ints]:
-    """Words as one array of letters, and where each begins in it and the last ends."""
+    """Return words as one array of letters, and the row starts into it."""
     flat = [np.array(w, dtype=np.int64) for w in signatures]
     row = np.concatenate([[0], np.cumsum([len(w) for w in flat])]).astype(np.int64)
     return (np.concatenate(flat).astype(np.int64) if row[-1] else np.zeros(0, np.int64)), row
@@ -172,8 +178,8 @@ def _fill_rows(
     out: Floats,
     stop: Ints,
 ) -> None:
-    """Fill rows first … last - 1, which are those of the vertices `asked`; of the whole matrix only
-    what is beyond the diagonal, and the columns with the same numbers."""
+    """Fill rows first … last - 1, those of the vertices `asked`. Of the whole matrix only the part
+    beyond the diagonal is computed, and mirrored."""
     room = empty_workspace(max_word_length(ends.row), slits)
     for k in range(first, last):
         if stop[0] != 0:
@@ -189,7 +195,7 @@ def _fill_rows(
 
 @kernel
 def max_word_length(row: Ints) -> int:
-    """Most letters of a word, given where each begins and the last ends."""
+    """Return the largest number of letters of a word, given row starts."""
     longest = int(np.int64(0))  # no literal: callees are compiled once
     for k in range(len(row) - 1):
         longest = max(longest, row[k + 1] - row[k])
@@ -198,15 +204,15 @@ def max_word_length(row: Ints) -> int:
 
 @kernel
 def empty_workspace(longest: int, slits: Slits) -> Workspace:
-    """For the strings of words of at most twice so many letters."""
+    """Return a workspace for words of up to twice `longest` letters."""
     gates = (2 * longest + 2) * (len(slits.x) + 2) + 2
     return Workspace(np.empty((gates, 4)), np.empty((gates, 2), dtype=np.int64))
 
 
 @kernel
 def string(u: int, v: int, ends: Ends, slits: Slits, room: Workspace) -> tuple[float, int]:
-    """Length of the path from u to v of the word inverse(word of u) times (word of v), and how
-    often it bends; where is in `room`."""
+    """Return the length of the path from u to v of the word inverse(word of u) times (word of v),
+    and the number of its bends, which are written into `room`."""
     letters, row = ends.letters, ends.row
     rank, x, bottom, top = slits.rank, slits.x, slits.bottom, slits.top
     gate = room.gate
@@ -253,8 +259,8 @@ def string(u: int, v: int, ends: Ends, slits: Slits, room: Workspace) -> tuple[f
 
 @kernel
 def _taut_string(y: float, gate: Floats, count: int, corner: Ints) -> tuple[float, int]:
-    """Length of the taut string from (0, y) through the first `count` gates, and how often it
-    bends."""
+    """Return the length of the taut string from (0, y) through the first `count` gates, and the
+    number of its bends."""
     s = 0.0
     total = 0.0
     k = bends = 0

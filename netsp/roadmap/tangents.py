@@ -1,8 +1,8 @@
-"""The tangent graph: all free segments that a taut path may use, with the letters they write.
+"""Tangent graph: all free segments that a taut path may use, with the letters that they write.
 
-Nodes are directed arcs (arc, sense) and points (base, goals). A directed arc carries its departures
-in the order in which a robot sliding along it meets them, so that a taut path is: arrive, slide on
-in the same sense, depart. A taut path never uses anything else (docs/theory.md).
+Nodes are directed arcs (arc, sense) and points (base, goals). A directed arc holds its departures
+in the order in which a robot that slides along it meets them. So a taut path repeats: arrive, slide
+on in the same sense, depart. A taut path never uses anything else (docs/theory.md).
 """
 
 from __future__ import annotations
@@ -99,12 +99,13 @@ class TangentGraph:
 
     @cached_property
     def longest_step(self) -> int:
-        """Most letters that sliding to a departure, leaving and sliding on can write together."""
+        """Return the maximum number of letters that sliding to a departure, leaving and sliding on
+        can write together."""
         rows = (self.segment_row, self.arrival_row, self.gap_row)
         return 1 + sum(int(np.max(row[:, 1] - row[:, 0], initial=0)) for row in rows)
 
     def point_node(self, p: int) -> int:
-        """Node of point p."""
+        """Return the node of point p."""
         return 2 * len(self.arcs) + p
 
 
@@ -140,14 +141,12 @@ def tangent_rows(
     clock: Clock | None = None,
     policy: SightPolicy | None = None,
 ) -> Floats:
-    """Rows of `_free_tangents` between arcs and the outline's points.
+    """Return rows of `_free_tangents` between arcs and the outline's points.
 
     Parameters
     ----------
     since
-        Only those with an end at point `since` or a later one, of all if 0.
-    policy
-        Policy of how pairs are ruled out in advance; by default `SightPolicy()`.
+        Number of the first point that an end must be at, or a later one; 0 for all tangents.
 
     Raises
     ------
@@ -277,8 +276,8 @@ def _merge_contacts(
 ) -> None:
     """Give contacts of one arc that agree within the angle tolerance the same coordinates.
 
-    Their sides of rays would else differ by rounding, and sliding from one to the other would write
-    letters that are not there. A point that lies on the arc lends its own coordinates.
+    Their sides of rays would otherwise differ by rounding, and sliding from one to the other would
+    write letters that are not there. A point that lies on the arc lends its own coordinates.
     """
     node = np.concatenate([source, target])
     on_arc = np.flatnonzero(node < 2 * arc_count)
@@ -316,7 +315,7 @@ def _merge_contacts(
 
 @kernel
 def _arc_position(theta: float, sense: int, start: float, end: float, full: bool) -> float:
-    """How far along the directed arc a contact angle lies; NaN if not on the arc."""
+    """Return how far along the directed arc a contact angle lies; NaN if it is not on the arc."""
     span = end - start
     if sense > 0:
         key = (theta - start) % TWO_PI
@@ -351,8 +350,8 @@ def _free_tangents(
     pairs: Ints,
     stop: Ints,
 ) -> Floats:
-    """Free directed segments between pairs of arcs and points, unsorted: rows of source, target,
-    key, arrival key, length, ends (4), angles (2).
+    """Return the free directed segments between pairs of arcs and points, unsorted: rows of source,
+    target, key, arrival key, length, ends (4), angles (2).
 
     Parameters
     ----------
@@ -440,7 +439,7 @@ def _write_letters(
     order: Ints,
     stop: Ints,
 ) -> tuple[Ints, Floats, Floats, npt.NDArray[np.int32], Ints, Ints, Ints]:
-    """Return the words of segments and of the arc pieces between arrivals and departures; some are
+    """Return the words of segments and of the arc pieces between arrivals and departures. Some are
     missing when the flag of a clock is set."""
     e_count = len(target)
     arc_nodes = 2 * len(arcs)

@@ -1,4 +1,4 @@
-"""The exact roadmap: every taut class of every goal, and the exact length of every leg.
+"""Exact roadmap: every taut class of every goal, and the exact length of every leg.
 
 Facts used (docs/theory.md): a homotopy class holds exactly one taut path; a taut path alternates
 common tangents and arcs; a leg between two admissible classes never needs more tether than its ends
@@ -30,33 +30,39 @@ from netsp.roadmap.roadmap_policy import RoadmapPolicy
 from netsp.roadmap.taut_legs import TautLegs
 
 RULES = {"all": ALL, "non-looping": NON_LOOPING}
-"""Which classes a roadmap holds, by name."""
+"""Rules for the classes that a roadmap holds, by name."""
 
 
 class TautRoadmap:
     """Classes and legs of one problem.
 
-    classes : ``all`` whose taut tether fits, or ``non-looping``, the rule of the 2017 paper, which
-        drops some of them (`netsp.hsignature.is_looping`; docs/theory.md, fact 7).
-    max_classes : when there are more, the shortest of every goal are kept, about as many of each.
-    time_limit : seconds, or the clock of the run. When it ends while classes are sought, those
-        found till then are kept; when it ends while legs are measured, `lengths` raises.
-    limits_paths : whether the limit holds for outline and tangents, too, without which there is
-        nothing to plan with.
+    Parameters
+    ----------
+    classes
+        ``all`` whose taut tether fits, or ``non-looping``, the rule of the 2017 paper, which drops
+        some of them (`netsp.hsignature.is_looping`; docs/theory.md, fact 7).
+    max_classes
+        Maximum number of classes, about; by default that of the policy. If there are more, the
+        shortest of every goal are kept.
+    time_limit
+        Seconds, or the clock of the run. When the time is up while classes are sought, those found
+        are kept; when it is up while legs are measured, `lengths` raises.
+    limits_paths
+        Whether the limit holds for outline and tangents, too, without which nothing can be planned.
 
     Attributes
     ----------
     complete
-        Whether every class is here.
+        Whether no class was left out.
     least_left_out
-        No class that is not here has a shorter tether; inf if it is complete.
+        Lower bound on the tether of every class left out; inf if none is.
 
     Raises
     ------
     InfeasibleError
-        A goal that no taut tether reaches; names it and the tether that would do.
+        A goal that no taut tether reaches; tells the tether that would.
     InputError
-        An unknown rule, a bad number of classes.
+        An unknown rule, or a bad number of classes.
     LimitReachedError
         The time was up before outline and tangents were complete.
     """
@@ -94,7 +100,7 @@ class TautRoadmap:
         self.legs = TautLegs(self.paths, self.cluster, self.signatures, self.planar)
 
     def to_travel_graph(self) -> TravelGraph:
-        """The travel graph over this roadmap; legs are computed when first asked for."""
+        """Return the travel graph over this roadmap; legs are computed when first asked for."""
         graph = TravelGraph(
             self.cluster,
             self.signatures,
@@ -112,7 +118,7 @@ class TautRoadmap:
         return graph
 
     def ways(self, goal: int, most: int) -> list[tuple[int, Word]]:
-        """As `netsp.gtsp.travel.graph.Carrier.ways`."""
+        """Return what `netsp.gtsp.travel.graph.Carrier.ways` does."""
         contacts = self.paths.contacts
         length, before = contacts.tree_to_nearest(goal, most + 2)  # with itself and the base
         near = np.argsort(length[: contacts.points], kind="stable")
@@ -124,7 +130,7 @@ class TautRoadmap:
         ]
 
     def carried(self, start: int, word: Word, goal: int) -> Word | None:
-        """As `netsp.gtsp.travel.graph.Carrier.carried`."""
+        """Return what `netsp.gtsp.travel.graph.Carrier.carried` does."""
         contacts = self.paths.contacts
         line = contacts.draw(start, goal, contacts.tree_to(start, goal))
         there = concatenate(word, signature(line, self.outline.rays))
@@ -133,8 +139,8 @@ class TautRoadmap:
     def with_classes(
         self, wanted: Iterable[tuple[int, Word]], up: Callable[[], bool]
     ) -> TravelGraph:
-        """As `netsp.gtsp.travel.graph.Carrier.with_classes`; the classes are in this roadmap from
-        then on."""
+        """Return what `netsp.gtsp.travel.graph.Carrier.with_classes` does. The classes are then
+        part of this roadmap."""
         known = set(zip(self.cluster.tolist(), self.signatures, strict=True))
         more = [
             (goal, word, length)
@@ -154,7 +160,7 @@ class TautRoadmap:
         return self.to_travel_graph()
 
     def _tether_length(self, goal: int, word: Word) -> float | None:
-        """Planar length of the taut tether of a class; None if it is too long."""
+        """Return the planar length of the taut tether of a class; None if it is too long."""
         rise = float(self._z[goal] - self._z[0])
         longest = math.sqrt(max(self.problem.tether_length**2 - rise**2, 0.0))
         bound = self.paths.slit_length(0, goal, word)

@@ -1,17 +1,17 @@
-"""The taut path of a word without a search: a string among slits, pulled over the obstacles.
+"""Taut path of a word without a search: a string among slits, pulled over the obstacles.
 
-Its class names the strip and the side on which a path passes every obstacle, so the string among
-slits (`netsp.roadmap.slits`) is known at once, and has the right class. Its bends name obstacles
-and senses; these become directed arcs of the tangent graph, and then, from the start on, wherever
+Its class gives the strip and the side on which a path passes every obstacle, so the string among
+slits (`netsp.roadmap.slits`) is known at once, and has the right class. Its bends give obstacles
+and senses, which become directed arcs of the tangent graph. Then, from the start on:
 
-- the tangent between two that follow one another is blocked, what stands out farthest comes
-  between them, on the side on which the string passes its representative point;
-- a path would have to slide backwards on an arc, the arc is left out.
+- where the tangent between two consecutive arcs is blocked, the arc that stands out farthest is
+  inserted between them, on the side on which the string passes its representative point;
+- where a path would slide backwards on an arc, the arc is removed.
 
 This is a funnel (Lee and Preparata 1984) with arcs for corners. It proves nothing: what is swept
-over may end up on the wrong side, and a bay needs more care. What is proven is the result. A path
+over may end up on the wrong side, and a bay needs more care. The result is what is proven. A path
 of tangents of the graph that slides forwards on every arc is taut, a class holds one taut path
-(docs/theory.md), and its word is read off the letters of the graph. What is not so is left to the
+(docs/theory.md), and its word is read off the letters of the graph. All other paths are left to the
 search (`netsp.roadmap.explore`).
 """
 
@@ -98,14 +98,14 @@ NODE, EDGE = range(2)
 
 
 class Path(NamedTuple):
-    """Where a path is worked out.
+    """Path that is being worked out.
 
     Attributes
     ----------
     real, whole
         (k, 8) and (k, 2) columns ARRIVING … and NODE ….
     word
-        (w,) letters written, reduced as they come, from the second place on.
+        (w,) letters written, reduced as they come, from index 1 on.
     """
 
     real: Floats
@@ -115,7 +115,7 @@ class Path(NamedTuple):
 
 @kernel
 def empty_path(longest: int, max_bends: int) -> Path:
-    """For words of at most twice so many letters."""
+    """Return a path of up to `max_bends` nodes for words of up to twice `longest` letters."""
     return Path(
         np.empty((max_bends, 8)),
         np.empty((max_bends, 2), dtype=np.int64),
@@ -124,7 +124,7 @@ def empty_path(longest: int, max_bends: int) -> Path:
 
 
 def path_from_pieces(a: int, pieces: Sequence[tuple[int, float]], target: Ints, arcs: Arcs) -> Path:
-    """A path from point a that was found otherwise.
+    """Return a path from point a that was found by a search.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def path_from_pieces(a: int, pieces: Sequence[tuple[int, float]], target: Ints, 
 def pull(
     u: int, v: int, ends: Ends, point: Ints, slits: Slits, arcs: Arcs, room: Workspace, path: Path
 ) -> tuple[float, float, int]:
-    """The taut path from u to v of the word inverse(word of u) times (word of v).
+    """Pull the path from u to v of the word inverse(word of u) times (word of v) taut.
 
     Parameters
     ----------
@@ -159,8 +159,8 @@ def pull(
     Returns
     -------
     tuple
-        Its length, `NOT_PULLED` where it was not found; the length among slits; how many tangents
-        it has. These, and the angles slid before them, are in `path`.
+        Length, `NOT_PULLED` if it was not found; length among slits; number of tangents. The
+        tangents, and the angles slid before them, are in `path`.
     """
     low, bends = string(u, v, ends, slits, room)
     count = _initial_arcs(
@@ -217,7 +217,7 @@ def pull(
 def pull_each(
     us: Ints, vs: Ints, ends: Ends, point: Ints, slits: Slits, arcs: Arcs, out: Floats
 ) -> None:
-    """The lengths of (k,) taut paths as of `pull`, into `out`."""
+    """Write the lengths of (k,) taut paths, as `pull` returns them, into `out`."""
     longest = max_word_length(ends.row)
     room, path = empty_workspace(longest, slits), empty_path(longest, arcs.max_bends)
     for k in range(len(us)):
@@ -226,8 +226,8 @@ def pull_each(
 
 @kernel
 def pull_one(ends: Ends, point: Ints, slits: Slits, arcs: Arcs) -> tuple[float, Ints, Floats]:
-    """The taut path between two ends: its length as of `pull`, departures and angles slid before
-    them."""
+    """Return the length, as `pull` does, of the taut path between two ends, with its departures and
+    the angles slid before them."""
     longest = max_word_length(ends.row)
     path = empty_path(longest, arcs.max_bends)
     length, _, count = pull(0, 1, ends, point, slits, arcs, empty_workspace(longest, slits), path)
@@ -249,15 +249,7 @@ def _tighten(
     on: Ints,
     max_backward_turn: float,
 ) -> int:
-    """How many nodes a path has when it is pulled taut; 0 where it could not be.
-
-    Parameters
-    ----------
-    of, row, disk, span, table, real, solid, edges
-        Of `Arcs`.
-    at, on
-        `Path.real` and `Path.whole`.
-    """
+    """Pull a path taut and return its number of nodes; 0 if that is not possible."""
     nodes = len(disk)
     at[0, SLID] = 0.0
     i, left = 0, 16 + 8 * count
@@ -310,7 +302,7 @@ def _tighten(
 
 @kernel
 def _delete_node(i: int, count: int, at: Floats, on: Ints) -> None:
-    """Node i is none any more."""
+    """Delete node i."""
     for k in range(i, count - 1):
         _copy_node(k + 1, k, at, on)
 
@@ -329,13 +321,13 @@ def _set_position(i: int, x: float, y: float, strip: float, at: Floats) -> None:
 
 @kernel
 def _unwrapped(angle: float, to: float) -> float:
-    """The same angle, but for whole turns, within half a turn of another."""
+    """Return the angle plus whole turns, within half a turn of another angle."""
     return angle - TWO_PI * math.floor((angle - to + math.pi) / TWO_PI)
 
 
 @kernel
 def _contact_angle(node: int, ux: float, uy: float) -> float:
-    """The angle on a directed arc that a line along (ux, uy) touches it at."""
+    """Return the angle on a directed arc at which a line along (ux, uy) touches it."""
     return math.atan2(-ux, uy) if node % 2 == 0 else math.atan2(ux, -uy)
 
 
@@ -358,8 +350,8 @@ def _initial_arcs(
     at: Floats,
     on: Ints,
 ) -> int:
-    """The directed arcs that the bends of a string name, between its two ends; how many, 0 where
-    that is not known."""
+    """Write the directed arcs that the bends of a string name, between its two ends, into a path.
+    Return the number of nodes; 0 if an arc is not known."""
     if bends and gate[corner[bends - 1, 0], LOW] == gate[corner[bends - 1, 0], HIGH]:
         bends -= 1  # that is its end
     on[0, NODE] = from_
@@ -423,8 +415,8 @@ def _farthest_arc(
     row: Ints,
     disk: Floats,
 ) -> tuple[int, float]:
-    """The directed arc of an obstacle that stands out farthest to one side of a line through (x, y)
-    along (ux, uy), and how far; -1 if there is none but those of nodes a and b."""
+    """Return the directed arc of an obstacle that stands out farthest to one side of a line through
+    (x, y) along (ux, uy), and how far; -1 if there is none but those of nodes a and b."""
     side = 1.0 if left else -1.0
     nx, ny = -side * uy, side * ux
     best, farthest = -1, -np.inf
@@ -457,8 +449,8 @@ def _arc_between(
     edges: Floats,
     at: Floats,
 ) -> tuple[int, float]:
-    """The directed arc that a path from node a to node b, number i and the one after it, has to
-    pass in between, -1 if it is not known; and the angle at which it stands out."""
+    """Return the directed arc that a path has to pass between node a, number i of the path, and the
+    next node b, and the angle at which it stands out; -1 if it is not known."""
     ra = 0.0 if span[a, OWNER] < 0 else disk[a, RADIUS] * (1.0 - 2.0 * (a % 2))
     rb = 0.0 if span[b, OWNER] < 0 else disk[b, RADIUS] * (1.0 - 2.0 * (b % 2))
     dx, dy = disk[b, CX] - disk[a, CX], disk[b, CY] - disk[a, CY]
@@ -527,18 +519,8 @@ def _verified_length(
     on: Ints,
     word: Ints,
 ) -> float:
-    """Length of a path of so many nodes if it is taut and has the word of the leg from u to v;
-    else `NOT_PULLED`.
-
-    Parameters
-    ----------
-    letters, row
-        Of `Ends`.
-    disk, span, real, whole, written
-        Of `Arcs`, the last its letters.
-    at, on, word
-        Of `Path`.
-    """
+    """Return the length of a path if it is taut and has the word of the leg from u to v; otherwise
+    `NOT_PULLED`."""
     if count < 2:
         return NOT_PULLED
     n, total = 0, 0.0
@@ -589,7 +571,7 @@ def _verified_length(
 
 @kernel
 def _append_letters(first: int, last: int, letters: Ints, word: Ints, n: int) -> int:
-    """How many letters there are when some more are written; -1 if there is no room for them."""
+    """Append letters to a reduced word; return its new length, or -1 if there is no room."""
     for k in range(first, last):
         a = letters[k]
         if n > 0 and word[n] == -a:

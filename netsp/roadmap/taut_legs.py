@@ -57,9 +57,12 @@ class TautLegs:
     def lengths(
         self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
-        """(k, k) 3D leg lengths among the given vertices; inf within a cluster, and where `asked`
-        is given and false, anything. LimitReachedError when the clock is up before all of many are
-        found; among `UNTIMED` vertices they are, whatever the clock says."""
+        """Return the (k, k) 3D leg lengths among vertices; inf within a cluster, and undefined
+        where `asked` is false.
+
+        Raises LimitReachedError when the clock is up before all are found. Legs among up to
+        `UNTIMED` vertices are found whatever the clock says.
+        """
         vertices = np.asarray(vertices, dtype=np.int64)
         if (
             asked is None
@@ -73,16 +76,23 @@ class TautLegs:
         return self._matrix(vertices, np.float64, 1.0, clock)
 
     def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
-        """(k, k) 3D leg lengths among the given vertices in single precision, rounded down; inf
-        within a cluster. LimitReachedError as of `lengths`."""
+        """Return the (k, k) 3D leg lengths in single precision, rounded down; inf within a cluster.
+        Raise LimitReachedError as `lengths` does."""
         return self._matrix(np.asarray(vertices, dtype=np.int64), np.float32, ROUNDED_DOWN, clock)
 
     def blocks(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
     ) -> Iterator[tuple[Ints, Floats]]:
-        """The legs among vertices in single precision, rounded down, some vertices at a time:
-        which (r,), as positions among them, and (r, k) lengths, to be used before the next are
-        asked for; of some rows only, if they are given. LimitReachedError as of `lengths`."""
+        """Yield the legs among vertices in single precision, rounded down, in blocks of rows: (r,)
+        positions among the vertices, and (r, k) lengths, which are valid until the next block.
+
+        Raises LimitReachedError as `lengths` does.
+
+        Parameters
+        ----------
+        rows
+            Positions whose rows are wanted; by default all.
+        """
         vertices = np.asarray(vertices, dtype=np.int64)
         clock, n = clock or Clock(), len(vertices)
         _measure_in_time(clock, lambda: self._tether_tree(clock.flag), n)
@@ -106,7 +116,7 @@ class TautLegs:
     def _matrix(
         self, vertices: Ints, kind: type[np.floating], share: float, clock: Clock | None
     ) -> Floats:
-        """All legs among vertices, branch by branch (`netsp.roadmap.branches`)."""
+        """Return all legs among vertices, found branch by branch (`netsp.roadmap.branches`)."""
         n = len(vertices)
         ask(
             float(np.dtype(kind).itemsize) * n**2,
@@ -129,8 +139,8 @@ class TautLegs:
         return out
 
     def _set_non_legs(self, vertices: Ints, rows: Ints, share: float, out: Floats) -> None:
-        """What is no leg between goals, into rows (r, k): legs of the base are tethers, and there
-        are none within a goal."""
+        """Write into rows (r, k) what is no leg between goals: tethers for legs of the base, inf
+        within a goal."""
         point, tethers = self.cluster[vertices], share * self.to_base()[vertices]
         for base in np.flatnonzero(point == 0).tolist():
             out[rows == base] = tethers
@@ -141,7 +151,7 @@ class TautLegs:
     def _fill(
         self, vertices: Ints, share: float, out: Floats, stop: Flag, branches: Branches, row: Ints
     ) -> None:
-        """The legs between goals, into (r, k) `out`; unfinished when the flag is set."""
+        """Write the legs between goals into (r, k) `out`; some are missing when the flag is set."""
         rows = self.policy.block_rows
         for first in range(0, len(out), rows):
             if stop[0]:
@@ -199,7 +209,7 @@ class TautLegs:
         return np.array(rows).reshape(-1, 3)
 
     def _tether_tree(self, stop: Flag) -> TetherTree:
-        """Where the tethers part, found out once; unfinished when the flag is set."""
+        """Return the tree of all tethers, built once; it is not complete when the flag is set."""
         if self._tree is not None:
             return self._tree
         paths, (ends, point) = self.paths, self._ends
@@ -223,7 +233,7 @@ class TautLegs:
         return tree
 
     def _search_tethers(self, vertices: list[int], stop: Flag) -> dict[int, Path]:
-        """The tethers of vertices, by one search; fewer when the flag is set."""
+        """Return the tethers of vertices, found by one search; fewer when the flag is set."""
         paths, (_, point) = self.paths, self._ends
         found = paths.tethers(
             point[vertices].tolist(),
@@ -238,20 +248,20 @@ class TautLegs:
         }
 
     def to_base(self) -> Floats:
-        """(V,) 3D lengths of the legs from the base, which are the tethers."""
+        """Return the (V,) 3D lengths of the legs from the base, which are the tethers."""
         return np.asarray(np.hypot(self.planar, self._z[self.cluster] - self._z[0]))
 
     def lower_bounds(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
     ) -> Floats:
-        """(k, k) lower bounds on leg lengths: a leg is no shorter than its class among slits
-        (`netsp.roadmap.slits`), nor than the difference of its two tethers (triangle inequality
-        on the cover).
+        """Return (k, k) lower bounds on leg lengths: a leg is no shorter than its class among slits
+        (`netsp.roadmap.slits`), nor than the difference of its two tethers (triangle inequality in
+        the cover).
 
         Parameters
         ----------
         rows
-            (r,) positions among the vertices; then (r, k).
+            (r,) positions among the vertices; the result is then (r, k).
         """
         vertices = np.asarray(vertices, dtype=np.int64)
         cluster, planar, z = self.cluster[vertices], self.planar[vertices], self._z
@@ -283,12 +293,12 @@ class TautLegs:
         return low
 
     def relative_word(self, u: int, v: int) -> Word:
-        """The word of the leg from vertex u to vertex v."""
+        """Return the word of the leg from vertex u to vertex v."""
         return concatenate(invert(self.signatures[u]), self.signatures[v])
 
     def path(self, u: int, v: int) -> Floats:
-        """(n, 3) polyline of the taut leg from vertex u to vertex v, arcs circumscribed; height
-        changes in proportion to planar length."""
+        """Return the (n, 3) polyline of the taut leg from vertex u to vertex v, with arcs
+        circumscribed; height changes in proportion to planar length."""
         if u > v:  # searched once for both senses
             return self.path(v, u)[::-1].copy()
         word, longest = self.relative_word(u, v), self._max_length(u, v)
@@ -300,13 +310,14 @@ class TautLegs:
             return np.vstack([self.path(u, 0), self.path(0, v)[1:]])
 
     def _max_length(self, u: int, v: int) -> float:
-        """More than the planar length of a leg: back along one tether to where the other parts, as
-        far as that is known."""
+        """Return an upper bound on the planar length of a leg: back along one tether to where the
+        other parts, as far as that is known."""
         part = 0.0 if self._tree is None else self._tree.shared_length(u, v)
         return float(self.planar[u] + self.planar[v] - 2.0 * part)
 
     def _selected(self, vertices: Ints, asked: Bools) -> Floats:
-        """As `lengths`, for a few legs; those that cannot be pulled are searches of their own."""
+        """Return the lengths of a few legs, as `lengths` does; where pulling fails, by a search for
+        each leg."""
         out = np.full(asked.shape, np.inf)
         rows, columns = np.nonzero(np.triu(asked, 1) | np.tril(asked, -1).T)
         us, vs = vertices[rows], vertices[columns]
@@ -316,7 +327,7 @@ class TautLegs:
         return out
 
     def pairs(self, us: Ints, vs: Ints) -> Floats:
-        """(k,) 3D lengths of legs between vertices of different goals."""
+        """Return the (k,) 3D lengths of legs between vertices of different goals."""
         planar = self._pull_pairs(us, vs)
         around: dict[int, float] = {}
         for k in np.flatnonzero(planar < 0.0).tolist():
@@ -337,7 +348,7 @@ class TautLegs:
         return np.asarray(out)
 
     def _pull_pairs(self, us: Ints, vs: Ints) -> Floats:
-        """(k,) planar lengths of legs, negative where they could not be pulled."""
+        """Return the (k,) planar lengths of legs, negative where they could not be pulled."""
         paths, (ends, point) = self.paths, self._ends
         # strided arrays are another type, for which the kernel would be compiled anew
         us, vs = np.ascontiguousarray(us), np.ascontiguousarray(vs)
@@ -358,14 +369,14 @@ class TautLegs:
 
     @cached_property
     def _ends(self) -> tuple[Ends, Ints]:
-        """Of all vertices, and their points."""
+        """Return the ends of all vertices, and their points."""
         places, point = self.paths.outline.places, np.asarray(self.cluster, dtype=np.int64)
         letters, row = flatten_words(self.signatures)
         return Ends(places[point], self.paths.slits.cells(places[:, 0])[point], letters, row), point
 
 
 def _measure_in_time(clock: Clock, find: Callable[[], object], classes: int) -> None:
-    """Find legs until the clock is up; LimitReachedError if it was."""
+    """Find legs until the clock is up; raise LimitReachedError if it was."""
     clock.interruptible(find)
     if clock.flag[0]:
         raise LimitReachedError(

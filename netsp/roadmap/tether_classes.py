@@ -1,4 +1,4 @@
-"""The taut tether to any place, while somebody moves a cursor there.
+"""Taut tether to any place, while somebody moves a cursor.
 
 The tangents between the arcs and the base are found once. For a new place only its own tangents are
 added, and a search from there (`netsp.roadmap.explore`) finds the taut paths to the base.
@@ -27,16 +27,16 @@ from netsp.roadmap.trie import Trie
 
 @dataclass(frozen=True, eq=False)
 class TautTether(ComparesArrays):
-    """A taut tether from the base to a place.
+    """Taut tether from the base to a place.
 
     Parameters
     ----------
     word : Word
-        Its h-signature.
+        H-signature.
     length : float
-        In 3D, in the problem's units.
+        Length in 3D, in the problem's units.
     path : ndarray, shape (n, 3)
-        Its polyline, base first.
+        Polyline, base first.
     """
 
     word: Word
@@ -45,12 +45,12 @@ class TautTether(ComparesArrays):
 
 
 class Tethers:
-    """Taut tethers from a problem's base to any place, in any class, quickly again and again.
+    """Taut tethers from a problem's base to any place, in any class, fast enough for a cursor.
 
     Parameters
     ----------
     problem : Problem
-        Its base, obstacles, bounds and tether length count.
+        Problem whose base, obstacles, bounds and tether length count.
     policy : RoadmapPolicy, optional
         Policy of the search for paths.
 
@@ -78,29 +78,22 @@ class Tethers:
         )
 
     def to(self, x: float, y: float, word: Word | None = None, z: float = 0.0) -> TautTether | None:
-        """The taut tether to a place.
+        """Return the taut tether to a place, by default the shortest of all classes.
+
+        The result is None if no tether of that class within the tether's length leads there, or if
+        the place lies in an obstacle or out of bounds.
 
         Parameters
         ----------
-        x : float
-            Of the place, in the problem's units.
-        y : float
-            Of the place.
+        x, y, z : float
+            Place, in the problem's units.
         word : Word, optional
-            The class; None takes the shortest of all.
-        z : float
-            Height of the place.
-
-        Returns
-        -------
-        TautTether or None
-            None where no tether of that class within the tether's length leads there, or where the
-            place lies in an obstacle or out of bounds.
+            Class of the tether.
 
         Raises
         ------
         InputError
-            No finite place.
+            The place is not finite.
         """
         place = self._place(x, y, z)
         if place is None:
@@ -117,26 +110,20 @@ class Tethers:
             limit *= self.policy.tethers.growth
 
     def classes(self, x: float, y: float, z: float = 0.0) -> list[TautTether]:
-        """All taut tethers to a place within the tether's length, the shortest first.
+        """Return all taut tethers to a place within the tether's length, the shortest first.
+
+        There is one for each class; with very long tethers, those found within
+        `TetherPolicy.max_states`.
 
         Parameters
         ----------
-        x : float
-            Of the place, in the problem's units.
-        y : float
-            Of the place.
-        z : float
-            Height of the place.
-
-        Returns
-        -------
-        list of TautTether
-            One for each class; with very long tethers those found within `TetherPolicy.max_states`.
+        x, y, z : float
+            Place, in the problem's units.
 
         Raises
         ------
         InputError
-            No finite place.
+            The place is not finite.
         """
         place = self._place(x, y, z)
         if place is None:
@@ -182,7 +169,7 @@ class Tethers:
 
 
 class _PlacePaths(TautPaths):
-    """Taut paths between the base (point 0) and one place (point 1), whose tangents are there."""
+    """Taut paths between the base (point 0) and one place (point 1), whose tangents are given."""
 
     def __init__(
         self, problem: Problem, outline: Outline, tangents: TangentGraph, policy: RoadmapPolicy
@@ -198,7 +185,7 @@ class _PlacePaths(TautPaths):
         self.max_planar = math.sqrt(max(problem.tether_length**2 - self.rise**2, 0.0))
 
     def all_paths(self, limit: float) -> FoundPaths:
-        """All taut paths from the place to the base, up to a planar length."""
+        """Return all taut paths from the place to the base, up to a planar length."""
         self._trie = Trie.root(limit)
         nowhere = np.zeros(len(self.tangents.target))
         return run_explore(
@@ -213,14 +200,14 @@ class _PlacePaths(TautPaths):
         )
 
     def tether_along(self, found: FoundPaths, hit: int) -> TautTether:
-        """The tether of a path found."""
+        """Return the tether along a path found."""
         word = invert(self._trie.word(int(found.word[hit])))
         xy = self._polyline(1, 0, found.pieces(hit))[::-1]
         length = math.hypot(float(found.length[hit]), self.rise)
         return TautTether(tuple(word), length, self._with_heights(0, 1, xy))
 
     def tether_of_class(self, word: Word) -> TautTether | None:
-        """The tether of a class; None where there is none within the tether's length."""
+        """Return the tether of a class; None if there is none within the tether's length."""
         try:
             length = self.length(0, 1, word)
         except NetspError:

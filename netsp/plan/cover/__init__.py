@@ -1,4 +1,4 @@
-"""Waypoints from the structure: few viewpoints that see what can be seen."""
+"""Waypoints from the structure: few viewpoints that see all that can be seen of it."""
 
 from netsp.plan.cover.cover_plan import Cover, cover
 

@@ -1,8 +1,8 @@
-"""The fewest viewpoints that see a share of the surface: a set cover, in part and weighted.
+"""Fewest viewpoints that see a share of the surface: a partial, weighted set cover.
 
-Greedy first: the viewpoint that shows most of what is not seen yet (within a factor of 1 + ln n of
-the fewest; Chvátal 1979, for part of it Slavík 1997). Then an integer program, whose relaxation
-gives a bound on every choice among these viewpoints:
+First greedily: the viewpoint that shows most of what is not seen yet (within a factor of 1 + ln n
+of the fewest; Chvátal 1979, for a partial cover Slavík 1997). Then by an integer program, whose
+relaxation gives a bound on every choice among these viewpoints:
 
     minimise   sum of x_c
     subject to y_p <= sum of x_c over the viewpoints c that see patch p,
@@ -25,14 +25,14 @@ from netsp.plan.cover.cover_policy import CoverPolicy
 
 @dataclass(frozen=True, eq=False)
 class Choice(ComparesArrays):
-    """Viewpoints that were chosen.
+    """Chosen viewpoints.
 
     Parameters
     ----------
     chosen : ndarray of int
-        Their numbers, ascending.
+        Numbers of the viewpoints, ascending.
     bound : int
-        No choice that sees as much has fewer.
+        Lower bound on the number of viewpoints that see as much.
     """
 
     chosen: Ints
@@ -42,25 +42,18 @@ class Choice(ComparesArrays):
 def choose(
     sees: Bools, areas: Floats, share: float, clock: Clock, policy: CoverPolicy | None = None
 ) -> Choice:
-    """Choose viewpoints.
+    """Choose few viewpoints.
 
     Parameters
     ----------
     sees : ndarray of bool, shape (n, m)
-        Which patches are seen from which viewpoint.
+        Whether each viewpoint sees each patch.
     areas : ndarray, shape (m,)
-        Of the patches.
+        Areas of the patches.
     share : float
-        Of what any of them sees, by area.
+        Share, by area, of what any viewpoint sees.
     clock : Clock
         When it is up, the integer program ends with what it has.
-    policy : CoverPolicy, optional
-        Limit of the integer program.
-
-    Returns
-    -------
-    Choice
-        As few as were found.
     """
     policy = policy or CoverPolicy()
     matrix, weights = merge_patches(sees, areas)
@@ -76,22 +69,8 @@ def choose(
 
 
 def merge_patches(sees: Bools, areas: Floats) -> tuple[Bools, Floats]:
-    """Patches that the same viewpoints see as one; those that none sees are left out.
-
-    Parameters
-    ----------
-    sees : ndarray of bool, shape (n, m)
-        Which patches are seen from which viewpoint.
-    areas : ndarray, shape (m,)
-        Of the patches.
-
-    Returns
-    -------
-    matrix : ndarray of bool, shape (n, k)
-        Which of these are seen from which viewpoint.
-    weights : ndarray, shape (k,)
-        Their areas.
-    """
+    """Merge the patches that the same viewpoints see, and drop those that none sees. Return the (n,
+    k) matrix of what each viewpoint sees, and (k,) areas."""
     some = sees.any(axis=0) & (areas > 0.0)
     packed = np.packbits(sees[:, some], axis=0)
     _, first, which = np.unique(packed, axis=1, return_index=True, return_inverse=True)
@@ -100,22 +79,8 @@ def merge_patches(sees: Bools, areas: Floats) -> tuple[Bools, Floats]:
 
 
 def choose_greedily(matrix: Bools, weights: Floats, needed: float) -> Ints:
-    """The viewpoint that shows most of what is not seen yet, again and again.
-
-    Parameters
-    ----------
-    matrix : ndarray of bool, shape (n, k)
-        Which patches are seen from which viewpoint.
-    weights : ndarray, shape (k,)
-        Areas.
-    needed : float
-        That are to be seen.
-
-    Returns
-    -------
-    ndarray of int
-        Viewpoints.
-    """
+    """Choose, again and again, the viewpoint that shows most of what is not seen yet, until the
+    needed area is seen."""
     left, seen, taken = weights.copy(), 0.0, []
     numbers = matrix.astype(float)
     while seen < needed * (1.0 - 1e-12):
@@ -130,24 +95,7 @@ def choose_greedily(matrix: Bools, weights: Floats, needed: float) -> Ints:
 
 
 def prune(matrix: Bools, weights: Floats, taken: Ints, needed: float) -> Ints:
-    """Without those that are not needed beside the others.
-
-    Parameters
-    ----------
-    matrix : ndarray of bool, shape (n, k)
-        Which patches are seen from which viewpoint.
-    weights : ndarray, shape (k,)
-        Areas.
-    taken : ndarray of int
-        Viewpoints.
-    needed : float
-        Area that is to be seen.
-
-    Returns
-    -------
-    ndarray of int
-        Viewpoints.
-    """
+    """Drop viewpoints, the least useful first, as long as the others see the needed area."""
     kept = list(taken)
     times = matrix[kept].sum(axis=0)
     seen = float(weights[times > 0].sum())
@@ -162,22 +110,8 @@ def prune(matrix: Bools, weights: Floats, taken: Ints, needed: float) -> Ints:
 
 
 def counting_bound(matrix: Bools, weights: Floats, needed: float) -> int:
-    """So many of those that show most, each for itself, would be needed if none showed twice.
-
-    Parameters
-    ----------
-    matrix : ndarray of bool, shape (n, k)
-        Which patches are seen from which viewpoint.
-    weights : ndarray, shape (k,)
-        Areas.
-    needed : float
-        Area that is to be seen.
-
-    Returns
-    -------
-    int
-        A number of viewpoints.
-    """
+    """Return a lower bound on the number of viewpoints: as if no patch were seen from two of
+    them."""
     if needed <= 0.0:
         return 0
     shown = np.sort(matrix.astype(float) @ weights)[::-1]
@@ -187,26 +121,8 @@ def counting_bound(matrix: Bools, weights: Floats, needed: float) -> int:
 def solve_program(
     matrix: Bools, weights: Floats, needed: float, clock: Clock
 ) -> tuple[Ints | None, int]:
-    """The integer program, as far as time allows.
-
-    Parameters
-    ----------
-    matrix : ndarray of bool, shape (n, k)
-        Which patches are seen from which viewpoint.
-    weights : ndarray, shape (k,)
-        Areas.
-    needed : float
-        That are to be seen.
-    clock : Clock
-        When it is up, the program ends.
-
-    Returns
-    -------
-    chosen : ndarray of int or None
-        Viewpoints; None if there was no time for any.
-    bound : int
-        No choice has fewer.
-    """
+    """Solve the integer program as far as time allows. Return the viewpoints, None if there was no
+    time for any, and a lower bound on their number."""
     from scipy import sparse
     from scipy.optimize import Bounds, LinearConstraint, milp
 

@@ -1,4 +1,4 @@
-"""From a scene to a mission: few waypoints with headings that see what can be seen of it."""
+"""Plan of a mission from a scene: few waypoints with headings that see all that can be seen."""
 
 from __future__ import annotations
 
@@ -38,21 +38,21 @@ class Cover(ComparesArrays):
     Parameters
     ----------
     mission : Mission
-        With the waypoints and the camera.
+        Mission with the waypoints and the camera.
     viewpoints : Viewpoints
-        Those that were chosen.
+        Chosen viewpoints.
     patches : Patches
-        What is to be seen.
+        Surface to be seen.
     candidates : int
-        How many viewpoints there were to choose from.
+        Number of viewpoints to choose from.
     bound : int
-        No choice among these that sees as much has fewer.
+        Lower bound on the number of viewpoints among these that see as much.
     seen : float
         Share of the whole surface that is seen from the waypoints.
     visible : float
         Share of it that is seen from any of the candidates.
     visible_patches : ndarray of bool, shape (m,)
-        Patches that are seen from any of the candidates.
+        Whether each patch is seen from any of the candidates.
     """
 
     mission: Mission
@@ -65,7 +65,7 @@ class Cover(ComparesArrays):
     visible_patches: Bools
 
     def __repr__(self) -> str:
-        """In a line."""
+        """Return the numbers on one line."""
         return (
             f"<Cover: {len(self.viewpoints)} viewpoints (no fewer than {self.bound}) see "
             f"{100 * self.seen:.1f} % of the surface, all {self.candidates} see "
@@ -96,31 +96,31 @@ def cover(
     Parameters
     ----------
     scene : Scene
-        What is to be seen.
+        Scene that is to be seen.
     anchor : (x, y, z)
-        Where the tether is fixed, metres.
+        Point where the tether is fixed, metres.
     start : (x, y, z), optional
-        Where the robot starts; the anchor by default, metres.
+        Point where the robot starts; the anchor by default, metres.
     camera : Camera, optional
-        That it is seen with.
+        Camera of the robot.
     standoff : float, optional
-        Metres from the surface; half the camera's range by default.
+        Distance from the surface, metres; half the camera's range by default.
     tether_length : float, optional
         Metres; waypoints need no more. By default a tenth more than they need.
     clearance : float
-        Metres that the robot keeps from all solids.
+        Distance that the robot keeps from all solids, metres.
     share : float
-        Of the surface that can be seen at all, by area.
+        Share, by area, of the surface that can be seen at all.
     incidence : float
-        Most that a line of sight is off the normal, degrees.
+        Largest angle between a line of sight and the normal, degrees.
     farthest : float, optional
-        Metres that a patch may be away; the camera's range by default.
+        Largest distance of a patch that is seen, metres; the camera's range by default.
     inspect : tuple of str, optional
         Names of the solids to be seen; all but half spaces and the sea floor by default.
     time_limit : float or Clock, optional
-        Seconds; when they are up, the best by then is returned.
+        Seconds; when they are up, the best result by then is returned.
     seed : int
-        Of all that is random.
+        Seed of all random choices.
     on_progress : callable, optional
         Called with a line of text now and then.
     policy : CoverPolicy, optional
@@ -129,8 +129,8 @@ def cover(
     Returns
     -------
     Cover
-        The waypoints, as a mission for `netsp.plan.space.mission_solver.solve_mission`, whose order
-        says nothing.
+        Waypoints, as a mission for `netsp.plan.space.mission_solver.solve_mission`. Their order has
+        no meaning.
 
     Raises
     ------
@@ -233,7 +233,7 @@ def _check(
 
 @dataclass
 class _Reach:
-    """Where the robot gets to on its tether."""
+    """Region to which the robot gets on its tether."""
 
     mission: Mission
     field: DistanceField
@@ -251,7 +251,7 @@ class _Reach:
         standoff: float,
         policy: CoverPolicy,
     ) -> _Reach:
-        """With a grid about everything that viewpoints may be at."""
+        """Return the region, with a grid about all places where viewpoints may be."""
         low, high = extent(scene, np.vstack([patches.centres, mission.every_place]))
         room = 2.0 * standoff
         corners = np.array([low - room, high + room])
@@ -268,7 +268,7 @@ class _Reach:
         return cls(mission, field, grid_of(there, scene, field), bounds, policy)
 
     def allowed(self, places: Floats) -> Bools:
-        """Which of some places (n, 3) the robot gets to, within the bounds."""
+        """Return which of places (n, 3) the robot gets to, within the bounds."""
         good = np.ones(len(places), dtype=bool)
         if self.bounds is not None:
             good &= (places >= self.bounds[0]).all(axis=1) & (places <= self.bounds[1]).all(axis=1)
@@ -282,7 +282,7 @@ class _Reach:
         return good
 
     def tethers(self, places: Floats) -> Floats:
-        """(n,) the shortest tethers to places (n, 3), metres; infinite where there is none."""
+        """Return the shortest tethers (n,) to places (n, 3), metres; inf where there is none."""
         anchor = np.array(self.mission.anchor)
         tree = ShortestTree(self.grid, anchor, places)
         out = np.full(len(places), np.inf)

@@ -1,4 +1,4 @@
-"""Viewpoints that may take the place of those chosen, one for one, in any combination."""
+"""Viewpoints that may take the place of chosen ones, one for one, in any combination."""
 
 from __future__ import annotations
 
@@ -16,30 +16,19 @@ def find_alternatives(
     needed: float,
     policy: CoverPolicy | None = None,
 ) -> list[list[int]]:
-    """Alternatives of each chosen viewpoint.
+    """Return the numbers of the alternatives of each chosen viewpoint.
 
-    Every patch that is seen gets one owner among the chosen. Who takes a viewpoint's place loses
-    what that owns and itself does not see; whichever are taken, no more is lost than is seen beyond
-    what is needed. Only places nearer to some other chosen viewpoint count, for they make tours
-    shorter.
+    Every patch that is seen gets one owner among the chosen. A viewpoint in an owner's place loses
+    the patches of that owner that it does not see itself. Whichever alternatives are taken, no more
+    is lost than is seen beyond what is needed. Only places nearer to another chosen viewpoint
+    count, because they make tours shorter.
 
     Parameters
     ----------
-    found : Viewpoints
-        All candidates.
-    chosen : ndarray of int
-        Numbers of those chosen.
     areas : ndarray, shape (m,)
-        Of the patches.
+        Areas of the patches.
     needed : float
-        Area that is to be seen.
-    policy : CoverPolicy, optional
-        Limits of the numbers of alternatives and places.
-
-    Returns
-    -------
-    list of list of int
-        Numbers of the alternatives of each.
+        Area that must be seen.
     """
     out: list[list[int]] = [[] for _ in chosen]
     policy = policy or CoverPolicy()
@@ -66,8 +55,8 @@ def find_alternatives(
 
 
 def _owners(sees: np.ndarray) -> Ints:
-    """(m,) one of the viewpoints that see a patch, -1 for none. Who must see much anyway takes the
-    rest of what it sees, so that others are freer."""
+    """Return (m,) one of the viewpoints that see each patch, -1 for none. A viewpoint that is the
+    only one to see much owns the rest of what it sees, too, so that others are freer."""
     alone = sees & (sees.sum(axis=0) == 1)
     owner = np.full(sees.shape[1], -1)
     for k in np.argsort(-alone.sum(axis=1), kind="stable"):

@@ -1,10 +1,10 @@
-"""Places to look at a structure from, and what is seen from each.
+"""Places from which to look at a structure, and what is seen from each.
 
-A viewpoint is a place and a heading; how far the camera is tilted follows as on a flight, where it
-has the nearest patch in the middle as far as its tilt allows (`netsp.world.simulator.coverage`), so
-that what is planned is what `netsp simulate` counts. Patches are spread evenly, and before each the
-robot stands off along the normal; where that place is taken or does not show it, at other angles
-and distances.
+A viewpoint is a place and a heading. The tilt of the camera follows as in a flight, which keeps the
+nearest patch in the middle as far as the tilt allows (`netsp.world.simulator.coverage`), so that
+what is planned is what `netsp simulate` counts. Patches are spread evenly, and before each the
+robot stands off along the normal; if that place is taken or does not show the patch, at other
+angles and distances.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from netsp.world.simulator.coverage import Coverage, Patches
 
 @dataclass(frozen=True, eq=False)
 class Viewpoints(ComparesArrays):
-    """Places to look from.
+    """Viewpoints, and what each sees.
 
     Parameters
     ----------
     places : ndarray, shape (n, 3)
-        Metres.
+        Places, metres.
     headings : ndarray, shape (n,)
         Radians from the x axis towards y.
     sees : ndarray of bool, shape (n, m)
-        Which patches are seen from each.
+        Whether each viewpoint sees each patch.
     """
 
     places: Floats
@@ -45,45 +45,28 @@ class Viewpoints(ComparesArrays):
         return len(self.places)
 
     def only(self, chosen: Ints | Bools) -> Viewpoints:
-        """Some of them.
-
-        Parameters
-        ----------
-        chosen : ndarray
-            Numbers, or whether.
-
-        Returns
-        -------
-        Viewpoints
-            Those.
-        """
+        """Return the viewpoints of given numbers, or where a mask is true."""
         return Viewpoints(self.places[chosen], self.headings[chosen], self.sees[chosen])
 
 
 @dataclass
 class Viewer:
-    """What is asked of viewpoints.
+    """Limits of viewpoints, and what can be seen within them.
 
     Parameters
     ----------
-    field : DistanceField
-        The scene.
-    patches : Patches
-        What is to be seen.
-    camera : Camera
-        That it is seen with.
     standoff : float
-        Metres from the surface.
+        Distance from the surface, metres.
     clearance : float
-        Metres that the robot keeps from all solids.
+        Distance that the robot keeps from all solids, metres.
     incidence : float
-        Most that a line of sight is off the normal, radians.
+        Largest angle between a line of sight and the normal, radians.
     farthest : float
-        Metres that a patch may be away.
+        Largest distance of a patch that is seen, metres.
     allowed : callable
-        Which of some places (n, 3) the robot gets to.
+        Function that returns which of places (n, 3) the robot gets to.
     policy : CoverPolicy
-        How densely places are tried.
+        Policy of how densely places are tried.
     """
 
     field: DistanceField
@@ -97,20 +80,7 @@ class Viewer:
     policy: CoverPolicy
 
     def seen_from(self, place: Floats, heading: float) -> Bools:
-        """Which patches are seen.
-
-        Parameters
-        ----------
-        place : ndarray, shape (3,)
-            Metres.
-        heading : float
-            Radians.
-
-        Returns
-        -------
-        ndarray of bool, shape (m,)
-            Whether each is.
-        """
+        """Return whether each patch (m,) is seen from a place with a heading."""
         patches = self.patches
         look = Coverage(patches, self.field, self.camera)
         look.look(place, heading)
@@ -128,23 +98,14 @@ class Viewer:
         return seen
 
     def before(self, targets: Ints, offsets: Floats, far: Floats) -> tuple[Floats, Ints]:
-        """Free places before patches.
+        """Return the free places before patches, and the patch of each.
 
         Parameters
         ----------
-        targets : ndarray of int, shape (n,)
-            The patches.
         offsets : ndarray, shape (n, 3)
-            Added to their normals: other angles.
+            Vectors that are added to the normals, for other angles.
         far : ndarray, shape (n,)
-            How far from each, metres.
-
-        Returns
-        -------
-        places : ndarray, shape (k, 3)
-            Metres.
-        targets : ndarray of int, shape (k,)
-            Of those, the patches.
+            Distance from each patch, metres.
         """
         toward = self.patches.normals[targets] + offsets
         toward /= np.linalg.norm(toward, axis=1)[:, None]
@@ -157,20 +118,7 @@ class Viewer:
         return places, targets
 
     def looks(self, places: Floats, targets: Ints) -> Viewpoints:
-        """Viewpoints at places, looking at patches.
-
-        Parameters
-        ----------
-        places : ndarray, shape (n, 3)
-            Metres.
-        targets : ndarray of int, shape (n,)
-            The patches.
-
-        Returns
-        -------
-        Viewpoints
-            One of each.
-        """
+        """Return a viewpoint at each place, looking at the patch of the same number."""
         toward = self.patches.centres[targets] - places
         headings = np.arctan2(toward[:, 1], toward[:, 0])
         level = np.hypot(toward[:, 0], toward[:, 1]) > 0.2 * np.linalg.norm(toward, axis=1)
@@ -186,23 +134,15 @@ class Viewer:
 def find_viewpoints(
     viewer: Viewer, rng: np.random.Generator, clock: Clock, tell: Callable[[str], None]
 ) -> Viewpoints:
-    """Places before the whole structure.
+    """Return viewpoints before the whole structure, many more than are needed.
+
+    Patches that no viewpoint sees count as hidden. When the clock is up, the viewpoints found by
+    then are returned.
 
     Parameters
     ----------
-    viewer : Viewer
-        What is asked of them.
-    rng : numpy.random.Generator
-        For other angles and distances.
-    clock : Clock
-        When it is up, those found by then are returned.
     tell : callable
         Called with a line of text now and then.
-
-    Returns
-    -------
-    Viewpoints
-        Many more than are needed; patches that none of them sees count as hidden.
     """
     patches, camera = viewer.patches, viewer.camera
     width = 2.0 * viewer.standoff * math.tan(math.radians(0.5 * camera.field_of_view))
@@ -237,7 +177,7 @@ def find_viewpoints(
 
 
 def _around(viewer: Viewer, patches: Ints, rng: np.random.Generator) -> tuple[Ints, Floats, Floats]:
-    """For each patch, other angles and distances to look at it from; straight first."""
+    """Return other angles and distances from which to look at each patch, straight first."""
     tries = viewer.policy.views_per_hidden_patch
     many = np.repeat(patches, tries)
     off = rng.normal(size=(len(many), 3)) * rng.uniform(0.0, 1.2, len(many))[:, None]
@@ -250,20 +190,16 @@ def _around(viewer: Viewer, patches: Ints, rng: np.random.Generator) -> tuple[In
 
 
 def coarsen(patches: Patches, size: float) -> Patches:
-    """Patches of one cube of space that face the same of six ways as one: tubes are drawn by
-    slivers, of which a view shows hundreds. Its place is that of the patch in their middle.
+    """Return patches that stand for all patches in one cube of space that face the same of six
+    ways.
+
+    Tubes are drawn with slivers, of which a view shows hundreds. The place of a coarse patch is
+    that of the patch in the middle, and areas add up.
 
     Parameters
     ----------
-    patches : Patches
-        Of a scene.
     size : float
-        Of the cubes, metres.
-
-    Returns
-    -------
-    Patches
-        Of the same area.
+        Edge of the cubes, metres.
     """
     count = len(patches.areas)
     normals = patches.normals
@@ -286,21 +222,8 @@ def coarsen(patches: Patches, size: float) -> Patches:
 
 
 def spread_out(points: Floats, apart: float) -> Ints:
-    """Points so far apart that balls about them hold all others: each is the one farthest from
-    those taken before (Gonzalez 1985).
-
-    Parameters
-    ----------
-    points : ndarray, shape (n, 3)
-        The points.
-    apart : float
-        Radius of the balls.
-
-    Returns
-    -------
-    ndarray of int, shape (k,)
-        Their numbers.
-    """
+    """Return the numbers of points so far apart that balls of radius `apart` about them hold all
+    others. Each is the one farthest from those before (Gonzalez 1985)."""
     taken = [0]
     far = np.linalg.norm(points - points[0], axis=1)
     while True:

@@ -1,4 +1,4 @@
-"""What is asked about a tour before it is flown: how long a tether, where to stand, what margin."""
+"""Questions before a tour: the length of the tether, the place of the base, the margins."""
 
 from netsp.base.deprecated import deprecated_names
 from netsp.plan.sizing.base_placement import BaseSearch, Candidate, best_base

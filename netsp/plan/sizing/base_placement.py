@@ -1,10 +1,10 @@
-"""Where to stand: the base, among candidates, from which the tour is shortest, with proof.
+"""Base, among candidates, from which the tour is shortest, with proof.
 
-For every candidate the shortest sufficient tether is the length of the shortest path to the goal
+The shortest sufficient tether of a candidate is the length of the shortest path to the goal
 farthest from it, and those lengths, for all candidates and goals, come from one graph of tangents.
-So does a bound on the tour: the travelling salesperson's over the shortest paths between goals and
-candidate in any class. Candidates are solved in the order of their bounds, until the best tour is
-no longer than the bound of the next: the others need no solve to be proven worse.
+So does a bound on the tour: that of the travelling salesperson over the shortest paths between
+goals and candidate in any class. Candidates are solved in the order of their bounds, until the best
+tour is no longer than the next bound: the others are then proven worse without a solve.
 """
 
 from __future__ import annotations
@@ -60,24 +60,24 @@ HEAD = (
 
 @dataclass(frozen=True)
 class Candidate:
-    """A place for the base.
+    """Candidate for the base.
 
     Parameters
     ----------
     position : tuple of float
         (x, y, z), in the problem's units.
     name : str
-        For people; its number where it has none.
+        Name for people; by default its number.
     shortest_tether : float
-        With less, some goal cannot be reached from here; inf where a goal is cut off.
+        Shortest tether that reaches every goal from here; inf if a goal is cut off.
     lower_bound : float
-        No tour from here is shorter; inf where there is none.
+        Lower bound on tours from here; inf if there is none.
     length : float or None
-        Of the best tour found from here; None where it was not sought.
+        Length of the best tour found from here; None if none was sought.
     status : Status or None
-        What is proven of that tour; `infeasible` where there is none; None where it was not sought.
+        What is proven of that tour; `infeasible` if there is none; None if none was sought.
     why : str
-        Why there is no tour from here.
+        Reason why there is no tour from here.
     """
 
     position: tuple[float, float, float]
@@ -90,27 +90,28 @@ class Candidate:
 
     @property
     def possible(self) -> bool:
-        """Whether there may be a tour from here."""
+        """Return whether there may be a tour from here."""
         return not self.why
 
     @property
     def bound(self) -> LowerBound:
-        """The lower bound, on all tours from here."""
+        """Return the lower bound, on all tours from here."""
         return LowerBound(self.lower_bound, Scope.ALL_TOURS)
 
 
 @dataclass(frozen=True)
 class BaseSearch(Drawn):
-    """Candidates for the base, the best first.
+    """Ranking of candidates for the base, the best first.
 
     Parameters
     ----------
     problem : Problem
-        With the base that it came with.
+        Problem with its original base.
     candidates : tuple of Candidate
-        Those with a tour by its length, then those that have a bound only, then those without.
+        Candidates with a tour by its length, then those with a bound only, then those without a
+        tour.
     solution : Solution or None
-        The tour from the best of them; None if no candidate has one.
+        Tour from the best candidate; None if no candidate has one.
     proven : bool
         Whether no other candidate has a shorter tour.
     """
@@ -123,12 +124,7 @@ class BaseSearch(Drawn):
     proven: bool
 
     def to_frame(self) -> pandas.DataFrame:
-        """Return the ranking as a pandas DataFrame, a column per field of `Candidate`.
-
-        Returns
-        -------
-        pandas.DataFrame
-            The best candidate first.
+        """Return the ranking as a pandas DataFrame, with a column for each field of `Candidate`.
 
         Raises
         ------
@@ -139,23 +135,17 @@ class BaseSearch(Drawn):
 
     @property
     def best(self) -> Candidate | None:
-        """The candidate with the shortest tour."""
+        """Return the candidate with the shortest tour."""
         first = self.candidates[0]
         return first if first.length is not None else None
 
     @property
     def best_problem(self) -> Problem | None:
-        """The problem with its base at the best candidate."""
+        """Return the problem with its base at the best candidate."""
         return None if self.best is None else _with_base(self.problem, self.best.position)
 
     def to_json(self) -> str:
-        """The ranking as JSON.
-
-        Returns
-        -------
-        str
-            Object with the candidates in a list.
-        """
+        """Return the ranking as a JSON object with the candidates in a list."""
         rows = [
             {
                 "name": c.name,
@@ -178,13 +168,7 @@ class BaseSearch(Drawn):
         return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
     def to_csv(self) -> str:
-        """The ranking as a table.
-
-        Returns
-        -------
-        str
-            A row for every candidate.
-        """
+        """Return the ranking as a CSV table, with a row for every candidate."""
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
         table.writerow(HEAD)
@@ -205,17 +189,12 @@ class BaseSearch(Drawn):
         return text.getvalue()
 
     def save(self, file: str | Path) -> None:
-        """Write the ranking: a table if the name ends in ``.csv``, else JSON.
-
-        Parameters
-        ----------
-        file : str or Path
-            The file.
+        """Write the ranking: a table if the name ends in ``.csv``, otherwise JSON.
 
         Raises
         ------
         InputError
-            It cannot be written.
+            The file cannot be written.
         """
         write_text(file, self.to_csv() if Path(file).suffix.lower() == ".csv" else self.to_json())
 
@@ -231,31 +210,32 @@ def best_base(
     on_candidate: Callable[[Candidate, int], None] | None = None,
     policy: SizingPolicy | None = None,
 ) -> BaseSearch:
-    """The base, among candidates, from which the tour of a problem is shortest.
+    """Find the base, among candidates, from which the tour of a problem is shortest.
 
     Parameters
     ----------
     problem : Problem
-        Its own base does not count.
+        Problem whose own base does not count.
     candidates : array_like, shape (k, 2) or (k, 3)
         Places, in the problem's units; without z at the height of the problem's base.
     names : sequence of str, optional
-        Of the candidates.
+        Names of the candidates.
     every : bool
-        Solve from every candidate, also where its bound proves it worse.
+        Whether every candidate is solved, even if its bound proves it worse.
     time_limit : float or Clock, optional
-        Seconds for all; the best known by then, or at Ctrl-C, is returned.
+        Seconds in all; the best known by then, or at Ctrl-C, is returned.
     seed : int
-        Of all that is random.
+        Seed of all random choices.
     on_candidate : callable, optional
-        Called with every candidate that was solved, and how many may still be better.
+        Called with every candidate that was solved, and the number of those that may still be
+        better.
     policy : SizingPolicy, optional
         Limit of the number of candidates.
 
     Returns
     -------
     BaseSearch
-        The ranking, and the best tour.
+        Ranking, and the best tour.
 
     Raises
     ------
@@ -282,7 +262,7 @@ def _solve_candidates(
     seed: int,
     on_candidate: Callable[[Candidate, int], None] | None,
 ) -> BaseSearch:
-    """Solve from the candidates, the most promising first, until none can be better."""
+    """Solve from the candidates, the most promising first, until no other can be better."""
     order = sorted(range(len(rated)), key=lambda k: (rated[k].lower_bound, k))
     best: Solution | None = None
     for n, k in enumerate(order):
@@ -322,7 +302,7 @@ def _solve_candidates(
 
 
 def _is_worse(candidate: Candidate, best: Solution | None) -> bool:
-    """Whether a candidate is proven to have no shorter tour."""
+    """Return whether a candidate is proven to have no shorter tour."""
     length = None if best is None else best.length
     if length is None:
         return not candidate.possible
@@ -330,13 +310,14 @@ def _is_worse(candidate: Candidate, best: Solution | None) -> bool:
 
 
 def _with_base(problem: Problem, position: Sequence[float]) -> Problem:
-    """The problem from another base. What its origin says holds of the old base only."""
+    """Return the problem with another base. Its origin holds for the old base only, and is
+    dropped."""
     data = problem.model_dump(exclude={"origin"})
     return Problem.model_validate({**data, "base": tuple(position)})
 
 
 def _checked_places(problem: Problem, candidates: npt.ArrayLike, policy: SizingPolicy) -> Floats:
-    """(k, 3) finite places."""
+    """Return the (k, 3) finite places."""
     try:
         given = np.atleast_2d(np.asarray(candidates, dtype=float))
     except (TypeError, ValueError):
@@ -354,7 +335,7 @@ def _checked_places(problem: Problem, candidates: npt.ArrayLike, policy: SizingP
 
 
 def _check_crop(problem: Problem, places: Floats, names: Sequence[str | None] | None) -> None:
-    """Raise an `InputError` where a tether would leave the part of the map that was imported."""
+    """Raise InputError if a tether would leave the part of the map that was imported."""
     circle = None if problem.site is None else problem.site.cropped
     if circle is None:
         return
@@ -375,7 +356,7 @@ def _check_crop(problem: Problem, places: Floats, names: Sequence[str | None] | 
 def _rate_candidates(
     problem: Problem, places: Floats, names: Sequence[str | None] | None, clock: Clock, seed: int
 ) -> list[Candidate]:
-    """Candidates with their shortest tethers and bounds."""
+    """Return the candidates with their shortest tethers and bounds."""
     blocked = [_obstruction(problem, p) for p in places]
     free = [k for k, why in enumerate(blocked) if not why]
     tethers, between = shortest_paths(problem, places[free])
@@ -405,7 +386,7 @@ def _rate_candidates(
 
 
 def _obstruction(problem: Problem, place: Floats) -> str:
-    """Why no base can be at a place."""
+    """Return why no base can be at a place; empty if it can."""
     if problem.bounds is not None:
         low, high = np.array(problem.bounds[:2]), np.array(problem.bounds[2:])
         if (place[:2] < low - problem.tolerance).any() or (
@@ -421,21 +402,16 @@ def _obstruction(problem: Problem, place: Floats) -> str:
 
 
 def shortest_paths(problem: Problem, places: Floats) -> tuple[Floats, Floats]:
-    """Shortest paths in any class.
+    """Return the lengths of shortest paths in any class, in 3D; inf where there is no path.
 
-    Parameters
-    ----------
-    problem : Problem
-        Its base and tether do not count.
-    places : ndarray, shape (k, 3)
-        In the problem's units.
+    Base and tether of the problem do not count.
 
     Returns
     -------
     from_places : ndarray, shape (k, goals)
-        Lengths in 3D from places to goals, infinite where there is no path.
+        Lengths from places to goals.
     between : ndarray, shape (goals, goals)
-        The same between goals.
+        Lengths between goals.
 
     Raises
     ------
@@ -470,7 +446,7 @@ def shortest_paths(problem: Problem, places: Floats) -> tuple[Floats, Floats]:
 
 
 def _farthest_goal(problem: Problem, to: Floats) -> int:
-    """The goal that asks for the longest tether, where of every choice the nearest is taken."""
+    """Return the goal that needs the longest tether; of every choice the nearest counts."""
     nearest = [
         members[np.argmin(to[members])]
         for c in range(1, problem.visits + 1)
@@ -480,8 +456,8 @@ def _farthest_goal(problem: Problem, to: Floats) -> int:
 
 
 def _tour_bound(problem: Problem, to: Floats, between: Floats, clock: Clock, seed: int) -> float:
-    """No tour from a place is shorter than the travelling salesperson's over shortest paths, one
-    goal of each choice, in any order."""
+    """Return a lower bound on tours from a place: that of the travelling salesperson over shortest
+    paths, one goal of each choice, in any order."""
     within = np.flatnonzero(np.isfinite(to))
     to, between = to[within], between[np.ix_(within, within)]
     n = len(to)

@@ -1,5 +1,5 @@
-"""Candidates for a base along a line or over a grid; `netsp.exchange.maps.csv_table` reads those of
-a table."""
+"""Candidates for a base along a line or over a grid. Those of a table are read by
+`netsp.exchange.maps.csv_table`."""
 
 from __future__ import annotations
 
@@ -11,22 +11,12 @@ from netsp.model.problem import Problem
 
 
 def along_line(text: str) -> Floats:
-    """Places along a line given as ``X1,Y1,X2,Y2,N``.
-
-    Parameters
-    ----------
-    text : str
-        Both ends and the number of places.
-
-    Returns
-    -------
-    ndarray, shape (N, 2)
-        In the problem's units.
+    """Return places (N, 2) along a line given as ``X1,Y1,X2,Y2,N``.
 
     Raises
     ------
     InputError
-        Something else.
+        The text is something else.
     """
     try:
         x1, y1, x2, y2, count = (float(v) for v in text.split(","))
@@ -39,24 +29,13 @@ def along_line(text: str) -> Floats:
 
 
 def over_grid(text: str, problem: Problem) -> Floats:
-    """Places of a grid given as ``NX,NY`` over the problem's bounds, or over what it holds.
-
-    Parameters
-    ----------
-    text : str
-        Numbers of places to either side.
-    problem : Problem
-        Whose base is sought.
-
-    Returns
-    -------
-    ndarray, shape (NX * NY, 2)
-        In the problem's units.
+    """Return places (NX * NY, 2) of a grid given as ``NX,NY`` over the problem's bounds, or over
+    all its points and obstacles.
 
     Raises
     ------
     InputError
-        Something else.
+        The text is something else.
     """
     try:
         across, up = (int(v) for v in text.replace("x", ",").split(","))

@@ -65,7 +65,7 @@ class ClearanceRoom:
     most
         Distance of base, goals and robot to the nearest obstacle, in the problem's units.
     place, obstacle
-        Names of the place and the obstacle that are so near.
+        Names of the place and the obstacle at this distance.
     """
 
     most: float
@@ -75,13 +75,7 @@ class ClearanceRoom:
 
 def clearance_room(problem: Problem) -> ClearanceRoom | None:
     """Return the largest clearance with which base, goals and robot lie in free water; None if
-    there are no obstacles. Goals that lie in obstacles by now, as in a run, do not count.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
-    """
+    there are no obstacles. Goals that already lie in obstacles, as in a run, do not count."""
     if not problem.obstacles:
         return None
     names = ["the base", *map(problem.goal_label, range(len(problem.goals)))]
@@ -103,25 +97,21 @@ def clearance_advice(
     margin: float = 0.0,
     room: ClearanceRoom | None = None,
 ) -> str | None:
-    """Return a warning if a plan has too little clearance to be flown.
+    """Return a line that warns of too little clearance to fly a plan, and says which number to
+    raise; None if there is enough.
+
+    Clearances in units that are not lengths are not checked.
 
     Parameters
     ----------
     clearance : float
         Clearance of the plan, in its units.
     units : str
-        Units of the plan; clearances in units that are not lengths are not checked.
-    policy : ClearancePolicy, optional
-        How much a vehicle needs.
+        Units of the plan.
     margin : float
         Margin that the plan was made with, which counts as clearance, in its units.
     room : ClearanceRoom, optional
         Largest clearance that the problem can have.
-
-    Returns
-    -------
-    str or None
-        One line, which says what number to raise; None if there is enough.
     """
     p = policy or ClearancePolicy()
     metres = metres_per_unit(units)

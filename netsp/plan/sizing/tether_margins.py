@@ -1,11 +1,11 @@
-"""With what margin: how far the world may be off before a tour does not fit any more.
+"""Margins of a tour: how far the world may be off before the tour does not fit any more.
 
 Say that every obstacle is moved or grown so that none of its points comes to lie farther than r
-from where the obstacle was said to be. Then the one whose obstacles are all grown by r holds that
-world: what is free among grown obstacles is free in it, and paths there have the same class in it.
-So the taut tether of a class is no longer than among the grown obstacles, and the tour, pulled taut
-in its own classes, is free. Tethers never get shorter as r grows: the largest r for which all of a
-tour fit is found by bisection, and what is stated is an r for which all were measured.
+from where the obstacle was assumed. The obstacles grown by r then hold those of that world: what is
+free among grown obstacles is free in it, and paths there have the same class in it. So the taut
+tether of a class is no longer than among the grown obstacles, and the tour, pulled taut in its own
+classes, is free. Tethers never get shorter as r grows: the largest r for which all tethers of a
+tour fit is found by bisection, and the stated r is one for which all were measured.
 """
 
 from __future__ import annotations
@@ -33,24 +33,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class VisitMargin:
-    """What is left at one visit.
+    """Margin at one visit.
 
     Parameters
     ----------
     goal : int
         Index of the goal, from 0.
     name : str
-        Of the goal.
+        Name of the goal.
     tether : float
         Length of the taut tether.
     slack : float
-        What may be lost of the tether before this goal is out of reach in its class.
+        Length that may be lost of the tether before this goal is out of reach in its class.
     turning : float
-        Sum of the angles by which the tether bends, radians, in the plane.
+        Sum of the angles by which the tether bends in the plane, radians.
     tension_ratio : float
-        Tension at the far end over that at the robot, by the capstan's formula.
+        Tension at the far end over that at the robot, by the capstan equation.
     clearance : float
-        From the tether or the goal to the nearest obstacle, as drawn.
+        Distance from the tether or the goal to the nearest obstacle, as drawn.
     """
 
     goal: int
@@ -64,23 +64,24 @@ class VisitMargin:
 
 @dataclass(frozen=True)
 class Margins:
-    """How far the world may be off before a tour does not fit any more; lengths in problem's units.
+    """Margins of a tour; lengths are in the problem's units.
 
     Parameters
     ----------
     obstacles : float
-        Every obstacle may be off by so much, moved or grown.
+        Distance by which every obstacle may be off, moved or grown.
     limited_by : str
         What ends that.
     tether : float
-        So much of the tether may be lost before a goal is.
+        Length of tether that may be lost before a goal is.
     cross_track : float
-        The robot may be so far beside its path without leaving its class or outstretching the
-        tether; what its body needs beyond its centre is in the problem's clearance.
+        Distance by which the robot may be beside its path without leaving its class or
+        outstretching the tether. What its body needs beyond its centre is in the problem's
+        clearance.
     friction : float
-        Coefficient that the tension ratios are for.
+        Coefficient of friction for the tension ratios.
     visits : tuple of VisitMargin
-        In the order of the visits.
+        Margins in the order of the visits.
     """
 
     obstacles: float
@@ -92,12 +93,7 @@ class Margins:
     stops = deprecated_method("stops", "visits")
 
     def to_frame(self) -> pandas.DataFrame:
-        """Return the visits as a pandas DataFrame, a column per field of `VisitMargin`.
-
-        Returns
-        -------
-        pandas.DataFrame
-            In the order of the visits.
+        """Return the visits as a pandas DataFrame, with a column for each field of `VisitMargin`.
 
         Raises
         ------
@@ -107,14 +103,8 @@ class Margins:
         return frame_of(self.visits)
 
     def to_json(self) -> str:
-        """The margins as JSON.
-
-        Returns
-        -------
-        str
-            Object with the stops in a list; null stands for a margin without limit, as there is
-            where a problem has no obstacles.
-        """
+        """Return the margins as a JSON object with the visits in a list, `stops`. A margin without
+        limit, as without obstacles, is null."""
         data = asdict(self)
         data["stops"] = data.pop("visits")
         for part in (data, *data["stops"]):
@@ -129,29 +119,24 @@ def margins(
     *,
     policy: SizingPolicy | None = None,
 ) -> Margins:
-    """The margins of a tour.
+    """Return the margins of a tour in its own classes, whatever margin it was planned with.
 
     Parameters
     ----------
     problem : Problem
-        What was solved.
+        Problem that was solved.
     solution : Solution
-        With a tour that fits.
+        Solution with a tour that fits.
     friction : float
         Coefficient of friction of the tether on obstacles, 0 to 10.
     policy : SizingPolicy, optional
-        How exactly the margin is found.
-
-    Returns
-    -------
-    Margins
-        For the classes of the tour, whatever margin it was planned with.
+        Number of bisections.
 
     Raises
     ------
     InputError
-        Friction out of range; no tour, one of another problem, one that starts with the robot
-        out, or that does not fit.
+        Friction out of range; no tour, one of another problem, one that starts with the robot out,
+        or one that does not fit.
     """
     friction = checked_argument("friction", friction, 0.0, MAX_FRICTION)
     if solution.problem.sha256 != problem.sha256:
@@ -192,7 +177,8 @@ def _visit_margin(
 
 
 def _turning(xy: Floats) -> float:
-    """Sum of the angles of a polyline; circumscribed arcs turn as far as the arcs themselves."""
+    """Return the sum of the angles of a polyline; circumscribed arcs turn as far as the arcs
+    themselves."""
     steps = np.diff(xy, axis=0)
     steps = steps[np.hypot(*steps.T) > 0.0]
     if len(steps) < 2:
@@ -203,7 +189,8 @@ def _turning(xy: Floats) -> float:
 
 
 def _obstacle_distance(problem: Problem, path: Floats) -> float:
-    """Least distance from a polyline to an obstacle, without the clearance; inf without any."""
+    """Return the smallest distance from a polyline to an obstacle, without the clearance; inf
+    without obstacles."""
     import shapely
 
     line = shapely.LineString(path[:, :2]) if len(path) > 1 else shapely.Point(path[0, :2])
@@ -218,7 +205,7 @@ def _obstacle_distance(problem: Problem, path: Floats) -> float:
 
 
 def _max_growth(problem: Problem, solution: Solution, policy: SizingPolicy) -> tuple[float, str]:
-    """The largest growth for which all tethers were measured to fit, and what ends it."""
+    """Return the largest growth for which all tethers were measured to fit, and what ends it."""
     if not problem.obstacles:
         return math.inf, "there are no obstacles"
     xy = problem.points[:, :2]
@@ -245,7 +232,7 @@ def _max_growth(problem: Problem, solution: Solution, policy: SizingPolicy) -> t
 
 
 def _misfit(problem: Problem, solution: Solution, growth: float) -> str | None:
-    """What does not fit among obstacles grown by so much; None if all does."""
+    """Return what does not fit among obstacles grown by a length; None if all does."""
     try:
         paths = TautPaths(problem.grown(growth), problem.tether_length * (1.0 + 1e-9))
     except InputError as error:

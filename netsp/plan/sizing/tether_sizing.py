@@ -1,16 +1,16 @@
-"""How long a tether: the shortest tour as a function of the tether's length.
+"""Shortest tour as a function of the tether's length.
 
 A taut tether is longest at the ends of a leg: unrolled class by class, the plane without its
 obstacles is a space (its universal cover, which is CAT(0)) in which the length of the shortest path
 from the base is convex along shortest paths. So a tour's longest tether is that of one of its
 vertices, the shortest tour f(L) with a tether of length L is the shortest over the vertices whose
-tether is at most L, and f is a staircase that falls.
+tether is at most L, and f is a falling staircase.
 
 Its steps are found from above: the shortest tour with the longest tether stays the shortest down to
 the longest tether t that it needs; below t, the vertices with tethers of t and more are gone, and
-what is the shortest then is the next step. Every step takes one solve, and the last ends at the
-shortest sufficient tether, below which some goal is out of reach. Tethers beyond half of a known
-tour never matter (`_max_useful_tether`), however long a tether is asked about.
+the shortest remaining tour is the next step. Every step takes one solve, and the last ends at the
+shortest sufficient tether, below which some goal is out of reach. Tethers longer than half of a
+known tour never matter (`_max_useful_tether`).
 """
 
 from __future__ import annotations
@@ -55,20 +55,21 @@ STEP_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Step:
-    """One step of the staircase.
+    """Step of the staircase.
 
     Parameters
     ----------
     tether : float
-        The least tether length that allows this tour.
+        Shortest tether length that allows this tour.
     until : float
-        Tether length from which on another tour is shorter; of the last step the longest asked for.
+        Tether length from which on another tour is shorter; for the last step the longest asked
+        for.
     length : float
-        Of the tour.
+        Length of the tour.
     lower_bound : float
-        No tour with a tether shorter than `until` is shorter.
+        Lower bound on tours with a tether shorter than `until`.
     status : Status
-        What is proven of it.
+        What is proven of the tour.
     order : tuple of int
         Goals (from 0) in the order of their visits.
     """
@@ -82,33 +83,34 @@ class Step:
 
     @property
     def bound(self) -> LowerBound:
-        """The lower bound, on all tours with such a tether."""
+        """Return the lower bound, on all tours with such a tether."""
         return LowerBound(self.lower_bound, Scope.ALL_TOURS)
 
     @property
     def gap(self) -> float:
-        """(length - lower_bound) / length."""
+        """Return (length - lower_bound) / length."""
         return self.bound.gap(self.length)
 
 
 @dataclass(frozen=True)
 class TetherCurve(Drawn):
-    """The shortest tour for every tether length up to the longest asked for.
+    """Shortest tour for every tether length up to the longest asked for.
 
     Parameters
     ----------
     name : str
-        Of the problem.
+        Name of the problem.
     units : str
-        Of length.
+        Units of length.
     steps : tuple of Step
-        From the shortest tether up.
+        Steps from the shortest tether up.
     shortest : float
-        The shortest sufficient tether: with less, some goal cannot be reached.
+        Shortest sufficient tether: with less, some goal cannot be reached.
     needs : int
-        The goal (from 0) that needs it.
+        Goal (from 0) that needs it.
     whole : bool
-        Whether the staircase goes down to the shortest sufficient tether; else time ran out.
+        Whether the staircase goes down to the shortest sufficient tether; otherwise the time was
+        up.
     """
 
     picture: ClassVar[str] = "netsp.view.pictures.sizing:draw_tether_curve"
@@ -121,12 +123,7 @@ class TetherCurve(Drawn):
     whole: bool
 
     def to_frame(self) -> pandas.DataFrame:
-        """Return the staircase as a pandas DataFrame, a column per field of `Step`.
-
-        Returns
-        -------
-        pandas.DataFrame
-            From the shortest tether up.
+        """Return the staircase as a pandas DataFrame, with a column for each field of `Step`.
 
         Raises
         ------
@@ -137,33 +134,17 @@ class TetherCurve(Drawn):
 
     @property
     def proven(self) -> bool:
-        """Whether every step is the shortest tour of its tether lengths."""
+        """Return whether every step is the shortest tour of its tether lengths."""
         return self.whole and all(s.status is Status.OPTIMAL for s in self.steps)
 
     def length_at(self, tether: float) -> float:
-        """The shortest tour with a tether of some length.
-
-        Parameters
-        ----------
-        tether : float
-            Length of the tether, in the problem's units.
-
-        Returns
-        -------
-        float
-            Its length; inf where no tour is known.
-        """
+        """Return the length of the shortest tour with a tether of some length; inf if no tour is
+        known."""
         fits = [s.length for s in self.steps if s.tether <= tether * (1.0 + STEP_TOLERANCE)]
         return min(fits, default=np.inf)
 
     def to_json(self) -> str:
-        """The curve as JSON.
-
-        Returns
-        -------
-        str
-            Object with the steps in a list.
-        """
+        """Return the curve as a JSON object with the steps in a list."""
         steps = [
             {
                 **vars(s),
@@ -184,13 +165,7 @@ class TetherCurve(Drawn):
         return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
     def to_csv(self) -> str:
-        """The curve as a table.
-
-        Returns
-        -------
-        str
-            A row for every step.
-        """
+        """Return the curve as a CSV table, with a row for every step."""
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
         table.writerow(
@@ -211,17 +186,12 @@ class TetherCurve(Drawn):
         return text.getvalue()
 
     def save(self, file: str | Path) -> None:
-        """Write the curve: a table if the name ends in ``.csv``, else JSON.
-
-        Parameters
-        ----------
-        file : str or Path
-            The file.
+        """Write the curve: a table if the name ends in ``.csv``, otherwise JSON.
 
         Raises
         ------
         InputError
-            It cannot be written.
+            The file cannot be written.
         """
         write_text(file, self.to_csv() if Path(file).suffix.lower() == ".csv" else self.to_json())
 
@@ -236,29 +206,20 @@ def tether_curve(
     on_step: Callable[[Step], None] | None = None,
     policy: SizingPolicy | None = None,
 ) -> TetherCurve:
-    """The shortest tour of a problem as a function of its tether's length.
+    """Return the shortest tour of a problem as a function of its tether's length.
 
     Parameters
     ----------
-    problem : Problem
-        What to solve; its tether length is the longest unless another is given.
     longest : float, optional
-        Longest tether, in the problem's units.
+        Longest tether, in the problem's units; by default that of the problem.
     solver : str
-        Solves every step.
+        Name of the solver for every step.
     time_limit : float or Clock, optional
-        Seconds for all; the steps found so far are returned when it is up, or at Ctrl-C.
-    seed : int
-        Of all that is random.
+        Seconds in all; the steps found so far are returned when they are up, or at Ctrl-C.
     on_step : callable, optional
         Called with every step, from the longest tether down.
     policy : SizingPolicy, optional
-        How many classes are measured at the start.
-
-    Returns
-    -------
-    TetherCurve
-        The staircase.
+        Limit of the number of classes measured at the start.
 
     Raises
     ------
@@ -343,7 +304,7 @@ def _staircase(
 
 
 def _nearest_of_choices(problem: Problem, tethers: Floats) -> Floats:
-    """0 for every goal with an alternative that is nearer."""
+    """Return the tethers with 0 for every goal that has a nearer alternative."""
     out = tethers.copy()
     for c in range(1, problem.visits + 1):
         members = np.flatnonzero(problem.clusters == c)
@@ -354,9 +315,9 @@ def _nearest_of_choices(problem: Problem, tethers: Floats) -> Floats:
 def _max_useful_tether(
     problem: Problem, shortest: float, solver: str, clock: Clock, seed: int
 ) -> float:
-    """The longest tether that can matter. A tour goes out to its longest tether and back, so that
-    one with a tether longer than half of a known tour is longer than that tour; and a tour is known
-    from the shortest sufficient tether."""
+    """Return the longest tether that can matter. A tour goes out to its longest tether and back, so
+    with a tether longer than half of a known tour it is longer than that tour. A tour is known from
+    the shortest sufficient tether."""
     if not shortest < problem.tether_length:
         return problem.tether_length  # out of reach, which will be said; or no choice
     least = min(shortest * (1.0 + REQUEST_TOLERANCE), problem.tether_length)
@@ -371,7 +332,8 @@ def _max_useful_tether(
 def _solve_step(
     graph: TravelGraph, fits: np.ndarray, solver: str, clock: Clock, seed: int, limit: float
 ) -> tuple[Result, np.ndarray]:
-    """The shortest tour over some vertices, with what holds for all classes of such tethers."""
+    """Return the shortest tour over some vertices, with what holds for all classes of such tethers,
+    and the vertices."""
     vertices = np.flatnonzero(fits)
     with graph.on_clock(clock):
         result = solve_graph(graph.subgraph(vertices), solver, time_limit=clock, seed=seed)
