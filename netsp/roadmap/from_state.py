@@ -93,11 +93,11 @@ class GraphFromState(TravelGraph):
 
     @property
     def knows_ways(self) -> bool:
-        """As of `TravelGraph`."""
+        """Return whether the graph without the surcharge does."""
         return self.within.knows_ways
 
     def ways_by_parity(self, up: Callable[[], bool] = lambda: False) -> WaysByParity | None:
-        """As of `TravelGraph`, with the surcharge."""
+        """Return the paths of `TravelGraph`, with the surcharge."""
         ways = self.within.ways_by_parity(up)
         if ways is None or self.start is None:
             return None
