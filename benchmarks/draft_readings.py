@@ -69,7 +69,7 @@ class DraftReading(ReactDraftPlanner):
         onward = pivots.onward(0)
         if onward is None:
             return np.vstack([pivots.points[0], self.waypoint])
-        return self.pulled(onward) if self.is_pulled else onward
+        return self.pull_taut(onward) if self.is_pulled else onward
 
     def candidate(self, pivots: Pivots, n: int) -> float:
         """Return the length of the candidate of pivot n, metres; inf beyond the anchor."""

@@ -204,7 +204,7 @@ def test_what_blocks_a_leg_is_not_met_and_all_is_visited_all_the_same(planned, l
     assert f"waypoint #{leg} is blocked" in repair["reason"]
     # words are told by the scene at the end, and are as in the tour that was mended
     assert words_of_flight(run).as_planned == 4
-    assert run.mission.tour.against(
+    assert run.mission.tour.mismatch(
         run.mission.begin, run.mission.start, run.mission.places, run.mission.reach
     ) is None  # fmt: skip
 

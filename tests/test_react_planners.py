@@ -55,7 +55,7 @@ def planner_of(kind):
     planner = object.__new__(kind)
     planner.mission = TWO_TURNS.model_copy(update={"tether_length": LIMIT})
     planner.rule, planner.index = DraftRule(), 0
-    planner.pulled = planner.refined = lambda path: path
+    planner.pull_taut = planner.refined = lambda path: path
     return planner
 
 

@@ -76,15 +76,20 @@ def test_the_tautest_path_is_sought_until_little_is_to_be_saved_or_enough_was_lo
     paths = [np.array([[0.0, 0, 0], [x, 0, 0]]) for x in lengths]
     planner = object.__new__(PredictivePlanner)
     planner.options = PlannerOptions(looks=looks, metres=metres)
-    planner._looks, planner._looked = 0, 0.0
-    planner._ever_tauter = lambda _: iter(paths)
+    planner._preview_count, planner._previewed_length = 0, 0.0
+    planner._pull_in_stages = lambda _: iter(paths)
 
     that_fit = lengths[: fitting + 1]
     found = []
 
     def fits(_, path, limit):
-        assert not (found and (planner._looks >= looks or planner._looked >= metres))
-        planner._looks, planner._looked = planner._looks + 1, planner._looked + path[1, 0]
+        assert not (
+            found and (planner._preview_count >= looks or planner._previewed_length >= metres)
+        )
+        planner._preview_count, planner._previewed_length = (
+            planner._preview_count + 1,
+            planner._previewed_length + path[1, 0],
+        )
         found.extend(that_fit[that_fit == path[1, 0]])
         return path[1, 0] in that_fit
 
@@ -95,7 +100,7 @@ def test_the_tautest_path_is_sought_until_little_is_to_be_saved_or_enough_was_lo
     else:
         assert taken[1, 0] in that_fit
         assert (
-            planner._looked_enough
+            planner._has_previewed_enough
             or taken[1, 0] * (1.0 - planner.predictive.min_saving) <= that_fit.min() + 1e-9
         )
 

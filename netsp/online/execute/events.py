@@ -154,10 +154,10 @@ def changed(problem: Problem, event: Event, policy: ExecutePolicy = ExecutePolic
             )
     if event.add_goal is not None:
         away = float(np.abs(np.array(event.add_goal.position) - np.array(problem.base)).max())
-        most = WIDEST * max(problem.tether_length, problem.scale)
-        if away > most:
+        max_distance = WIDEST * max(problem.tether_length, problem.scale)
+        if away > max_distance:
             raise InputError(
-                f"add_goal: is {away:.4g} from the base; expected at most {most:.4g}, "
+                f"add_goal: is {away:.4g} from the base; expected at most {max_distance:.4g}, "
                 f"{WIDEST:g} times the size of the problem"
             )
     base = np.array([out.base[:2]])

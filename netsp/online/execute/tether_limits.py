@@ -130,12 +130,12 @@ def _times(over: Sequence[Overrun], units: str, max_times: int = 5) -> str:
     """Return words for the first times at which the tether was over its limit; a log has all."""
     if not over:
         return ""
-    told = [
+    periods = [
         f"{o.begin_s:.1f} to {o.end_s:.1f} s: up to {o.longest:.4g} of {o.limit:g} {units}"
         for o in over[:max_times]
     ]
     rest = f"; {len(over) - max_times} more" if len(over) > max_times else ""
-    return f" ({'; '.join(told)}{rest})"
+    return f" ({'; '.join(periods)}{rest})"
 
 
 def _runs(values: Floats) -> list[tuple[int, int]]:

@@ -264,52 +264,52 @@ class _Run:
 
     def happen(self, event: Event) -> None:
         """Let an event happen, and repair what it breaks."""
-        left, must = self.left, None if self.retreat is None else self.retreat.why
+        left, reason = self.left, None if self.retreat is None else self.retreat.why
         if event.kind == "push":
             assert event.push is not None
             self._push(np.array(event.push))
-            must = "pushed off its path"
+            reason = "pushed off its path"
         else:
             before = self.problem
             self._enter_changed(event)
             if event.kind == "add_goal":
                 new = len(before.goals)
-                left, must = [*left, new], f"{self.problem.goal_label(new)} was added"
+                left, reason = [*left, new], f"{self.problem.goal_label(new)} was added"
             elif event.cancel_goal is not None:
                 gone = index_of(event.cancel_goal, list(before.goals), "cancel_goal")
                 if gone in left:
                     left = [g for g in left if g != gone]
-                    must = f"{before.goal_label(gone)} was cancelled"
+                    reason = f"{before.goal_label(gone)} was cancelled"
                 if self.options.repair and (gone in self.left or gone in self.out.left_out):
                     self.out.left_out.pop(gone, None)
                     self.out.cancelled[gone] = self.now
         if event.tether_length is not None and self.tether.length > event.tether_length:
             self.shorten = True
-        back = self._in_reach_again() if self.options.repair else []
-        if back:
-            names = ", ".join(map(self.problem.goal_label, back))
-            left, must = [*left, *back], f"within reach again: {names}"
-            for goal in back:
+        restored = self._in_reach_again() if self.options.repair else []
+        if restored:
+            names = ", ".join(map(self.problem.goal_label, restored))
+            left, reason = [*left, *restored], f"within reach again: {names}"
+            for goal in restored:
                 del self.out.left_out[goal]
         if self._is_over_limit and self.options.repair:
-            must = must or (
+            reason = reason or (
                 f"{self.tether.length:.4g} of {self.problem.tether_length:g} {self.problem.units} "
                 "of tether were out"
             )
-        if must is None:
+        if reason is None:
             limit = self._reserved(left) if self.options.repair else None
-            must, legs = broken(self.problem, self.tether.nodes, self._from_here(), limit)
-            if must is None:
+            reason, legs = broken(self.problem, self.tether.nodes, self._from_here(), limit)
+            if reason is None:
                 self.legs = legs
                 self.path, self.leg_s = self.legs[0].path[1:], 0.0
-        if must is None:
+        if reason is None:
             self._enter_log(event.kind, "kept", "the rest of the plan still holds", 0.0)
         elif not self.options.repair:
-            self._enter_log(event.kind, "ignored", must, 0.0)
+            self._enter_log(event.kind, "ignored", reason, 0.0)
             for goal in set(left) - set(self.left):
                 self.out.left_out[goal] = "was added, and plans are not repaired"
         else:
-            self._mend_within_limit(must, left, event.kind)
+            self._mend_within_limit(reason, left, event.kind)
 
     def asked(self, event: Event) -> None:
         """Let an event happen that nobody could check before."""
@@ -404,11 +404,11 @@ class _Run:
         # a vehicle with dynamics ends somewhere within its reach of where it is sent
         near = 0.0 if self.options.vehicle == "kinematic" else self.options.reach
         length = max(min(limit, self.problem.tether_length - near), 0.0)
-        back = np.ascontiguousarray(self.tether.nodes[::-1])
+        way_back = np.ascontiguousarray(self.tether.nodes[::-1])
         self.retreat = _Retreat(length, why, left, event)
         # the way to the base, left half-way: to a place nearby a vehicle slows down before it
-        self.legs = [Leg(HOME, back, (), 0.0)]
-        self.path, self.fresh, self.leg_s = back[1:], True, 0.0
+        self.legs = [Leg(HOME, way_back, (), 0.0)]
+        self.path, self.fresh, self.leg_s = way_back[1:], True, 0.0
         units = self.problem.units
         self._enter_log(
             event,
@@ -422,8 +422,8 @@ class _Run:
         if self.live is not None:
             # it has gone on since its tether was last looked at, perhaps past an obstacle
             self.live.hold()
-            way = np.array([self.tether.robot, self.vehicle.position])
-            self._follow(polylines.dense(way, 0.5 * self.delta)[1:])
+            line = np.array([self.tether.robot, self.vehicle.position])
+            self._follow(polylines.dense(line, 0.5 * self.delta)[1:])
         begin = time.perf_counter()
         try:
             options = self.options

@@ -297,18 +297,18 @@ def outside(problem: Problem, robot: Floats) -> tuple[float, float, float]:
         i = int(np.argmax(depth)) if depth else -1
         if i < 0 or depth[i] <= 0.0:
             break
-        obstacle, here = problem.obstacles[i], place[:2].copy()
+        obstacle, xy = problem.obstacles[i], place[:2].copy()
         rim = obstacle.shape(problem.clearance).exterior
-        near = np.array(rim.interpolate(rim.project(shapely.Point(here))).coords[0])
+        nearest = np.array(rim.interpolate(rim.project(shapely.Point(xy))).coords[0])
         if isinstance(obstacle, Circle):
             # a circle's rim is drawn as a polygon inside of it
-            away = here - obstacle.center
-            size = float(np.hypot(*away))
+            direction = xy - obstacle.center
+            size = float(np.hypot(*direction))
             reach = obstacle.radius + problem.clearance
-            near = obstacle.center + away * (reach / size) if size else near
-        away = near - here
-        size = float(np.hypot(*away))
-        place[:2] = near + (away / size if size else 0.0) * 1e-7 * problem.scale
+            nearest = obstacle.center + direction * (reach / size) if size else nearest
+        direction = nearest - xy
+        size = float(np.hypot(*direction))
+        place[:2] = nearest + (direction / size if size else 0.0) * 1e-7 * problem.scale
     x, y, z = place.tolist()
     return (x, y, z)
 
@@ -344,11 +344,11 @@ def _home(problem: Problem, state: State, tether: Floats, why: str) -> tuple[Leg
     placed = problem.model_copy(update={"goals": (Goal(position=state.position),), "state": None})
     longest = RoadmapPolicy().max_state_ratio * max(problem.tether_length, polylines.length(tether))
     try:
-        back = TautPaths(placed, longest).path(0, 1, state.signature)[::-1]
+        path = TautPaths(placed, longest).path(0, 1, state.signature)[::-1]
     except UnknownPathError:
-        back = tether[::-1]
+        path = tether[::-1]
         why += "; no taut path of the tether was found, so back along the tether as it lies"
-    return Leg(HOME, np.ascontiguousarray(back), (), 0.0), why
+    return Leg(HOME, np.ascontiguousarray(path), (), 0.0), why
 
 
 def _keeping_order(graph: GraphFromState, goals: int) -> Result:
@@ -359,29 +359,31 @@ def _keeping_order(graph: GraphFromState, goals: int) -> Result:
     """
     start = graph.start
     assert start is not None
-    at = np.array([start])
-    reach = np.zeros(1)
+    vertices = np.array([start])
+    lengths = np.zeros(1)
     layers: list[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]] = []
     for c in range(1, goals + 1):
         members = graph.members(c)
-        both = np.concatenate([at, members])
-        asked = np.zeros((len(both), len(both)), dtype=bool)
-        asked[: len(at), len(at) :] = asked[len(at) :, : len(at)] = True
+        both = np.concatenate([vertices, members])
+        is_needed = np.zeros((len(both), len(both)), dtype=bool)
+        is_needed[: len(vertices), len(vertices) :] = is_needed[
+            len(vertices) :, : len(vertices)
+        ] = True
         try:
-            legs = graph.within.costs_among(both, asked)
+            legs = graph.within.costs_among(both, is_needed)
         except LimitReachedError:
-            best_so_far, shortest = int(reach.argmin()), int(graph.tethers[members].argmin())
+            best_so_far, shortest = int(lengths.argmin()), int(graph.tethers[members].argmin())
             members = members[[shortest]]
             with graph.within.on_clock(None):
-                d = graph.within.costs_among([at[best_so_far], members[0]])[0, 1]
+                d = graph.within.costs_among([vertices[best_so_far], members[0]])[0, 1]
             layers.append((members, np.array([best_so_far])))
-            reach, at = reach[[best_so_far]] + d, members
+            lengths, vertices = lengths[[best_so_far]] + d, members
             continue
-        total = reach[:, None] + legs[: len(at), len(at) :]
+        total = lengths[:, None] + legs[: len(vertices), len(vertices) :]
         best = total.argmin(axis=0)
         layers.append((members, best))
-        reach, at = total[best, np.arange(len(members))], members
-    home = reach + graph.within.costs_to_base[at]
+        lengths, vertices = total[best, np.arange(len(members))], members
+    home = lengths + graph.within.costs_to_base[vertices]
     k = int(home.argmin())
     length = float(home[k])
     tour: list[int] = []
@@ -405,11 +407,11 @@ def _least(graph: GraphFromState, goals: int, clock: Clock) -> float:
     cluster = graph.cluster
     ends, total = [0, int(cluster[graph.start])], 0.0
     for c in range(goals + 2):
-        own = cluster == c
-        if not own.any():
+        is_member = cluster == c
+        if not is_member.any():
             continue
         nearest = [
-            float(bounds[np.ix_(own, cluster == other)].min())
+            float(bounds[np.ix_(is_member, cluster == other)].min())
             for other in range(goals + 2)
             if other != c and (cluster == other).any() and {c, other} != set(ends)
         ]

@@ -80,7 +80,7 @@ def drive_order(
         tether = context.model.drive(tether, polylines.dense(path, mission.delta))[0]
         walked += list(command.path)
         robot = command.path[-1]
-        planner.passed(len(command.path))
+        planner.drop_passed(len(command.path))
     if not planner.home:
         return None
     return drive_legs(context, legs, np.array(walked if len(walked) > 1 else [robot, robot]))

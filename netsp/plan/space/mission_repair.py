@@ -132,18 +132,18 @@ class RepairPlanner(PredictivePlanner):
         super().__post_init__()
         self._as_given = self.mission
 
-    def take_map(
+    def update_map(
         self, scene: DistanceField, tethers: Tethers, box: Floats, robot: Floats, tether: Tether
     ) -> None:
         """See `Planner`."""
-        super().take_map(scene, tethers, box, robot, tether)
+        super().update_map(scene, tethers, box, robot, tether)
         self._must_check = self.mission.tour is not None
 
     def step(self, robot: Floats, tether: Tether) -> Command:
         """See `Planner`. The robot holds its place until a plan is due, even if it is ready
         earlier, so that the same seed gives the same flight."""
         self._walked.append(np.array(robot))
-        if self._must_check and not self.done and self._shortened(tether) is None:
+        if self._must_check and not self.is_done and self._path_to_shorten(tether) is None:
             self._must_check = False
             begin = time.process_time()
             try:
@@ -164,7 +164,7 @@ class RepairPlanner(PredictivePlanner):
         super().add_waypoint(waypoint)
         self._must_check = self._has_new_waypoint = self.mission.tour is not None
 
-    def _without_stop(self, k: int) -> None:
+    def _drop_visit(self, k: int) -> None:
         """Join the legs before and after a visit that is left out, pulled taut in their class."""
         tour = self.mission.tour
         if tour is None or k >= len(tour.stops):
@@ -174,7 +174,7 @@ class RepairPlanner(PredictivePlanner):
             path = self._first[1]
         del stops[k]
         onward = tour.home if k == len(stops) else stops[k].path
-        leg = in_file(self.pulled(np.vstack([path, np.array(onward)])))
+        leg = in_file(self.pull_taut(np.vstack([path, np.array(onward)])))
         self._first = (k, np.array(leg)) if k == self.index else self._first
         home = tour.home
         if k == len(stops):
@@ -186,14 +186,14 @@ class RepairPlanner(PredictivePlanner):
         )
         self._must_check = True
 
-    def take_limit(self, limit: float) -> None:
+    def update_limit(self, limit: float) -> None:
         """See `Planner`."""
-        super().take_limit(limit)
+        super().update_limit(limit)
         self._must_check = self.mission.tour is not None
 
-    def carried_off(self) -> None:
+    def on_push(self) -> None:
         """See `Planner`."""
-        super().carried_off()
+        super().on_push()
         self._must_check, self._planned = self.mission.tour is not None, -1
 
     def _next(self) -> None:
@@ -214,7 +214,7 @@ class RepairPlanner(PredictivePlanner):
         worth = rest.old + self.options.planning_limit * self.mission.speed
         found, added = None, self._has_new_waypoint
         self._has_new_waypoint = False
-        if not self.homeward and (added or not rest.whole or rest.length > worth):
+        if not self.is_homeward and (added or not rest.whole or rest.length > worth):
             found = self._replan(robot, tether, rest, added)
         if found is not None:
             self._follow_plan(found)
@@ -257,7 +257,7 @@ class RepairPlanner(PredictivePlanner):
                 tether_after, _ = self._drive_leg(tether, leg, name)
             if tether_after is not None and home and not self._is_free(tether_after):
                 rest.reason = rest.reason or "the tether would not be free at home"
-                leg = self.pulled(self.back_along(tether))
+                leg = self.pull_taut(self.back_along(tether))
                 tether_after, _ = self._drive_leg(tether, leg, name)
                 if tether_after is not None and not self._is_free(tether_after):
                     tether_after = None
@@ -272,14 +272,14 @@ class RepairPlanner(PredictivePlanner):
     def _path_around(self, begin: Floats, end: Floats) -> Floats | None:
         """Return the shortest path by the map, pulled taut; None if there is none."""
         path = ShortestTree(self.grid, end, begin[None]).path(0)
-        return None if path is None else self.pulled(path)
+        return None if path is None else self.pull_taut(path)
 
     def _drive_leg(
         self, tether: Tether, leg: Floats | None, name: str
     ) -> tuple[Tether | None, str]:
         """Return the tether at the end of a leg; None, and the reason, if the robot cannot follow
         it."""
-        if leg is None or not self.keeps_off(leg):
+        if leg is None or not self.is_clear_of_solids(leg):
             return None, f"{name} is blocked"
         step = drive_step(self.mission, self.mission_policy.tether_share)
         tether_after, lengths = self._model.drive(tether, polylines.dense(leg, step))
@@ -407,7 +407,7 @@ class RepairPlanner(PredictivePlanner):
             return self._first[1], None
         return super()._planned_leg()
 
-    def told(self) -> dict[str, Any]:
+    def summary_fields(self) -> dict[str, Any]:
         """See `Planner`: all repairs, and the original numbers of the waypoints."""
         return {"repairs": [asdict(r) for r in self.repairs], "given_as": self.given}
 
@@ -417,8 +417,8 @@ class RepairPlanner(PredictivePlanner):
         waypoints were left out before the tour was planned anew."""
         m = self.mission if self.mission.waypoints else self._as_given
         assert m is not None
-        if m.tour is not None and m.tour.against(m.begin, m.start, m.places, m.reach):
+        if m.tour is not None and m.tour.mismatch(m.begin, m.start, m.places, m.reach):
             return m.model_copy(update={"tour": None})
         if m.tour is not None and self.repairs and self._first is not None:
-            return m.model_copy(update={"tour": m.tour.mended()})
+            return m.model_copy(update={"tour": m.tour.without_bounds()})
         return m

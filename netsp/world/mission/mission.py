@@ -84,19 +84,19 @@ class MissionWaypoint(Model):
         """Serialise as a bare position if nothing else is set."""
         if self.heading is None and not self.dwell and not self.alternatives:
             return self.position
-        told = handler(self)
+        data = handler(self)
         if not self.alternatives:
-            del told["alternatives"]
-        return told
+            del data["alternatives"]
+        return data
 
     def at(self, choice: int) -> MissionWaypoint:
         """Return the waypoint with one of its alternatives, counted from 1, in exchange for its own
         place; 0 keeps its own."""
         if choice == 0:
             return self
-        own = Viewpoint(position=self.position, heading=self.heading)
+        replaced = Viewpoint(position=self.position, heading=self.heading)
         chosen, rest = self.alternatives[choice - 1], list(self.alternatives)
-        rest[choice - 1] = own
+        rest[choice - 1] = replaced
         return self.model_copy(
             update={
                 "position": chosen.position,
@@ -271,7 +271,7 @@ class Mission(FileModel):
     @model_validator(mode="after")
     def _tour_fits(self) -> Self:
         if self.tour is not None:
-            wrong = self.tour.against(self.begin, self.start, self.places, self.reach)
+            wrong = self.tour.mismatch(self.begin, self.start, self.places, self.reach)
             if wrong is not None:
                 raise ValueError(f"tour.{wrong}")
         return self

@@ -130,9 +130,9 @@ class PlannedTour(Model):
         """Length of the longest tether before the way home, metres."""
         return max((stop.longest_tether for stop in self.stops), default=0.0)
 
-    def mended(self) -> PlannedTour:
+    def without_bounds(self) -> PlannedTour:
         """Return a feasible tour of the same paths, without bounds."""
-        legs = [*(stop.path for stop in self.stops), self.home]
+        legs = [*(visit.path for visit in self.stops), self.home]
         return self.model_copy(
             update={
                 "length": float(sum(polylines.length(np.array(leg)) for leg in legs)),
@@ -144,7 +144,9 @@ class PlannedTour(Model):
             }
         )
 
-    def against(self, begin: Point3, start: Point3, places: Floats, tolerance: float) -> str | None:
+    def mismatch(
+        self, begin: Point3, start: Point3, places: Floats, tolerance: float
+    ) -> str | None:
         """Return what does not match the mission that the tour is part of, in one line; None if all
         does.
 
@@ -162,22 +164,25 @@ class PlannedTour(Model):
                 f"stops: {len(self.stops)} of them; expected no more than there are waypoints, "
                 f"{len(places)}"
             )
-        here = np.array(begin)
+        place_before = np.array(begin)
         for k, stop in enumerate(self.stops):
-            for name, place, end in (("begins", here, 0), ("ends", places[k], -1)):
-                off = float(np.linalg.norm(np.array(stop.path[end]) - place))
-                if off > tolerance:
+            for name, place, end in (("begins", place_before, 0), ("ends", places[k], -1)):
+                distance = float(np.linalg.norm(np.array(stop.path[end]) - place))
+                if distance > tolerance:
                     return (
-                        f"stops[{k}].path: {name} {off:.2f} m from "
+                        f"stops[{k}].path: {name} {distance:.2f} m from "
                         f"{'waypoint' if end else 'the stop before'}"
                         f"{f' #{k}' if end else ''}; expected no more than {tolerance:g}"
                     )
-            here = places[k]
-        for name, place, end in (("begins", here, 0), ("ends", np.array(start), -1)):
-            off = float(np.linalg.norm(np.array(self.home[end]) - place))
-            if off > tolerance:
+            place_before = places[k]
+        for name, place, end in (("begins", place_before, 0), ("ends", np.array(start), -1)):
+            distance = float(np.linalg.norm(np.array(self.home[end]) - place))
+            if distance > tolerance:
                 where = "the start" if end else "the last stop"
-                return f"home: {name} {off:.2f} m from {where}; expected no more than {tolerance:g}"
+                return (
+                    f"home: {name} {distance:.2f} m from {where}; expected no more than "
+                    f"{tolerance:g}"
+                )
         return None
 
 

@@ -64,9 +64,9 @@ class RefineParams:
     def __post_init__(self) -> None:
         if self.keeps not in PERTURBATIONS:
             raise InputError(f"keeps: expected {' or '.join(PERTURBATIONS)}, got {self.keeps!r}")
-        for name, least in (("max_trials", 1), ("segment", 5), ("overlap", 0), ("max_rounds", 1)):
-            if getattr(self, name) < least:
-                raise InputError(f"{name}: expected {least} or more, got {getattr(self, name)!r}")
+        for name, minimum in (("max_trials", 1), ("segment", 5), ("overlap", 0), ("max_rounds", 1)):
+            if getattr(self, name) < minimum:
+                raise InputError(f"{name}: expected {minimum} or more, got {getattr(self, name)!r}")
         if self.overlap >= self.segment:
             raise InputError(f"overlap: expected less than {self.segment}, got {self.overlap!r}")
         if not 0.0 < self.step_share < np.inf:

@@ -46,10 +46,10 @@ def beside(
         moved[short] = np.where(better[:, None], moved[short], path[short])
         blocked = ~sees(field.arrays, moved[:-1], moved[1:], 1e-2)
         blocked &= sees(field.arrays, path[:-1], path[1:], 1e-2)
-        back = np.zeros(len(path), dtype=bool)
-        back[:-1] |= blocked
-        back[1:] |= blocked
-        moved[back] = path[back]
+        undone = np.zeros(len(path), dtype=bool)
+        undone[:-1] |= blocked
+        undone[1:] |= blocked
+        moved[undone] = path[undone]
         if np.array_equal(moved, path):
             break
         path = moved

@@ -328,12 +328,12 @@ def grow(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> npt.NDArray
         offset[s] = STEPS[s, 0] * plane + STEPS[s, 1] * row + STEPS[s, 2]
     state = states.copy().reshape(states.size)
     lengths, toward = np.full(states.size, np.inf), np.full(states.size, -1, dtype=np.int8)
-    asked, left = np.zeros(states.size, dtype=np.bool_), 0
+    is_wanted, left = np.zeros(states.size, dtype=np.bool_), 0
     cells = np.empty(len(wanted), dtype=np.int64)
     for w in range(len(wanted)):
         cells[w] = (wanted[w, 0] + 1) * plane + (wanted[w, 1] + 1) * row + wanted[w, 2] + 1
-        left += 0 if asked[cells[w]] else 1
-        asked[cells[w]] = True
+        left += 0 if is_wanted[cells[w]] else 1
+        is_wanted[cells[w]] = True
     # (cell, the next entry of its bucket)
     waiting, count = np.empty((4096, 2), dtype=np.int64), 1
     first = np.full(3, -1)
@@ -349,25 +349,25 @@ def grow(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> npt.NDArray
             entry = waiting[entry, 1]
             if state[cell] == BLOCKED:
                 continue  # settled
-            came = 25 - toward[cell]
-            all_of_them = came < 0 or state[cell] != OPEN
+            reverse = 25 - toward[cell]
+            all_of_them = reverse < 0 or state[cell] != OPEN
             state[cell] = BLOCKED
-            if asked[cell]:
+            if is_wanted[cell]:
                 left -= 1
-            here = lengths[cell]
-            for n in range(26 if all_of_them else ONWARD[came, 0]):
-                s = n if all_of_them else ONWARD[came, n + 1]
-                beside = cell + offset[s]
-                if state[beside] == BLOCKED:
+            length = lengths[cell]
+            for n in range(26 if all_of_them else ONWARD[reverse, 0]):
+                s = n if all_of_them else ONWARD[reverse, n + 1]
+                neighbour = cell + offset[s]
+                if state[neighbour] == BLOCKED:
                     continue
-                onward = here + _LONG[s]
-                if onward < lengths[beside]:
-                    lengths[beside] = onward
-                    toward[beside] = 25 - s  # the opposite step
+                onward = length + _LONG[s]
+                if onward < lengths[neighbour]:
+                    lengths[neighbour] = onward
+                    toward[neighbour] = 25 - s  # the opposite step
                     if count == len(waiting):
                         waiting = more_int_rows(waiting)
                     bucket = int(onward) % 3
-                    waiting[count, 0], waiting[count, 1] = beside, first[bucket]
+                    waiting[count, 0], waiting[count, 1] = neighbour, first[bucket]
                     first[bucket] = count
                     count += 1
         floor += 1
@@ -387,15 +387,15 @@ def _grow_in_numpy(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> n
     offset, size = STEPS @ strides, states.size
     state = states.flatten()
     lengths, toward = np.full(size, np.inf), np.full(size, -1, dtype=np.int8)
-    asked, place = np.zeros(size, dtype=np.bool_), np.empty(size, dtype=np.int64)
+    is_wanted, place = np.zeros(size, dtype=np.bool_), np.empty(size, dtype=np.int64)
 
     def first_of_each(cells: Ints) -> Bools:
         numbers = np.arange(len(cells))
         place[cells[::-1]] = numbers[::-1]
         return np.asarray(place[cells] == numbers)
 
-    asked[(wanted + 1) @ strides] = True
-    left = np.count_nonzero(asked)
+    is_wanted[(wanted + 1) @ strides] = True
+    left = np.count_nonzero(is_wanted)
     begin = (root + 1) @ strides
     lengths[begin], toward[begin] = 0.0, 26
     waiting: list[list[Ints]] = [[np.array([begin])], [], []]
@@ -408,27 +408,27 @@ def _grow_in_numpy(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> n
         cells = np.concatenate(entries)[::-1]
         cells = cells[state[cells] != BLOCKED]
         cells = cells[first_of_each(cells)]
-        came = 25 - toward[cells].astype(np.int64)
-        steps = np.where((came < 0) | (state[cells] != OPEN), 26, came)
+        reverse = 25 - toward[cells].astype(np.int64)
+        steps = np.where((reverse < 0) | (state[cells] != OPEN), 26, reverse)
         state[cells] = BLOCKED
-        left -= np.count_nonzero(asked[cells])
+        left -= np.count_nonzero(is_wanted[cells])
         counts = _NEXT_COUNTS[steps]
         nth = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
         step = _NEXT_STEPS[np.repeat(steps, counts), nth]
-        beside = np.repeat(cells, counts) + offset[step]
+        neighbours = np.repeat(cells, counts) + offset[step]
         onward = np.repeat(lengths[cells], counts) + _LONG[step]
-        is_shorter = (state[beside] != BLOCKED) & (onward < lengths[beside])
-        beside, onward, step = beside[is_shorter], onward[is_shorter], step[is_shorter]
-        np.minimum.at(lengths, beside, onward)
-        is_least = onward == lengths[beside]
-        beside, onward, step = beside[is_least], onward[is_least], step[is_least]
-        is_first = first_of_each(beside)
-        beside, onward, step = beside[is_first], onward[is_first], step[is_first]
-        toward[beside] = 25 - step
+        is_shorter = (state[neighbours] != BLOCKED) & (onward < lengths[neighbours])
+        neighbours, onward, step = neighbours[is_shorter], onward[is_shorter], step[is_shorter]
+        np.minimum.at(lengths, neighbours, onward)
+        is_shortest = onward == lengths[neighbours]
+        neighbours, onward, step = neighbours[is_shortest], onward[is_shortest], step[is_shortest]
+        is_first = first_of_each(neighbours)
+        neighbours, onward, step = neighbours[is_first], onward[is_first], step[is_first]
+        toward[neighbours] = 25 - step
         bucket = onward.astype(np.int64) % 3
         for k in range(3):
-            if len(some := beside[bucket == k]):
-                waiting[k].append(some)
+            if len(entering := neighbours[bucket == k]):
+                waiting[k].append(entering)
     return toward.reshape(states.shape)[1:-1, 1:-1, 1:-1]
 
 

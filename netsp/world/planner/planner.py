@@ -13,6 +13,7 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.clock import Clock
 from netsp.base.compiled.kernel import runs_compiled
+from netsp.base.deprecated import deprecated_method
 from netsp.base.errors import interrupted
 from netsp.base.geometry import polylines
 from netsp.world.mission.anchor_track import Track
@@ -138,11 +139,11 @@ class Planner:
         Waypoints visited.
     home : bool
         Whether the robot is back at the start.
-    not_home : str or None
+    home_failure : str or None
         Why the robot has given up getting home.
     now : float
         Seconds since the start, which the simulator updates.
-    caught : float
+    excess_payout : float
         Length of tether that is out beyond what the map explains, metres.
     trail : ndarray, shape (n, 3)
         Line along which the tether was laid, if it is known.
@@ -163,9 +164,9 @@ class Planner:
     defects: list[str] = field(default_factory=list)
     reached: list[int] = field(default_factory=list)
     home: bool = False
-    not_home: str | None = None
+    home_failure: str | None = None
     now: float = 0.0
-    caught: float = 0.0
+    excess_payout: float = 0.0
     trail: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     given: list[int] = field(default_factory=list)
     _held: int = 0
@@ -191,7 +192,7 @@ class Planner:
         return self.mission.sensor.reserve(self.mission.speed)
 
     @property
-    def loaded(self) -> bool:
+    def has_load(self) -> bool:
         """True if the tether needs more than its taut length, or has a limit of turning."""
         physics = self.mission.tether
         return physics.slack > 0.0 or physics.diameter > 0.0 or math.isfinite(physics.max_turning)
@@ -199,7 +200,7 @@ class Planner:
     def payout(self, tether: Tether) -> float:
         """Return the length (m) that must be out for a tether to lie as it does; the limit applies
         to it."""
-        if not self.loaded:
+        if not self.has_load:
             return tether.length
         if isinstance(self.tethers, GeodesicTether):
             return payout(tether, self.load)
@@ -211,9 +212,9 @@ class Planner:
 
     def add_waypoint(self, waypoint: MissionWaypoint) -> None:
         """Visit another waypoint, after all others."""
-        if self.done:
+        if self.is_done:
             return
-        if self.homeward:
+        if self.is_homeward:
             self.path, self.mode = self.path[:0], NORMAL
         self.given.append(max(self.given, default=-1) + 1)
         waypoints = (*self.mission.waypoints, waypoint)
@@ -228,7 +229,7 @@ class Planner:
             The waypoint's present number; None if the robot has been there.
         """
         k = self.given.index(number) if number in self.given else -1
-        if k < self.index or self.done:
+        if k < self.index or self.is_done:
             return None
         del self.given[k]
         waypoints = (*self.mission.waypoints[:k], *self.mission.waypoints[k + 1 :])
@@ -237,11 +238,11 @@ class Planner:
             self.path, self.mode = self.path[:0], NORMAL
         return k
 
-    def take_limit(self, limit: float) -> None:
+    def update_limit(self, limit: float) -> None:
         """Keep to another length of tether (m) from now on."""
         self.mission = self.mission.model_copy(update={"tether_length": limit})
 
-    def carried_off(self) -> None:
+    def on_push(self) -> None:
         """Forget the path, because the robot was carried off it."""
         self.path = self.path[:0]
 
@@ -250,7 +251,7 @@ class Planner:
         """The mission as it was flown, for a file."""
         return self.mission
 
-    def told(self) -> dict[str, Any]:
+    def summary_fields(self) -> dict[str, Any]:
         """Return what the planner adds to the summary of a run."""
         changed = self.given != list(range(len(self.given)))
         return {"given_as": self.given} if changed else {}
@@ -258,7 +259,7 @@ class Planner:
     @property
     def waypoint(self) -> Floats:
         """Position (3,) of the next waypoint, or of home."""
-        return self.home_now if self.homeward else self.mission.places[self.index]
+        return self.home_position if self.is_homeward else self.mission.places[self.index]
 
     @cached_property
     def track(self) -> Track | None:
@@ -266,12 +267,12 @@ class Planner:
         return Track.of(self.mission)
 
     @property
-    def anchor_moves(self) -> bool:
+    def is_anchor_moving(self) -> bool:
         """True if the anchor still moves."""
         return self.track is not None and self.now < self.track.end
 
     @property
-    def home_now(self) -> Floats:
+    def home_position(self) -> Floats:
         """Position (3,) of home: the start, or for a moving anchor the place as far from it as when
         the mission began, if that is in free water and in sight of the anchor; else the anchor."""
         start = np.array(self.mission.start)
@@ -284,20 +285,20 @@ class Planner:
         return home if free else anchor
 
     @property
-    def laid_now(self) -> Tether:
+    def home_tether(self) -> Tether:
         """The tether as it should lie at home."""
         assert self.laid is not None
         if self.track is None:
             return self.laid
-        return self.tethers.start(self.track(self.now), self.home_now)
+        return self.tethers.start(self.track(self.now), self.home_position)
 
     @property
-    def homeward(self) -> bool:
+    def is_homeward(self) -> bool:
         """True if all waypoints are visited or left out, so that only the way home remains."""
         return self.index >= len(self.mission.waypoints)
 
     @property
-    def done(self) -> bool:
+    def is_done(self) -> bool:
         """True if the robot is home, or has given up getting there."""
         return self.index > len(self.mission.waypoints)
 
@@ -310,25 +311,25 @@ class Planner:
         """
         self._advance(robot, tether)
         self._follow_home(robot)
-        if self.done:
+        if self.is_done:
             return Command(np.array([robot]), DONE)
         begin = time.process_time()
         planned, before = False, -1
-        while not self.done and before < len(self.left_out):
+        while not self.is_done and before < len(self.left_out):
             before = len(self.left_out)
             try:
-                plan = self.plan_home if self.homeward else self.plan
+                plan = self.plan_home if self.is_homeward else self.plan
                 planned = plan(robot, tether) or planned
             except Exception as error:  # a vehicle in the water must not be left without a command
                 if interrupted(error):
                     raise KeyboardInterrupt from error
                 return self._hold(robot, error, time.process_time() - begin)
         spent = time.process_time() - begin if planned else 0.0
-        if self.done:
+        if self.is_done:
             return Command(np.array([robot]), DONE, spent)
         return Command(self.path if len(self.path) else np.array([robot]), self.mode, spent)
 
-    def take_map(
+    def update_map(
         self, scene: DistanceField, tethers: Tethers, box: Floats, robot: Floats, tether: Tether
     ) -> None:
         """Plan with another map from now on, and forget a path that is no longer clear of solids.
@@ -346,10 +347,10 @@ class Planner:
         """
         del tether
         self.scene, self.tethers, self.grid = scene, tethers, self.grid.over(scene, box)
-        if len(self.path) and not self.keeps_off(np.vstack([robot, self.path])):
+        if len(self.path) and not self.is_clear_of_solids(np.vstack([robot, self.path])):
             self.path = self.path[:0]
 
-    def keeps_off(self, path: Floats) -> bool:
+    def is_clear_of_solids(self, path: Floats) -> bool:
         """Return whether a path (k, 3) from the robot on is clear of all solids of the map, by most
         of the clearance, or of what its ends have of it."""
         line = polylines.dense(path, 0.5 * self.grid.cell)
@@ -357,7 +358,7 @@ class Planner:
         needed = self.policy.min_clearance_share * room
         return not len(line) or bool(self.scene.distance(line).min() >= needed)
 
-    def hear_of_payout(self, more: float, trail: Floats) -> None:
+    def on_excess_payout(self, more: float, trail: Floats) -> None:
         """Note that more tether is out than the map explains, because something unmapped has caught
         it.
 
@@ -369,7 +370,7 @@ class Planner:
             Line from the anchor to the robot along which the tether was laid: going back along it
             frees the tether.
         """
-        self.caught, self.trail = more, trail
+        self.excess_payout, self.trail = more, trail
 
     def _hold(self, robot: Floats, error: Exception, spent: float) -> Command:
         """Return a command to stay and try again; leave the waypoint out after a while."""
@@ -385,7 +386,7 @@ class Planner:
         self.prepare()
         path = self.paths(robot[None]).path(0)
         if path is not None:
-            self.pulled(path)
+            self.pull_taut(path)
 
     def prepare(self) -> None:
         """Find the shortest paths to all waypoints, and home, before the mission.
@@ -406,7 +407,7 @@ class Planner:
             Whether anything had to be planned.
         """
         del tether
-        return False if len(self.path) else self.go_on(robot)
+        return False if len(self.path) else self.plan_direct(robot)
 
     def plan_home(self, robot: Floats, tether: Tether) -> bool:
         """Set `path` and `mode` after the last waypoint, here straight to the start whatever the
@@ -420,11 +421,11 @@ class Planner:
         del tether
         if len(self.path):
             return False
-        planned = self.go_on(robot)
+        planned = self.plan_direct(robot)
         self.mode = HOME
         return planned
 
-    def ends_here(self, tether: Tether) -> bool:
+    def may_end(self, tether: Tether) -> bool:
         """Return whether the mission may end now that the robot is home; otherwise the way home is
         planned again."""
         del tether
@@ -433,21 +434,21 @@ class Planner:
     def back_along(self, tether: Tether) -> Floats:
         """Return the path (k, 3) back along a tether to the anchor, and on to the start as the
         tether was first laid. At its end the tether is free."""
-        return self.beside(np.vstack([tether.nodes[::-1], self.laid_now.nodes[1:]]))
+        return self.off_surfaces(np.vstack([tether.nodes[::-1], self.home_tether.nodes[1:]]))
 
-    def beside(self, line: Floats) -> Floats:
+    def off_surfaces(self, line: Floats) -> Floats:
         """Return a finely divided line (k, 3) moved off surfaces to the clearance."""
-        points = polylines.points_along(line, self.fine)
+        points = polylines.points_along(line, self.fine_spacing)
         standoff = self.policy.paths.standoff
         return beside(self.scene, points, self.mission.clearance, standoff)
 
     @property
-    def fine(self) -> float:
+    def fine_spacing(self) -> float:
         """Distance between points of a path back along a tether, metres. The tether model may miss
         a solid of twice that thickness."""
         return min(self.grid.cell, 0.5 * THINNEST * self.mission.delta)
 
-    def go_on(self, robot: Floats) -> bool:
+    def plan_direct(self, robot: Floats) -> bool:
         """Plan a straight path to the waypoint, or the shortest path round what is between.
 
         Returns
@@ -463,7 +464,7 @@ class Planner:
         if path is None:
             self.leave_out("no free path to it")
         else:
-            self.path = self.refined(self.pulled(path))[1:]
+            self.path = self.refined(self.pull_taut(path))[1:]
         return True
 
     def paths(self, points: Floats) -> Paths:
@@ -505,7 +506,7 @@ class Planner:
         """Distance between pivots along a tether, metres."""
         return self.options.pivot_spacing or max(self.grid.cell, self.policy.min_pivot_spacing)
 
-    def pulled(self, path: Floats) -> Floats:
+    def pull_taut(self, path: Floats) -> Floats:
         """Return a path (k, 3) pulled taut in its class, at the clearance."""
         mission = self.mission
         return taut(self.scene, path, mission.clearance, mission.delta, self.policy.paths)
@@ -520,11 +521,11 @@ class Planner:
     def _advance(self, robot: Floats, tether: Tether) -> None:
         """Go on to the next waypoint if this one is reached at the end of the path."""
         reach = self.mission.reach
-        if self.done or self.mode == WAIT or len(self.path) > 1:
+        if self.is_done or self.mode == WAIT or len(self.path) > 1:
             return
         if np.linalg.norm(self.waypoint - robot) <= reach:
-            if self.homeward:
-                if not self.ends_here(tether):
+            if self.is_homeward:
+                if not self.may_end(tether):
                     self.path = self.path[:0]
                     return
                 self.home = True
@@ -534,7 +535,7 @@ class Planner:
 
     def _follow_home(self, robot: Floats) -> None:
         """Lead the path home to where home is now; forget the path if that is not possible."""
-        if not self.homeward or self.track is None or not len(self.path):
+        if not self.is_homeward or self.track is None or not len(self.path):
             return
         last = np.array([self.path[-2] if len(self.path) > 1 else robot, self.waypoint])
         self.path = np.vstack([self.path[:-1], last[1:]]) if self.is_free(last) else self.path[:0]
@@ -543,15 +544,35 @@ class Planner:
         self.index += 1
         self.path, self.mode, self._held = np.zeros((0, 3)), NORMAL, 0
 
-    def passed(self, count: int) -> None:
+    def drop_passed(self, count: int) -> None:
         """Remove points that the robot has passed from the path; the last point stays."""
         self.path = self.path[min(count, max(0, len(self.path) - 1)) :]
 
     def leave_out(self, reason: str) -> None:
         """Leave the next waypoint out, for a reason that is logged; on the way home, end the
         mission."""
-        if self.homeward:
-            self.not_home = reason
+        if self.is_homeward:
+            self.home_failure = reason
         else:
             self.left_out.append((self.index, reason))
         self._next()
+
+    hear_of_payout = deprecated_method("hear_of_payout", "on_excess_payout")
+    take_map = deprecated_method("take_map", "update_map")
+    take_limit = deprecated_method("take_limit", "update_limit")
+    carried_off = deprecated_method("carried_off", "on_push")
+    keeps_off = deprecated_method("keeps_off", "is_clear_of_solids")
+    ends_here = deprecated_method("ends_here", "may_end")
+    laid_now = deprecated_method("laid_now", "home_tether")
+    homeward = deprecated_method("homeward", "is_homeward")
+    anchor_moves = deprecated_method("anchor_moves", "is_anchor_moving")
+    told = deprecated_method("told", "summary_fields")
+    home_now = deprecated_method("home_now", "home_position")
+    not_home = deprecated_method("not_home", "home_failure")
+    loaded = deprecated_method("loaded", "has_load")
+    caught = deprecated_method("caught", "excess_payout")
+    pulled = deprecated_method("pulled", "pull_taut")
+    fine = deprecated_method("fine", "fine_spacing")
+    done = deprecated_method("done", "is_done")
+    go_on = deprecated_method("go_on", "plan_direct")
+    passed = deprecated_method("passed", "drop_passed")

@@ -20,7 +20,7 @@ from netsp.world.paths.standoff import beside
 from netsp.world.paths.tree import ever_tauter, homotopic, roughly_taut
 from netsp.world.planner.planner import HOME, NORMAL, RECOVERY, WAIT, Planner, Tethers
 from netsp.world.planner.planner_policy import PredictivePolicy
-from netsp.world.planner.preview import CONTACT_DEPTH, Ahead
+from netsp.world.planner.preview import CONTACT_DEPTH, TetherPreview
 from netsp.world.scene.field import DistanceField
 from netsp.world.tether import GeodesicTether, Tether
 
@@ -40,13 +40,13 @@ class PredictivePlanner(Planner):
 
     _planned: int = field(default=-1)
     _warned: int = field(default=-1)
-    _asked: int = 0
+    _home_steps: int = 0
     _homes: int = 0
-    _sure: bool = False
-    _looks: int = 0
-    _looked: float = 0.0
+    _is_sure_of_home: bool = False
+    _preview_count: int = 0
+    _previewed_length: float = 0.0
     _checked: float = 0.0
-    _caught_before: float = 0.0
+    _previous_excess: float = 0.0
     _candidates: list[Candidate] = field(default_factory=list)
 
     name = "predictive"
@@ -61,15 +61,15 @@ class PredictivePlanner(Planner):
         if (
             self._planned == self.index
             and len(self.path)
-            and not self._surprised(tether)
-            and not self._overtaken(robot, tether)
+            and not self._has_used_half_reserve(tether)
+            and not self._is_overtaken(robot, tether)
         ):
             return False
-        back = None if self.anchor_moves else self._shortened(tether)
-        if back is not None:
-            gone = np.linalg.norm(self.path[-1:] - robot) <= self.mission.reach
-            if not len(self.path) or gone:
-                self.path, self.mode = back[1:], RECOVERY
+        way_back = None if self.is_anchor_moving else self._path_to_shorten(tether)
+        if way_back is not None:
+            is_gone = np.linalg.norm(self.path[-1:] - robot) <= self.mission.reach
+            if not len(self.path) or is_gone:
+                self.path, self.mode = way_back[1:], RECOVERY
                 return True
             return False
         first = self._planned != self.index
@@ -84,11 +84,11 @@ class PredictivePlanner(Planner):
             self.path, self.mode = straight[1:], NORMAL
             return True
         path, mode = self._shortest_feasible(robot, tether, limit)
-        if path is None and self.anchor_moves:
+        if path is None and self.is_anchor_moving:
             self._wait(robot, tether, limit)
             return True
         if path is None:
-            path = self._by_the_anchor(tether, limit)
+            path = self._path_by_anchor(tether, limit)
         if path is None:
             return True
         better = self.refined(path)
@@ -111,7 +111,7 @@ class PredictivePlanner(Planner):
             return None
         # it counts as there a bit before the waypoint, from where a corner may be cut too short
         for path in (np.vstack([robot, leg[1:]]), np.vstack([robot, leg])):
-            if self.is_free(path[:2]) and self.keeps_off(path):
+            if self.is_free(path[:2]) and self.is_clear_of_solids(path):
                 return path
         return None
 
@@ -121,7 +121,7 @@ class PredictivePlanner(Planner):
         tour = self.mission.tour
         if tour is None or self.track is not None:
             return None, None
-        leg = np.array(tour.home) if self.homeward else tour.leg(self.index)
+        leg = np.array(tour.home) if self.is_homeward else tour.leg(self.index)
         before = min(self.index, len(tour.stops)) - 1
         return leg, None if before < 0 else tour.stops[before].tether_length
 
@@ -135,17 +135,17 @@ class PredictivePlanner(Planner):
         k = super().cancel_waypoint(number)
         if k is not None:
             self._planned = -1
-            self._without_stop(k)
+            self._drop_visit(k)
         return k
 
-    def take_limit(self, limit: float) -> None:
+    def update_limit(self, limit: float) -> None:
         """See `Planner`; if more is out, the robot first goes back along its tether."""
         shorter = limit < self.mission.tether_length
-        super().take_limit(limit)
+        super().update_limit(limit)
         if shorter:
             self.path, self._planned = self.path[:0], -1
 
-    def _shortened(self, tether: Tether) -> Floats | None:
+    def _path_to_shorten(self, tether: Tether) -> Floats | None:
         """Return the path back along a tether that is over the limit, as far as necessary; None for
         others."""
         over = self.payout(tether) - self.limit
@@ -153,7 +153,7 @@ class PredictivePlanner(Planner):
             return None
         return polylines.part(self.back_along(tether), 0.0, over + self.mission.reach)
 
-    def _without_stop(self, k: int) -> None:
+    def _drop_visit(self, k: int) -> None:
         """Forget the tour, because its legs would lead to other waypoints."""
         del k
         self.mission = self.mission.model_copy(update={"tour": None})
@@ -162,27 +162,27 @@ class PredictivePlanner(Planner):
     def limit(self) -> float:
         """Length of tether that plans may use, metres."""
         margin = self.policy.preview.limit_margin
-        return self.mission.tether_length * (1.0 - margin) - self._kept
+        return self.mission.tether_length * (1.0 - margin) - self._reserved
 
     @property
-    def _kept(self) -> float:
+    def _reserved(self) -> float:
         """Length of tether in reserve for positions, a moving anchor and what is not on the map,
         metres."""
         unknown = 0.0 if self.mission.range_sensor is None else self.predictive.unmapped_reserve
-        return self.reserve + self._anchors_way + self.caught + unknown
+        return self.reserve + self._anchor_reserve + self.excess_payout + unknown
 
     @property
-    def _anchors_way(self) -> float:
+    def _anchor_reserve(self) -> float:
         """Length of tether in reserve for a moving anchor, metres."""
-        if self.track is None or not self.anchor_moves:
+        if self.track is None or not self.is_anchor_moving:
             return 0.0
         return self.predictive.anchor_lag_s * self.track.speed
 
     @property
-    def _kept_back(self) -> str:
-        return f", of which {self._kept:.2f} m are kept in reserve" if self._kept else ""
+    def _reserve_words(self) -> str:
+        return f", of which {self._reserved:.2f} m are kept in reserve" if self._reserved else ""
 
-    def _surprised(self, tether: Tether) -> bool:
+    def _has_used_half_reserve(self, tether: Tether) -> bool:
         """Return whether half of the reserve is used up, as in a current; true once for each
         waypoint."""
         margin = self.policy.preview.limit_margin
@@ -195,18 +195,18 @@ class PredictivePlanner(Planner):
         self._warned = self.index
         return True
 
-    def _overtaken(self, robot: Floats, tether: Tether) -> bool:
+    def _is_overtaken(self, robot: Floats, tether: Tether) -> bool:
         """Return whether a moving anchor requires another plan.
 
         Checked at intervals; true for a robot that waits, and for others if the tether no longer
         lasts for the rest of the path.
         """
-        if self.mode == WAIT and not self.anchor_moves:
+        if self.mode == WAIT and not self.is_anchor_moving:
             return True
-        if not self.anchor_moves or self.now < self._checked + self.predictive.anchor_check_s:
+        if not self.is_anchor_moving or self.now < self._checked + self.predictive.anchor_check_s:
             return False
         self._checked = self.now
-        limit = self.limit + 0.5 * self._anchors_way
+        limit = self.limit + 0.5 * self._anchor_reserve
         return self.mode == WAIT or not self._fits(tether, np.vstack([robot, self.path]), limit)
 
     def _wait(self, robot: Floats, tether: Tether, limit: float) -> None:
@@ -221,30 +221,30 @@ class PredictivePlanner(Planner):
             distance = wait_s * self.mission.speed
             self.path = polylines.part(self.back_along(tether), 0.0, distance)[1:]
 
-    def _near_enough(self, robot: Floats, waypoint: Floats) -> Floats:
+    def _visit_point(self, robot: Floats, waypoint: Floats) -> Floats:
         """Return the point on the straight path at which the waypoint counts as visited, in case
         the tether fits only there. A fifth of the reach is left for a vehicle that does not stop on
         the spot."""
         path = waypoint - robot
-        far = float(np.linalg.norm(path))
-        return waypoint - path * min(1.0, 0.8 * self.mission.reach / max(far, 1e-12))
+        distance = float(np.linalg.norm(path))
+        return waypoint - path * min(1.0, 0.8 * self.mission.reach / max(distance, 1e-12))
 
-    def take_map(
+    def update_map(
         self, scene: DistanceField, tethers: Tethers, box: Floats, robot: Floats, tether: Tether
     ) -> None:
         """See `Planner`; a path on which the tether no longer fits is forgotten, too."""
-        super().take_map(scene, tethers, box, robot, tether)
-        self._sure = False
+        super().update_map(scene, tethers, box, robot, tether)
+        self._is_sure_of_home = False
         if len(self.path) and not self._fits(tether, np.vstack([robot, self.path]), self.limit):
             self.path = self.path[:0]
 
-    def hear_of_payout(self, more: float, trail: Floats) -> None:
+    def on_excess_payout(self, more: float, trail: Floats) -> None:
         """See `Planner`; a path that was planned for less tether is forgotten."""
-        if more > self._caught_before + self.predictive.snag_tolerance:
-            self._caught_before = more
+        if more > self._previous_excess + self.predictive.snag_tolerance:
+            self._previous_excess = more
             self.path = self.path[:0]
-        self._caught_before = min(self._caught_before, more)
-        super().hear_of_payout(more, trail)
+        self._previous_excess = min(self._previous_excess, more)
+        super().on_excess_payout(more, trail)
 
     @property
     def _model(self) -> GeodesicTether:
@@ -257,43 +257,43 @@ class PredictivePlanner(Planner):
         self._shortest_feasible(robot, tether, self.limit)
 
     @property
-    def _ahead(self) -> Ahead:
+    def _preview(self) -> TetherPreview:
         """Preview by the present map and time."""
-        return Ahead(
+        return TetherPreview(
             self.mission,
             self._model,
-            self.load if self.loaded else None,
-            self.track if self.anchor_moves else None,
+            self.load if self.has_load else None,
+            self.track if self.is_anchor_moving else None,
             self.now,
             self.policy.preview,
         )
 
     @property
-    def _stay(self) -> float:
+    def _stay_s(self) -> float:
         """Time at the end of the path that is planned, s."""
-        if self.homeward:
+        if self.is_homeward:
             return 0.0
         waypoint = self.mission.waypoints[self.index]
         return waypoint.dwell + (0.0 if waypoint.heading is None else self.policy.max_turn_s)
 
     def _fits(
-        self, tether: Tether, path: Floats, limit: float, staying: float | None = None
+        self, tether: Tether, path: Floats, limit: float, stay_s: float | None = None
     ) -> bool:
         """Return whether the tether stays within the limit all along a path, and at its end."""
-        self._looks += 1
-        self._looked += polylines.length(path)
-        return self._ahead.fits(tether, path, limit, self._stay if staying is None else staying)
+        self._preview_count += 1
+        self._previewed_length += polylines.length(path)
+        return self._preview.fits(tether, path, limit, self._stay_s if stay_s is None else stay_s)
 
     def _straight(self, robot: Floats, tether: Tether, limit: float) -> Floats | None:
         """Return the straight path to the waypoint, or to where it counts as visited, if the tether
         fits."""
         far = None
-        for end in (self.waypoint, self._near_enough(robot, self.waypoint)):
+        for end in (self.waypoint, self._visit_point(robot, self.waypoint)):
             path = np.array([robot, end])
             if not self.is_free(path):
                 continue
-            if far is None or self.anchor_moves:
-                far, _ = self._ahead.follow(tether, path, limit, self._stay)
+            if far is None or self.is_anchor_moving:
+                far, _ = self._preview.follow(tether, path, limit, self._stay_s)
             if polylines.length(path) <= far:
                 return path
         return None
@@ -326,51 +326,51 @@ class PredictivePlanner(Planner):
             passed = int(np.searchsorted(along, places[i] - 1e-9, side="right"))
             return np.vstack([tether.nodes[: max(1, len(nodes) - passed)], back[i]])
 
-        self._looks, self._looked, self._candidates = 0, 0.0, []
+        self._preview_count, self._previewed_length, self._candidates = 0, 0.0, []
         if onward[0] is not None:
             # the shortest path of all: where the tether fits on it, nothing else need be tried
-            path = self.pulled(onward[0])
+            path = self.pull_taut(onward[0])
             direct = Candidate(np.vstack([tether.nodes, path[1:]]), path, path)
             self._candidates.append(direct)
-            if not self._over_at_its_end(direct, limit) and self._fits(tether, path, limit):
+            if not self._exceeds_at_end(direct, limit) and self._fits(tether, path, limit):
                 return path, NORMAL
         classes = []
         for last in self._classes(back, onward):
             on = onward[last]
             assert on is not None
             path = np.vstack([back[: last + 1], on[1:]])
-            there = np.vstack([taken_back(last), on[1:]])
-            classes.append(Candidate(there, path, self._roughly_pulled(path)))
+            end_tether = np.vstack([taken_back(last), on[1:]])
+            classes.append(Candidate(end_tether, path, self._roughly_pulled(path)))
         self._candidates += classes
         best: Floats | None = None
-        least = np.inf
+        min_length = np.inf
         for candidate in sorted(classes, key=lambda c: polylines.length(c.rough)):
             expected = self.predictive.min_pull_ratio * polylines.length(candidate.rough)
-            if expected >= least or (best is not None and self._looked_enough):
+            if expected >= min_length or (best is not None and self._has_previewed_enough):
                 break
-            if self._over_at_its_end(candidate, limit):
+            if self._exceeds_at_end(candidate, limit):
                 continue
-            path = self.pulled(candidate.rough)
+            path = self.pull_taut(candidate.rough)
             length = polylines.length(path)
-            if length >= least:
+            if length >= min_length:
                 continue
             if self._fits(tether, path, limit):
-                best, least = path, length
+                best, min_length = path, length
                 continue
-            found = self._tautest(tether, candidate.path, limit, least)
+            found = self._tautest(tether, candidate.path, limit, min_length)
             if found is not None:
-                best, least = found, polylines.length(found)
+                best, min_length = found, polylines.length(found)
         return best, RECOVERY
 
-    def _over_at_its_end(self, candidate: Candidate, limit: float) -> bool:
+    def _exceeds_at_end(self, candidate: Candidate, limit: float) -> bool:
         """Return whether even the taut tether at the end of a path is over the limit, less slack,
         however near the anchor may have come by then."""
-        if self.track is not None and self.anchor_moves:
-            way = polylines.length(candidate.rough) / self.mission.speed
-            limit += self.track.travelled(self.now, self.now + way)
-        return self._longer_than(candidate.tether, limit / (1.0 + self.mission.tether.slack))
+        if self.track is not None and self.is_anchor_moving:
+            distance = polylines.length(candidate.rough) / self.mission.speed
+            limit += self.track.travelled(self.now, self.now + distance)
+        return self._exceeds(candidate.tether, limit / (1.0 + self.mission.tether.slack))
 
-    def _in_time(self, paths: Iterator[Floats]) -> Iterator[Floats]:
+    def _while_in_time(self, paths: Iterator[Floats]) -> Iterator[Floats]:
         """Yield paths while there is time."""
         for path in paths:
             if self.options.clock is not None and self.options.clock.up:
@@ -378,31 +378,40 @@ class PredictivePlanner(Planner):
             yield path
 
     @property
-    def _looked_enough(self) -> bool:
+    def _has_previewed_enough(self) -> bool:
         """True if enough was simulated to take the best path so far.
 
         Simulations and metres are counted, not seconds, so that a plan is the same on every
         machine.
         """
-        return self._looks >= self.options.looks or self._looked >= self.options.metres
+        return (
+            self._preview_count >= self.options.looks
+            or self._previewed_length >= self.options.metres
+        )
 
     def _tautest(
-        self, tether: Tether, line: Floats, limit: float, least: float = np.inf
+        self, tether: Tether, line: Floats, limit: float, max_length: float = np.inf
     ) -> Floats | None:
         """Return the tautest path in the class of a line on which the tether fits, by bisection of
         ever tauter paths: the less of a retreat is saved, the more likely the tether fits. None if
         none is shorter than `least`."""
         best = None
-        paths = [p for p in self._in_time(self._ever_tauter(line)) if polylines.length(p) < least]
-        while paths and not (self._looked_enough and (best is not None or least < np.inf)):
+        paths = [
+            p
+            for p in self._while_in_time(self._pull_in_stages(line))
+            if polylines.length(p) < max_length
+        ]
+        while paths and not (
+            self._has_previewed_enough and (best is not None or max_length < np.inf)
+        ):
             middle = len(paths) // 2
             if self._fits(tether, paths[middle], limit):
                 best, paths = paths[middle], paths[middle + 1 :]
-                least = polylines.length(best)
+                max_length = polylines.length(best)
             else:
                 paths = paths[:middle]
-            min_saving = self.predictive.min_saving * least
-            if paths and least - polylines.length(paths[-1]) < min_saving:
+            min_saving = self.predictive.min_saving * max_length
+            if paths and max_length - polylines.length(paths[-1]) < min_saving:
                 break
         return best
 
@@ -411,21 +420,21 @@ class PredictivePlanner(Planner):
         back along the tether, pulled as far as both hold."""
         if (
             len(self.path)
-            and not self._led_astray(robot, tether)
-            and not self._overtaken(robot, tether)
+            and not self._is_tether_lost(robot, tether)
+            and not self._is_overtaken(robot, tether)
         ):
             return False
         self._checked = self.now
-        if self.caught > self.predictive.snag_tolerance:
-            back = polylines.points_along(self.trail[::-1], self.fine)
-            back = np.vstack([back, self.laid_now.nodes[1:]])
+        if self.excess_payout > self.predictive.snag_tolerance:
+            back = polylines.points_along(self.trail[::-1], self.fine_spacing)
+            back = np.vstack([back, self.home_tether.nodes[1:]])
             if self.scene.distance(back).min() > CONTACT_DEPTH * self.mission.delta:
-                self.path, self.mode, self._sure = back[1:], HOME, False
+                self.path, self.mode, self._is_sure_of_home = back[1:], HOME, False
                 return True
         path = self._leg_home(robot, tether)
         if path is None:
             path = self._direct_home(robot, tether)
-        self._sure = path is not None
+        self._is_sure_of_home = path is not None
         if path is None:
             path = self._home_along(tether)
         self.path, self.mode = path[1:], HOME
@@ -436,7 +445,7 @@ class PredictivePlanner(Planner):
         leg = self._leg(robot, tether)
         if leg is None:
             return None
-        far, end = self._ahead.follow(tether, leg, self.limit, 0.0)
+        far, end = self._preview.follow(tether, leg, self.limit, 0.0)
         return leg if np.isinf(far) and self._is_free(end) else None
 
     def _direct_home(self, robot: Floats, tether: Tether) -> Floats | None:
@@ -444,46 +453,46 @@ class PredictivePlanner(Planner):
         path = self.paths(robot[None]).path(0)
         if path is None:
             return None
-        path = self.pulled(path)
-        if self._longer_than(np.vstack([tether.nodes, path[1:]]), self._free_length):
+        path = self.pull_taut(path)
+        if self._exceeds(np.vstack([tether.nodes, path[1:]]), self._free_length):
             return None
-        far, end = self._ahead.follow(tether, path, self.limit, 0.0)
+        far, end = self._preview.follow(tether, path, self.limit, 0.0)
         return path if np.isinf(far) and self._is_free(end) else None
 
     def _home_along(self, tether: Tether) -> Floats:
         """Return the path back along the tether, pulled as far as the tether fits and comes
         free."""
         line = self.back_along(tether)
-        path = self.pulled(line)
-        far, end = self._ahead.follow(tether, path, self.limit, 0.0)
+        path = self.pull_taut(line)
+        far, end = self._preview.follow(tether, path, self.limit, 0.0)
         if np.isinf(far):
-            self._sure = self._is_free(end)
+            self._is_sure_of_home = self._is_free(end)
         else:
             found = self._tautest(tether, line, self.limit)
             path = line if found is None else found
-            self._sure = self._comes_free(tether, path)
-        if not self._sure and path is not line:
-            path, self._sure = line, self._comes_free(tether, line)
+            self._is_sure_of_home = self._comes_free(tether, path)
+        if not self._is_sure_of_home and path is not line:
+            path, self._is_sure_of_home = line, self._comes_free(tether, line)
         return path
 
-    def _led_astray(self, robot: Floats, tether: Tether) -> bool:
+    def _is_tether_lost(self, robot: Floats, tether: Tether) -> bool:
         """Return whether the tether no longer comes free on the rest of the way home, as when a
         vehicle that cuts corners has taken it past something. Checked at intervals."""
-        self._asked += 1
-        if self._asked % self.predictive.home_check_steps or not self._sure:
+        self._home_steps += 1
+        if self._home_steps % self.predictive.home_check_steps or not self._is_sure_of_home:
             return False
         return not self._comes_free(tether, np.vstack([robot, self.path]))
 
-    def ends_here(self, tether: Tether) -> bool:
+    def may_end(self, tether: Tether) -> bool:
         """Return whether the tether is free at home; if not, the robot goes back along it and comes
         home again."""
         policy, max_attempts = self.predictive, self.predictive.max_home_attempts
-        if self.caught > policy.snag_tolerance and self._homes < max_attempts:
+        if self.excess_payout > policy.snag_tolerance and self._homes < max_attempts:
             self._homes += 1
             return False
-        here = self._model.update(self.laid_now, tether.robot)
+        home_tether = self._model.update(self.home_tether, tether.robot)
         length = self._model.relaxed(tether.nodes, policy.release_rounds).length
-        free_length = here.length + self.policy.free_tolerance * self.mission.delta
+        free_length = home_tether.length + self.policy.free_tolerance * self.mission.delta
         if length <= free_length or self._homes >= max_attempts:
             return True
         self._homes += 1
@@ -502,13 +511,13 @@ class PredictivePlanner(Planner):
     @property
     def _free_length(self) -> float:
         """Length up to which a tether is free at home, metres."""
-        return self.laid_now.length + self.policy.free_tolerance * self.mission.delta
+        return self.home_tether.length + self.policy.free_tolerance * self.mission.delta
 
     def _roughly_pulled(self, path: Floats) -> Floats:
         mission = self.mission
         return roughly_taut(self.scene, path, mission.clearance, mission.delta, self.policy.paths)
 
-    def _ever_tauter(self, path: Floats) -> Iterator[Floats]:
+    def _pull_in_stages(self, path: Floats) -> Iterator[Floats]:
         mission = self.mission
         return ever_tauter(self.scene, path, mission.clearance, mission.delta, self.policy.paths)
 
@@ -528,38 +537,40 @@ class PredictivePlanner(Planner):
                 out.append(i)
         return out
 
-    def _longer_than(self, line: Floats, limit: float) -> bool:
+    def _exceeds(self, line: Floats, limit: float) -> bool:
         """Return whether a tether along a line is longer than a limit even when taut, as far as
         that can be predicted: each pull takes less away than the one before."""
         policy = self.predictive
         tether = self._model.relaxed(line, policy.pull_rounds)
-        length, less = tether.length, np.inf
+        length, decrease = tether.length, np.inf
         for _ in range(policy.max_pulls):
             if length <= limit:
                 return False
             tether = self._model.relaxed(tether.nodes, policy.pull_rounds)
-            before, less, length = less, length - tether.length, tether.length
-            ratio = min(less / before, 0.95) if before > 0.0 else 0.0
-            if length - policy.pull_allowance * less * ratio / (1.0 - ratio) > limit:
+            before, decrease, length = decrease, length - tether.length, tether.length
+            ratio = min(decrease / before, 0.95) if before > 0.0 else 0.0
+            if length - policy.pull_allowance * decrease * ratio / (1.0 - ratio) > limit:
                 break
         return length > limit
 
-    def _by_the_anchor(self, tether: Tether, limit: float) -> Floats | None:
+    def _path_by_anchor(self, tether: Tether, limit: float) -> Floats | None:
         """Return a path back to the anchor and on beside the shortest tether that any class found
         has at the waypoint. If that does not fit either, leave the waypoint out with the reason and
         return None."""
-        own = self._shortest_tether(limit)
-        if own is None:
+        shortest = self._shortest_tether(limit)
+        if shortest is None:
             self.leave_out("no free path to it")
             return None
-        needs, near = self.payout(own), 0.8 * self.mission.reach
+        needs, near = self.payout(shortest), 0.8 * self.mission.reach
         if needs - near <= limit:
-            path = np.vstack([self.beside(tether.nodes[::-1]), self.beside(own.nodes)[1:]])
+            path = np.vstack(
+                [self.off_surfaces(tether.nodes[::-1]), self.off_surfaces(shortest.nodes)[1:]]
+            )
             for short in (0.0, near):
                 part = polylines.part(path, 0.0, polylines.length(path) - short)
                 if self._fits(tether, part, limit):
                     return part
-        limits = f"the limit is {self.mission.tether_length:g} m{self._kept_back}"
+        limits = f"the limit is {self.mission.tether_length:g} m{self._reserve_words}"
         self.leave_out(
             f"out of reach: it needs {needs:.2f} m of tether, {limits}"
             if needs - near > limit

@@ -21,7 +21,7 @@ tether model's nodes let paths dip in."""
 
 
 @dataclass(frozen=True)
-class Ahead:
+class TetherPreview:
     """Preview of the tether along paths that are not followed yet.
 
     Parameters
@@ -48,7 +48,7 @@ class Ahead:
     policy: PreviewPolicy = PreviewPolicy()
 
     def follow(
-        self, tether: Tether, path: Floats, limit: float, staying: float
+        self, tether: Tether, path: Floats, limit: float, stay_s: float
     ) -> tuple[float, Tether]:
         """Return how far along a path the tether stays within the limit, and how it lies there.
 
@@ -73,14 +73,14 @@ class Ahead:
         if self._meets_solid(path):
             return 0.0, tether
         if self.track is not None:
-            return self._by_the_clock(self.track, tether, path, limit, staying)
+            return self._with_moving_anchor(self.track, tether, path, limit, stay_s)
         if self.load is not None:
             return self._under_load(self.load, tether, path, limit)
         return self._taut(tether, path, limit)
 
-    def fits(self, tether: Tether, path: Floats, limit: float, staying: float) -> bool:
+    def fits(self, tether: Tether, path: Floats, limit: float, stay_s: float) -> bool:
         """Return whether the tether stays within the limit to the end; see `follow`."""
-        return math.isinf(self.follow(tether, path, limit, staying)[0])
+        return math.isinf(self.follow(tether, path, limit, stay_s)[0])
 
     def _taut(self, tether: Tether, path: Floats, limit: float) -> tuple[float, Tether]:
         """Follow a path with a taut tether.
@@ -88,15 +88,17 @@ class Ahead:
         A taut tether grows by at most the path of its end, so the robot can take steps as long as
         the rest of the limit.
         """
-        most = max(limit, tether.length + 1e-6)
-        s, length = 0.0, polylines.length(path)
-        while s < length:
-            until = min(length, s + max(self._fine, most - tether.length))
-            part = polylines.part(path, s, until)[1:]
-            tether, lengths = self.model.drive(tether, part, floor=self.policy.floor_share * most)
-            if lengths.max() > most:
-                return s, tether
-            s = until
+        max_length = max(limit, tether.length + 1e-6)
+        start, length = 0.0, polylines.length(path)
+        while start < length:
+            stop = min(length, start + max(self._fine, max_length - tether.length))
+            part = polylines.part(path, start, stop)[1:]
+            tether, lengths = self.model.drive(
+                tether, part, floor=self.policy.floor_share * max_length
+            )
+            if lengths.max() > max_length:
+                return start, tether
+            start = stop
         return math.inf, tether
 
     @property
@@ -123,40 +125,40 @@ class Ahead:
             return math.inf, tether
         end, payouts, turnings = self.model.drive_under(tether, points, load)
         over = payouts > max(limit, payout(tether, load) + 1e-6)
-        over |= turnings > self._most_turning(tether)
+        over |= turnings > self._max_turning(tether)
         if not over.any():
             return math.inf, end
         return float(polylines.along(np.vstack([path[:1], points]))[over.argmax()]), end
 
-    def _by_the_clock(
-        self, track: Track, tether: Tether, path: Floats, limit: float, staying: float
+    def _with_moving_anchor(
+        self, track: Track, tether: Tether, path: Floats, limit: float, stay_s: float
     ) -> tuple[float, Tether]:
         """Follow a path while the anchor moves, also during the stay at the end.
 
         A taut tether grows by at most what both of its ends travel.
         """
-        most, turns = max(limit, self._payout(tether) + 1e-6), self._most_turning(tether)
-        speed, far = self.mission.speed, polylines.length(path)
-        whole, at, out = far / speed + staying, 0.0, self._payout(tether)
-        while at < whole - 1e-9:
+        max_payout, max_turning = max(limit, self._payout(tether) + 1e-6), self._max_turning(tether)
+        speed, path_length = self.mission.speed, polylines.length(path)
+        duration, elapsed, current = path_length / speed + stay_s, 0.0, self._payout(tether)
+        while elapsed < duration - 1e-9:
             step = self.policy.min_step_s
             if self.load is None:
-                step = max(step, (most - out) / (speed + track.speed))
-            until = min(whole, at + step)
-            for place in track.between(self.now + at, self.now + until)[1:]:
+                step = max(step, (max_payout - current) / (speed + track.speed))
+            until = min(duration, elapsed + step)
+            for place in track.between(self.now + elapsed, self.now + until)[1:]:
                 tether = self.model.update(tether, tether.robot, place)
-            if speed * at < far:
-                part = polylines.part(path, speed * at, min(far, speed * until))
+            if speed * elapsed < path_length:
+                part = polylines.part(path, speed * elapsed, min(path_length, speed * until))
                 tether, _ = self.model.drive(tether, part[1:])
-            at, out = until, self._payout(tether)
-            if out > most or turning(tether, self.mission.delta) > turns:
+            elapsed, current = until, self._payout(tether)
+            if current > max_payout or turning(tether, self.mission.delta) > max_turning:
                 return 0.0, tether  # nearer by, it would have to last as long: that was not asked
         return math.inf, tether
 
     def _payout(self, tether: Tether) -> float:
         return tether.length if self.load is None else payout(tether, self.load)
 
-    def _most_turning(self, tether: Tether) -> float:
+    def _max_turning(self, tether: Tether) -> float:
         """Return the sum of turning angles that plans may use, rad: at least the present one."""
         most = self.mission.tether.max_turning
         if math.isinf(most):

@@ -113,7 +113,7 @@ class ReactDraftPlanner(ReactPlanner):
             if len(self.path) and not ended:
                 return searched
             self.path, self.mode = self.path[:0], NORMAL
-        return False if len(self.path) else self.go_on(robot) or searched
+        return False if len(self.path) else self.plan_direct(robot) or searched
 
     def recovery(self, pivots: Pivots) -> Floats:
         """Return the refined recovery path (k, 3) without the robot's position (Algorithms 2 and
@@ -147,7 +147,7 @@ class ReactDraftPlanner(ReactPlanner):
         onward = pivots.onward(0)
         if onward is None:
             return np.vstack([pivots.points[0], self.waypoint])
-        return self.pulled(onward)
+        return self.pull_taut(onward)
 
 
 @dataclass

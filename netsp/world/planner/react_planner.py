@@ -48,7 +48,7 @@ class ReactPlanner(Planner):
             self.path = self.recovery(Pivots(self, tether))
             self.mode = RECOVERY
             return True
-        return False if len(self.path) else self.go_on(robot)
+        return False if len(self.path) else self.plan_direct(robot)
 
     def plan_home(self, robot: Floats, tether: Tether) -> bool:
         """Go back along the whole tether (the paper's tether recovery)."""
@@ -76,7 +76,7 @@ class ReactPlanner(Planner):
             return self.fallback(pivots)
         onward = pivots.onward(n)
         assert onward is not None
-        return self.refined(np.vstack([pivots.back(n), self.pulled(onward)[1:]]))[1:]
+        return self.refined(np.vstack([pivots.back(n), self.pull_taut(onward)[1:]]))[1:]
 
     def fallback(self, pivots: Pivots) -> Floats:
         """Return the shortest path to the waypoint, the limit being a soft one."""
@@ -84,4 +84,4 @@ class ReactPlanner(Planner):
         onward = pivots.onward(0)
         if onward is None:
             return self.waypoint[None]
-        return self.refined(self.pulled(onward))[1:]
+        return self.refined(self.pull_taut(onward))[1:]

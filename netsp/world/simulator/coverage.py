@@ -79,14 +79,14 @@ def patches_of(
             raise InputError(f"inspect: expected names of solids, got {name!r}")
     centres, normals, areas = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0)]
     pairs = np.zeros((0, 2), dtype=np.int64)
-    own = [
+    surfaces = [
         (surface_of(s.shape, low, high), Scene(solids=(s,)).field())
         for s in solids
         if not isinstance(s.shape, HalfSpace) and (inspect is None or s.name in inspect)
     ]
     chosen_meshes = ("mesh",) if inspect is None else inspect  # no floor unless it is asked for
-    own += [(triangles, field) for name, triangles in scene.meshes() if name in chosen_meshes]
-    for (vertices, faces), alone in own:
+    surfaces += [(triangles, field) for name, triangles in scene.meshes() if name in chosen_meshes]
+    for (vertices, faces), own_field in surfaces:
         triangles = divided(vertices[faces], size, policy.max_patches)
         cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         twice = np.linalg.norm(cross, axis=1)
@@ -94,8 +94,8 @@ def patches_of(
         middle = triangles[good].mean(axis=1)
         if len(middle):
             # facets of what is round lie a little inside of it
-            outward = alone.gradient(middle)
-            centres.append(middle - alone.distance(middle)[:, None] * outward)
+            outward = own_field.gradient(middle)
+            centres.append(middle - own_field.distance(middle)[:, None] * outward)
             normals.append(outward)
             areas.append(0.5 * twice[good])
     if scene.cloud is not None and (inspect is None or "cloud" in inspect):
@@ -211,8 +211,8 @@ class Coverage:
         """Mark what the camera sees from a place (3,) looking in a horizontal direction (rad),
         tilted towards the nearest patch as far as it can."""
         near = self._nearest(eye)
-        most = math.radians(self.camera.tilt)
-        pitch = min(max(math.atan2(near[2], math.hypot(near[0], near[1])), -most), most)
+        max_tilt = math.radians(self.camera.tilt)
+        pitch = min(max(math.atan2(near[2], math.hypot(near[0], near[1])), -max_tilt), max_tilt)
         half = math.tan(math.radians(0.5 * self.camera.field_of_view))
         open_, through = mark(
             self.field.arrays,
@@ -332,8 +332,8 @@ def _mark_in_numpy(
     seen_through[fresh] = True
     targets = surface.centres[at] + view.off * surface.normals[at]
     eyes = np.broadcast_to(view.eye, targets.shape)
-    least = lowest_along_each(field, eyes, targets, 0.5 * view.off)
-    open_ = at[least > -0.5 * view.off]
+    lowest = lowest_along_each(field, eyes, targets, 0.5 * view.off)
+    open_ = at[lowest > -0.5 * view.off]
     seen[open_] = True
     return _in_order(surface.shares[open_]), _in_order(surface.shares[fresh])
 

@@ -171,23 +171,23 @@ def simulate(
     if surprises is not None:
         line = np.vstack([taut.nodes, robot.position])
         around = Surroundings(mission, scene, field.voxels, surprises, line, seed, policy)
-        world.model, world.believed, world.tethers_seen = tethers, taut, [(0, taut)]
+        world.model, world.believed, world.kept_tethers = tethers, taut, [(0, taut)]
     since, stopped, stalls = (0.0, -1), False, Stalls()
     begin = time.perf_counter()
     try:
         while True:
             before, chosen.now = chosen.index, world.now
             if around is not None:
-                around.go_on(world, chosen)
+                around.update(world, chosen)
             command = chosen.step(world.robot, world.believed or world.tether)
-            row = world.note(chosen, command)
+            row = world.log_state(chosen, command)
             if on_step is not None:
                 on_step(row, chosen)
             if command.mode == DONE:
                 break
             if chosen.reached and chosen.index > before and chosen.reached[-1] == before:
                 stay(world, chosen, chosen.mission.waypoints[before], on_step)
-                if chosen.anchor_moves and world.now > row.time:
+                if chosen.is_anchor_moving and world.now > row.time:
                     chosen.path = chosen.path[:0]  # it was planned for another moment
                     continue
             if since[1] != chosen.index or command.mode == WAIT:
@@ -195,13 +195,13 @@ def simulate(
             elif world.now - since[0] > policy.max_waypoint_s:
                 chosen.leave_out(f"not reached in {policy.max_waypoint_s:g} s")
                 continue
-            if stalls.seen(world, chosen, command):
+            if stalls.check(world, chosen, command):
                 chosen.leave_out(stalls.reason)
                 continue
             fresh = before != chosen.index or command.replan_s > 0.0 or not world.now
-            passed, moved = world.go(command.path, fresh, chosen.homeward)
+            passed, moved = world.step(command.path, fresh, chosen.is_homeward)
             if moved:
-                chosen.passed(passed)
+                chosen.drop_passed(passed)
             else:
                 chosen.leave_out("the path to it leads through a solid")
     except (KeyboardInterrupt, SystemError) as error:
@@ -209,9 +209,9 @@ def simulate(
             raise
         stopped = True
     wall = time.perf_counter() - begin
-    summary = {**summarise(chosen.mission, chosen, world, wall, stopped), **chosen.told()}
+    summary = {**summarise(chosen.mission, chosen, world, wall, stopped), **chosen.summary_fields()}
     summary["stalls"] = stalls.found
-    summary["surprises"] = None if around is None else around.told()
+    summary["surprises"] = None if around is None else around.summary_fields()
     return Run(
         chosen.flown,
         planner if isinstance(planner, str) else chosen.name,
@@ -219,7 +219,7 @@ def simulate(
         world.tether,
         summary,
         None if around is None else around.scene_now,
-        tuple(world.tethers_seen),
+        tuple(world.kept_tethers),
     )
 
 
@@ -237,12 +237,14 @@ def stay(
     if heading is None and waypoint.dwell == 0.0:
         return
     tolerance = math.radians(world.policy.heading_tolerance_deg)
-    here, since, arrived = world.vehicle.position, world.now, None
+    position, since, arrived = world.vehicle.position, world.now, None
     while arrived is None or world.now < arrived + waypoint.dwell - 1e-9:
-        world.go(here[None], world.now == since, heading=heading)
-        row = world.note(planner, Command(here[None], DWELL))
+        world.step(position[None], world.now == since, heading=heading)
+        row = world.log_state(planner, Command(position[None], DWELL))
         if on_step is not None:
             on_step(row, planner)
-        off = 0.0 if heading is None else abs(turned(heading - world.vehicle.yaw))
-        if arrived is None and (off <= tolerance or world.now - since >= planner.policy.max_turn_s):
+        error = 0.0 if heading is None else abs(turned(heading - world.vehicle.yaw))
+        if arrived is None and (
+            error <= tolerance or world.now - since >= planner.policy.max_turn_s
+        ):
             arrived = world.now

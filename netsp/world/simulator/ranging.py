@@ -74,13 +74,13 @@ class Ranging:
 
 
 @kernel
-def cast(field: Field, place: Floats, rays: Floats, most: float) -> Floats:
+def cast(field: Field, place: Floats, rays: Floats, max_range: float) -> Floats:
     """Return (n,) the distance at which each ray (n, 3) meets a solid; inf beyond `most` (sphere
     tracing)."""
     out = np.full(len(rays), math.inf)
     for n in range(len(rays)):
         s = 0.0
-        while s <= most:
+        while s <= max_range:
             d = distance(
                 field,
                 place[0] + s * rays[n, 0],

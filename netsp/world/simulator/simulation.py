@@ -50,7 +50,7 @@ class Simulation:
         The tether of that model.
     positions : Positions, optional
         Sensor of the robot's position.
-    thought : ndarray, shape (3,), optional
+    estimated_position : ndarray, shape (3,), optional
         Estimated position of the robot, metres.
     track : Track, optional
         Track of the anchor.
@@ -60,7 +60,7 @@ class Simulation:
         Number of contacts of the robot with solids.
     shortening : bool
         Whether the limit was lowered below the tether, which is being shortened.
-    tethers_seen : list of (int, Tether)
+    kept_tethers : list of (int, Tether)
         Rows of the log with their tethers, at intervals, if the scene changes; else empty.
     log : list of LogRow
         One row per step.
@@ -78,12 +78,12 @@ class Simulation:
     model: Tethers | None = None
     believed: Tether | None = None
     positions: Positions | None = None
-    thought: Floats | None = None
+    estimated_position: Floats | None = None
     track: Track | None = None
     now: float = 0.0
     contacts: int = 0
     shortening: bool = False
-    tethers_seen: list[tuple[int, Tether]] = field(default_factory=list)
+    kept_tethers: list[tuple[int, Tether]] = field(default_factory=list)
     log: list[LogRow] = field(default_factory=list)
     policy: SimulationPolicy = SimulationPolicy()
     _was: Floats | None = None
@@ -103,8 +103,8 @@ class Simulation:
         physics = self.mission.tether
         if not physics.pulls_vehicle:
             return {}
-        here, delta = self.vehicle.position, self.tethers.delta
-        velocity = np.zeros(3) if self._was is None else (here - self._was) / self.policy.step_s
+        position, delta = self.vehicle.position, self.tethers.delta
+        velocity = np.zeros(3) if self._was is None else (position - self._was) / self.policy.step_s
         return {"pull": pull_on_robot(self.tether, self.load, physics.friction, velocity, delta)}
 
     @property
@@ -112,7 +112,7 @@ class Simulation:
         """Load on the tether now."""
         return self.mission.tether.load(self.water(self.now))
 
-    def note(self, planner: Planner, command: Command) -> LogRow:
+    def log_state(self, planner: Planner, command: Command) -> LogRow:
         """Log the present state, with the planner's waypoint and the mode of its command."""
         x, y, z = (float(v) for v in self.vehicle.position)
         seen = self.coverage
@@ -141,13 +141,13 @@ class Simulation:
             limit,
             self.shortening,
         )
-        if self.tethers_seen and len(self.log) % self.policy.tether_steps == 0:
-            self.tethers_seen.append((len(self.log), self.tether))
+        if self.kept_tethers and len(self.log) % self.policy.tether_steps == 0:
+            self.kept_tethers.append((len(self.log), self.tether))
         self.log.append(row)
         return row
 
-    def go(
-        self, path: Floats, fresh: bool, homeward: bool = False, heading: float | None = None
+    def step(
+        self, path: Floats, fresh: bool, is_homeward: bool = False, heading: float | None = None
     ) -> tuple[int, bool]:
         """Take one step along a path; a vehicle that runs into a solid is stopped where it was.
 
@@ -174,7 +174,7 @@ class Simulation:
         self._was = robot
         if heading is not None:
             yaw = heading
-        elif self.coverage is not None and not homeward:
+        elif self.coverage is not None and not is_homeward:
             yaw = self.coverage.heading(robot, yaw)
         elif self.coverage is None:
             yaw = self._course(path, yaw)
@@ -188,12 +188,12 @@ class Simulation:
             self.contacts += 1
         for point in points:
             self.tether = self.tethers.update(self.tether, point, anchor)
-        told = points
+        seen_points = points
         if self.positions is not None and not self.positions.exact:
-            self.thought = self.positions(self.vehicle.position)
-            told = [self.thought]
+            self.estimated_position = self.positions(self.vehicle.position)
+            seen_points = [self.estimated_position]
         if self.model is not None and self.believed is not None:
-            for point in told:
+            for point in seen_points:
                 self.believed = self._believed_after(point, anchor)
         return passed, moved
 
@@ -211,4 +211,4 @@ class Simulation:
     @property
     def robot(self) -> Floats:
         """Position (3,) at which the planner believes the robot."""
-        return self.vehicle.position if self.thought is None else self.thought
+        return self.vehicle.position if self.estimated_position is None else self.estimated_position

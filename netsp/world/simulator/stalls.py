@@ -29,25 +29,27 @@ class Stalls:
     found: list[dict[str, Any]] = field(default_factory=list)
     reason: str = ""
     _index: int = -1
-    _least: float = math.inf
+    _min_left: float = math.inf
     _since: float = 0.0
 
-    def seen(self, world: Simulation, planner: Planner, command: Command) -> bool:
+    def check(self, world: Simulation, planner: Planner, command: Command) -> bool:
         """Return whether the rest of the path has not become shorter for the policy's `stall_s`; a
         stall is recorded. A path that has been planned anew starts the time again."""
-        here = world.vehicle.position
-        left = polylines.length(np.vstack([here, command.path]))
+        position = world.vehicle.position
+        left = polylines.length(np.vstack([position, command.path]))
         # home may move away as fast as the robot comes after it
-        chasing = command.mode == WAIT or (planner.homeward and planner.anchor_moves)
+        chasing = command.mode == WAIT or (planner.is_homeward and planner.is_anchor_moving)
         planned = planner.index != self._index or command.replan_s > 0.0
-        if chasing or planned or left < self._least - world.policy.stall_progress:
-            self._index, self._least, self._since = planner.index, left, world.now
+        if chasing or planned or left < self._min_left - world.policy.stall_progress:
+            self._index, self._min_left, self._since = planner.index, left, world.now
             return False
         stall_s = world.policy.stall_s
         if world.now - self._since < stall_s or command.mode == HOLD:
             return False
         water = float(np.linalg.norm(world.water(world.now)))
         self.reason = f"stalled: no progress in {stall_s:g} s, in water of {water:.2f} m/s"
-        self.found.append({"time": world.now, "waypoint": planner.index, "position": here.tolist()})
+        self.found.append(
+            {"time": world.now, "waypoint": planner.index, "position": position.tolist()}
+        )
         self._index = -1
         return True

@@ -97,14 +97,14 @@ def _over(row: LogRow) -> bool:
 def _home(planner: Planner, world: Simulation, since: float) -> dict[str, Any]:
     """Return how the mission ended; `left` is measured once the tether has come to rest."""
     model, delta = world.tethers, world.tethers.delta
-    as_laid = model.refine(model.update(planner.laid_now, world.vehicle.position)).length
+    as_laid = model.refine(model.update(planner.home_tether, world.vehicle.position)).length
     left = max(0.0, model.refine(world.tether).length - as_laid)
     return {
         "reached": planner.home,
         "tether_free": planner.home and left <= planner.policy.free_tolerance * delta,
         "left": left,
-        "seconds": world.now - since if planner.homeward else 0.0,
-        "reason": planner.not_home,
+        "seconds": world.now - since if planner.is_homeward else 0.0,
+        "reason": planner.home_failure,
     }
 
 
@@ -136,9 +136,9 @@ def _friction(mission: Mission, turnings: Floats, step_s: float) -> dict[str, fl
     physics = mission.tether
     if physics.friction == 0.0:
         return None
-    most = float(turnings.max(initial=0.0))
+    max_turning = float(turnings.max(initial=0.0))
     return {
-        "most_turning_deg": math.degrees(most),
-        "most_tension_ratio": tension_ratio(physics.friction, most),
+        "most_turning_deg": math.degrees(max_turning),
+        "most_tension_ratio": tension_ratio(physics.friction, max_turning),
         "over_s": float((turnings > physics.max_turning * (1 + 1e-9)).sum() * step_s),
     }

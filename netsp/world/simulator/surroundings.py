@@ -51,15 +51,15 @@ class Sighting:
 
     solid: Solid
     count: int = 0
-    off: Floats = field(default_factory=lambda: np.zeros(3))
+    error_sum: Floats = field(default_factory=lambda: np.zeros(3))
     mapped: Solid | None = None
     placed_by: int = 0
 
-    def place(self, min_hits: int) -> bool:
+    def update_map_place(self, min_hits: int) -> bool:
         """Put the solid on the map where the rays say; return whether that is a new place."""
         if self.count < max(min_hits, 4 * self.placed_by):
             return False
-        x, y, z = (self.off / self.count).tolist()
+        x, y, z = (self.error_sum / self.count).tolist()
         self.mapped, self.placed_by = moved(self.solid, (x, y, z)), self.count
         return True
 
@@ -104,41 +104,41 @@ class Surroundings:
         self._since = 0.0
         self._steps = 0
 
-    def go_on(self, world: Simulation, planner: Planner) -> None:
+    def update(self, world: Simulation, planner: Planner) -> None:
         """Let events happen that are due, look, and update the planner's map."""
-        here = world.vehicle.position
-        self._leave_trail(here)
+        position = world.vehicle.position
+        self._extend_trail(position)
         before = self.mapped
-        told = self._happen(world, planner)
+        has_changed = self._apply_due_events(world, planner)
         if self.ranging is not None:
-            told = self._steps % self.policy.look_steps == 0 and self._look(world, planner)
+            has_changed = self._steps % self.policy.look_steps == 0 and self._look(world, planner)
         self._steps += 1
-        if told:
-            self._tell(world, planner, self._other(before))
+        if has_changed:
+            self._update_planner(world, planner, self._changed_box(before))
         if world.believed is not None:
-            more = payout(world.tether, world.load) - payout(world.believed, world.load)
+            excess = payout(world.tether, world.load) - payout(world.believed, world.load)
             is_recalled = self._steps % self.policy.recall_steps == 0
-            if more > planner.policy.predictive.snag_tolerance and is_recalled:
+            if excess > planner.policy.predictive.snag_tolerance and is_recalled:
                 assert isinstance(world.model, GeodesicTether)
-                world.believed = self._laid_again(world, world.model)
-                more = payout(world.tether, world.load) - payout(world.believed, world.load)
+                world.believed = self._recover_tether(world, world.model)
+                excess = payout(world.tether, world.load) - payout(world.believed, world.load)
             elif is_recalled:
                 self.moments.append((world.believed.nodes.copy(), len(self.trail)))
                 self.times.append(world.now)
                 if len(self.moments) > self.policy.max_recalled:
                     self.moments, self.times = self.moments[1::2], self.times[1::2]
-            planner.hear_of_payout(max(0.0, more), self.trail)
+            planner.on_excess_payout(max(0.0, excess), self.trail)
 
-    def _leave_trail(self, here: Floats) -> None:
+    def _extend_trail(self, position: Floats) -> None:
         """Lengthen the trail, or shorten it where the robot goes back along it."""
         spacing = self.policy.trail_spacing
-        back = self.policy.retrace_share * spacing
-        while len(self.trail) > 2 and np.linalg.norm(here - self.trail[-2]) < back:
+        min_distance = self.policy.retrace_share * spacing
+        while len(self.trail) > 2 and np.linalg.norm(position - self.trail[-2]) < min_distance:
             self.trail = self.trail[:-1]
-        if np.linalg.norm(here - self.trail[-1]) >= spacing:
-            self.trail = np.vstack([self.trail, here])
+        if np.linalg.norm(position - self.trail[-1]) >= spacing:
+            self.trail = np.vstack([self.trail, position])
 
-    def _happen(self, world: Simulation, planner: Planner) -> bool:
+    def _apply_due_events(self, world: Simulation, planner: Planner) -> bool:
         """Let events happen that are due; return whether the scene has changed.
 
         Solids wait that would stand on the tether, at home or in the anchor's way, or nearer to the
@@ -147,7 +147,7 @@ class Surroundings:
         waiting, before = [], self.solids
         for event in self.due:
             if not event.of_scene and event.time <= world.now:
-                self._tell_of(event, world, planner)
+                self._apply_event(event, world, planner)
                 self.happened.append((world.now, event))
                 continue
             solids = changed(self.solids, event) if event.time <= world.now else None
@@ -166,7 +166,7 @@ class Surroundings:
             self.mapped = self.solids
         return True
 
-    def _tell_of(self, event: SceneEvent, world: Simulation, planner: Planner) -> None:
+    def _apply_event(self, event: SceneEvent, world: Simulation, planner: Planner) -> None:
         """Let an event happen that does not change the scene: other waypoints, another limit, or a
         push, as far as there is water and the tether reaches."""
         if event.add_waypoint is not None:
@@ -178,23 +178,23 @@ class Surroundings:
             world.shortening = payout(world.tether, world.load) > limit
             self.mission = self.mission.model_copy(update={"tether_length": limit})
             world.mission = world.mission.model_copy(update={"tether_length": limit})
-            planner.take_limit(limit)
+            planner.update_limit(limit)
         elif event.push is not None:
             start = world.vehicle.position
-            most = max(self.mission.tether_length, world.tether.length)
+            max_length = max(self.mission.tether_length, world.tether.length)
             line = np.array([start, start + np.array(event.push)])
             for point in polylines.dense(line, 0.5 * self.mission.delta):
                 if float(world.scene.distance(point)) < 0.0:
                     break
                 tether = world.tethers.update(world.tether, point)
-                if tether.length > most:
+                if tether.length > max_length:
                     break
                 world.tether = tether
                 world.vehicle.stop_at(point)
                 if world.believed is not None and isinstance(world.model, GeodesicTether):
                     world.believed = world.model.update(world.believed, point)
-                self._leave_trail(point)
-            planner.carried_off()
+                self._extend_trail(point)
+            planner.on_push()
 
     def _has_room(self, world: Simulation, solids: tuple[Solid, ...]) -> bool:
         new = [s for s in solids if all(s is not old for old in self.solids)]
@@ -225,22 +225,24 @@ class Surroundings:
     def _look(self, world: Simulation, planner: Planner) -> bool:
         """Look along the path; return whether the map has changed."""
         assert self.ranging is not None
-        here = world.vehicle.position
-        onward = polylines.part(np.vstack([here, planner.path]), 0.0, 1.0)[-1] - here
+        position = world.vehicle.position
+        onward = polylines.part(np.vstack([position, planner.path]), 0.0, 1.0)[-1] - position
         if np.linalg.norm(onward) < 1e-6:
             onward = np.array([np.cos(world.vehicle.yaw), np.sin(world.vehicle.yaw), 0.0])
-        rays, ranges, off = self.ranging.look(world.scene, here, onward)
-        gone = self._take_off(planner.scene, here, rays, ranges)
-        return self._put_on(world, rays, ranges, off) or gone
+        rays, ranges, errors = self.ranging.look(world.scene, position, onward)
+        is_any_removed = self._remove_passed_solids(planner.scene, position, rays, ranges)
+        return self._add_met_solids(world, rays, ranges, errors) or is_any_removed
 
-    def _put_on(self, world: Simulation, rays: Floats, ranges: Floats, off: Floats) -> bool:
+    def _add_met_solids(
+        self, world: Simulation, rays: Floats, ranges: Floats, errors: Floats
+    ) -> bool:
         """Put solids on the map that rays have met; return whether there were any."""
         met = np.isfinite(ranges)
-        points = world.vehicle.position + rays[met] * (ranges - off)[met, None]
-        which = world.scene.nearest(points)
+        points = world.vehicle.position + rays[met] * (ranges - errors)[met, None]
+        solid_of_ray = world.scene.nearest(points)
         known = {id(s) for s in self.mapped}
         found = False
-        for n in np.unique(which[which >= 0]).tolist():
+        for n in np.unique(solid_of_ray[solid_of_ray >= 0]).tolist():
             solid = self.solids[n]
             if id(solid) in known:
                 continue
@@ -248,11 +250,13 @@ class Surroundings:
             if sighting is None:
                 sighting = Sighting(solid)
                 self.sightings.append(sighting)
-            some = which == n
-            sighting.count += int(some.sum())
-            sighting.off = sighting.off + (rays[met][some] * off[met][some, None]).sum(0)
+            is_hit = solid_of_ray == n
+            sighting.count += int(is_hit.sum())
+            sighting.error_sum = sighting.error_sum + (
+                rays[met][is_hit] * errors[met][is_hit, None]
+            ).sum(0)
             before = sighting.mapped
-            if sighting.place(self.policy.min_hits) and sighting.mapped is not None:
+            if sighting.update_map_place(self.policy.min_hits) and sighting.mapped is not None:
                 # whatever has a name is there once
                 name = solid.name
                 kept = tuple(
@@ -262,43 +266,45 @@ class Surroundings:
                 self.mapped, found = (*kept, sighting.mapped), True
         return found
 
-    def _take_off(self, known: DistanceField, here: Floats, rays: Floats, ranges: Floats) -> bool:
+    def _remove_passed_solids(
+        self, known: DistanceField, position: Floats, rays: Floats, ranges: Floats
+    ) -> bool:
         """Remove solids from the map that rays pass through; return whether there were any."""
         assert self.ranging is not None
         sensor = self.ranging.sensor
-        expected = cast(known.arrays, here, rays, sensor.range)
+        expected = cast(known.arrays, position, rays, sensor.range)
         depth = self.policy.removal_depth
         inside = expected + depth
         passed = inside + 3.0 * sensor.noise + depth < np.minimum(ranges, sensor.range)
-        points = here + rays[passed] * inside[passed, None]
+        points = position + rays[passed] * inside[passed, None]
         deep = known.distance(points) < -0.25 * depth - 2.0 * sensor.noise
         which, counts = np.unique(known.nearest(points[deep]), return_counts=True)
         is_gone = (which >= 0) & (counts >= self.policy.min_passes)
         gone = set(which[is_gone].tolist())
-        off = [s for n, s in enumerate(self.mapped) if n in gone]
+        removed = [s for n, s in enumerate(self.mapped) if n in gone]
         self.mapped = tuple(s for n, s in enumerate(self.mapped) if n not in gone)
-        self.sightings = [s for s in self.sightings if all(s.mapped is not o for o in off)]
-        return bool(off)
+        self.sightings = [s for s in self.sightings if all(s.mapped is not o for o in removed)]
+        return bool(removed)
 
-    def _other(self, before: tuple[Solid, ...]) -> Floats:
+    def _changed_box(self, before: tuple[Solid, ...]) -> Floats:
         """Return the box (2, 3) of all differences between the map and the one before."""
         boxes: list[list[list[float]]] = []
         everywhere = [[-UNBOUNDED_EXTENT] * 3, [UNBOUNDED_EXTENT] * 3]
-        for some, others in ((before, self.mapped), (self.mapped, before)):
-            for solid in some:
+        for solids, others in ((before, self.mapped), (self.mapped, before)):
+            for solid in solids:
                 if all(solid is not o for o in others):
                     box = solid.shape.box()
                     boxes.append(everywhere if box is None else box.tolist())
         return np.array([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
 
-    def _tell(self, world: Simulation, planner: Planner, box: Floats) -> None:
+    def _update_planner(self, world: Simulation, planner: Planner, box: Floats) -> None:
         """Give the planner its map, and the tether in it."""
         known = self._field(self.mapped)
         world.model = GeodesicTether(known, self.mission.delta)
-        world.believed = self._laid_again(world, world.model)
-        planner.take_map(known, world.model, box, world.vehicle.position, world.believed)
+        world.believed = self._recover_tether(world, world.model)
+        planner.update_map(known, world.model, box, world.vehicle.position, world.believed)
 
-    def _laid_again(self, world: Simulation, model: GeodesicTether) -> Tether:
+    def _recover_tether(self, world: Simulation, model: GeodesicTether) -> Tether:
         """Return the tether in another map, on that side of every new solid which explains the
         payout.
 
@@ -307,26 +313,26 @@ class Surroundings:
         earlier moments are each taken on along the trail since; the one whose payout is nearest to
         the measured one is believed, and the earliest of several.
         """
-        out = payout(world.tether, world.load)
-        best, least, tolerance = None, np.inf, self.policy.payout_tolerance
+        measured = payout(world.tether, world.load)
+        best, min_difference, tolerance = None, np.inf, self.policy.payout_tolerance
         for n, (nodes, count) in enumerate([(self.trail[:1], 1), *self.moments]):
             if count > len(self.trail):
                 continue  # gone back past it
             line = np.vstack([nodes, self.trail[count:], world.vehicle.position])
             line[1:-1] = pushed_out(model.field, line[1:-1], 1e-3)
-            line = np.vstack([self._anchors_way(world, n), line])
+            line = np.vstack([self._anchor_path_back(world, n), line])
             tether = model.drive(model.relaxed(line[[0, 0]], 1), line[1:])[0]
-            off = abs(payout(tether, world.load) - out)
-            if best is None or off < least - tolerance:
-                best, least, chosen, trail = tether, off, n, line
-            if least <= tolerance:
+            difference = abs(payout(tether, world.load) - measured)
+            if best is None or difference < min_difference - tolerance:
+                best, min_difference, chosen, trail = tether, difference, n, line
+            if min_difference <= tolerance:
                 break
         assert best is not None
         if chosen:
             self.trail, self.moments, self.times, self._since = trail, [], [], world.now
         return best
 
-    def _anchors_way(self, world: Simulation, n: int) -> Floats:
+    def _anchor_path_back(self, world: Simulation, n: int) -> Floats:
         """Return the way of a moving anchor back to its position at a moment."""
         if world.track is None:
             return self.trail[:0]
@@ -338,7 +344,7 @@ class Surroundings:
         """Scene with the solids that are there now."""
         return self.scene.model_copy(update={"solids": self.solids, "problem": None})
 
-    def told(self) -> dict[str, int]:
+    def summary_fields(self) -> dict[str, int]:
         """Return the number of events that happened, of events that never had room, and of solids
         that the sensor put on the map."""
         return {

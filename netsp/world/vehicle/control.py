@@ -74,7 +74,7 @@ def improved(
 ) -> Floats:
     """Return the thrusts (n, m) after one iteration, from those of the step before."""
     n, m = last.shape
-    step_s, state_cost, most = weights.step_s, weights.state, weights.max_thrust
+    step_s, state_cost, max_thrust = weights.step_s, weights.state, weights.max_thrust
     thrust_cost, change_cost = weights.thrust, weights.change
     guess = np.empty((n, m))
     write_rows(guess, last[1:], n - 1)
@@ -108,7 +108,7 @@ def improved(
                 hessian[j, j] += change_cost
                 hessian[j + m, j] -= change_cost
                 wish[j] -= change_cost * (guess[k + 1, i] - guess[k, i])
-            low[j], high[j] = -most - guess[k, i], most - guess[k, i]
+            low[j], high[j] = -max_thrust - guess[k, i], max_thrust - guess[k, i]
     for j in range(m * n):
         for a in range(j):
             hessian[a, j] = hessian[j, a]
@@ -116,7 +116,7 @@ def improved(
     out = np.empty((n, m))
     for k in range(n):
         for i in range(m):
-            out[k, i] = min(max(guess[k, i] + change[m * k + i], -most), most)
+            out[k, i] = min(max(guess[k, i] + change[m * k + i], -max_thrust), max_thrust)
     return out
 
 

@@ -93,8 +93,8 @@ class KinematicVehicle:
     ) -> tuple[list[Floats], int]:
         """Follow a path for some seconds; see `Vehicle.go`. Water and pull have no effect."""
         del water, fresh, pull
-        most = math.radians(self.policy.max_turn_rate_deg) * seconds
-        self.yaw += float(np.clip(turned(yaw - self.yaw), -most, most))
+        max_turn = math.radians(self.policy.max_turn_rate_deg) * seconds
+        self.yaw += float(np.clip(turned(yaw - self.yaw), -max_turn, max_turn))
         points, passed = advance(self.position, path, self.speed * seconds)
         self.position = points[-1]
         return points, passed
@@ -113,11 +113,11 @@ def advance(robot: Floats, path: Floats, step: float) -> tuple[list[Floats], int
     """Return the corners that a robot passes on its next `step` metres of a path, its end, and the
     number of points of the path that it has passed."""
     points: list[Floats] = []
-    here, left = robot, step
+    position, left = robot, step
     for passed, point in enumerate(path):
-        far = float(np.linalg.norm(point - here))
-        if far > left:
-            return [*points, here + (point - here) * (left / far)], passed
-        here, left = point, left - far
-        points.append(here)
+        distance = float(np.linalg.norm(point - position))
+        if distance > left:
+            return [*points, position + (point - position) * (left / distance)], passed
+        position, left = point, left - distance
+        points.append(position)
     return points or [robot], len(path)
