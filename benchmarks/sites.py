@@ -20,9 +20,9 @@ from table import ROOT, head, heading, row
 from netsp.base.geometry import polylines
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
-from netsp.world.paths.tree import ShortestTree, taut
+from netsp.world.paths.tree import ShortestTree, pull_taut
 from netsp.world.scene.field import pushed_out
-from netsp.world.simulator.mission_run import grid_of, simulate
+from netsp.world.simulator.mission_run import mission_grid, simulate
 
 SHARE = 1.1
 """Tether over the longest of the shortest."""
@@ -195,12 +195,12 @@ def mission_of(name: str) -> tuple[Mission, Scene]:
         scene="-", name=name, anchor=anchor, start=tuple(start), tether_length=1e3,
         waypoints=[tuple(p) for p in places], clearance=0.3, speed=0.4,
     )  # fmt: skip
-    tree = ShortestTree(grid_of(there, scene, field), anchor, places)
+    tree = ShortestTree(mission_grid(there, scene, field), anchor, places)
     paths = [tree.path(k) for k in range(len(places))]
     room = field.distance(places) > 0.3
     reachable = [k for k, p in enumerate(paths) if p is not None and room[k]]
     longest = max(
-        polylines.length(taut(field, p, 0.0, there.delta)) for p in paths if p is not None
+        polylines.length(pull_taut(field, p, 0.0, there.delta)) for p in paths if p is not None
     )
     return there.model_copy(
         update={

@@ -58,7 +58,7 @@ from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import Run
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import scene_of
-from netsp.world.simulator.mission_run import grid_of, simulate
+from netsp.world.simulator.mission_run import mission_grid, simulate
 
 MISSIONS = ("basin", "pipes", "jacket")
 LONGER_PEN = "net pen, 24 m of tether"
@@ -138,7 +138,7 @@ def group(name: str) -> list[str]:
         mission = Mission.load(ROOT / "missions" / f"{name.split(',')[0]}.json")
         scene = mission.load_scene()
         field = scene.field()
-        grid = grid_of(mission, scene, field)
+        grid = mission_grid(mission, scene, field)
         box = (grid.low, grid.low + grid.cell * np.array(grid.free.shape))
         cell, anchor = grid.cell, mission.anchor
         if "," in name:
@@ -582,7 +582,7 @@ def by_going_on(mission: Mission, scene: Scene) -> str:
     field = scene.field()
     mission = mission.checked_waypoints(field)
     order = order_by_going_on(
-        mission, field, grid_of(mission, scene, field), clock=Clock(60.0), seed=0
+        mission, field, mission_grid(mission, scene, field), clock=Clock(60.0), seed=0
     )
     lengths = []
     for there in (order, order[::-1]):

@@ -26,7 +26,7 @@ from netsp.plan.cover.viewpoints import Viewer, coarsen, spread_out
 from netsp.world import Scene
 from netsp.world.mission.equipment import Camera
 from netsp.world.mission.mission import Mission
-from netsp.world.simulator.coverage import Coverage, patches_of
+from netsp.world.simulator.coverage import Coverage, surface_patches
 from netsp.world.simulator.mission_run import simulate
 
 RING = Scene(name="ring", solids=[{"torus": {
@@ -102,7 +102,7 @@ def test_a_wall_hides_what_is_behind_it():
 
 def test_lines_of_sight_keep_to_their_limits():
     field = RING.field()
-    patches = coarsen(patches_of(RING, field, 0.25, np.array([ANCHOR])), 0.25)
+    patches = coarsen(surface_patches(RING, field, 0.25, np.array([ANCHOR])), 0.25)
     place = np.array([2.9, 0.1, -4.0])
     seen = {}
     for incidence, farthest in ((80.0, 2.5), (40.0, 2.5), (80.0, 1.3)):
@@ -121,7 +121,7 @@ def test_lines_of_sight_keep_to_their_limits():
 
 
 def test_coarser_patches_have_the_same_area():
-    fine = patches_of(RING, RING.field(), 0.2, np.array([ANCHOR]))
+    fine = surface_patches(RING, RING.field(), 0.2, np.array([ANCHOR]))
     coarse = coarsen(fine, 0.25)
     assert len(coarse.areas) < 0.5 * len(fine.areas)
     assert coarse.areas.sum() == pytest.approx(fine.areas.sum())

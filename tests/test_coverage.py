@@ -8,7 +8,7 @@ import pytest
 from netsp import InputError
 from netsp.world import Scene
 from netsp.world.mission.equipment import Camera
-from netsp.world.simulator.coverage import Coverage, divided, patches_of
+from netsp.world.simulator.coverage import Coverage, divided_triangles, surface_patches
 
 BALL = {"name": "ball", "sphere": {"center": [0, 0, 0], "radius": 1.0}}
 PLACES = np.array([[-5.0, -5, -5], [5, 5, 5]])
@@ -17,7 +17,7 @@ PLACES = np.array([[-5.0, -5, -5], [5, 5, 5]])
 def cover(solids, camera, **how):
     scene = Scene(solids=solids)
     field = scene.field()
-    return Coverage(patches_of(scene, field, camera.patch, PLACES, **how), field, camera)
+    return Coverage(surface_patches(scene, field, camera.patch, PLACES, **how), field, camera)
 
 
 @pytest.mark.parametrize("distance", [2.0, 3.0, 5.0])
@@ -69,7 +69,7 @@ def test_what_lies_inside_another_solid_need_not_be_seen():
 
 def test_dividing_keeps_the_area_and_bounds_the_sides():
     triangles = np.random.default_rng(0).normal(size=(20, 3, 3))
-    small = divided(triangles, 0.3, 200_000)
+    small = divided_triangles(triangles, 0.3, 200_000)
 
     def area(t):
         return 0.5 * np.linalg.norm(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]), axis=1).sum()
@@ -88,7 +88,7 @@ def test_a_sheet_is_seen_from_either_side_and_its_patches_lie_on_it(tmp_path):
     np.savez(tmp_path / "sheet.npz", points=np.column_stack([u, 0 * u, v]))
     scene = Scene(cloud={"file": str(tmp_path / "sheet.npz"), "voxel": 0.05})
     field = scene.field()
-    patches = patches_of(scene, field, 0.3, np.array([[0.0, -2.0, 0.0]]))
+    patches = surface_patches(scene, field, 0.3, np.array([[0.0, -2.0, 0.0]]))
     inner = np.abs(patches.centres[:, [0, 2]]).max(axis=1) < 0.8
     assert np.abs(np.abs(patches.centres[inner, 1]) - 0.1).max() < 0.01
     assert patches.areas.sum() == pytest.approx(2500, rel=0.01)

@@ -14,7 +14,7 @@ from netsp.command.main import main
 from netsp.gtsp.travel.result import Result
 from netsp.model.solution import Status
 from netsp.online.execute import ExecutionOptions, Surprises, execute
-from netsp.online.execute.tour_repair import broken
+from netsp.online.execute.tour_repair import plan_fault
 from netsp.plan.random_worlds import random_world
 from netsp.plan.tour_plan import HOME, legs_of
 from netsp.world.vehicle import make_vehicle
@@ -176,7 +176,7 @@ def test_many_surprises_at_once(seed):
 def test_what_is_whole_is_not_called_broken(world):
     problem, solution = world
     tether = np.array([problem.base, problem.base])
-    why, legs = broken(problem, tether, legs_of(problem, solution))
+    why, legs = plan_fault(problem, tether, legs_of(problem, solution))
     assert why is None
     assert [leg.word for leg in legs] == [*(v.signature for v in solution.tour), ()]
 
@@ -379,7 +379,7 @@ def test_an_interrupt_while_a_new_order_is_searched_ends_the_run(monkeypatch):
         return solve_graph(*args, on_progress=interrupt, **options)
 
     monkeypatch.setattr(module, "solve_graph", interrupted_search)
-    monkeypatch.setattr(module, "_least", lambda *_: 0.0)
+    monkeypatch.setattr(module, "_lower_bound_of_rest", lambda *_: 0.0)
     push = events({"time": 5.0, "push": [1.0, 1.0, 0.0]})
     # what a shell starts in the background ignores Ctrl-C, and so would the run
     before = signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -117,7 +117,7 @@ def test_a_run_killed_as_its_problem_is_replaced_is_resumed(tour, tmp_path, monk
     killed(tour, tmp_path, 4.0)
     state, written = read_run(tmp_path)[2], []
     record = RunRecord(tmp_path, tour)
-    record.keep(SITE, state)
+    record.write_state(SITE, state)
 
     def write_text(file, text):
         if len(written) == n_files:
@@ -128,7 +128,7 @@ def test_a_run_killed_as_its_problem_is_replaced_is_resumed(tour, tmp_path, monk
     monkeypatch.setattr(run_record, "write_text", write_text)
     longer = SITE.model_copy(update={"tether_length": SITE.tether_length + 1.0})
     with contextlib.suppress(KilledError):
-        record.keep(longer, state)
+        record.write_state(longer, state)
     assert written == ["state.json", "problem.json", "state.json"][:n_files]
     problem, _, _ = read_run(tmp_path)
     assert problem.tether_length == (SITE if n_files < 2 else longer).tether_length

@@ -21,7 +21,7 @@ from netsp.exchange.maps.read_map import read_site
 from netsp.exchange.missions import Projection, export
 from netsp.exchange.missions.mission_files import ExportSettings
 from netsp.online.execute import ExecutionOptions, Surprises, execute
-from netsp.online.execute.events import changed
+from netsp.online.execute.events import problem_after
 from netsp.view.pictures import style
 from netsp.view.pictures.style import literal
 from netsp.world.mission.mission import Mission
@@ -448,11 +448,12 @@ def test_a_surprise_may_call_an_obstacle_as_messages_do():
     for which, gone in (("#0", 1), (0, 0), (1, 1)):
         event = {"time": 1, "vanish": which}
         (event,) = Surprises(events=[event]).events
-        (left,) = changed(problem, event).obstacles
+        (left,) = problem_after(problem, event).obstacles
         assert left == problem.obstacles[1 - gone]
     nameless = problem.model_copy(update={"obstacles": problem.obstacles[:1]})
     assert (
-        changed(nameless, Surprises(events=[{"time": 1, "vanish": "#0"}]).events[0]).obstacles == ()
+        problem_after(nameless, Surprises(events=[{"time": 1, "vanish": "#0"}]).events[0]).obstacles
+        == ()
     )
 
 

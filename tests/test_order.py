@@ -12,7 +12,7 @@ from netsp.plan.space.mission_solver import seconds_until_home, solve_mission, t
 from netsp.plan.space.visit_order import order_by_going_on, waypoint_graph
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
-from netsp.world.simulator.mission_run import grid_of, simulate
+from netsp.world.simulator.mission_run import mission_grid, simulate
 from tests.worlds import FEW_CELLS
 
 
@@ -51,7 +51,7 @@ def test_legs_never_cost_more_than_by_the_anchor_and_never_less_than_straight(ri
     mission = Mission.load(rings)
     scene = mission.load_scene()
     field = scene.field()
-    graph, points, reached = waypoint_graph(mission, field, grid_of(mission, scene, field))
+    graph, points, reached = waypoint_graph(mission, field, mission_grid(mission, scene, field))
     costs, home = graph.costs, graph.costs_to_base
     places = np.array([mission.anchor, *mission.places])
     assert len(reached) == 36
@@ -68,7 +68,7 @@ def test_the_older_way_makes_a_tour_that_flies_as_it_did(rings):
     mission = Mission.load(rings)
     scene = mission.load_scene()
     field = scene.field()
-    grid = grid_of(mission, scene, field)
+    grid = mission_grid(mission, scene, field)
     order = order_by_going_on(mission, field, grid, clock=Clock(20.0))
     there = mission.model_copy(update={"waypoints": tuple(mission.waypoints[n] for n in order)})
     run = simulate(there, scene=scene, field=field)

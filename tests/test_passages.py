@@ -21,7 +21,7 @@ from netsp.plan.space.space_plan import candidate_plans, plan_given_order, prepa
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.planned_tour import PlannedTour
-from netsp.world.simulator.mission_run import grid_box, grid_of
+from netsp.world.simulator.mission_run import mission_grid, mission_grid_box
 
 BOUNDS = [-3, -4, -1.5, 3, 4, 1.5]
 CLEARANCE = 0.1
@@ -55,7 +55,9 @@ def mission_of(**more) -> Mission:
 
 def gaps_of(scene: Scene, **more):
     mission = mission_of(**more)
-    return find_hidden_gaps(GapGrid.in_box(scene.field(), grid_box(mission, scene), CLEARANCE))
+    return find_hidden_gaps(
+        GapGrid.in_box(scene.field(), mission_grid_box(mission, scene), CLEARANCE)
+    )
 
 
 @settings(max_examples=16, deadline=None)
@@ -69,7 +71,7 @@ def test_a_slot_wide_enough_is_shown_by_the_cells_or_named_with_its_place_and_wi
 ):
     """Walls at x = 0 close two layers of cells, those at x = 0.1 a single one if they are thin."""
     scene = scene_of(y, width, x=x, thick=thick)
-    grid = GapGrid.in_box(scene.field(), grid_box(mission_of(), scene), CLEARANCE)
+    grid = GapGrid.in_box(scene.field(), mission_grid_box(mission_of(), scene), CLEARANCE)
     gaps = find_hidden_gaps(grid)
     rows = grid.low[1] + (np.arange(grid.shape[1]) + 0.5) * grid.cell
     # middles of the cells beside a thin wall at x = 0 are a little off its corners
@@ -125,7 +127,7 @@ def test_every_way_to_a_plan_names_the_gaps_that_its_cells_do_not_show():
     """Plans of the library and plans on a given grid, as repairs make, name them like a run."""
     scene = scene_of(0.0, 0.24)
     field, asked = scene.field(), mission_of(cell=0.2)
-    grid = grid_of(asked, scene, field)
+    grid = mission_grid(asked, scene, field)
     first = next(candidate_plans(asked, scene=scene, clock=Clock(5.0)))
     on_grid = plan_given_order(prepare_context(asked, Clock(), field=field, grid=grid))
     for tour in (first.to_mission().tour, on_grid.to_mission().tour):

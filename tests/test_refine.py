@@ -17,7 +17,7 @@ from netsp.world.paths.refine import (
     smoothed,
 )
 from netsp.world.paths.sampled import OMPL_PLANNERS, SampledPaths
-from netsp.world.paths.tree import Grid, homotopic, taut
+from netsp.world.paths.tree import Grid, are_homotopic, pull_taut
 from netsp.world.planner import PlannerOptions, make_planner
 
 POST = Scene(solids=[{"post": {"center": [0, 0], "radius": 0.5}}], bounds=(-3, -3, -1, 3, 3, 1))
@@ -113,13 +113,13 @@ def test_sampled_ways_are_free_repeatable_and_no_shorter_than_the_shortest(name)
 def test_taut_ways_have_the_closed_form():
     path = arc(1.5)
     shortest = 2 * np.sqrt(1.5**2 - 0.7**2) + 0.7 * (np.pi - 2 * np.arccos(0.7 / 1.5))
-    assert polylines.length(taut(FIELD, path, 0.2, 0.05)) == pytest.approx(shortest, rel=5e-3)
+    assert polylines.length(pull_taut(FIELD, path, 0.2, 0.05)) == pytest.approx(shortest, rel=5e-3)
 
 
 def test_ways_on_different_sides_of_a_post_are_told_apart():
     left, right = arc(1.0), arc(1.0) * [1, -1, 1]
-    assert homotopic(FIELD, left, arc(1.4) * [1 / 1.4, 1.0, 1.0], 0.2)
-    assert not homotopic(FIELD, left, right, 0.2)
+    assert are_homotopic(FIELD, left, arc(1.4) * [1 / 1.4, 1.0, 1.0], 0.2)
+    assert not are_homotopic(FIELD, left, right, 0.2)
 
 
 @pytest.mark.parametrize(

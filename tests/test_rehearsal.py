@@ -136,7 +136,8 @@ def test_ctrl_c_before_the_flight_ends_it(module, stage, told, monkeypatch):
     press = {told: lambda _: signal.raise_signal(signal.SIGINT)}
     monkeypatch.setattr(module, stage, lambda *args, **more: real(*args, **{**more, **press}))
     monkeypatch.setattr(
-        "netsp.online.execute.tour_execution.make_ready", repair_warm_up.make_ready.__wrapped__
+        "netsp.online.execute.tour_execution.warm_up_repair",
+        repair_warm_up.warm_up_repair.__wrapped__,
     )
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:

@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from netsp.base.compiled import interpretation
 from netsp.base.compiled.compile_policy import CompilePolicy, compiled_by, everything_compiled
 from netsp.world import Scene
-from netsp.world.paths.standoff import sees
-from netsp.world.paths.tree import all_see, free_cells, grow, states_of, way
+from netsp.world.paths.standoff import are_in_sight
+from netsp.world.paths.tree import are_all_in_sight, free_cells, grow, states_of, tree_path
 from netsp.world.scene import packing, sampling
 from netsp.world.scene.sites import point_sites
-from netsp.world.simulator.coverage import Surface, View, mark, nearest
+from netsp.world.simulator.coverage import CameraView, PatchArrays, mark_visible, nearest_point
 
 SOLIDS = (
     {"name": "ball", "sphere": {"center": [0, 0, 0], "radius": 1.0}},
@@ -68,9 +68,9 @@ def test_distances_and_sight_are_equal(field, seed):
     """Distances, gradients and sight are equal for each kind of solid, with and without lookup."""
     p = points(seed, 40)
     assert_alike(*both(sampling.sample_many, field, p))
-    assert_alike(*both(sees, field, p[:6], p[6:12], 0.05))
+    assert_alike(*both(are_in_sight, field, p[:6], p[6:12], 0.05))
     for k in range(3):
-        assert_alike(*both(all_see, field, p[k : k + 2], p[k + 1 : k + 3], 0.1))
+        assert_alike(*both(are_all_in_sight, field, p[k : k + 2], p[k + 1 : k + 3], 0.1))
 
 
 def test_an_empty_array_of_points_has_no_distances():
@@ -95,7 +95,7 @@ def test_free_cells_and_trees_of_paths_are_equal(field, seed):
         assert_alike(toward, by_numpy)
     there = np.argwhere(toward >= 0)
     for start in there[rng.integers(len(there), size=3)]:
-        assert_alike(*both(way, toward, start))
+        assert_alike(*both(tree_path, toward, start))
 
 
 def test_the_lookup_lists_the_same_solids_in_both_forms():
@@ -114,11 +114,11 @@ def test_a_view_marks_the_same_patches_in_both_forms(field, seed, yaw):
     centres = points(seed, 120)
     normals = points(seed + 1, 120)
     normals /= np.maximum(np.linalg.norm(normals, axis=1), 1.0)[:, None]
-    surface = Surface(centres, normals, np.random.default_rng(seed).random(120))
-    view = View(centres[0] + 0.3, yaw, -0.2, 1.0, 6.0, 0.05)
-    assert_alike(*both(nearest, centres, view.eye))
+    surface = PatchArrays(centres, normals, np.random.default_rng(seed).random(120))
+    view = CameraView(centres[0] + 0.3, yaw, -0.2, 1.0, 6.0, 0.05)
+    assert_alike(*both(nearest_point, centres, view.eye))
     seen = [np.zeros(120, dtype=bool) for _ in range(4)]
-    own, numpy = getattr(mark, "py_func", mark), CompilePolicy(min_numpy_items=0)
+    own, numpy = getattr(mark_visible, "py_func", mark_visible), CompilePolicy(min_numpy_items=0)
     with np.errstate(all="ignore"), compiled_by(numpy):
         new = interpretation._in_numpy[own](field, surface, *seen[:2], view)
         loops = interpretation.FunctionType(

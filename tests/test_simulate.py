@@ -21,13 +21,13 @@ from netsp.world.mission.equipment import PositionSensor
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import describe_run
 from netsp.world.paths.path_policy import PathPolicy
-from netsp.world.paths.tree import STEPS, Grid, ShortestTree, grow, states_of, taut, way
+from netsp.world.paths.tree import STEPS, Grid, ShortestTree, grow, pull_taut, states_of, tree_path
 from netsp.world.planner import PLANNERS, PlannerOptions
 from netsp.world.planner.predictive import PredictivePlanner
 from netsp.world.scene.field import pushed_out
 from netsp.world.simulator.mission_run import simulate
 from netsp.world.simulator.sensing import Positions
-from netsp.world.vehicle.kinematic import advance
+from netsp.world.vehicle.kinematic import advance_along
 from tests.pages import unpacked
 from tests.posts_and_rings import POST, ring
 
@@ -152,7 +152,7 @@ def test_ways_of_the_tree_are_shortest_and_pull_taut_to_the_truth():
     straight = 0.95
     length = polylines.length(tree.path(1))
     assert straight <= length <= straight + 0.3  # ends lie beside the centres of cells
-    path = taut(field, tree.path(0), 0.0, 0.05)
+    path = pull_taut(field, tree.path(0), 0.0, 0.05)
     exact = 2 * math.sqrt(4 - 0.25) + 0.5 * (math.pi - 2 * math.acos(0.25))
     assert polylines.length(path) == pytest.approx(exact, rel=0.02)
     assert polylines.length(tree.path(0)) >= polylines.length(path)
@@ -197,7 +197,7 @@ def test_trees_that_are_kept_lead_as_those_that_are_grown_whatever_comes_and_goe
                                  (POST.field(), POST.field(), far)):  # fmt: skip
         kept = Grid(first, (-4, -4, -1), (4, 4, 1), 0.1, 0.0)
         assert kept.prepare([goal]) == 1
-        for grid, field in ((kept, first), (kept.over(second, where), second)):
+        for grid, field in ((kept, first), (kept.with_changed_box(second, where), second)):
             fresh = Grid(field, (-4, -4, -1), (4, 4, 1), 0.1, 0.0)
             tree, other = (ShortestTree(g, goal, points) for g in (grid, fresh))
             for n in range(len(points)):
@@ -216,7 +216,7 @@ def test_no_more_trees_are_kept_than_go_into_the_memory():
 
 def test_advance_passes_corners_and_stops_after_its_step():
     path = np.array([[1.0, 0, 0], [1.0, 1.0, 0]])
-    stops, passed = advance(np.zeros(3), path, 1.25)
+    stops, passed = advance_along(np.zeros(3), path, 1.25)
     assert passed == 1
     assert np.allclose(stops, [[1, 0, 0], [1, 0.25, 0]])
 
@@ -434,7 +434,7 @@ def test_lengths_in_a_grid_are_those_of_dijkstra_over_all_neighbours(shape, shar
             if toward[tuple(cell)] < 0:
                 assert not np.isfinite(length)
                 continue
-            cells_on_the_way = way(toward, cell)
+            cells_on_the_way = tree_path(toward, cell)
             assert free[tuple(cells_on_the_way.T)].all()
             assert tuple(cells_on_the_way[-1]) == root
             steps = np.diff(cells_on_the_way, axis=0)
@@ -479,11 +479,11 @@ def test_a_start_out_of_sight_of_the_anchor_is_reached_along_the_shortest_path()
     run = simulate(there, scene=POST)
     far = math.hypot(2, 0.1)
     arc = math.pi - math.atan2(0.1, 2) - math.acos(0.5 / 2) - math.acos(0.5 / far)
-    taut = math.sqrt(4 - 0.25) + 0.5 * arc + math.sqrt(far**2 - 0.25)
-    assert run.log[0].tether == pytest.approx(taut, abs=0.005)
+    pull_taut = math.sqrt(4 - 0.25) + 0.5 * arc + math.sqrt(far**2 - 0.25)
+    assert run.log[0].tether == pytest.approx(pull_taut, abs=0.005)
     assert run.summary["visited"] == 3
     assert run.summary["home"]["tether_free"]
-    assert run.tether.length == pytest.approx(taut, abs=run.mission.reach)
+    assert run.tether.length == pytest.approx(pull_taut, abs=run.mission.reach)
 
 
 def test_anchor_and_start_in_different_parts_of_the_water_are_refused():

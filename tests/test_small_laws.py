@@ -53,8 +53,8 @@ from netsp.gtsp.travel.result import Result, proven, relative_gap
 from netsp.hsignature.words import concatenate, cyclically_reduced, entangled, invert, reduce
 from netsp.model.bound_scope import LowerBound, Scope
 from netsp.model.solution import Status
-from netsp.online.execute.temporary_obstacles import lasting, passing
-from netsp.online.execute.tour_repair import broken, outside, reachable
+from netsp.online.execute.temporary_obstacles import lasting_problem, temporary_obstacles
+from netsp.online.execute.tour_repair import free_position, plan_fault, split_reachable
 from netsp.online.fly.preflight_checks import ready
 from netsp.online.fly.stopped import RefusedError
 from netsp.online.fly.vehicle import POSITION_ONLY, LinkedVehicle, _wrong
@@ -603,7 +603,7 @@ def test_velocity_and_turn_are_those_of_the_motion():
 class Vehicle:
     """The part of a session that is used before a flight; it answers everything at once."""
 
-    system, others, broken = 1, (), None
+    system, others, plan_fault = 1, (), None
     silent_s = unplaced_s = stalled_s = 0.0
     kind, echo = VehicleKind(12, 3), None
 
@@ -692,15 +692,15 @@ def test_a_vertex_at_the_surface_is_reached_at_a_decimetre():
 
 def test_goals_out_of_reach_or_built_over_are_left_out_with_the_reason(posts):
     short = posts.model_copy(update={"tether_length": 6.3})
-    order, left_out = reachable(short, [0, 1])
+    order, left_out = split_reachable(short, [0, 1])
     assert (order, left_out) == ([0, 1], [])
-    none, why = reachable(posts.model_copy(update={"tether_length": 6.0}), [0, 1])
+    none, why = split_reachable(posts.model_copy(update={"tether_length": 6.0}), [0, 1])
     assert none == []
     assert [g for g, _ in why] == [0, 1]
     over = posts.model_copy(
         update={"obstacles": (*posts.obstacles, Circle(center=(6, 1.15), radius=0.1))}
     )
-    order, left_out = reachable(over, [0, 1])
+    order, left_out = split_reachable(over, [0, 1])
     assert order == [1]
     assert left_out[0][0] == 0
     assert "stands on it" in left_out[0][1]
@@ -723,18 +723,18 @@ def test_a_plan_is_broken_by_what_stands_in_its_way_and_by_a_short_tether(posts)
     )
     legs = legs_through(problem, (1, 3), (3, 3))
     start = np.zeros((2, 3))
-    why, now = broken(problem, start, legs)
+    why, now = plan_fault(problem, start, legs)
     assert why is None
     assert [leg.tether for leg in now[:-1]] == pytest.approx([math.hypot(1, 3), math.hypot(3, 3)])
     wall = Circle(center=(2, 3.25), radius=0.1)  # 0.15 from the leg, with a clearance of 0.2
     blocked = problem.model_copy(update={"obstacles": (*problem.obstacles, wall)})
-    assert "blocks the path" in broken(blocked, start, legs)[0]
+    assert "blocks the path" in plan_fault(blocked, start, legs)[0]
     clear = problem.model_copy(
         update={"obstacles": (*problem.obstacles, Circle(center=(2, 3.35), radius=0.1))}
     )
-    assert broken(clear, start, legs)[0] is None
+    assert plan_fault(clear, start, legs)[0] is None
     short = problem.model_copy(update={"tether_length": 4.2})
-    assert "over the limit" in broken(short, start, legs)[0]
+    assert "over the limit" in plan_fault(short, start, legs)[0]
 
 
 def test_a_plan_that_ends_wound_around_something_is_broken(posts):
@@ -743,19 +743,21 @@ def test_a_plan_that_ends_wound_around_something_is_broken(posts):
         Leg(1, np.array([[6, 1, 0], [6, -1, 0]], float), (), 0.0),
         Leg(HOME, np.array([[6, -1, 0], [4, -1.5, 0], [0, 0, 0]], float), (), 0.0),
     ]
-    assert broken(posts, np.zeros((2, 3)), around)[0] == "the tether would not be free at the base"
+    assert (
+        plan_fault(posts, np.zeros((2, 3)), around)[0] == "the tether would not be free at the base"
+    )
 
 
 def test_a_robot_within_the_clearance_is_placed_just_outside(posts):
-    x, y, _ = outside(posts, np.array([2.9, 0.0, -1.0]))
+    x, y, _ = free_position(posts, np.array([2.9, 0.0, -1.0]))
     assert math.hypot(x - 4.0, y) == pytest.approx(1.2, abs=1e-4)
     assert math.hypot(x - 4.0, y) > 1.2
-    assert outside(posts, np.array([0.0, 5.0, -1.0])) == (0.0, 5.0, -1.0)
+    assert free_position(posts, np.array([0.0, 5.0, -1.0])) == (0.0, 5.0, -1.0)
     square = Problem(
         base=(0, 0), goals=[(9, 9)], tether_length=20,
         obstacles=[Polygon(polygon=[(4, -1), (6, -1), (6, 1), (4, 1)])],
     )  # fmt: skip
-    x, y, _ = outside(square, np.array([4.2, 0.0, 0.0]))
+    x, y, _ = free_position(square, np.array([4.2, 0.0, 0.0]))
     assert (x, y) == pytest.approx((4.0, 0.0), abs=1e-4)
     assert x < 4.0
 
@@ -765,8 +767,8 @@ def test_what_passes_is_told_with_its_times(posts):
     later = posts.model_copy(update={"obstacles": (*posts.obstacles, visitor)})
     fewer = posts.model_copy(update={"obstacles": posts.obstacles[:1]})
     maps = [(0.0, posts), (5.0, later), (9.0, fewer)]
-    assert lasting(maps).obstacles == posts.obstacles[:1]
-    found = {p.obstacle: (p.begin, p.end, p.when) for p in passing(maps)}
+    assert lasting_problem(maps).obstacles == posts.obstacles[:1]
+    found = {p.obstacle: (p.begin, p.end, p.when) for p in temporary_obstacles(maps)}
     assert found[visitor] == (5.0, 9.0, "5 to 9 s")
     assert found[posts.obstacles[1]] == (0.0, 9.0, "until 9 s")
 

@@ -19,10 +19,10 @@ from netsp.plan.space.mission_solver import seconds_until_home, solve_mission
 from netsp.plan.space.path_bound import bound_all_tours
 from netsp.plan.space.space_plan import plan
 from netsp.world.mission.mission import Mission
-from netsp.world.mission.planned_tour import in_file
+from netsp.world.mission.planned_tour import thinned_path
 from netsp.world.planner.predictive import PredictivePlanner
 from netsp.world.simulator.laid_tether import present_tether
-from netsp.world.simulator.mission_run import grid_of, simulate
+from netsp.world.simulator.mission_run import mission_grid, simulate
 from netsp.world.tether import GeodesicTether
 from tests.worlds import FEW_CELLS
 from tests.written_problems import SCENE, WAYPOINTS, written
@@ -403,7 +403,7 @@ POINT = st.tuples(*[st.integers(-5, 5).map(float)] * 3)
 @given(st.lists(POINT, min_size=2, max_size=12))
 def test_a_simplified_path_is_the_same_path(points):
     path = np.array(points)
-    short = np.array(in_file(path))
+    short = np.array(thinned_path(path))
     assert len(short) <= len(path)
     assert polylines.length(short) == pytest.approx(polylines.length(path))
     assert (short[[0, -1]] == path[[0, -1]]).all()
@@ -443,7 +443,7 @@ def longest_by_steps(mission, step):
     scene = mission.load_scene()
     field = scene.field()
     model = GeodesicTether(field, mission.delta)
-    tether = present_tether(mission, field, model, grid_of(mission, scene, field))
+    tether = present_tether(mission, field, model, mission_grid(mission, scene, field))
     _, lengths = model.drive(tether, polylines.dense(mission.tour.line, step))
     return float(lengths.max())
 

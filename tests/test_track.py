@@ -9,7 +9,7 @@ from netsp import InputError
 from netsp.plan.space.mission_solver import solve_mission
 from netsp.view.pictures.mission_picture import save_runs, tethers_along
 from netsp.world import Scene
-from netsp.world.mission.anchor_track import Track
+from netsp.world.mission.anchor_track import AnchorTrack
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import describe_run
 from netsp.world.simulator.mission_run import simulate
@@ -46,11 +46,11 @@ def kept(run):
 def test_a_track_goes_no_faster_than_its_fastest_leg_and_passes_every_position(legs, now, later):
     times = np.cumsum([leg[0] for leg in legs])
     rows = [(t, *leg[1:]) for t, leg in zip(times, legs, strict=True)]
-    track = Track.of(mission(AMONG, rows))
+    track = AnchorTrack.for_mission(mission(AMONG, rows))
     for t, *place in rows:
         assert np.allclose(track(t), place)
     assert np.allclose(track(track.end + later), rows[-1][1:])
-    way = track.travelled(now, now + later)
+    way = track.distance_between(now, now + later)
     assert np.linalg.norm(track(now + later) - track(now)) <= way + 1e-9
     assert way <= track.speed * later * (1.0 + 1e-9) + 1e-9
 

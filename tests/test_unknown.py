@@ -17,8 +17,8 @@ from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import describe_run
 from netsp.world.scene.scene import Solid
 from netsp.world.simulator.mission_run import simulate
-from netsp.world.simulator.ranging import Ranging, cast, fan
-from netsp.world.simulator.surprises import SceneSurprises, changed, moved
+from netsp.world.simulator.ranging import Ranging, cast_rays, ray_fan
+from netsp.world.simulator.surprises import SceneSurprises, moved_solid, solids_after
 from netsp.world.simulator.surroundings import Surroundings
 
 ROOT = Path(__file__).parent.parent
@@ -59,7 +59,7 @@ def kept(run):
 @given(st.floats(1.0, 180.0), st.floats(0, 7), st.tuples(*[st.floats(-1, 1)] * 3))
 def test_rays_fill_the_cone_and_none_leaves_it(angle, turn, ahead):
     ahead = np.array(ahead) + np.array([0.0, 0.0, 2.0])
-    rays = fan(angle, ahead, turn, 240)
+    rays = ray_fan(angle, ahead, turn, 240)
     assert np.allclose(np.linalg.norm(rays, axis=1), 1.0)
     cosine = rays @ ahead / np.linalg.norm(ahead)
     assert cosine.min() >= math.cos(math.radians(0.5 * angle)) - 1e-9
@@ -71,12 +71,12 @@ def test_rays_fill_the_cone_and_none_leaves_it(angle, turn, ahead):
 def test_a_ray_measures_the_distance_to_a_ball():
     field = Scene(solids=[{"sphere": {"center": [4, 0, 0], "radius": 1}}]).field()
     rays = np.array([[1, 0, 0], [0, 1, 0], [math.cos(0.2), math.sin(0.2), 0]], dtype=float)
-    found = cast(field.arrays, np.zeros(3), rays, 10.0)
+    found = cast_rays(field.arrays, np.zeros(3), rays, 10.0)
     assert found[0] == pytest.approx(3.0, abs=2e-3)
     assert math.isinf(found[1])
     near = 4 * math.cos(0.2) - math.sqrt(1 - (4 * math.sin(0.2)) ** 2)
     assert found[2] == pytest.approx(near, abs=5e-3)
-    assert math.isinf(cast(field.arrays, np.zeros(3), rays, 2.5)[0])
+    assert math.isinf(cast_rays(field.arrays, np.zeros(3), rays, 2.5)[0])
 
 
 @pytest.mark.parametrize("sensor", [None, {}, {"noise": 0.05, "range": 4}, {"field_of_view": 60}])
@@ -234,7 +234,7 @@ def test_a_moved_solid_is_the_same_one_elsewhere(kind, by):
         {"half_space": {"point": [0, 0, -3], "normal": [0, 0.1, 1]}},
     ][kind])  # fmt: skip
     points = np.random.default_rng(kind).uniform(-4, 4, (20, 3))
-    here, there = Scene(solids=[solid]).field(), Scene(solids=[moved(solid, by)]).field()
+    here, there = Scene(solids=[solid]).field(), Scene(solids=[moved_solid(solid, by)]).field()
     assert np.allclose(here.distance(points), there.distance(points + np.array(by)), atol=1e-9)
 
 
@@ -292,6 +292,6 @@ def test_the_example_is_flown_and_drawn(tmp_path, capsys):
     assert (out / "run.png").stat().st_size > 10_000
     assert json.loads((out / "summary.json").read_text())["contacts"] == 0
     solids = Scene.load(ROOT / "scenes" / "jetty.json").all_solids()
-    for event in SceneSurprises.load(surprises).in_order():
-        solids = changed(solids, event)
+    for event in SceneSurprises.load(surprises).by_time():
+        solids = solids_after(solids, event)
     assert "container" in {s.name for s in solids}

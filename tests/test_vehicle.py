@@ -10,16 +10,16 @@ from hypothesis import strategies as st
 from netsp import InputError
 from netsp.world.simulator.current import Water
 from netsp.world.vehicle import VEHICLES, make_vehicle
-from netsp.world.vehicle.control import PredictiveControl, solve_positive, within
+from netsp.world.vehicle.control import PredictiveControl, minimum_in_box, solve_positive
 from netsp.world.vehicle.dynamics import (
     ALLOCATION,
     INERTIA,
     MAX_THRUST,
     derivative,
-    linearised,
     step,
+    step_jacobians,
 )
-from netsp.world.vehicle.kinematic import KinematicVehicle, turned
+from netsp.world.vehicle.kinematic import KinematicVehicle, wrapped_angle
 
 STILL = np.zeros(3)
 
@@ -66,7 +66,7 @@ def test_a_vehicle_without_thrust_drifts_with_the_current():
 def test_the_linear_model_predicts_small_changes():
     rng = np.random.default_rng(1)
     states, forces = rng.normal(size=(4, 8)), 5 * rng.normal(size=(3, 4))
-    by_state, by_force = linearised(states, forces, STILL, 0.1)
+    by_state, by_force = step_jacobians(states, forces, STILL, 0.1)
     dx, du = 1e-4 * rng.normal(size=8), 1e-3 * rng.normal(size=4)
     for k in range(3):
         after = step(states[k], forces[k], STILL, 0.1)
@@ -83,7 +83,7 @@ def test_thrusts_between_bounds_are_those_of_the_least_cost(seed):
     some = rng.normal(size=(n + 3, n))
     hessian, slope = some.T @ some + 1e-3 * np.eye(n), 10.0 * rng.normal(size=n)
     low, high = -rng.random(n), rng.random(n)
-    x = within(hessian, slope, low, high, 100)
+    x = minimum_in_box(hessian, slope, low, high, 100)
     down = hessian @ x + slope
     assert (low <= x).all()
     assert (x <= high).all()
@@ -116,7 +116,7 @@ def test_it_follows_a_circle_to_centimetres_whatever_the_current(water):
     off = np.hypot(places[:, 0] + 1, places[:, 1]) - 1
     assert np.abs(off[40:]).max() < 0.03
     assert np.linalg.norm(places[-1] - [0, 0, 0.2 * np.pi]) < 0.05
-    assert turned(rov.yaw - 0.5) == pytest.approx(0.0, abs=0.05)
+    assert wrapped_angle(rov.yaw - 0.5) == pytest.approx(0.0, abs=0.05)
 
 
 @settings(max_examples=10, deadline=None)

@@ -180,10 +180,10 @@ def _of_execution(place: Path, problem: Problem, solution: Solution) -> Shown:
 
 def _of_mission(place: Path) -> Shown:
     """A mission that was flown; the tether is worked out again along the way."""
-    from netsp.world.mission.anchor_track import Track
+    from netsp.world.mission.anchor_track import AnchorTrack
     from netsp.world.mission.mission import Mission
     from netsp.world.simulator.laid_tether import present_tether
-    from netsp.world.simulator.mission_run import grid_of
+    from netsp.world.simulator.mission_run import mission_grid
     from netsp.world.tether import GeodesicTether
 
     mission = Mission.load(place / "mission.json")
@@ -193,8 +193,8 @@ def _of_mission(place: Path) -> Shown:
     path = np.array([[float(r[k]) for k in "xyz"] for r in rows])
     scene_field = scene.field()
     model = GeodesicTether(scene_field, mission.delta)
-    state = present_tether(mission, scene_field, model, grid_of(mission, scene, scene_field))
-    track, frames, every = Track.of(mission), [], max(1, len(rows) // SHOWN_FRAMES)
+    state = present_tether(mission, scene_field, model, mission_grid(mission, scene, scene_field))
+    track, frames, every = AnchorTrack.for_mission(mission), [], max(1, len(rows) // SHOWN_FRAMES)
     for k, row in enumerate(rows):
         anchor = None if track is None else track(float(row["time"]))
         state = model.update(state, path[k], anchor)

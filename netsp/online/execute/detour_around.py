@@ -10,7 +10,7 @@ from netsp.base.arrays import Floats
 from netsp.model.problem import Problem
 
 
-def aside(problem: Problem, nodes: Floats, by: float) -> Floats:
+def pushed_aside(problem: Problem, nodes: Floats, by: float) -> Floats:
     """Return the tether's nodes (k, 3) with every stretch inside obstacles replaced by the shorter
     part of their outline, `by` outside of it.
 

@@ -108,13 +108,15 @@ class Surprises(FileModel):
         """
         for k, event in sorted(enumerate(self.events), key=lambda e: e[1].time):
             try:
-                problem = changed(problem, event)
+                problem = problem_after(problem, event)
             except InputError as error:
                 where = f"{source}: " if source else ""
                 raise InputError(f"{where}events[{k}]: {error}") from None
 
 
-def changed(problem: Problem, event: Event, policy: ExecutePolicy = ExecutePolicy()) -> Problem:
+def problem_after(
+    problem: Problem, event: Event, policy: ExecutePolicy = ExecutePolicy()
+) -> Problem:
     """Return the problem after an event.
 
     Goals keep their numbers, also cancelled ones, and so do obstacles, except after one vanishes.
@@ -133,7 +135,7 @@ def changed(problem: Problem, event: Event, policy: ExecutePolicy = ExecutePolic
         del obstacles[index_of(event.vanish, obstacles, "vanish")]
     elif event.move is not None:
         i = index_of(event.move.obstacle, obstacles, "move.obstacle")
-        obstacles[i] = moved(obstacles[i], event.move.by)
+        obstacles[i] = moved_obstacle(obstacles[i], event.move.by)
     elif event.add_goal is not None:
         goals.append(event.add_goal)
     elif event.cancel_goal is not None:
@@ -167,7 +169,7 @@ def changed(problem: Problem, event: Event, policy: ExecutePolicy = ExecutePolic
     return out
 
 
-def moved(obstacle: Circle | Polygon, by: tuple[float, float]) -> Circle | Polygon:
+def moved_obstacle(obstacle: Circle | Polygon, by: tuple[float, float]) -> Circle | Polygon:
     """Return an obstacle moved by (x, y)."""
     try:
         if isinstance(obstacle, Circle):

@@ -21,17 +21,17 @@ _SOLVERS = (("dp", None), ("mip", None), ("lns", 200), ("auto", 30))
 """Solvers with iteration limits, which together call everything that a new order may need."""
 
 
-def should_make_ready() -> bool:
+def should_warm_up_repair() -> bool:
     """Return whether to warm up before a simulated tour: only where kernels are on disk.
 
-    On a machine that has compiled nothing yet, `make_ready` would take a minute, so a simulated
-    tour runs interpreted until compiling pays. Flights always call `make_ready`.
+    On a machine that has compiled nothing yet, `warm_up_repair` would take a minute, so a simulated
+    tour runs interpreted until compiling pays. Flights always call `warm_up_repair`.
     """
     return runs_compiled(extend)
 
 
 @cache
-def make_ready() -> None:
+def warm_up_repair() -> None:
     """Load everything that a repair needs, and compile it on a machine that never did.
 
     Raises

@@ -118,7 +118,7 @@ class RunState(FileModel):
 
 
 @dataclass(frozen=True)
-class Begun:
+class ResumePoint:
     """Beginning of a run elsewhere than at the start of its plan.
 
     Attributes
@@ -166,7 +166,7 @@ class RunRecord:
         self._state: RunState | None = None
         self._due = -np.inf
 
-    def take(self, row: ExecutionRow, problem: Problem, state: Callable[[], RunState]) -> None:
+    def write_row(self, row: ExecutionRow, problem: Problem, state: Callable[[], RunState]) -> None:
         """Write a row, and the state if it is due.
 
         Parameters
@@ -185,9 +185,9 @@ class RunRecord:
         changed = problem is not self._problem
         if changed or row.time >= self._due:
             self._due = row.time + self.policy.state_interval_s
-            self.keep(problem, state())
+            self.write_state(problem, state())
 
-    def keep(self, problem: Problem, state: RunState) -> None:
+    def write_state(self, problem: Problem, state: RunState) -> None:
         """Write the state now, regardless of when the last one was written."""
         if problem is not self._problem:
             before, self._sha256 = self._sha256, problem.sha256

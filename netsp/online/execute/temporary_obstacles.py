@@ -12,7 +12,7 @@ Maps = Sequence[tuple[float, Problem]]
 
 
 @dataclass(frozen=True)
-class Passing:
+class TemporaryObstacle:
     """Obstacle that stood for a time only.
 
     Parameters
@@ -40,7 +40,7 @@ class Passing:
         return f"{self.begin:.0f} to {self.end:.0f} s" if self.begin else f"until {self.end:.0f} s"
 
 
-def lasting(maps: Maps) -> Problem:
+def lasting_problem(maps: Maps) -> Problem:
     """Return the first problem with only those obstacles that stand there all the time."""
     first = maps[0][1]
     every = [p.obstacles for _, p in maps]
@@ -48,14 +48,16 @@ def lasting(maps: Maps) -> Problem:
     return first.model_copy(update={"obstacles": kept})
 
 
-def passing(maps: Maps) -> list[Passing]:
+def temporary_obstacles(maps: Maps) -> list[TemporaryObstacle]:
     """Return the other obstacles of all problems, in the order in which they came."""
-    found: list[Passing] = []
-    always = lasting(maps).obstacles
+    found: list[TemporaryObstacle] = []
+    always = lasting_problem(maps).obstacles
     for k, (time, problem) in enumerate(maps):
         for i, obstacle in enumerate(problem.obstacles):
             if obstacle in always or (k and obstacle in maps[k - 1][1].obstacles):
                 continue
             gone = (t for t, later in maps[k:] if obstacle not in later.obstacles)
-            found.append(Passing(obstacle, problem.obstacle_name(i), time, next(gone, None)))
+            found.append(
+                TemporaryObstacle(obstacle, problem.obstacle_name(i), time, next(gone, None))
+            )
     return found

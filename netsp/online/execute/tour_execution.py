@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from netsp.base.arrays import Floats
+from netsp.base.deprecated import renamed_parameters
 from netsp.base.errors import InputError, interrupted
 from netsp.base.field_types import LARGEST, checked_argument, checked_instance
 from netsp.base.geometry import polylines
@@ -18,8 +19,8 @@ from netsp.hsignature import signature
 from netsp.judge import verify
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution, Status
-from netsp.online.execute.detour_around import aside
-from netsp.online.execute.events import Event, Surprises, changed, index_of
+from netsp.online.execute.detour_around import pushed_aside
+from netsp.online.execute.events import Event, Surprises, index_of, problem_after
 from netsp.online.execute.execution_log import (
     Arrival,
     Entry,
@@ -27,11 +28,17 @@ from netsp.online.execute.execution_log import (
     ExecutionOptions,
     ExecutionRow,
 )
-from netsp.online.execute.repair_warm_up import make_ready, should_make_ready
-from netsp.online.execute.run_record import Begun, LeftOut, RunRecord, RunState
+from netsp.online.execute.repair_warm_up import should_warm_up_repair, warm_up_repair
+from netsp.online.execute.run_record import LeftOut, ResumePoint, RunRecord, RunState
 from netsp.online.execute.tether_limits import TETHER_TOLERANCE
 from netsp.online.execute.tether_reserve import ReservedLimit
-from netsp.online.execute.tour_repair import Repair, broken, reachable, repair, reserved_limit
+from netsp.online.execute.tour_repair import (
+    Repair,
+    plan_fault,
+    repair,
+    reserved_limit,
+    split_reachable,
+)
 from netsp.plan.tour_plan import HOME, Leg, legs_of
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.scene.scene import scene_of
@@ -75,7 +82,7 @@ class _Retreat:
     length
         Length of tether at which the retreat ends.
     why, left, event
-        Reason for a new plan, its goals, and what happened; see `_Run._mend`.
+        Reason for a new plan, its goals, and what happened; see `_Run._replan`.
     """
 
     length: float
@@ -93,19 +100,19 @@ class _Run:
         solution: Solution,
         options: ExecutionOptions,
         live: LiveVehicle | None = None,
-        begun: Begun | None = None,
+        resume_point: ResumePoint | None = None,
     ) -> None:
         self.out = Execution(problem, solution, options)
         self.problem, self.options = problem, options
-        self.legs: list[Leg] = [] if begun is not None else legs_of(problem, solution)
+        self.legs: list[Leg] = [] if resume_point is not None else legs_of(problem, solution)
         self.start = np.array(problem.base if problem.state is None else problem.state.position)
         self.delta = options.delta or suggested_delta(problem)
         self.now = 0.0
-        self._enter(problem)
-        if begun is not None:
-            self.start = begun.tether[-1]
-            anchor = self.model.start(begun.tether[0], begun.tether[0])
-            self.tether = self.model.refine(self.model.drive(anchor, begun.tether[1:])[0])
+        self._enter_problem(problem)
+        if resume_point is not None:
+            self.start = resume_point.tether[-1]
+            anchor = self.model.start(resume_point.tether[0], resume_point.tether[0])
+            self.tether = self.model.refine(self.model.drive(anchor, resume_point.tether[1:])[0])
         elif problem.state is None:
             self.tether = self.model.start(problem.base, problem.base)
         else:
@@ -123,26 +130,26 @@ class _Run:
         self.mode, self.fresh, self.leg_s = "tour", True, 0.0
         self.shorten = False
         self.retreat: _Retreat | None = None
-        if begun is None or options.reserve_policy.reserve is not None:
+        if resume_point is None or options.reserve_policy.reserve is not None:
             self.reserve = options.reserve_policy.of_plan(problem, solution)
         else:
-            self.reserve = begun.reserve
+            self.reserve = resume_point.reserve
         self.out.reserve = self.reserve
         self.unreachable: set[int] = set()
         self.path = self.legs[0].path if self.legs else np.array([self.vehicle.position])
 
-    def _enter(self, problem: Problem) -> None:
+    def _enter_problem(self, problem: Problem) -> None:
         """Enter the scene of a problem."""
         self.problem = self.out.problem = problem
         self.out.maps.append((round(self.now, 6), problem))
         self.scene: DistanceField = scene_of(problem).field()
         self.model = GeodesicTether(self.scene, self.delta)
 
-    def resume(self, begun: Begun) -> None:
+    def resume(self, resume_point: ResumePoint) -> None:
         """Plan the rest of a run from where the robot is."""
-        self.out.left_out |= begun.left_out
-        self.out.cancelled |= dict.fromkeys(begun.cancelled, 0.0)
-        self._mend_within_limit(begun.why, list(begun.left), "resumed")
+        self.out.left_out |= resume_point.left_out
+        self.out.cancelled |= dict.fromkeys(resume_point.cancelled, 0.0)
+        self._replan_within_limit(resume_point.why, list(resume_point.left), "resumed")
 
     @property
     def state(self) -> RunState:
@@ -158,7 +165,7 @@ class _Run:
 
     # a step
 
-    def note(self) -> ExecutionRow:
+    def log_state(self) -> ExecutionRow:
         """Log the present state."""
         x, y, z = (float(v) for v in self.vehicle.position)
         goal = self.left[0] if self.left else HOME
@@ -207,7 +214,7 @@ class _Run:
         if self.retreat is not None:
             if is_there or is_late or self.tether.length <= self.retreat.length:
                 done, self.retreat = self.retreat, None
-                self._mend(done.why, done.left, done.event)
+                self._replan(done.why, done.left, done.event)
         elif is_there:
             self._arrive()
         elif is_late:
@@ -240,7 +247,7 @@ class _Run:
     def _leave_out(self, goal: int, why: str) -> None:
         if goal == HOME:
             self.legs = []
-            self._enter_log("left out", "ignored", f"the base was {why}", 0.0)
+            self._log_event("left out", "ignored", f"the base was {why}", 0.0)
             return
         self.out.left_out[goal] = why
         if not self.options.repair:
@@ -248,10 +255,10 @@ class _Run:
             first = self.legs[0]
             path = np.vstack([self.vehicle.position, first.path[1:]])
             self.legs[0] = Leg(first.goal, path, first.word, first.tether)
-            self._enter_log("left out", "ignored", f"{self.problem.goal_label(goal)} {why}", 0.0)
+            self._log_event("left out", "ignored", f"{self.problem.goal_label(goal)} {why}", 0.0)
             self._next()
             return
-        self._mend(f"{self.problem.goal_label(goal)} {why}", [g for g in self.left if g != goal])
+        self._replan(f"{self.problem.goal_label(goal)} {why}", [g for g in self.left if g != goal])
 
     @property
     def left(self) -> list[int]:
@@ -262,7 +269,7 @@ class _Run:
 
     # events
 
-    def happen(self, event: Event) -> None:
+    def on_event(self, event: Event) -> None:
         """Let an event happen, and repair what it breaks."""
         left, reason = self.left, None if self.retreat is None else self.retreat.why
         if event.kind == "push":
@@ -271,7 +278,7 @@ class _Run:
             reason = "pushed off its path"
         else:
             before = self.problem
-            self._enter_changed(event)
+            self._enter_problem_after(event)
             if event.kind == "add_goal":
                 new = len(before.goals)
                 left, reason = [*left, new], f"{self.problem.goal_label(new)} was added"
@@ -285,7 +292,7 @@ class _Run:
                     self.out.cancelled[gone] = self.now
         if event.tether_length is not None and self.tether.length > event.tether_length:
             self.shorten = True
-        restored = self._in_reach_again() if self.options.repair else []
+        restored = self._reachable_again() if self.options.repair else []
         if restored:
             names = ", ".join(map(self.problem.goal_label, restored))
             left, reason = [*left, *restored], f"within reach again: {names}"
@@ -298,43 +305,43 @@ class _Run:
             )
         if reason is None:
             limit = self._reserved(left) if self.options.repair else None
-            reason, legs = broken(self.problem, self.tether.nodes, self._from_here(), limit)
+            reason, legs = plan_fault(self.problem, self.tether.nodes, self._from_here(), limit)
             if reason is None:
                 self.legs = legs
                 self.path, self.leg_s = self.legs[0].path[1:], 0.0
         if reason is None:
-            self._enter_log(event.kind, "kept", "the rest of the plan still holds", 0.0)
+            self._log_event(event.kind, "kept", "the rest of the plan still holds", 0.0)
         elif not self.options.repair:
-            self._enter_log(event.kind, "ignored", reason, 0.0)
+            self._log_event(event.kind, "ignored", reason, 0.0)
             for goal in set(left) - set(self.left):
                 self.out.left_out[goal] = "was added, and plans are not repaired"
         else:
-            self._mend_within_limit(reason, left, event.kind)
+            self._replan_within_limit(reason, left, event.kind)
 
-    def asked(self, event: Event) -> None:
+    def on_request(self, event: Event) -> None:
         """Let an event happen that nobody could check before."""
         try:
             if event.kind == "push" and self.live is not None:
                 raise InputError("push: a real vehicle says itself where it is")
-            changed(self.problem, event, self.policy)
+            problem_after(self.problem, event, self.policy)
         except InputError as error:
-            self._enter_log(event.kind, "ignored", f"cannot be: {error}", 0.0)
+            self._log_event(event.kind, "ignored", f"cannot be: {error}", 0.0)
             return
         if self.legs:
-            self.happen(event)
+            self.on_event(event)
 
-    def _in_reach_again(self) -> list[int]:
+    def _reachable_again(self) -> list[int]:
         """Return the goals that no tether reached, and one does now."""
         away = [g for g in self.unreachable if g in self.out.left_out]
-        back = reachable(self.problem, away)[0] if away else []
+        back = split_reachable(self.problem, away)[0] if away else []
         self.unreachable -= set(back)
         return back
 
-    def too_late(self, event: Event) -> None:
+    def on_late_event(self, event: Event) -> None:
         """Log an event after the end."""
-        self._enter_log(event.kind, "ignored", f"came at {event.time:g} s, after the end", 0.0)
+        self._log_event(event.kind, "ignored", f"came at {event.time:g} s, after the end", 0.0)
         if event.add_goal is not None:
-            problem = changed(self.problem, event, self.policy)
+            problem = problem_after(self.problem, event, self.policy)
             self.problem = self.out.problem = problem
             self.out.left_out[len(problem.goals) - 1] = "was added after the end"
 
@@ -343,17 +350,17 @@ class _Run:
         path = np.vstack([self.vehicle.position, self.path])
         return [Leg(first.goal, path, first.word, first.tether), *self.legs[1:]]
 
-    def _enter_changed(self, event: Event) -> None:
+    def _enter_problem_after(self, event: Event) -> None:
         """Enter the world after an event.
 
         An obstacle that appears on the tether or the robot pushes them aside, to the nearer side;
         one that vanishes lets the tether go.
         """
-        problem = changed(self.problem, event, self.policy)
-        self._enter(problem)
+        problem = problem_after(self.problem, event, self.policy)
+        self._enter_problem(problem)
         if event.kind not in ("appear", "vanish", "move"):
             return
-        line = aside(problem, self.tether.nodes, 1e-2 * self.delta)
+        line = pushed_aside(problem, self.tether.nodes, 1e-2 * self.delta)
         if not np.array_equal(line[-1], self.vehicle.position):
             self.vehicle.stop_at(line[-1])
         anchor = self.model.start(line[0], line[0])
@@ -385,7 +392,7 @@ class _Run:
         """Return the length of tether that a plan through goals may use."""
         return reserved_limit(self.problem, goals, self.reserve)
 
-    def _mend_within_limit(self, why: str, left: list[int], event: str) -> None:
+    def _replan_within_limit(self, why: str, left: list[int], event: str) -> None:
         """Plan anew, after going back along the tether if too much of it is out.
 
         The tether gets shorter nowhere faster than along itself. While the limit is kept, only one
@@ -398,7 +405,7 @@ class _Run:
         has_room = self.tether.length <= (limit if event == "tether_length" else np.inf)
         if has_room and not self._is_over_limit:
             self.retreat = None
-            self._mend(why, left, event)
+            self._replan(why, left, event)
             return
         out = self.tether.length
         # a vehicle with dynamics ends somewhere within its reach of where it is sent
@@ -410,7 +417,7 @@ class _Run:
         self.legs = [Leg(HOME, way_back, (), 0.0)]
         self.path, self.fresh, self.leg_s = way_back[1:], True, 0.0
         units = self.problem.units
-        self._enter_log(
+        self._log_event(
             event,
             "shorten",
             f"{out:.4g} of {self.problem.tether_length:g} {units} of tether are out: back along it "
@@ -418,7 +425,7 @@ class _Run:
             0.0,
         )
 
-    def _mend(self, why: str, left: list[int], event: str = "left out") -> None:
+    def _replan(self, why: str, left: list[int], event: str = "left out") -> None:
         if self.live is not None:
             # it has gone on since its tether was last looked at, perhaps past an obstacle
             self.live.hold()
@@ -451,7 +458,7 @@ class _Run:
             reason = f"{why}; a defect of netsp ended planning ({what})"
             spent = time.perf_counter() - begin
             made = Repair("defect", reason, [home], left_out, home.length, spent)
-        self._enter_log(event, made.kind, made.reason, made.planning_s)
+        self._log_event(event, made.kind, made.reason, made.planning_s)
         self._hold(self.options.planning_limit)
         self.legs = made.legs
         for goal, reason in made.left_out:
@@ -469,14 +476,15 @@ class _Run:
         mode, self.mode = self.mode, "hold"
         until = self.now + seconds
         while self.now < until:
-            self.note()
+            self.log_state()
             self.now = min(self.now + self.policy.hold_step_s, until)
         self.mode = mode
 
-    def _enter_log(self, event: str, response: str, reason: str, spent: float) -> None:
+    def _log_event(self, event: str, response: str, reason: str, spent: float) -> None:
         self.out.entries.append(Entry(round(self.now, 6), event, response, reason, spent))
 
 
+@renamed_parameters(begun="resume_point")
 def execute(
     problem: Problem,
     solution: Solution,
@@ -487,7 +495,7 @@ def execute(
     vehicle: LiveVehicle | None = None,
     incoming: Callable[[], list[Event]] | None = None,
     record: RunRecord | None = None,
-    begun: Begun | None = None,
+    resume_point: ResumePoint | None = None,
 ) -> Execution:
     """Carry out a solution in the scene of its problem.
 
@@ -506,7 +514,7 @@ def execute(
         Called at every step; returns the events that have come since.
     record : RunRecord, optional
         Record of rows and state during the run.
-    begun : Begun, optional
+    resume_point : ResumePoint, optional
         Beginning elsewhere than at the start of the solution; the rest is planned from there.
 
     Raises
@@ -533,7 +541,7 @@ def execute(
         raise InputError(f"seed: expected a whole number from 0 on, got {options.seed!r}")
     if solution.status is Status.INVALID or solution.length is None:
         raise InputError(f"solution: has status {solution.status.value}; expected a tour that fits")
-    judged = verify(problem, solution) if begun is None else None
+    judged = verify(problem, solution) if resume_point is None else None
     if judged is not None and not judged:
         failed = next(c for c in judged.checks if not c.passed)
         raise InputError(f"solution: fails its check {failed.name!r}: {failed.detail}")
@@ -547,34 +555,34 @@ def execute(
             f"delta: expected at most {coarsest:.4g}, or the tether would slip through the "
             f"thinnest obstacle, got {options.delta!r}"
         )
-    is_live = incoming is not None or begun is not None
-    if options.repair and (is_live or (surprises.events and should_make_ready())):
-        make_ready()
+    is_live = incoming is not None or resume_point is not None
+    if options.repair and (is_live or (surprises.events and should_warm_up_repair())):
+        warm_up_repair()
     begin = time.perf_counter()
-    run = _Run(problem, solution, options, vehicle, begun)
+    run = _Run(problem, solution, options, vehicle, resume_point)
 
     def note() -> ExecutionRow:
-        row = run.note()
+        row = run.log_state()
         if record is not None:
-            record.take(row, run.problem, lambda: run.state)
+            record.write_row(row, run.problem, lambda: run.state)
         return row
 
     coming = sorted(surprises.events, key=lambda e: e.time)
     try:
-        if begun is not None:
-            run.resume(begun)
+        if resume_point is not None:
+            run.resume(resume_point)
         while run.legs:
             while coming and coming[0].time <= run.now:
-                run.happen(coming.pop(0))
+                run.on_event(coming.pop(0))
             for event in incoming() if incoming is not None else ():
-                run.asked(event)
+                run.on_request(event)
             row = note()
             if on_step is not None:
                 on_step(row)
             run.go()
         note()
         for event in coming:
-            run.too_late(event)
+            run.on_late_event(event)
     except KeyboardInterrupt:
         run.out.interrupted = True
     except StopsFlightError as stop:
@@ -583,7 +591,7 @@ def execute(
     except Exception:
         if record is not None and run.out.rows:
             with contextlib.suppress(Exception):  # the first exception is raised, not a second one
-                record.keep(run.problem, run.state)
+                record.write_state(run.problem, run.state)
         raise
     run.out.tethers.append((round(run.now, 6), run.tether.nodes.copy()))
     # a corner may have held it back for the few rounds of an update

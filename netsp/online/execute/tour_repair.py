@@ -63,7 +63,7 @@ class Repair:
     limit: ReservedLimit | None = None
 
 
-def broken(
+def plan_fault(
     problem: Problem, tether: Floats, legs: list[Leg], limit: ReservedLimit | None = None
 ) -> tuple[str | None, list[Leg]]:
     """Return what is wrong with the rest of a plan, None if nothing is, and its legs with the words
@@ -83,7 +83,7 @@ def broken(
     word = signature(tether[:, :2], rays)
     left = [leg.goal for leg in legs if leg.goal != HOME]
     for leg in legs:
-        obstacle = _in_the_way(problem, leg.path)
+        obstacle = _blocking_obstacle(problem, leg.path)
         if obstacle is not None:
             label = problem.obstacle_label(obstacle)
             return f"{label} blocks the path to {_label(problem, leg)}", legs
@@ -117,7 +117,7 @@ def _label(problem: Problem, leg: Leg) -> str:
     return "the base" if leg.goal == HOME else problem.goal_label(leg.goal)
 
 
-def _in_the_way(problem: Problem, path: Floats) -> int | None:
+def _blocking_obstacle(problem: Problem, path: Floats) -> int | None:
     """Return an obstacle, grown by the clearance, that a path enters; None if there is none."""
     line = shapely.LineString(path[:, :2]) if len(path) > 1 else shapely.Point(path[0, :2])
     place = 1e-6 * problem.scale
@@ -188,8 +188,8 @@ def _repaired(
 ) -> Repair:
     """Return a plan as `repair` does, with what the clock leaves time for."""
     word = signature(tether[:, :2], problem.representative_points)
-    state = State(position=outside(problem, robot), signature=word)
-    order, left_out = reachable(problem, left)
+    state = State(position=free_position(problem, robot), signature=word)
+    order, left_out = split_reachable(problem, left)
     if not order:
         home, reason = _home(problem, state, tether, why)
         return Repair("home", reason, [home], tuple(left_out), home.length, clock.elapsed)
@@ -206,7 +206,7 @@ def _repaired(
     replan_s = max(clock.left, 0.0)
     chosen, kind = local, "local"
     reason = f"{why}; {local.length:.4g} {problem.units} to go in the same order"
-    saving = (local.length - _least(graph, len(order), clock)) / speed
+    saving = (local.length - _lower_bound_of_rest(graph, len(order), clock)) / speed
     if saving > replan_s > 0.0:
         found = solve_graph(graph, "auto", time_limit=clock, seed=seed, warm_start=local.tour)
         worthwhile = local.length - speed * replan_s
@@ -273,7 +273,7 @@ def _shortest_tethers(problem: Problem, goals: list[int]) -> tuple[TautPaths, Fl
     return paths, np.hypot(planar, plain.points[1:, 2] - plain.points[0, 2])
 
 
-def reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple[int, str]]]:
+def split_reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple[int, str]]]:
     """Return the goals that a taut tether within the limit reaches, in order, and the others with
     the reason."""
     order, left_out = _in_free_water(problem, left)
@@ -288,7 +288,7 @@ def reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple[
     return [g for k, g in enumerate(order) if k not in beyond], left_out
 
 
-def outside(problem: Problem, robot: Floats) -> tuple[float, float, float]:
+def free_position(problem: Problem, robot: Floats) -> tuple[float, float, float]:
     """Return the robot's place, moved out of obstacles that the tether model's resolution has let
     it enter."""
     place = np.array(robot, dtype=float)
@@ -395,7 +395,7 @@ def _keeping_order(graph: GraphFromState, goals: int) -> Result:
     return Result(full, length, None, Status.FEASIBLE, walk=(*full[1:], 0))
 
 
-def _least(graph: GraphFromState, goals: int, clock: Clock) -> float:
+def _lower_bound_of_rest(graph: GraphFromState, goals: int, clock: Clock) -> float:
     """Return a quick lower bound on every path: half the two cheapest legs at each goal, and one at
     each end; 0 if there is no time."""
     vertices = np.arange(len(graph))

@@ -20,9 +20,9 @@ from netsp.base.geometry import polylines
 from netsp.hsignature import Word
 from netsp.model.problem import Circle, Goal, Problem
 from netsp.model.solution import Solution
-from netsp.online.execute.run_record import PROBLEM, SOLUTION, STATE, Begun, RunState
+from netsp.online.execute.run_record import PROBLEM, SOLUTION, STATE, ResumePoint, RunState
 from netsp.online.execute.tether_reserve import ReservePolicy
-from netsp.online.execute.tour_repair import outside
+from netsp.online.execute.tour_repair import free_position
 from netsp.online.fly.flight_policy import FlightPolicy
 from netsp.online.fly.stopped import RefusedError
 from netsp.online.guard.state_file import GuardState
@@ -30,7 +30,7 @@ from netsp.plan.tour_plan import HOME, legs_of
 from netsp.roadmap.paths import TautPaths, UnknownPathError
 from netsp.roadmap.roadmap_policy import RoadmapPolicy
 
-BeginsAt = Callable[[Floats], Begun]
+BeginsAt = Callable[[Floats], ResumePoint]
 """Function that returns how a flight begins, given the position of the vehicle, shape (3,)."""
 
 SAY_CLASS = "say with --class on which sides of the obstacles the tether lies"
@@ -106,7 +106,7 @@ def from_record(problem: Problem, state: RunState, policy: FlightPolicy | None =
     before = np.array(state.tether, dtype=float)
     policy = policy or FlightPolicy()
 
-    def begins(place: Floats) -> Begun:
+    def begins(place: Floats) -> ResumePoint:
         way = float(np.linalg.norm(place - before[-1]))
         if way > policy.max_unwatched_way:
             raise RefusedError(
@@ -119,7 +119,7 @@ def from_record(problem: Problem, state: RunState, policy: FlightPolicy | None =
                 f"{problem.obstacle_label(blocked)} lies between the vehicle and where it was "
                 f"last: {SAY_CLASS}"
             )
-        return _begun(problem, state, np.vstack([before, place]))
+        return _resume_point(problem, state, np.vstack([before, place]))
 
     return begins
 
@@ -152,8 +152,8 @@ def from_word(problem: Problem, word: Word, state: RunState) -> BeginsAt:
             f"{', '.join(map(str, word))}"
         )
 
-    def begins(place: Floats) -> Begun:
-        goal = Goal(position=outside(problem, place))
+    def begins(place: Floats) -> ResumePoint:
+        goal = Goal(position=free_position(problem, place))
         placed = problem.model_copy(update={"goals": (goal,), "state": None})
         try:
             longest = RoadmapPolicy().max_state_ratio * problem.tether_length
@@ -163,7 +163,7 @@ def from_word(problem: Problem, word: Word, state: RunState) -> BeginsAt:
                 f"no tether of class {', '.join(map(str, word)) or 'straight'} reaches the "
                 "vehicle: is the class right?"
             ) from None
-        return _begun(problem, state, np.asarray(path))
+        return _resume_point(problem, state, np.asarray(path))
 
     return begins
 
@@ -228,11 +228,11 @@ def whole_tour(problem: Problem, solution: Solution) -> RunState:
     return RunState(time=0.0, tether=(base, base), left=left, reserve=reserve)
 
 
-def _begun(problem: Problem, state: RunState, tether: Floats) -> Begun:
+def _resume_point(problem: Problem, state: RunState, tether: Floats) -> ResumePoint:
     tether = tether.copy()
     tether[0] = problem.base
     length = polylines.length(tether)
-    return Begun(
+    return ResumePoint(
         tether, list(state.left),
         f"resumed with {counted(len(state.left), 'goal')} left, {length:.1f} {problem.units} along "
         "the tether from the base",

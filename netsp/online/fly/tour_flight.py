@@ -102,14 +102,21 @@ def fly(
     start = np.array(problem.base if problem.state is None else problem.state.position)
     near = NEAR_START if begins is None else np.inf
     ready(session, start, near, should_stop, any_vehicle=any_vehicle)
-    begun = begins and begins(np.array(session.now.position))
+    resume_point = begins and begins(np.array(session.now.position))
     session.places()  # of before the flight
     vehicle = LinkedVehicle(session, options.reach, policy)
     try:
         done = execute(
-            problem, solution, replace(options, vehicle="linked"), surprises=surprises,
-            on_step=on_step, vehicle=vehicle, incoming=incoming, record=record, begun=begun,
-        )  # fmt: skip
+            problem,
+            solution,
+            replace(options, vehicle="linked"),
+            surprises=surprises,
+            on_step=on_step,
+            vehicle=vehicle,
+            incoming=incoming,
+            record=record,
+            resume_point=resume_point,
+        )
     except (Exception, KeyboardInterrupt):
         if vehicle.sent:
             _leave(session, vehicle)

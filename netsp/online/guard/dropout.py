@@ -9,7 +9,7 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.hsignature import Word, crossings
 from netsp.model.problem import Problem
-from netsp.online.execute.tour_repair import outside
+from netsp.online.execute.tour_repair import free_position
 from netsp.online.guard.site import Site
 from netsp.roadmap.tether_classes import Tethers
 
@@ -42,7 +42,7 @@ def ways_between(
         Words, and the lengths of the shortest paths, metres; shortest first.
     """
     bare = problem.model_copy(update={"clearance": 0.0, "bounds": None})
-    begin, end = outside(bare, before), outside(bare, after)
+    begin, end = free_position(bare, before), free_position(bare, after)
     straight = math.dist(begin, end)
     if straight <= 1e-6 * problem.scale:
         end = begin

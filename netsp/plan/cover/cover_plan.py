@@ -20,12 +20,12 @@ from netsp.plan.cover.viewpoints import Viewer, Viewpoints, coarsen, find_viewpo
 from netsp.world.mission.equipment import Camera
 from netsp.world.mission.mission import Mission, MissionWaypoint, Viewpoint
 from netsp.world.mission.mission_limits import check_bounds
-from netsp.world.paths.tree import Grid, ShortestTree, taut
+from netsp.world.paths.tree import Grid, ShortestTree, pull_taut
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
 from netsp.world.scene.surfaces import extent
-from netsp.world.simulator.coverage import Patches, patches_of
-from netsp.world.simulator.mission_run import grid_of
+from netsp.world.simulator.coverage import Patches, surface_patches
+from netsp.world.simulator.mission_run import mission_grid
 
 UNKNOWN_TETHER_LENGTH = 1e6
 """Sentinel: length of a tether of which it is not known yet how long it must be, metres."""
@@ -159,7 +159,7 @@ def cover(
         tell("surface of the scene")
         fine = clock.bounded(
             "covering the surface with patches",
-            lambda: patches_of(scene, field, camera.patch, np.array([anchor]), inspect),
+            lambda: surface_patches(scene, field, camera.patch, np.array([anchor]), inspect),
         )
         patches = coarsen(fine, camera.patch)
         mission = Mission(
@@ -265,7 +265,7 @@ class _Reach:
         bounds = None
         if scene.bounds is not None:
             bounds = np.array(scene.bounds[:3]), np.array(scene.bounds[3:])
-        return cls(mission, field, grid_of(there, scene, field), bounds, policy)
+        return cls(mission, field, mission_grid(there, scene, field), bounds, policy)
 
     def allowed(self, places: Floats) -> Bools:
         """Return which of places (n, 3) the robot gets to, within the bounds."""
@@ -291,7 +291,7 @@ class _Reach:
             if path is not None:
                 out[k] = polylines.length(path)
                 if out[k] > self.policy.max_tether_share * self.mission.tether_length:
-                    out[k] = polylines.length(taut(self.field, path, 0.0, self.mission.delta))
+                    out[k] = polylines.length(pull_taut(self.field, path, 0.0, self.mission.delta))
         return out
 
 

@@ -24,7 +24,7 @@ from netsp.plan.space.mission_policy import MissionPolicy
 from netsp.plan.space.planning_context import DIP_RATIO, drive_step
 from netsp.plan.space.space_plan import SpacePlan, plan
 from netsp.world.mission.mission import Mission, MissionState, MissionWaypoint
-from netsp.world.mission.planned_tour import PlannedStop, PlannedTour, in_file
+from netsp.world.mission.planned_tour import PlannedTour, PlannedVisit, thinned_path
 from netsp.world.paths.tree import ShortestTree
 from netsp.world.planner.planner import HOLD, Command, Tethers
 from netsp.world.planner.predictive import PredictivePlanner
@@ -174,7 +174,7 @@ class RepairPlanner(PredictivePlanner):
             path = self._first[1]
         del stops[k]
         onward = tour.home if k == len(stops) else stops[k].path
-        leg = in_file(self.pull_taut(np.vstack([path, np.array(onward)])))
+        leg = thinned_path(self.pull_taut(np.vstack([path, np.array(onward)])))
         self._first = (k, np.array(leg)) if k == self.index else self._first
         home = tour.home
         if k == len(stops):
@@ -311,7 +311,7 @@ class RepairPlanner(PredictivePlanner):
         mission = self.mission
         place = pushed_out(self.scene, robot[None], 1e-3)[0] if self._inside(robot) else robot
         line = np.vstack([tether.nodes[:-1], place])
-        state = MissionState(position=in_file(place[None])[0], tether=in_file(line))
+        state = MissionState(position=thinned_path(place[None])[0], tether=thinned_path(line))
         rest = mission.model_copy(
             update={
                 "state": state,
@@ -359,18 +359,18 @@ class RepairPlanner(PredictivePlanner):
         tour = self.mission.tour
         assert tour is not None
         stops = tuple(
-            tour.stops[k].model_copy(update={"path": in_file(path), "tether_length": length})
+            tour.stops[k].model_copy(update={"path": thinned_path(path), "tether_length": length})
             for k, (path, length) in zip(rest.kept, rest.legs, strict=False)
         )
         beyond = range(max(self.index, len(tour.stops)), len(self.mission.waypoints))
         left = [*rest.kept, *rest.lost, *beyond]
         waypoints = tuple(self.mission.waypoints[k] for k in left)
-        self._splice(tour, stops, in_file(rest.legs[-1][0]), waypoints, left)
+        self._splice(tour, stops, thinned_path(rest.legs[-1][0]), waypoints, left)
 
     def _splice(
         self,
         tour: PlannedTour,
-        stops: tuple[PlannedStop, ...],
+        stops: tuple[PlannedVisit, ...],
         home: tuple[Point3, ...],
         waypoints: tuple[MissionWaypoint, ...],
         left: list[int],
@@ -389,7 +389,7 @@ class RepairPlanner(PredictivePlanner):
             for k, stop in enumerate(stops)
         )
         self._first = (n, np.array(stops[0].path if stops else home))
-        walked = in_file(np.vstack([np.array(self._walked), self._first[1]]))
+        walked = thinned_path(np.vstack([np.array(self._walked), self._first[1]]))
         if stops:
             stops = (stops[0].model_copy(update={"path": walked}), *stops[1:])
         else:

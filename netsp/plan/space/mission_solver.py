@@ -48,7 +48,7 @@ from netsp.plan.space.upright import bound_by_upright_solids
 from netsp.plan.space.visit_order import order_by_going_on
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.mission_limits import check_tether
-from netsp.world.mission.planned_tour import PlannedStop, PlannedTour, in_file
+from netsp.world.mission.planned_tour import PlannedTour, PlannedVisit, thinned_path
 from netsp.world.mission.run_log import LogRow, Run
 from netsp.world.planner import PlannerOptions
 from netsp.world.scene.field import DistanceField
@@ -669,8 +669,8 @@ def tour_of_flight(
         if broken is not None:
             return None
         planned_stops.append(
-            PlannedStop(
-                path=in_file(legs[k]),
+            PlannedVisit(
+                path=thinned_path(legs[k]),
                 signature=word,
                 tether_length=stop["tether"],
                 longest_tether=max(r.tether for r in parts[k]),
@@ -685,7 +685,7 @@ def tour_of_flight(
         bound = min(length, max(0.0, bound - 2.0 * float(distances.sum()) - short_of_home))
     tour = PlannedTour(
         stops=tuple(planned_stops),
-        home=in_file(legs[-1]),
+        home=thinned_path(legs[-1]),
         status=Status.FEASIBLE,
         solver=solver,
         seed=seed,

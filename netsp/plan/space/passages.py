@@ -23,7 +23,7 @@ from netsp.world.mission.planned_tour import UnresolvedGap
 from netsp.world.paths.tree import Grid
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
-from netsp.world.simulator.mission_run import grid_box
+from netsp.world.simulator.mission_run import mission_grid_box
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class GapGrid:
         min_room_ratio: float = WordPolicy.min_room_ratio,
     ) -> GapGrid:
         """Return the cells of a grid by its box and cell size
-        (`netsp.world.simulator.mission_run.grid_box`)."""
+        (`netsp.world.simulator.mission_run.mission_grid_box`)."""
         low, high, cell = box
         counts = np.maximum(1.0, np.round((high - low) / cell))  # as `Grid` counts
         return cls(field, low, low + cell * counts, cell, clearance, min_room_ratio)
@@ -492,9 +492,9 @@ def resolve_gaps(
     searching = (clock or Clock()).part(policy.time_share)
 
     def box_of(cell: float) -> tuple[Floats, Floats, float]:
-        return grid_box(mission.model_copy(update={"cell": cell}), scene)
+        return mission_grid_box(mission.model_copy(update={"cell": cell}), scene)
 
-    box = grid_box(mission, scene)
+    box = mission_grid_box(mission, scene)
     grid = GapGrid.in_box(field, box, mission.clearance, min_room_ratio)
     try:
         gaps = find_hidden_gaps(grid, policy, searching)

@@ -21,13 +21,13 @@ from netsp.plan.space.space_signature import SpaceSignature
 from netsp.plan.space.word_search import NO_WORD, WordSearch, path_to_slot, shortest_words
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.planned_tour import UnresolvedGap
-from netsp.world.paths.standoff import beside
+from netsp.world.paths.standoff import move_off_surfaces
 from netsp.world.paths.tree import OPEN as ALL_FREE
-from netsp.world.paths.tree import Grid, free_cells, states_of, taut
+from netsp.world.paths.tree import Grid, free_cells, pull_taut, states_of
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.scene.scene import Scene
 from netsp.world.simulator.laid_tether import first_tether, present_tether
-from netsp.world.simulator.mission_run import grid_of
+from netsp.world.simulator.mission_run import mission_grid
 from netsp.world.tether import GeodesicTether, Tether
 from netsp.world.tether.tether_policy import THINNEST
 
@@ -51,7 +51,7 @@ class PlanningContext:
     mission, field
         Mission, and distance field of its scene.
     grid
-        Box and cell size (`netsp.world.simulator.mission_run.grid_of`).
+        Box and cell size (`netsp.world.simulator.mission_run.mission_grid`).
     words
         Words of paths, in the water of the tether.
     model
@@ -89,7 +89,9 @@ class PlanningContext:
         InputError
             As `netsp.plan.space.space_signature.SpaceSignature.in_box`.
         """
-        return cls.on_grid(mission, field, grid_of(mission, scene, field), scene.bounds, policy)
+        return cls.on_grid(
+            mission, field, mission_grid(mission, scene, field), scene.bounds, policy
+        )
 
     @classmethod
     def on_grid(
@@ -256,7 +258,7 @@ class PlanningContext:
     def pull_taut(self, path: Floats) -> Floats:
         """Return a path (k, 3) of the robot pulled taut in its class, at its clearance, metres."""
         mission = self.mission
-        line = taut(self.field, path, mission.clearance, mission.delta)
+        line = pull_taut(self.field, path, mission.clearance, mission.delta)
         if mission.clearance >= 0.5 * mission.delta:
             return line
         room = min(mission.clearance, end_clearance(self.field, path))
@@ -282,7 +284,9 @@ class PlanningContext:
         if self.word_number(path) == word and keeps_clearance(self.field, path, self.mission):
             return path
         step = min(self.grid.cell, 0.5 * THINNEST * self.mission.delta)
-        moved = beside(self.field, polylines.points_along(line, step), self.mission.clearance)
+        moved = move_off_surfaces(
+            self.field, polylines.points_along(line, step), self.mission.clearance
+        )
         if self.word_number(moved) != word:
             return None
         for path in (self.pull_taut(moved), moved):

@@ -46,11 +46,11 @@ from netsp.plan.space.states import add_states_with_room, find_first_states
 from netsp.plan.space.trees import add_states_of_trees
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.mission_limits import check_bounds, check_size, check_tether
-from netsp.world.mission.planned_tour import PlannedStop, PlannedTour, in_file
+from netsp.world.mission.planned_tour import PlannedTour, PlannedVisit, thinned_path
 from netsp.world.paths.tree import Grid
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
-from netsp.world.simulator.mission_run import grid_of
+from netsp.world.simulator.mission_run import mission_grid
 
 LENGTH_ROUNDING = 1e-9
 """Tolerance for the rounding of lengths, relative."""
@@ -178,8 +178,8 @@ class SpacePlan:
             bound = min(bound, self.length)
         tour = PlannedTour(
             stops=tuple(
-                PlannedStop(
-                    path=in_file(stop.path),
+                PlannedVisit(
+                    path=thinned_path(stop.path),
                     signature=stop.word,
                     tether_length=stop.tether_length,
                     longest_tether=stop.longest_tether,
@@ -187,7 +187,7 @@ class SpacePlan:
                 )
                 for stop in self.visits
             ),
-            home=in_file(self.home),
+            home=thinned_path(self.home),
             status=self._status(bound),
             solver=solver if self.kind in (TAUT_LEGS, DETOURS) else self.kind,
             seed=seed,
@@ -418,7 +418,7 @@ def prepare_context(
     Places.for_mission(mission, field)  # refuse bad waypoints before the long search for words
     if grid is None:
         assert scene is not None
-        grid = clock.bounded("measuring the cells", partial(grid_of, mission, scene, field))
+        grid = clock.bounded("measuring the cells", partial(mission_grid, mission, scene, field))
     on_progress("words of the scene")
     bounds = None if scene is None else scene.bounds
     context = clock.bounded(

@@ -25,7 +25,7 @@ from netsp.plan.space.mission_policy import MissionPolicy
 from netsp.plan.space.planning_context import drive_step, is_straight_clear
 from netsp.plan.space.states import hang_alike
 from netsp.world.mission.mission import Mission
-from netsp.world.paths.tree import Grid, ShortestTree, taut
+from netsp.world.paths.tree import Grid, ShortestTree, pull_taut
 from netsp.world.scene.field import DistanceField
 from netsp.world.tether import GeodesicTether, Tether
 
@@ -181,7 +181,7 @@ def waypoint_graph(
             leg = min(straight_legs.get((v, w), np.inf), straight_legs.get((w, v), np.inf))
             if not np.isfinite(leg):
                 line = np.vstack([found.tether[v].nodes[::-1], found.tether[w].nodes[1:]])
-                path = taut(field, line, mission.clearance, mission.delta)
+                path = pull_taut(field, line, mission.clearance, mission.delta)
                 leg = polylines.length(path)
             costs[v + 1, w + 1] = costs[w + 1, v + 1] = min(leg, costs[v + 1, w + 1])
     reached = sorted(set(found.point))

@@ -11,7 +11,7 @@ from netsp.base.arrays import Floats
 from netsp.base.errors import counted
 from netsp.base.geometry import polylines
 from netsp.online.execute.execution_log import Execution
-from netsp.online.execute.temporary_obstacles import Maps, lasting, passing
+from netsp.online.execute.temporary_obstacles import Maps, lasting_problem, temporary_obstacles
 from netsp.view.pictures import style
 from netsp.view.pictures.problem_picture import draw_obstacles
 
@@ -53,7 +53,7 @@ def draw_map(done: Execution, *, ax: Any = None) -> Any:
         ax = Figure(figsize=(7, 6), layout="constrained").subplots()
     few = len(problem.obstacles) <= 40
     maps = done.maps or [(0.0, problem)]
-    at_first = lasting(maps)
+    at_first = lasting_problem(maps)
     draw_obstacles(ax, at_first, label=at_first.obstacle_name if few else None)
     plan = np.array(done.solution.path).reshape(-1, 3)
     path = np.array([[r.x, r.y] for r in done.rows]).reshape(-1, 2)
@@ -93,7 +93,7 @@ def _draw_passing(ax: Any, maps: Maps, busy: Floats) -> None:
     """Obstacles that stood there for a time only, by their outline and their times; these stand
     beside it, where there is least else (n, 2), for a goal that was lost lies within."""
     size = float(np.ptp(busy, axis=0).max())
-    for p in passing(maps):
+    for p in temporary_obstacles(maps):
         rim = np.asarray(p.obstacle.shape(0.0).exterior.coords)[:, :2]
         ax.fill(*rim.T, fc=style.OBSTACLE, ec=style.EDGE, ls="--", lw=0.9, alpha=0.6, zorder=1)
         (x0, y0), (x1, y1) = rim.min(0), rim.max(0)

@@ -15,12 +15,12 @@ from netsp.base.errors import counted
 from netsp.view.pictures import style
 from netsp.view.pictures.scene_picture import draw_space, save
 from netsp.view.pictures.waypoint_marks import WaypointMarks
-from netsp.world.mission.anchor_track import Track
+from netsp.world.mission.anchor_track import AnchorTrack
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import Run
 from netsp.world.scene.scene import Scene
 from netsp.world.simulator.laid_tether import present_tether
-from netsp.world.simulator.mission_run import grid_of
+from netsp.world.simulator.mission_run import mission_grid
 from netsp.world.tether import GeodesicTether, Tether
 
 DASHES = ("-", "-.")
@@ -97,7 +97,7 @@ def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
     axes = right.subplots(len(runs), 1, subplot_kw={"projection": "3d"}, squeeze=False)[:, 0]
     for run, ax in zip(runs, axes, strict=True):
         draw_space(scene, path_of(run), run.tether.nodes, ax=ax, stops=stops_of(run))
-        track = Track.of(run.mission)
+        track = AnchorTrack.for_mission(run.mission)
         if track is not None:
             gone = track.between(0.0, run.log[-1].time)
             ax.plot(*gone.T, color=style.BASE, lw=1.2, ls="--", label="anchor's track")
@@ -175,9 +175,9 @@ def tethers_along(run: Run, scene: Scene, moments: npt.NDArray[np.int64]) -> lis
     mission = run.mission
     field = scene.field()
     model = GeodesicTether(field, mission.delta)
-    state = present_tether(mission, field, model, grid_of(mission, scene, field))
+    state = present_tether(mission, field, model, mission_grid(mission, scene, field))
     path, out, at = path_of(run), [], 0
-    track = Track.of(mission)
+    track = AnchorTrack.for_mission(mission)
     for row in moments:
         if track is None:
             state = model.drive(state, path[at : int(row) + 1])[0]

@@ -19,7 +19,7 @@ from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import Run
 from netsp.world.scene.scene import Scene, scene_of
 from netsp.world.simulator.laid_tether import present_tether
-from netsp.world.simulator.mission_run import grid_of
+from netsp.world.simulator.mission_run import mission_grid
 from netsp.world.tether import GeodesicTether
 from netsp.world.tether.resolution import suggested_delta
 
@@ -239,7 +239,7 @@ def moments_of_mission(mission: Mission, scene: Scene, count: int) -> list[Momen
         )
     field_of = scene.field()
     model = GeodesicTether(field_of, mission.delta)
-    state = present_tether(mission, field_of, model, grid_of(mission, scene, field_of))
+    state = present_tether(mission, field_of, model, mission_grid(mission, scene, field_of))
     legs = [mission.tour.leg(k) for k in range(len(mission.tour.stops))]
     ends = np.cumsum([polylines.length(leg) for leg in legs if leg is not None])
     path = mission.tour.line

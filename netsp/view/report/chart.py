@@ -14,7 +14,7 @@ from netsp.base.arrays import Floats
 from netsp.base.geometry import polylines
 from netsp.model.problem import Circle, Problem
 from netsp.model.solution import Solution
-from netsp.online.execute.temporary_obstacles import Maps, lasting, passing
+from netsp.online.execute.temporary_obstacles import Maps, lasting_problem, temporary_obstacles
 from netsp.view.pictures import style
 from netsp.view.pictures.film import Film
 
@@ -176,7 +176,7 @@ def draw(
         order = {v.goal: n for n, v in enumerate(solution.tour, 1)}
     shapes = [
         *_frame(problem, view),
-        *_obstacles(lasting(maps) if maps else problem, view),
+        *_obstacles(lasting_problem(maps) if maps else problem, view),
         *_passing(maps, view),
         *(
             _tour(np.array(solution.path), view)
@@ -333,7 +333,7 @@ def _passing(maps: Maps, view: View) -> list[str]:
     look = (
         f'fill="{style.OBSTACLE}" fill-opacity="0.6" stroke="{style.EDGE}" stroke-dasharray="5 3"'
     )
-    for p in passing(maps) if maps else ():
+    for p in temporary_obstacles(maps) if maps else ():
         rim = np.asarray(p.obstacle.shape(0.0).exterior.coords)[:, :2]
         # above it: a goal that was lost lies within
         x, y = view.point([rim[:, 0].mean(), rim[:, 1].max()])

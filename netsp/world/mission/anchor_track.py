@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Track(ComparesArrays):
+class AnchorTrack(ComparesArrays):
     """Positions of an anchor over time, straight and steady in between; it stays at the last one.
 
     Parameters
@@ -33,7 +33,7 @@ class Track(ComparesArrays):
     places: Floats
 
     @classmethod
-    def of(cls, mission: Mission) -> Track | None:
+    def for_mission(cls, mission: Mission) -> AnchorTrack | None:
         """Return the track of a mission's anchor; None if the anchor stays."""
         if not mission.track:
             return None
@@ -50,7 +50,7 @@ class Track(ComparesArrays):
         corners = self.places[(self.times > since) & (self.times < until)]
         return np.vstack([self(since), corners, self(until)])
 
-    def travelled(self, since: float, until: float) -> float:
+    def distance_between(self, since: float, until: float) -> float:
         """Return the distance that the anchor travels between two times in seconds, metres."""
         return polylines.length(self.between(since, until))
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
-from netsp.world.mission.anchor_track import Track
+from netsp.world.mission.anchor_track import AnchorTrack
 from netsp.world.mission.mission import Mission
 from netsp.world.planner import PLANNERS
 from netsp.world.scene.scene import Scene
@@ -66,7 +66,7 @@ def check_size(mission: Mission, policy: SimulationPolicy = SimulationPolicy()) 
                 "expected far less: mixed units?"
             )
     places = mission.every_place[1:]
-    track = Track.of(mission)
+    track = AnchorTrack.for_mission(mission)
     if track is not None:
         k = int(track.speeds.argmax())
         if track.speed >= mission.speed:

@@ -17,7 +17,7 @@ from netsp.model.solution import Status
 PathField = Annotated[tuple[Point3, ...], Field(min_length=2)]
 
 
-class PlannedStop(Model):
+class PlannedVisit(Model):
     """Visit of a planned tour."""
 
     path: Annotated[PathField, Field(description="from the stop before to the waypoint, m")]
@@ -59,7 +59,7 @@ class PlannedTour(Model):
     """
 
     stops: Annotated[
-        tuple[PlannedStop, ...],
+        tuple[PlannedVisit, ...],
         Field(description="one for each of the first waypoints; the others are not reached"),
     ]
     home: Annotated[PathField, Field(description="from the last stop to the start, m")]
@@ -186,7 +186,7 @@ class PlannedTour(Model):
         return None
 
 
-def in_file(path: Floats) -> tuple[Point3, ...]:
+def thinned_path(path: Floats) -> tuple[Point3, ...]:
     """Return a path (k, 3) for a file, without points on the line between their neighbours."""
     keep = [0]
     for k in range(1, len(path) - 1):

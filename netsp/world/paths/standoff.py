@@ -12,7 +12,7 @@ from netsp.world.scene.field import DistanceField
 from netsp.world.scene.sampling import Field, lowest_along, lowest_along_each
 
 
-def beside(
+def move_off_surfaces(
     field: DistanceField, line: Floats, clearance: float, policy: StandoffPolicy = StandoffPolicy()
 ) -> Floats:
     """Return a line (n, 3) moved off surfaces to the clearance, as far as its class allows.
@@ -44,8 +44,8 @@ def beside(
         moved[short] += step[:, None] * rise
         better = field.distance(moved[short]) >= d[short] + policy.min_gain * step
         moved[short] = np.where(better[:, None], moved[short], path[short])
-        blocked = ~sees(field.arrays, moved[:-1], moved[1:], 1e-2)
-        blocked &= sees(field.arrays, path[:-1], path[1:], 1e-2)
+        blocked = ~are_in_sight(field.arrays, moved[:-1], moved[1:], 1e-2)
+        blocked &= are_in_sight(field.arrays, path[:-1], path[1:], 1e-2)
         undone = np.zeros(len(path), dtype=bool)
         undone[:-1] |= blocked
         undone[1:] |= blocked
@@ -57,7 +57,7 @@ def beside(
 
 
 @kernel
-def sees(field: Field, a: Floats, b: Floats, depth: float) -> Bools:
+def are_in_sight(field: Field, a: Floats, b: Floats, depth: float) -> Bools:
     """Return which of the points a[k] and b[k] (n, 3) see one another, up to a depth in solids."""
     out = np.empty(len(a), dtype=np.bool_)
     for k in range(len(a)):
@@ -68,7 +68,7 @@ def sees(field: Field, a: Floats, b: Floats, depth: float) -> Bools:
     return out
 
 
-@interprets(sees)
+@interprets(are_in_sight)
 def _sees_in_numpy(field: Field, a: Floats, b: Floats, depth: float) -> Bools:
-    """Vectorise `sees` over all points."""
+    """Vectorise `are_in_sight` over all points."""
     return np.asarray(lowest_along_each(field, a, b, 0.5 * depth) > -depth)

@@ -81,7 +81,7 @@ class Grid:
         one. Returns the number of trees kept.
         """
         for target in targets:
-            root = self.free_near(target)
+            root = self.nearest_free_cell(target)
             if root is None or tuple(root) in self._kept:
                 continue
             if (len(self._kept) + 1) * self.free.size > self.policy.max_tree_bytes:
@@ -90,20 +90,20 @@ class Grid:
             self._kept[tuple(root)] = grow(self.states, root, nowhere)
         return len(self._kept)
 
-    def toward(self, root: Ints, wanted: Ints) -> npt.NDArray[np.int8]:
+    def tree_to(self, root: Ints, wanted: Ints) -> npt.NDArray[np.int8]:
         """Return the step that leads on to the root from the wanted cells (n, 3) and those on their
         way; see `grow`."""
         kept = self._kept.get(tuple(root))
         if kept is not None:
             if all(
-                kept[tuple(cell)] < 0 or self.free[tuple(way(kept, cell).T)].all()
+                kept[tuple(cell)] < 0 or self.free[tuple(tree_path(kept, cell).T)].all()
                 for cell in wanted
             ):
                 return kept
             del self._kept[tuple(root)]  # something stands in its way since
         return grow(self.states, root, wanted)
 
-    def over(self, field: DistanceField, box: Floats) -> Grid:
+    def with_changed_box(self, field: DistanceField, box: Floats) -> Grid:
         """Return the same cells in a scene that differs within a box (2, 3)."""
         room = self.clearance + self.cell
         first, last = self.index(box[0] - room), self.index(box[1] + room) + 1
@@ -137,7 +137,7 @@ class Grid:
         """Return the centres (..., 3) of cells (..., 3)."""
         return np.asarray(self.low + (np.asarray(cells) + 0.5) * self.cell)
 
-    def free_near(self, point: npt.ArrayLike) -> npt.NDArray[np.int64] | None:
+    def nearest_free_cell(self, point: npt.ArrayLike) -> npt.NDArray[np.int64] | None:
         """Return the nearest free cell within three cells that a point sees; None if there is
         none."""
         p = np.asarray(point, dtype=float)
@@ -171,11 +171,11 @@ class ShortestTree:
     def __init__(self, grid: Grid, target: npt.ArrayLike, points: npt.ArrayLike) -> None:
         self.grid, self.target = grid, np.asarray(target, dtype=float)
         self.points = np.asarray(points, dtype=float).reshape(-1, 3)
-        root = grid.free_near(self.target)
-        self._cells = [None if root is None else grid.free_near(p) for p in self.points]
+        root = grid.nearest_free_cell(self.target)
+        self._cells = [None if root is None else grid.nearest_free_cell(p) for p in self.points]
         if root is not None:
             wanted = np.array([c for c in self._cells if c is not None], dtype=np.int64)
-            self._toward = grid.toward(root, wanted.reshape(-1, 3))
+            self._toward = grid.tree_to(root, wanted.reshape(-1, 3))
 
     def path(self, n: int) -> Floats | None:
         """Return the path (k, 3) from point n to the target along the grid; None if there is
@@ -183,7 +183,7 @@ class ShortestTree:
         cell = self._cells[n]
         if cell is None or self._toward[tuple(cell)] < 0:
             return None
-        cells = way(self._toward, cell)
+        cells = tree_path(self._toward, cell)
         return np.vstack([self.points[n], self.grid.centre(cells), self.target])
 
 
@@ -441,7 +441,7 @@ _NEXT_STEPS[:26, : ONWARD.shape[1] - 1], _NEXT_STEPS[26] = ONWARD[:, 1:], np.ara
 
 
 @kernel
-def way(toward: npt.NDArray[np.int8], start: Ints) -> Ints:
+def tree_path(toward: npt.NDArray[np.int8], start: Ints) -> Ints:
     """Return the cells (k, 3) from one in the tree to the root, both ends among them."""
     out, count = np.empty((64, 3), dtype=np.int64), 1
     # axis by axis: assigning a row would compile NumPy's error messages, which takes seconds
@@ -458,9 +458,9 @@ def way(toward: npt.NDArray[np.int8], start: Ints) -> Ints:
         count += 1
 
 
-@interprets(way)
-def _way_in_python(toward: npt.NDArray[np.int8], start: Ints) -> Ints:
-    """Compute `way` with Python's integers, which the interpreter handles faster than arrays."""
+@interprets(tree_path)
+def _tree_path_in_python(toward: npt.NDArray[np.int8], start: Ints) -> Ints:
+    """Compute `tree_path` with Python's integers, which the interpreter handles faster."""
     i, j, k = start.tolist()
     out, steps = [(i, j, k)], STEPS.tolist()
     while (step := toward.item(i, j, k)) < 26:
@@ -470,7 +470,7 @@ def _way_in_python(toward: npt.NDArray[np.int8], start: Ints) -> Ints:
     return np.array(out, dtype=np.int64)
 
 
-def taut(
+def pull_taut(
     field: DistanceField,
     path: Floats,
     clearance: float,
@@ -487,20 +487,20 @@ def taut(
     return line[np.r_[True, np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-9]]
 
 
-def roughly_taut(
+def pull_roughly_taut(
     field: DistanceField,
     path: Floats,
     clearance: float,
     delta: float,
     policy: PathPolicy = PathPolicy(),
 ) -> Floats:
-    """Return a path pulled nearly taut, in a tenth of the time of `taut`."""
+    """Return a path pulled nearly taut, in a tenth of the time of `pull_taut`."""
     grown, room = _grown(field, path, clearance, delta)
     step = max(room, delta)
     return _relaxed(grown, _shortcut(grown, path, step), step, policy.rough_pull_rounds)
 
 
-def ever_tauter(
+def pull_in_stages(
     field: DistanceField,
     path: Floats,
     clearance: float,
@@ -573,14 +573,14 @@ def shortcut(field: Field, path: Floats, tolerance: float) -> Floats:
     return out[:count].copy()
 
 
-def homotopic(field: DistanceField, a: Floats, b: Floats, step: float) -> bool:
+def are_homotopic(field: DistanceField, a: Floats, b: Floats, step: float) -> bool:
     """Return whether two paths between the same ends certainly belong to one class.
 
     Points at most `step` apart, at the same share of both paths, must all see one another. Then
     nothing wider than `step` can stand between the paths.
     """
     k = 2 + int(max(polylines.length(a), polylines.length(b)) / step)
-    return bool(all_see(field.arrays, _shares(a, k), _shares(b, k), 0.1 * step))
+    return bool(are_all_in_sight(field.arrays, _shares(a, k), _shares(b, k), 0.1 * step))
 
 
 def _shares(path: Floats, k: int) -> Floats:
@@ -590,7 +590,7 @@ def _shares(path: Floats, k: int) -> Floats:
 
 
 @kernel
-def all_see(field: Field, a: Floats, b: Floats, step: float) -> bool:
+def are_all_in_sight(field: Field, a: Floats, b: Floats, step: float) -> bool:
     """Return whether all points a[k] and b[k] (n, 3) see one another, in steps of `step`."""
     for k in range(len(a)):
         low, _ = lowest_along(field, a[k, 0], a[k, 1], a[k, 2], b[k, 0], b[k, 1], b[k, 2], step)
@@ -599,7 +599,7 @@ def all_see(field: Field, a: Floats, b: Floats, step: float) -> bool:
     return True
 
 
-@interprets(all_see)
+@interprets(are_all_in_sight)
 def _all_see_in_numpy(field: Field, a: Floats, b: Floats, step: float) -> bool:
-    """Vectorise `all_see` over all segments."""
+    """Vectorise `are_all_in_sight` over all segments."""
     return not (lowest_along_each(field, a, b, step) < 0.0).any()

@@ -16,12 +16,12 @@ from netsp.base.compiled.kernel import runs_compiled
 from netsp.base.deprecated import deprecated_method
 from netsp.base.errors import interrupted
 from netsp.base.geometry import polylines
-from netsp.world.mission.anchor_track import Track
+from netsp.world.mission.anchor_track import AnchorTrack
 from netsp.world.mission.mission import Mission, MissionWaypoint
 from netsp.world.paths.refine import RefineParams, refined, stepped
 from netsp.world.paths.sampled import SampledPaths
-from netsp.world.paths.standoff import beside
-from netsp.world.paths.tree import Grid, Paths, ShortestTree, grow, taut
+from netsp.world.paths.standoff import move_off_surfaces
+from netsp.world.paths.tree import Grid, Paths, ShortestTree, grow, pull_taut
 from netsp.world.planner.planner_policy import PlannerPolicy
 from netsp.world.scene.field import DistanceField
 from netsp.world.tether import GeodesicTether, ReactTether, Tether
@@ -262,9 +262,9 @@ class Planner:
         return self.home_position if self.is_homeward else self.mission.places[self.index]
 
     @cached_property
-    def track(self) -> Track | None:
+    def track(self) -> AnchorTrack | None:
         """Track of a moving anchor."""
-        return Track.of(self.mission)
+        return AnchorTrack.for_mission(self.mission)
 
     @property
     def is_anchor_moving(self) -> bool:
@@ -346,7 +346,7 @@ class Planner:
             The tether in the new map.
         """
         del tether
-        self.scene, self.tethers, self.grid = scene, tethers, self.grid.over(scene, box)
+        self.scene, self.tethers, self.grid = scene, tethers, self.grid.with_changed_box(scene, box)
         if len(self.path) and not self.is_clear_of_solids(np.vstack([robot, self.path])):
             self.path = self.path[:0]
 
@@ -440,7 +440,7 @@ class Planner:
         """Return a finely divided line (k, 3) moved off surfaces to the clearance."""
         points = polylines.points_along(line, self.fine_spacing)
         standoff = self.policy.paths.standoff
-        return beside(self.scene, points, self.mission.clearance, standoff)
+        return move_off_surfaces(self.scene, points, self.mission.clearance, standoff)
 
     @property
     def fine_spacing(self) -> float:
@@ -509,7 +509,7 @@ class Planner:
     def pull_taut(self, path: Floats) -> Floats:
         """Return a path (k, 3) pulled taut in its class, at the clearance."""
         mission = self.mission
-        return taut(self.scene, path, mission.clearance, mission.delta, self.policy.paths)
+        return pull_taut(self.scene, path, mission.clearance, mission.delta, self.policy.paths)
 
     def is_free(self, path: Floats) -> bool:
         """Return whether a straight path (2, 3) keeps the clearance, or what its ends have of

@@ -16,8 +16,8 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.geometry import polylines
 from netsp.world.mission.mission import MissionWaypoint
-from netsp.world.paths.standoff import beside
-from netsp.world.paths.tree import ever_tauter, homotopic, roughly_taut
+from netsp.world.paths.standoff import move_off_surfaces
+from netsp.world.paths.tree import are_homotopic, pull_in_stages, pull_roughly_taut
 from netsp.world.planner.planner import HOME, NORMAL, RECOVERY, WAIT, Planner, Tethers
 from netsp.world.planner.planner_policy import PredictivePolicy
 from netsp.world.planner.preview import CONTACT_DEPTH, TetherPreview
@@ -315,7 +315,9 @@ class PredictivePlanner(Planner):
         along = polylines.along(nodes)
         back = polylines.points_along(nodes, self.grid.cell)
         places = np.linspace(0.0, along[-1], len(back))
-        back = beside(self.scene, back, self.mission.clearance, self.policy.paths.standoff)
+        back = move_off_surfaces(
+            self.scene, back, self.mission.clearance, self.policy.paths.standoff
+        )
         pivots = np.linspace(0, len(back) - 1, self.predictive.max_pivots + 1)
         pivots = np.unique(pivots.round().astype(int))
         tree = self.paths(back[pivots])
@@ -367,7 +369,7 @@ class PredictivePlanner(Planner):
         however near the anchor may have come by then."""
         if self.track is not None and self.is_anchor_moving:
             distance = polylines.length(candidate.rough) / self.mission.speed
-            limit += self.track.travelled(self.now, self.now + distance)
+            limit += self.track.distance_between(self.now, self.now + distance)
         return self._exceeds(candidate.tether, limit / (1.0 + self.mission.tether.slack))
 
     def _while_in_time(self, paths: Iterator[Floats]) -> Iterator[Floats]:
@@ -515,11 +517,13 @@ class PredictivePlanner(Planner):
 
     def _roughly_pulled(self, path: Floats) -> Floats:
         mission = self.mission
-        return roughly_taut(self.scene, path, mission.clearance, mission.delta, self.policy.paths)
+        return pull_roughly_taut(
+            self.scene, path, mission.clearance, mission.delta, self.policy.paths
+        )
 
     def _pull_in_stages(self, path: Floats) -> Iterator[Floats]:
         mission = self.mission
-        return ever_tauter(self.scene, path, mission.clearance, mission.delta, self.policy.paths)
+        return pull_in_stages(self.scene, path, mission.clearance, mission.delta, self.policy.paths)
 
     def _classes(self, back: Floats, onward: Mapping[int, Floats | None]) -> list[int]:
         """Return the last pivot of each row of pivots that lead to paths of one class."""
@@ -530,7 +534,7 @@ class PredictivePlanner(Planner):
             if path is not None and (
                 j is None
                 or after is None
-                or not homotopic(
+                or not are_homotopic(
                     self.scene, path, np.vstack([back[i : j + 1], after[1:]]), self.grid.cell
                 )
             ):

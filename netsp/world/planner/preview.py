@@ -9,7 +9,7 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.geometry import polylines
-from netsp.world.mission.anchor_track import Track
+from netsp.world.mission.anchor_track import AnchorTrack
 from netsp.world.mission.mission import Mission
 from netsp.world.planner.planner_policy import PreviewPolicy
 from netsp.world.tether import GeodesicTether, Tether
@@ -43,7 +43,7 @@ class TetherPreview:
     mission: Mission
     model: GeodesicTether
     load: Load | None
-    track: Track | None
+    track: AnchorTrack | None
     now: float
     policy: PreviewPolicy = PreviewPolicy()
 
@@ -131,7 +131,7 @@ class TetherPreview:
         return float(polylines.along(np.vstack([path[:1], points]))[over.argmax()]), end
 
     def _with_moving_anchor(
-        self, track: Track, tether: Tether, path: Floats, limit: float, stay_s: float
+        self, track: AnchorTrack, tether: Tether, path: Floats, limit: float, stay_s: float
     ) -> tuple[float, Tether]:
         """Follow a path while the anchor moves, also during the stay at the end.
 

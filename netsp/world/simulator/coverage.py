@@ -47,7 +47,7 @@ class Patches(ComparesArrays):
     sides: Ints
 
 
-def patches_of(
+def surface_patches(
     scene: Scene,
     field: DistanceField,
     size: float,
@@ -87,7 +87,7 @@ def patches_of(
     chosen_meshes = ("mesh",) if inspect is None else inspect  # no floor unless it is asked for
     surfaces += [(triangles, field) for name, triangles in scene.meshes() if name in chosen_meshes]
     for (vertices, faces), own_field in surfaces:
-        triangles = divided(vertices[faces], size, policy.max_patches)
+        triangles = divided_triangles(vertices[faces], size, policy.max_patches)
         cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         twice = np.linalg.norm(cross, axis=1)
         good = twice > 1e-12
@@ -101,7 +101,7 @@ def patches_of(
     if scene.cloud is not None and (inspect is None or "cloud" in inspect):
         points = drawn_points(scene)
         sheet = field.distance(points) < -0.5 * (field.voxel or 0.0)
-        for k, side in enumerate(sides_of(field, points)):
+        for k, side in enumerate(cloud_sides(field, points)):
             chosen = sheet if k else np.ones(len(points), dtype=bool)
             centres.append(side[chosen])
             normals.append(field.gradient(side[chosen]))
@@ -119,7 +119,7 @@ def patches_of(
     return Patches(c[bare], n[bare], a[bare], place[pairs[bare[pairs].all(axis=1)]])
 
 
-def sides_of(field: DistanceField, points: Floats) -> tuple[Floats, Floats]:
+def cloud_sides(field: DistanceField, points: Floats) -> tuple[Floats, Floats]:
     """Return points (n, 3) of a cloud moved to the surface, and to its other side: the points of a
     sheet lie in its middle."""
     normals = field.gradient(points)
@@ -133,7 +133,7 @@ def sides_of(field: DistanceField, points: Floats) -> tuple[Floats, Floats]:
     return out[0], out[1]
 
 
-def divided(triangles: Floats, size: float, max_patches: int) -> Floats:
+def divided_triangles(triangles: Floats, size: float, max_patches: int) -> Floats:
     """Return triangles (n, 3, 3) halved across their longest sides until none is longer than
     `size`."""
     done = []
@@ -155,7 +155,7 @@ def divided(triangles: Floats, size: float, max_patches: int) -> Floats:
     return np.concatenate(done) if done else np.zeros((0, 3, 3))
 
 
-class Surface(NamedTuple):
+class PatchArrays(NamedTuple):
     """Patches for the kernel: centres and normals (n, 3), and shares of the area (n,)."""
 
     centres: Floats
@@ -163,7 +163,7 @@ class Surface(NamedTuple):
     shares: Floats
 
 
-class View(NamedTuple):
+class CameraView(NamedTuple):
     """View of a camera for the kernel.
 
     Attributes
@@ -214,12 +214,12 @@ class Coverage:
         max_tilt = math.radians(self.camera.tilt)
         pitch = min(max(math.atan2(near[2], math.hypot(near[0], near[1])), -max_tilt), max_tilt)
         half = math.tan(math.radians(0.5 * self.camera.field_of_view))
-        open_, through = mark(
+        open_, through = mark_visible(
             self.field.arrays,
-            Surface(self.patches.centres, self.patches.normals, self._shares),
+            PatchArrays(self.patches.centres, self.patches.normals, self._shares),
             self.seen,
             self.seen_through,
-            View(eye, yaw, pitch, half, self.camera.range, 0.1 * self.camera.patch),
+            CameraView(eye, yaw, pitch, half, self.camera.range, 0.1 * self.camera.patch),
         )
         self.share += open_
         self.share_through += through
@@ -242,13 +242,13 @@ class Coverage:
         """Return the vector from a place to the nearest patch."""
         # kept, because `heading` and `look` ask for the same place in turn
         if self._latest is None or not np.array_equal(self._latest[0], eye):
-            at = nearest(self.patches.centres, eye)
+            at = nearest_point(self.patches.centres, eye)
             self._latest = (np.array(eye), np.asarray(self.patches.centres[at] - eye))
         return self._latest[1]
 
 
 @kernel
-def nearest(centres: Floats, eye: Floats) -> int:
+def nearest_point(centres: Floats, eye: Floats) -> int:
     """Return the index of the nearest of some points (n, 3)."""
     best, at = math.inf, 0
     for i in range(len(centres)):
@@ -262,20 +262,20 @@ def nearest(centres: Floats, eye: Floats) -> int:
     return at
 
 
-@interprets(nearest)
+@interprets(nearest_point)
 def _nearest_in_numpy(centres: Floats, eye: Floats) -> int:
-    """Vectorise `nearest` over all points."""
+    """Vectorise `nearest_point` over all points."""
     x, y, z = (centres[:, axis] - eye[axis] for axis in range(3))
     return int(np.argmin(x * x + y * y + z * z)) if len(centres) else 0
 
 
 @kernel
-def mark(
+def mark_visible(
     field: Field,
-    surface: Surface,
+    surface: PatchArrays,
     seen: Bools,
     seen_through: Bools,
-    view: View,
+    view: CameraView,
 ) -> tuple[float, float]:
     """Mark the patches in view; return the shares that were new, with and without regard to what
     stands in between."""
@@ -310,11 +310,11 @@ def mark(
     return new, new_through
 
 
-@interprets(mark)
+@interprets(mark_visible)
 def _mark_in_numpy(
-    field: Field, surface: Surface, seen: Bools, seen_through: Bools, view: View
+    field: Field, surface: PatchArrays, seen: Bools, seen_through: Bools, view: CameraView
 ) -> tuple[float, float]:
-    """Vectorise `mark` over all patches."""
+    """Vectorise `mark_visible` over all patches."""
     at = np.flatnonzero(~seen)
     x, y, z = (surface.centres[at, axis] - view.eye[axis] for axis in range(3))
     nx, ny, nz = (surface.normals[at, axis] for axis in range(3))
@@ -339,5 +339,5 @@ def _mark_in_numpy(
 
 
 def _in_order(shares: Floats) -> float:
-    """Return the sum of shares, added in order as `mark` does; np.sum adds pairwise."""
+    """Return the sum of shares, added in order as `mark_visible` does; np.sum adds pairwise."""
     return float(np.add.accumulate(shares)[-1]) if len(shares) else 0.0

@@ -9,8 +9,7 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
 from netsp.world.mission.mission import Mission
-from netsp.world.paths.tree import Grid, ShortestTree
-from netsp.world.paths.tree import taut as taut_path
+from netsp.world.paths.tree import Grid, ShortestTree, pull_taut
 from netsp.world.planner.planner import Tethers
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.tether import Tether
@@ -39,7 +38,7 @@ def first_tether(mission: Mission, field: DistanceField, model: Tethers, grid: G
             f"start: no path in the water leads from the anchor {_shown(anchor)} to "
             f"{_shown(start)} at the clearance {mission.clearance:g}"
         )
-    path = taut_path(field, path, 0.0, mission.delta)
+    path = pull_taut(field, path, 0.0, mission.delta)
     return model.drive(model.start(anchor, anchor), path[1:])[0]
 
 

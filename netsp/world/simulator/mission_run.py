@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from netsp.base.arrays import Floats
+from netsp.base.deprecated import deprecated_names
 from netsp.base.errors import InputError, interrupted
-from netsp.world.mission.anchor_track import Track
+from netsp.world.mission.anchor_track import AnchorTrack
 from netsp.world.mission.mission import Mission, MissionWaypoint
 from netsp.world.mission.mission_limits import check_bounds, check_names, check_size, check_tether
 from netsp.world.mission.run_log import LogRow, Run
@@ -22,7 +23,7 @@ from netsp.world.planner.planner import DONE, DWELL, WAIT
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
 from netsp.world.scene.surfaces import extent
-from netsp.world.simulator.coverage import Coverage, patches_of
+from netsp.world.simulator.coverage import Coverage, surface_patches
 from netsp.world.simulator.current import Water
 from netsp.world.simulator.laid_tether import first_tether, present_tether
 from netsp.world.simulator.sensing import Positions
@@ -34,10 +35,10 @@ from netsp.world.simulator.surprises import SceneSurprises
 from netsp.world.simulator.surroundings import Surroundings
 from netsp.world.tether import GeodesicTether, make_tether
 from netsp.world.vehicle import make_vehicle
-from netsp.world.vehicle.kinematic import turned
+from netsp.world.vehicle.kinematic import wrapped_angle
 
 
-def grid_of(
+def mission_grid(
     mission: Mission, scene: Scene, field: DistanceField, policy: PathPolicy = PathPolicy()
 ) -> Grid:
     """Return the grid on which paths are searched: the scene's bounds, or all of the scene with a
@@ -48,11 +49,11 @@ def grid_of(
     InputError
         A grid that takes too much memory, or cells larger than the site.
     """
-    low, high, cell = grid_box(mission, scene, policy)
+    low, high, cell = mission_grid_box(mission, scene, policy)
     return Grid(field, low, high, cell, mission.clearance, policy)
 
 
-def grid_box(
+def mission_grid_box(
     mission: Mission, scene: Scene, policy: PathPolicy = PathPolicy()
 ) -> tuple[Floats, Floats, float]:
     """Return low and high corner (3,) of the box of that grid, and its cell size, metres.
@@ -131,7 +132,7 @@ def simulate(
     check_names(planner, vehicle, tether)
     check_size(mission, policy)
     options = options or PlannerOptions()
-    track = Track.of(mission)
+    track = AnchorTrack.for_mission(mission)
     if surprises is not None and tether != "geodesic":
         raise InputError(f"surprises: tether model {tether!r} has one map only; expected geodesic")
     if track is not None and tether != "geodesic":
@@ -141,7 +142,7 @@ def simulate(
     field = field or scene.field()
     mission = mission.checked_waypoints(field, snap=snap)
     tethers = GeodesicTether(field, mission.delta)
-    grid = grid_of(mission, scene, field, options.policy.paths)
+    grid = mission_grid(mission, scene, field, options.policy.paths)
     laid = first_tether(mission, field, tethers, grid)
     taut = present_tether(mission, field, tethers, grid)
     if surprises is not None:
@@ -156,7 +157,7 @@ def simulate(
     coverage = None
     if mission.camera is not None:
         size, places = mission.camera.patch, mission.every_place
-        patches = patches_of(scene, field, size, places, mission.inspect, policy.coverage)
+        patches = surface_patches(scene, field, size, places, mission.inspect, policy.coverage)
         coverage = Coverage(patches, field, mission.camera)
     water = Water(mission.current, mission.gusts, seed, policy.gusts)
     chosen.warm_up(robot.position, taut)
@@ -243,8 +244,11 @@ def stay(
         row = world.log_state(planner, Command(position[None], DWELL))
         if on_step is not None:
             on_step(row, planner)
-        error = 0.0 if heading is None else abs(turned(heading - world.vehicle.yaw))
+        error = 0.0 if heading is None else abs(wrapped_angle(heading - world.vehicle.yaw))
         if arrived is None and (
             error <= tolerance or world.now - since >= planner.policy.max_turn_s
         ):
             arrived = world.now
+
+
+__getattr__ = deprecated_names(globals(), grid_of="mission_grid", grid_box="mission_grid_box")

@@ -17,7 +17,7 @@ RAY_TOLERANCE = 1e-3
 """Tolerance of sphere tracing: distance from a surface at which a ray has hit it, metres."""
 
 
-def fan(field_of_view: float, ahead: Floats, turn: float, ray_count: int) -> Floats:
+def ray_fan(field_of_view: float, ahead: Floats, turn: float, ray_count: int) -> Floats:
     """Return unit vectors (n, 3) that share a cone evenly: a Fibonacci spiral on the cap of a
     sphere.
 
@@ -67,14 +67,14 @@ class Ranging:
             Errors of these, metres.
         """
         turn = self._rng.uniform(0.0, 2.0 * math.pi)
-        rays = fan(self.sensor.field_of_view, ahead, turn, self.policy.ray_count)
-        ranges = cast(field.arrays, np.asarray(place, dtype=float), rays, self.sensor.range)
+        rays = ray_fan(self.sensor.field_of_view, ahead, turn, self.policy.ray_count)
+        ranges = cast_rays(field.arrays, np.asarray(place, dtype=float), rays, self.sensor.range)
         noise = self.sensor.noise * self._rng.normal(size=len(rays))
         return rays, ranges + noise, noise
 
 
 @kernel
-def cast(field: Field, place: Floats, rays: Floats, max_range: float) -> Floats:
+def cast_rays(field: Field, place: Floats, rays: Floats, max_range: float) -> Floats:
     """Return (n,) the distance at which each ray (n, 3) meets a solid; inf beyond `most` (sphere
     tracing)."""
     out = np.full(len(rays), math.inf)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from netsp.base.arrays import Floats
-from netsp.world.mission.anchor_track import Track
+from netsp.world.mission.anchor_track import AnchorTrack
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import LogRow
 from netsp.world.planner import Command, Planner
@@ -79,7 +79,7 @@ class Simulation:
     believed: Tether | None = None
     positions: Positions | None = None
     estimated_position: Floats | None = None
-    track: Track | None = None
+    track: AnchorTrack | None = None
     now: float = 0.0
     contacts: int = 0
     shortening: bool = False

@@ -61,7 +61,7 @@ class SceneEvent(Model):
     ] = None
 
     @property
-    def of_scene(self) -> bool:
+    def changes_scene(self) -> bool:
         """True if a solid appears, vanishes or moves."""
         return any(v is not None for v in (self.appear, self.vanish, self.move))
 
@@ -90,7 +90,7 @@ class SceneSurprises(FileModel):
     schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
     events: Annotated[tuple[SceneEvent, ...], Field(description="in any order")]
 
-    def in_order(self) -> list[SceneEvent]:
+    def by_time(self) -> list[SceneEvent]:
         """Return the events by time; those of one time as in the file."""
         return sorted(self.events, key=lambda e: e.time)
 
@@ -109,7 +109,7 @@ class SceneSurprises(FileModel):
         solids = scene.all_solids()
         for k, event in sorted(enumerate(self.events), key=lambda e: e[1].time):
             try:
-                solids = changed(solids, event)
+                solids = solids_after(solids, event)
                 if waypoints is not None:
                     waypoints += event.add_waypoint is not None
                     if (event.cancel_waypoint or 0) >= waypoints:
@@ -152,7 +152,7 @@ class SceneSurprises(FileModel):
                     )
 
 
-def changed(solids: tuple[Solid, ...], event: SceneEvent) -> tuple[Solid, ...]:
+def solids_after(solids: tuple[Solid, ...], event: SceneEvent) -> tuple[Solid, ...]:
     """Return the solids after an event.
 
     Raises
@@ -160,7 +160,7 @@ def changed(solids: tuple[Solid, ...], event: SceneEvent) -> tuple[Solid, ...]:
     InputError
         The event names a solid that is not there, or one appears by a name that is taken.
     """
-    if not event.of_scene:
+    if not event.changes_scene:
         return solids
     names = [s.name for s in solids]
     if event.appear is not None:
@@ -173,11 +173,11 @@ def changed(solids: tuple[Solid, ...], event: SceneEvent) -> tuple[Solid, ...]:
         known = ", ".join(repr(n) for n in names[:8] if n) or "none with a name"
         raise InputError(f"{field}: no solid is named {name!r}; there are {known}")
     which = names.index(name)
-    new = () if event.move is None else (moved(solids[which], event.move.by),)
+    new = () if event.move is None else (moved_solid(solids[which], event.move.by),)
     return (*solids[:which], *new, *solids[which + 1 :])
 
 
-def moved(solid: Solid, by: Point3) -> Solid:
+def moved_solid(solid: Solid, by: Point3) -> Solid:
     """Return a solid moved by (x, y, z), metres."""
     kind = next(k for k in type(solid).model_fields if getattr(solid, k) is solid.shape)
     shape = solid.shape.model_dump()

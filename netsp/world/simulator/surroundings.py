@@ -18,10 +18,10 @@ from netsp.world.planner import Planner
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.scene.grid import VoxelGrid
 from netsp.world.scene.scene import Scene, Solid
-from netsp.world.simulator.ranging import Ranging, cast
+from netsp.world.simulator.ranging import Ranging, cast_rays
 from netsp.world.simulator.simulation import Simulation
 from netsp.world.simulator.simulation_policy import SimulationPolicy
-from netsp.world.simulator.surprises import SceneEvent, SceneSurprises, changed, moved
+from netsp.world.simulator.surprises import SceneEvent, SceneSurprises, moved_solid, solids_after
 from netsp.world.tether import GeodesicTether, Tether
 from netsp.world.tether.load import payout
 
@@ -60,7 +60,7 @@ class Sighting:
         if self.count < max(min_hits, 4 * self.placed_by):
             return False
         x, y, z = (self.error_sum / self.count).tolist()
-        self.mapped, self.placed_by = moved(self.solid, (x, y, z)), self.count
+        self.mapped, self.placed_by = moved_solid(self.solid, (x, y, z)), self.count
         return True
 
 
@@ -96,7 +96,7 @@ class Surroundings:
         self.solids = self.mapped = scene.all_solids()
         self.sightings: list[Sighting] = []
         self.found: set[str | int] = set()
-        self.due = surprises.in_order()
+        self.due = surprises.by_time()
         self.happened: list[tuple[float, SceneEvent]] = []
         self.trail = np.array(places)
         self.moments: list[tuple[Floats, int]] = []
@@ -146,11 +146,11 @@ class Surroundings:
         """
         waiting, before = [], self.solids
         for event in self.due:
-            if not event.of_scene and event.time <= world.now:
+            if not event.changes_scene and event.time <= world.now:
                 self._apply_event(event, world, planner)
                 self.happened.append((world.now, event))
                 continue
-            solids = changed(self.solids, event) if event.time <= world.now else None
+            solids = solids_after(self.solids, event) if event.time <= world.now else None
             if solids is None or not self._has_room(world, solids):
                 waiting.append(event)
                 continue
@@ -272,7 +272,7 @@ class Surroundings:
         """Remove solids from the map that rays pass through; return whether there were any."""
         assert self.ranging is not None
         sensor = self.ranging.sensor
-        expected = cast(known.arrays, position, rays, sensor.range)
+        expected = cast_rays(known.arrays, position, rays, sensor.range)
         depth = self.policy.removal_depth
         inside = expected + depth
         passed = inside + 3.0 * sensor.noise + depth < np.minimum(ranges, sensor.range)

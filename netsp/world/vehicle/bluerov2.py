@@ -10,7 +10,7 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.world.vehicle.control import PredictiveControl
 from netsp.world.vehicle.dynamics import step
-from netsp.world.vehicle.kinematic import advance, turned
+from netsp.world.vehicle.kinematic import advance_along, wrapped_angle
 from netsp.world.vehicle.vehicle_policy import VehiclePolicy
 
 TOP_SPEED = 1.5
@@ -32,7 +32,7 @@ class BlueRov2:
         self.speed = min(speed, TOP_SPEED)
         self.control_s: list[float] = []
         self._control = PredictiveControl(policy.control)
-        self._carrot = np.array(place, dtype=float)
+        self._followed = np.array(place, dtype=float)
         self._drift = np.zeros(3)
         # load compiled code before the first step
         aims = np.tile(self.state, (policy.control.horizon, 1))
@@ -61,16 +61,16 @@ class BlueRov2:
         """See `netsp.world.vehicle.Vehicle`."""
         points, behind, policy, step_s = [], 0, self.policy, self.policy.control.step_s
         if fresh:
-            self._carrot = self.position
+            self._followed = self.position
         for _ in range(max(1, round(seconds / step_s))):
             begin = time.perf_counter()
-            lead = float(np.linalg.norm(self._carrot - self.position))
-            on, passed = advance(
-                self._carrot,
+            lead = float(np.linalg.norm(self._followed - self.position))
+            on, passed = advance_along(
+                self._followed,
                 path[behind:],
                 min(self.speed * step_s, max(0.0, policy.max_lead - lead)),
             )
-            self._carrot = on[-1]
+            self._followed = on[-1]
             behind += passed
             force = self._control.force(self.state, self._aims(path[behind:], yaw), self._drift)
             expected = step(self.state, force, self._drift, step_s)
@@ -91,18 +91,18 @@ class BlueRov2:
         """See `netsp.world.vehicle.Vehicle`."""
         self.state[:3] = place
         self.state[4:] = 0.0
-        self._carrot = np.array(place)
+        self._followed = np.array(place)
 
     def _aims(self, path: Floats, yaw: float) -> Floats:
         """Return (horizon, 8) the places and velocities of the followed point, with the heading."""
         horizon, step_s = self.policy.control.horizon, self.policy.control.step_s
         aims = np.zeros((horizon, 8))
-        heading = self.state[3] + turned(yaw - self.state[3])
+        heading = self.state[3] + wrapped_angle(yaw - self.state[3])
         c, s = math.cos(heading), math.sin(heading)
-        at, rest = self._carrot, path
+        at, rest = self._followed, path
         for k in range(horizon):
             if k > 0:
-                on, passed = advance(at, rest, self.speed * step_s)
+                on, passed = advance_along(at, rest, self.speed * step_s)
                 velocity = (on[-1] - at) / step_s - self._drift
                 at, rest = on[-1], rest[passed:]
             else:

@@ -18,7 +18,7 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.compiled.dynamic_array import write_floats, write_rows
 from netsp.base.compiled.kernel import kernel
-from netsp.world.vehicle.dynamics import ALLOCATION, MAX_THRUST, linearised, step_into
+from netsp.world.vehicle.dynamics import ALLOCATION, MAX_THRUST, step_into, step_jacobians
 from netsp.world.vehicle.vehicle_policy import ControlPolicy
 
 
@@ -59,12 +59,12 @@ class PredictiveControl:
         water : ndarray, shape (3,)
             Estimated velocity of the water, m/s.
         """
-        self.thrusts = improved(self.thrusts, state, aims, water, ALLOCATION, self._weights)
+        self.thrusts = improved_thrusts(self.thrusts, state, aims, water, ALLOCATION, self._weights)
         return np.asarray(ALLOCATION @ self.thrusts[0])
 
 
 @kernel
-def improved(
+def improved_thrusts(
     last: Floats,
     state: Floats,
     aims: Floats,
@@ -87,7 +87,7 @@ def improved(
     write_floats(states[0], state, 8)
     for k in range(n):
         step_into(states[k + 1], states[k], forces[k], water, step_s, room)
-    by_state, by_force = linearised(states, forces, water, step_s)
+    by_state, by_force = step_jacobians(states, forces, water, step_s)
     answer = _answer(by_state, by_force, allocation)
     hessian, wish = np.zeros((m * n, m * n)), np.zeros(m * n)
     for k in range(n):
@@ -112,7 +112,7 @@ def improved(
     for j in range(m * n):
         for a in range(j):
             hessian[a, j] = hessian[j, a]
-    change = within(hessian, wish, low, high, weights.max_newton_steps)
+    change = minimum_in_box(hessian, wish, low, high, weights.max_newton_steps)
     out = np.empty((n, m))
     for k in range(n):
         for i in range(m):
@@ -146,7 +146,7 @@ def _add(share: float, row: Floats, to: Floats) -> None:
 
 
 @kernel
-def within(hessian: Floats, slope: Floats, low: Floats, high: Floats, steps: int) -> Floats:
+def minimum_in_box(hessian: Floats, slope: Floats, low: Floats, high: Floats, steps: int) -> Floats:
     """Return the minimum of x H x / 2 + g x between bounds, H positive definite (projected
     Newton)."""
     n = len(slope)

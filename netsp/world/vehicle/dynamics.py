@@ -105,7 +105,7 @@ def step_into(
 
 
 @kernel
-def linearised(
+def step_jacobians(
     states: Floats, forces: Floats, water: Floats, seconds: float
 ) -> tuple[Floats, Floats]:
     """Return the Jacobians of the steps along a trajectory (n + 1, 8), (n, 4), by central

@@ -94,8 +94,8 @@ class KinematicVehicle:
         """Follow a path for some seconds; see `Vehicle.go`. Water and pull have no effect."""
         del water, fresh, pull
         max_turn = math.radians(self.policy.max_turn_rate_deg) * seconds
-        self.yaw += float(np.clip(turned(yaw - self.yaw), -max_turn, max_turn))
-        points, passed = advance(self.position, path, self.speed * seconds)
+        self.yaw += float(np.clip(wrapped_angle(yaw - self.yaw), -max_turn, max_turn))
+        points, passed = advance_along(self.position, path, self.speed * seconds)
         self.position = points[-1]
         return points, passed
 
@@ -104,12 +104,12 @@ class KinematicVehicle:
         self.position = np.array(place)
 
 
-def turned(angle: float) -> float:
+def wrapped_angle(angle: float) -> float:
     """Return an angle between -pi and pi."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
-def advance(robot: Floats, path: Floats, step: float) -> tuple[list[Floats], int]:
+def advance_along(robot: Floats, path: Floats, step: float) -> tuple[list[Floats], int]:
     """Return the corners that a robot passes on its next `step` metres of a path, its end, and the
     number of points of the path that it has passed."""
     points: list[Floats] = []
