@@ -479,11 +479,11 @@ def test_a_start_out_of_sight_of_the_anchor_is_reached_along_the_shortest_path()
     run = simulate(there, scene=POST)
     far = math.hypot(2, 0.1)
     arc = math.pi - math.atan2(0.1, 2) - math.acos(0.5 / 2) - math.acos(0.5 / far)
-    pull_taut = math.sqrt(4 - 0.25) + 0.5 * arc + math.sqrt(far**2 - 0.25)
-    assert run.log[0].tether == pytest.approx(pull_taut, abs=0.005)
+    shortest = math.sqrt(4 - 0.25) + 0.5 * arc + math.sqrt(far**2 - 0.25)
+    assert run.log[0].tether == pytest.approx(shortest, abs=0.005)
     assert run.summary["visited"] == 3
     assert run.summary["home"]["tether_free"]
-    assert run.tether.length == pytest.approx(pull_taut, abs=run.mission.reach)
+    assert run.tether.length == pytest.approx(shortest, abs=run.mission.reach)
 
 
 def test_anchor_and_start_in_different_parts_of_the_water_are_refused():

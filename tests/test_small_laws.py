@@ -603,7 +603,7 @@ def test_velocity_and_turn_are_those_of_the_motion():
 class Vehicle:
     """The part of a session that is used before a flight; it answers everything at once."""
 
-    system, others, plan_fault = 1, (), None
+    system, others, broken = 1, (), None
     silent_s = unplaced_s = stalled_s = 0.0
     kind, echo = VehicleKind(12, 3), None
 
