@@ -41,17 +41,17 @@ class Cursor:
 
     @property
     def shares(self) -> Floats:
-        """Of the tour's length, up to each point of its path."""
+        """Shares of the tour's length up to each point of its path."""
         return self._along / self._along[-1] if len(self._along) else self._along
 
     def share_at(self, place: Floats) -> float:
-        """The share of the tour's length at which it is nearest to a place (3,)."""
+        """Return the share of the tour's length at its point nearest to a place (3,)."""
         k = int(np.argmin(np.linalg.norm(self._path - place, axis=1)))
         return float(self.shares[k])
 
     def hover(self, x: float, y: float) -> dict[str, Any]:
-        """The taut tether to a place, in the class that it would have coming from the nearest point
-        of the tour; the shortest of all while there is no tour."""
+        """Return the taut tether to a place, in the class it has when coming from the nearest point
+        of the tour; without a tour, the shortest tether."""
         word = None
         if len(self._path) > 1:
             a, b = self._path[:-1, :2], self._path[1:, :2]
@@ -69,13 +69,13 @@ class Cursor:
         return {"x": x, "y": y} | (_told(found) if found else {"length": None})
 
     def classes(self, goal: int) -> dict[str, Any]:
-        """The shortest classes of a goal, and how many there are."""
+        """Return the shortest classes of a goal, and the number of all."""
         x, y, z = self.problem.goals[goal].position
         every = self.tethers.classes(x, y, z)
         return {"classes": [_told(t) for t in every[:MAX_DRAWN_CLASSES]], "count": len(every)}
 
     def along(self, share: float) -> dict[str, Any]:
-        """The tether in the class that the tour has at a share of its length."""
+        """Return the tether in the class that the tour has at a share of its length."""
         if len(self._path) < 2:
             return {"length": None}
         s = min(max(share, 0.0), 1.0) * self._along[-1]

@@ -67,7 +67,7 @@ def facts(
 
 
 def shortest_sufficient(problem: Problem) -> float | None:
-    """The shortest tether with which every goal can be visited, one of each choice.
+    """Return the shortest tether with which every goal, one of each choice, can be visited.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def shortest_sufficient(problem: Problem) -> float | None:
 
 
 def needed(problem: Problem) -> Floats:
-    """The shortest tether to every goal, whatever tether there is.
+    """Return the shortest tether to every goal, for any length of the tether.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def needed(problem: Problem) -> Floats:
 
 
 def plain(value: Any) -> Any:
-    """The same with None for numbers that are not finite, which JSON cannot say."""
+    """Return a value with None for numbers that are not finite, which JSON cannot express."""
     if isinstance(value, dict):
         return {k: plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple):

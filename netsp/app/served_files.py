@@ -50,7 +50,7 @@ EXPORTS = {
 
 
 def bare_name(name: str) -> str:
-    """The last part of a name, whatever the system it comes from.
+    """Return the last part of a file name from any operating system.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def imported(
     tether_length: float | None = None,
     answers: ImportAnswers | None = None,
 ) -> tuple[dict[str, Any], list[str]]:
-    """The problem in a file: a problem file, or a map of a site (docs/sites.md).
+    """Read the problem in a file: a problem file, or a map (docs/sites.md).
 
     Parameters
     ----------
@@ -299,7 +299,7 @@ def import_warnings(problem: Problem) -> list[str]:
 
 
 def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str, list[str]]:
-    """A tour as a mission file.
+    """Return a tour as a mission file.
 
     Parameters
     ----------

@@ -98,7 +98,7 @@ class Session:
         self._worker = Worker(self._solver_told, time_limit) if shown is None else None
 
     def begin(self) -> None:
-        """From within the running loop."""
+        """Start the session; call it within the running event loop."""
         self._loop = asyncio.get_running_loop()
         if self.shown is None:
             self._changed()
@@ -119,7 +119,7 @@ class Session:
             self._worker.close()
 
     def everything(self) -> list[dict[str, Any]]:
-        """What a page that has just been opened needs."""
+        """Return the messages that a newly opened page needs."""
         told = [self._state()]
         if self.answer is not None:
             told.append({"tour": self.answer})
@@ -240,7 +240,7 @@ class Session:
         return figures
 
     def _target(self, asked: object) -> Path | None:
-        """Where to save: in the folder that was opened, and over no other file."""
+        """Return the path to save to: in the opened folder, and over no other file."""
         if asked is True:
             return None
         if not isinstance(asked, str):
@@ -344,7 +344,7 @@ class Session:
 
 
 def application(session: Session, token: str, port: int) -> Any:
-    """The ASGI application.
+    """Return the ASGI application.
 
     Parameters
     ----------
@@ -378,7 +378,7 @@ def application(session: Session, token: str, port: int) -> Any:
     hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
 
     def known(headers: Mapping[str, str]) -> bool:
-        """Whether a request is for this server, and comes from its own page or from none."""
+        """Return whether a request is for this server, and comes from its own page or no page."""
         origin = headers.get("origin")
         return headers.get("host") in hosts and (
             origin is None or (urlsplit(origin).netloc in hosts and origin.startswith("http://"))
@@ -399,7 +399,7 @@ def application(session: Session, token: str, port: int) -> Any:
         return answer
 
     async def take_in(request: Request) -> Response:
-        """A file that was dropped on the page becomes the next version."""
+        """Make a file that was dropped on the page the next version."""
         if not allowed(request.query_params.get("token")):
             return PlainTextResponse("netsp: the address lacks its token", status_code=403)
         size = request.headers.get("content-length", "")
@@ -529,7 +529,8 @@ def application(session: Session, token: str, port: int) -> Any:
 
 
 def _in_space(told: Mapping[str, Any]) -> list[list[float]]:
-    """The taut tether of an answer about the plane, its height in proportion to its length."""
+    """Return the taut tether of an answer in the plane, with heights in proportion to its
+    length."""
     import numpy as np
 
     from netsp.base.geometry import polylines
@@ -544,7 +545,7 @@ def _in_space(told: Mapping[str, Any]) -> list[list[float]]:
 
 
 def _numbers(values: object, count: int) -> list[float]:
-    """So many finite numbers of a message."""
+    """Return a number of finite numbers of a message."""
     if not isinstance(values, list) or len(values) != count:
         raise InputError(f"message: expected {count} numbers, got {shown(values)}")
     return [checked_argument("message", v, -1e12) for v in values]
@@ -562,7 +563,7 @@ def _parsed(text: str | None) -> dict[str, Any] | str:
 
 
 def _download(session: Session, name: str) -> Any:
-    """A file of what is shown: problem.json, solution.json, report.html."""
+    """Return a file of what is shown: problem.json, solution.json or report.html."""
     from starlette.responses import PlainTextResponse, Response
 
     notes: list[str] = []

@@ -62,7 +62,7 @@ class Shown:
         return {"sufficient": None, "margins": None, "profile": rows, "visits": []}
 
     def problem(self) -> Problem:
-        """The site; goals that a run has lost lie in obstacles.
+        """Return the site. Goals that a run has lost lie in obstacles.
 
         Returns
         -------
@@ -72,7 +72,7 @@ class Shown:
         return Problem.from_run(json.dumps(self.data), "the run")
 
     def along(self, share: float) -> dict[str, Any]:
-        """The tether at a share of the run's time.
+        """Return the tether at a share of the run's time.
 
         Parameters
         ----------
@@ -89,7 +89,7 @@ class Shown:
 
 
 def read_shown(source: str | Path, problem_file: str | Path | None = None) -> Shown:
-    """A solution file with its problem, or the folder of a run of `execute` or `simulate`.
+    """Read a solution file with its problem, or the folder of a run of `execute` or `simulate`.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def _answer(problem: Problem, solution: Solution) -> dict[str, Any]:
 
 
 def _of_execution(place: Path, problem: Problem, solution: Solution) -> Shown:
-    """A tour that was carried out: the way that was flown, its tethers, its events."""
+    """Read a tour that was carried out: its path, tethers and events."""
     rows = _rows(place / "log.csv", ("time", "x", "y", "z", "tether", "mode"))
     stamps = np.array([float(r["time"]) for r in rows])
     kept = parse_json_object(
@@ -179,7 +179,7 @@ def _of_execution(place: Path, problem: Problem, solution: Solution) -> Shown:
 
 
 def _of_mission(place: Path) -> Shown:
-    """A mission that was flown; the tether is worked out again along the way."""
+    """Read a mission that was flown; its tether is computed again along the path."""
     from netsp.world.mission.anchor_track import AnchorTrack
     from netsp.world.mission.mission import Mission
     from netsp.world.simulator.laid_tether import present_tether

@@ -99,7 +99,7 @@ class Worker:
 
 
 def work(connection: Connection) -> None:
-    """What the worker does until its other end is closed."""
+    """Solve the versions that arrive until the other end closes."""
     last: Solution | None = None
     try:
         while True:

@@ -18,7 +18,7 @@ from netsp.world.scene.surfaces import extent
 
 
 def script() -> Path:
-    """The script of plotly, which its package brings along.
+    """Return the path of plotly's script, which its package contains.
 
     Returns
     -------

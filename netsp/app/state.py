@@ -79,11 +79,11 @@ class Document:
 
     @property
     def saved(self) -> bool:
-        """Whether the file holds the present version."""
+        """True if the file holds the current version."""
         return self.data == self._saved
 
     def problem(self) -> Problem:
-        """The present version as a problem.
+        """Return the current version as a problem.
 
         Returns
         -------
@@ -100,7 +100,7 @@ class Document:
         return read_model(Problem, json.dumps(self.data), "problem")
 
     def complaint(self) -> str | None:
-        """What is wrong with the present version, in one line; None for a problem."""
+        """Return the error of the current version in one line, or None if it is a valid problem."""
         try:
             self.problem()
         except InputError as error:
@@ -165,12 +165,12 @@ class Document:
 
     @property
     def can_undo(self) -> bool:
-        """Whether there is a version to go back to."""
+        """True if there is an earlier version."""
         return self._at > 0
 
     @property
     def can_redo(self) -> bool:
-        """Whether there is a version that was gone back from."""
+        """True if a version was undone."""
         return self._at + 1 < len(self._versions)
 
     def undo(self) -> bool:
@@ -235,7 +235,7 @@ class Document:
 
     @property
     def _aside(self) -> Path | None:
-        """Where the present version is kept until it is saved."""
+        """Path at which the current version is kept until it is saved, or None."""
         return None if self.file is None else self.file.with_name(f".{self.file.name}.unsaved")
 
     def _kept(self) -> dict[str, Any] | None:
@@ -256,12 +256,12 @@ class Document:
 
 
 def _read(file: Path) -> dict[str, Any]:
-    """A problem file with everything written out that it says in short."""
+    """Read a problem file and write out its short forms."""
     return dict(json.loads(Problem.load(file).to_json()))
 
 
 def _list(data: dict[str, Any], name: object) -> list[Any]:
-    """A list of this version's own, to be changed."""
+    """Return a list of this version that may be changed: a copy, if versions share it."""
     if not isinstance(name, str) or name not in LISTS:
         raise InputError(f"edit: expected one of {', '.join(LISTS)}, got {shown(name)}")
     own = data[name] = list(data.get(name, []))

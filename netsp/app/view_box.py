@@ -73,7 +73,7 @@ class Frame:
         raise InputError("".join(said).strip().removeprefix("netsp: ") or "the map cannot be shown")
 
     def problem(self) -> Problem:
-        """The problem as it was saved last (Ctrl+S on the map).
+        """Return the problem as it was saved last (Ctrl+S on the map).
 
         Returns
         -------

@@ -18,7 +18,7 @@ EXAMPLE = "netsp animate tour.json --problem problems/wharf.json -o tour.gif"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument(
         "source",
         metavar="SOURCE",
@@ -92,7 +92,7 @@ def _told(args: argparse.Namespace) -> int:
 
 
 def _in_space(source: str) -> bool:
-    """Whether it is the folder of a flight in space, or a mission."""
+    """Return whether a source is a mission, or the folder of a flight in space."""
     place = Path(source)
     if place.is_dir():
         return (place / "mission.json").exists() and not (place / "solution.json").exists()
@@ -100,7 +100,7 @@ def _in_space(source: str) -> bool:
 
 
 def _page(args: argparse.Namespace) -> int:
-    """A page that plays."""
+    """Write a page that plays."""
     in_space = [_in_space(source) for source in args.source]
     if all(in_space):
         from netsp.view.pictures.film_page import PAGE_FRAMES, save_page

@@ -22,7 +22,7 @@ EXAMPLE = "netsp app problems/wharf.json"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument(
         "problem",
         metavar="PROBLEM",

@@ -14,7 +14,7 @@ EXAMPLE = "netsp base problems/wharf.json --grid 10,10 --plot base.png"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument(
         "problem", metavar="PROBLEM", help="problem file (JSON); its base does not count"
     )

@@ -11,7 +11,7 @@ EXAMPLE = "netsp combine part-1.jsonl part-2.jsonl -o rows.jsonl"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument("results", metavar="RESULTS", nargs="+", help="results of netsp compare")
     p.add_argument("-o", "--output", required=True, metavar="FILE", help="file for all rows")
     json_output.json_flag(p)

@@ -27,7 +27,7 @@ EXAMPLE = "netsp compare examples/study.toml -o rows.jsonl --jobs 2"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument(
         "study",
         metavar="STUDY",
@@ -116,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def study_of(args: argparse.Namespace) -> Study:
-    """The study file, or a study made from the flags."""
+    """Return the study in the file, or a study made from the flags."""
     from netsp.study.compare.study import Study
 
     flags = {
@@ -187,7 +187,7 @@ class Bar:
 
 
 def describe_row(row: TrialRow) -> str:
-    """A trial in a few words."""
+    """Return a trial in a few words."""
     world = row["world"]
     return (
         f"{row['solver']['label']} on {world['family']}-{world['seed']}, {world['goals']} goals, "

@@ -41,7 +41,7 @@ SHELLS = ("bash", "zsh", "tcsh")
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument("shell", choices=SHELLS, help="that is to complete")
 
 

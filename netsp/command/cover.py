@@ -23,7 +23,7 @@ EXAMPLE = "netsp cover scenes/jetty.json --anchor=-3,-3,-1 -o mission.json"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument("scene", metavar="SCENE", help="scene file (JSON)")
     p.add_argument("--anchor", required=True, metavar="X,Y,Z", help="where the tether is fixed (m)")
     p.add_argument("--start", metavar="X,Y,Z", help="where the robot starts; default the anchor")
@@ -169,7 +169,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _camera(text: str, patch: float) -> Camera:
-    """From ``RANGE[,FIELD[,TILT]]``."""
+    """Return the camera that ``RANGE[,FIELD[,TILT]]`` describes."""
     from netsp.world.mission.equipment import Camera
 
     names = ("range", "field_of_view", "tilt")
@@ -189,7 +189,7 @@ def _camera(text: str, patch: float) -> Camera:
 
 
 def _summary(found: Cover, units: str, output: str | None, plot: str | None) -> str:
-    """What was found, in a few lines."""
+    """Return the result in a few lines."""
     mission, count = found.mission, len(found.viewpoints)
     less = 100.0 * (1.0 - found.bound / count)
     fewest = f"no choice among them has fewer than {found.bound}, {less:.1f} % less"

@@ -31,7 +31,7 @@ EXAMPLE = (
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument(
         "problem", metavar="PROBLEM", help="problem file (JSON), or a mission that was planned"
     )
@@ -99,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _mission(args: argparse.Namespace) -> int:
-    """Of a planned mission in space."""
+    """Carry out a planned mission in space."""
     from netsp.command.flight import fly
     from netsp.world.mission.mission import Mission
     from netsp.world.mission.mission_limits import check_names
@@ -152,7 +152,7 @@ def _mission(args: argparse.Namespace) -> int:
 
 
 def _problem(args: argparse.Namespace) -> int:
-    """Of a problem in the plane."""
+    """Carry out a tour in the plane."""
     from netsp.base.clock import until_interrupt
     from netsp.base.files import output_folder
     from netsp.model.problem import Problem

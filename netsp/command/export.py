@@ -27,7 +27,7 @@ EXAMPLE = (
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument(
         "solution", metavar="SOLUTION", help="solution file, or a mission that was planned (JSON)"
     )

@@ -144,7 +144,7 @@ def _flown(
 
 
 def draw_runs(runs: list[Run], scene: Scene, folder: Path) -> None:
-    """The pictures of one run, or of two side by side; the page only where plotly is installed."""
+    """Draw one run, or two side by side; the page is written only if plotly is installed."""
     from netsp.view.pictures import mission_picture as flights
 
     flights.save_runs(runs, scene, folder / "run.png")
@@ -162,7 +162,7 @@ def draw_runs(runs: list[Run], scene: Scene, folder: Path) -> None:
 def until_stopped(
     clock: Clock, on_step: Callable[[LogRow, Planner], None] | None
 ) -> Callable[[LogRow, Planner], None]:
-    """The same, and the end of the flight at Ctrl-C."""
+    """Return a callback that also ends the flight at Ctrl-C."""
 
     def step(row: LogRow, planner: Planner) -> None:
         if clock.stopped:

@@ -33,7 +33,7 @@ EXAMPLE = "netsp fly problems/wharf.json tour.json --link udpin:14550 -o run"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument("problem", metavar="PROBLEM", nargs="?", help="problem file (JSON)")
     p.add_argument("solution", metavar="TOUR", nargs="?", help="its solution file (JSON)")
     p.add_argument(
@@ -458,7 +458,7 @@ def _watched(problem: Problem, page: Page, speed: float) -> Callable[[ExecutionR
 
 
 def print_targets(problem: Problem, solution: Solution, frame: Frame) -> None:
-    """What would be sent, in its order."""
+    """Print the targets that would be sent, in order."""
     from netsp.exchange.missions.mission_files import altitude
     from netsp.plan.tour_plan import HOME, legs_of
 
@@ -482,7 +482,7 @@ def print_targets(problem: Problem, solution: Solution, frame: Frame) -> None:
 
 
 def way_home(done: Execution) -> str:
-    """The path home in the class that the tether has, from where the vehicle was last."""
+    """Return the path home, in the tether's class, from the last position of the vehicle."""
     from netsp.base.geometry import polylines
 
     line = done.tethers[-1][1][::-1]

@@ -21,7 +21,7 @@ EXAMPLE = "netsp gtsp examples/7ring28.gtsp -o ring.tour --plot ring.png"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument("instance", metavar="FILE", help="file in the format of TSPLIB or GTSPLIB")
     p.add_argument(
         "--solver",
@@ -117,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _summary(result: Result, spent: float, output: str | None, plot: str | None) -> str:
-    """What was found, in a few lines."""
+    """Return the result in a few lines."""
     if result.length is None:
         why = "there is no tour" if result.status.value == "infeasible" else "no tour found"
         return f"{why} ({spent:.2f} s)"
@@ -136,7 +136,7 @@ def _summary(result: Result, spent: float, output: str | None, plot: str | None)
 
 
 def _told(instance: Instance, result: Result, spent: float) -> dict[str, object]:
-    """For programs."""
+    """Return the result for programs."""
     return {
         "instance": instance.name,
         "vertices": len(instance.clusters),

@@ -25,7 +25,7 @@ GUARD_PORT = 8650
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument(
         "site",
         metavar="SITE",
@@ -181,7 +181,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 class _Told:
-    """What was said, in words and in sum."""
+    """Reports so far, and the numbers in them."""
 
     def __init__(self, site: Site, quiet: bool) -> None:
         self.site, self.quiet = site, quiet
@@ -192,7 +192,7 @@ class _Told:
         self._show = not quiet and sys.stderr.isatty()
 
     def say(self, text: str) -> None:
-        """A line of text."""
+        """Print a line."""
         if not self.quiet:
             print(f"{self._clear()}{text}", file=sys.stderr, flush=True)
 
@@ -200,7 +200,7 @@ class _Told:
         return "\r\033[K" if self._show else ""
 
     def take(self, report: Report) -> None:
-        """One more report."""
+        """Add a report."""
         self._count += 1
         for alarm in report.raised:
             self._raised.append(
@@ -242,7 +242,7 @@ class _Told:
         return str(estimates[-1]).partition(",")[0].partition(":")[0]
 
     def summary(self) -> dict[str, Any]:
-        """The numbers."""
+        """Return the numbers."""
         last = self.last
         return {
             "site": self.site.name,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def json_flag(p: argparse.ArgumentParser) -> None:
-    """The flag, of a command whose other arguments are known."""
+    """Add `--json` to a command whose other arguments are known."""
     data = any("--output" in action.option_strings for action in p._actions)
     more = " (data then needs -o FILE)" if data else ""
     p.add_argument("--json", action="store_true", help=f"print the summary as JSON on stdout{more}")
@@ -41,7 +41,7 @@ def tell(summary: Mapping[str, Any]) -> None:
 
 
 def of_solution(problem: Problem, solution: Solution) -> dict[str, Any]:
-    """What `netsp solve` says of a problem."""
+    """Return the output of `netsp solve` for a problem."""
     return {
         "problem": problem.name,
         "units": problem.units,
@@ -61,7 +61,7 @@ def of_solution(problem: Problem, solution: Solution) -> dict[str, Any]:
 
 
 def of_infeasible(problem: Problem, error: InfeasibleError) -> dict[str, Any]:
-    """What `netsp solve` says of a problem that has no tour."""
+    """Return the output of `netsp solve` for a problem without a tour."""
     return {
         "problem": problem.name,
         "units": problem.units,
@@ -74,7 +74,7 @@ def of_infeasible(problem: Problem, error: InfeasibleError) -> dict[str, Any]:
 
 
 def of_mission(mission: Mission, found: SolvedMission, units: str) -> dict[str, Any]:
-    """What `netsp solve` says of a mission."""
+    """Return the output of `netsp solve` for a mission."""
     tour = found.tour
     return {
         "mission": mission.name,
@@ -101,7 +101,7 @@ def of_mission(mission: Mission, found: SolvedMission, units: str) -> dict[str, 
 
 
 def of_verdict(verdict: Verification) -> dict[str, Any]:
-    """What `netsp verify` says."""
+    """Return the output of `netsp verify`."""
     return {
         "verified": verdict.passed,
         "checks": [

@@ -23,7 +23,7 @@ FOLDER = "problems/library"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument(
         "action",
         choices=("list", "check", "rank"),

@@ -164,7 +164,7 @@ VECTORS = ("--origin", "--base", "--current")
 
 
 def _joined(argv: Sequence[str]) -> list[str]:
-    """`--origin -33,151` as `--origin=-33,151`."""
+    """Return `--origin -33,151` as `--origin=-33,151`."""
     out: list[str] = []
     for word in argv:
         if out and out[-1] in VECTORS and word[:1] == "-" and word[1:2].isdigit():
@@ -217,8 +217,8 @@ COMMANDS = {
 
 
 def _parsed(words: list[str], wanted: str | None) -> argparse.Namespace:
-    """The arguments; what argparse would say of a word that it does not know names neither the
-    command whose help would tell, nor itself in one line."""
+    """Return the arguments. Unknown words get one line that names the word and the command whose
+    help lists the options; argparse's own message does neither."""
     names = [name for group in COMMANDS.values() for name in group]
     if wanted is not None and wanted not in names:
         import difflib
@@ -233,7 +233,7 @@ def _parsed(words: list[str], wanted: str | None) -> argparse.Namespace:
 
 
 def parser_of_all() -> argparse.ArgumentParser:
-    """The parser of all commands with all of their arguments.
+    """Return the parser of all commands with all of their arguments.
 
     Returns
     -------
@@ -244,7 +244,7 @@ def parser_of_all() -> argparse.ArgumentParser:
 
 
 def _parser(wanted: Container[str | None]) -> argparse.ArgumentParser:
-    """The parser of all commands, with the arguments of those that are wanted."""
+    """Return the parser of all commands, with the arguments of the wanted ones."""
     width = max(len(name) for group in COMMANDS.values() for name in group)
     lines = ["commands, by what they are for:"]
     for purpose, group in COMMANDS.items():

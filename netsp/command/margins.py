@@ -16,7 +16,7 @@ EXAMPLE = "netsp margins problems/wharf.json solution.json --friction 0.2"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
     p.add_argument("solution", metavar="SOLUTION", help="solution file (JSON)")
     p.add_argument(
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def describe(problem: Problem, found: Margins) -> str:
-    """The margins, a line for every stop."""
+    """Return the margins, one line for each visit."""
     units = problem.units
     lines = [
         f"obstacles    may be off by {found.obstacles:.6g} {units}: then {found.limited_by}",

@@ -71,7 +71,7 @@ def visit_table(m: PathMeasures) -> str:
 
 
 def describe_tethers(problem: Problem, solution: Solution) -> str:
-    """The taut tether at every visit against the definitions of Battocletti et al. 2024."""
+    """Compare the taut tether at every visit with the definitions of Battocletti et al. 2024."""
     path = np.array(solution.path)[:, :2]
     longest = float(np.hypot(*np.diff(path, axis=0).T).sum()) if len(path) > 1 else 0.0
     paths = TautPaths(problem, max(longest, problem.tether_length))
@@ -109,7 +109,7 @@ def _verdict(problem: Problem, broken: tuple[int, ...]) -> str:
 
 
 def entered(problem: Problem, path: npt.ArrayLike) -> list[str]:
-    """The obstacles that a path passes through.
+    """Return the obstacles that a path passes through.
 
     Parameters
     ----------

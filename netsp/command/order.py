@@ -11,7 +11,7 @@ EXAMPLE = "netsp order missions/basin.json -o better.json"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line: those of `netsp solve` that missions take."""
+    """Add the arguments of `netsp solve` that apply to missions."""
     solve.for_all(p)
 
 

@@ -59,7 +59,7 @@ class Patience:
 
     @property
     def line(self) -> str:
-        """How far it is."""
+        """State of the work in one line."""
         now, done, total = time.monotonic(), self._done, self._total
         if not 0 < done < total:
             return f"{self._doing}: {span(now - self._begin)} so far"

@@ -25,7 +25,7 @@ EXAMPLE = "netsp plot problems/wharf.json solution.json -o wharf.svg"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument("problem", metavar="PROBLEM", help="problem, scene or mission file (JSON)")
     p.add_argument(
         "solution",
@@ -133,7 +133,7 @@ def _mission(args: argparse.Namespace) -> int:
 
 
 def is_scene(path: str) -> bool:
-    """A file that describes a scene rather than a problem: by its fields."""
+    """Return whether a file's fields are those of a scene, rather than of a problem."""
     from netsp.base.files import read_text
     from netsp.base.validated import kind_of, parse_json_object
 

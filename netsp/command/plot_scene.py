@@ -23,7 +23,7 @@ from netsp.world.tether.resolution import delta_for_path
 
 
 def plot_scene(args: argparse.Namespace) -> int:
-    """`netsp plot SCENE [PATH]`: returns the exit code."""
+    """Run `netsp plot SCENE [PATH]`, and return the exit code."""
     style.check_format(args.output, pictures.INTERACTIVE)
     scene = Scene.load(args.problem)
     path, tether = None, None
@@ -68,7 +68,7 @@ def warn_of_scene(model: GeodesicTether, delta: float, remedy: str) -> None:
 
 
 def lay(field: DistanceField, path: Floats, model: str, delta: float) -> Tether:
-    """The tether after a robot has gone a path from its anchor, the first point, on."""
+    """Return the tether after a robot has followed a path from its anchor, the first point."""
     chosen = make_tether(model, field, delta)
     if isinstance(chosen, GeodesicTether):
         warn_of_scene(chosen, delta, "take a smaller --delta")
@@ -77,7 +77,7 @@ def lay(field: DistanceField, path: Floats, model: str, delta: float) -> Tether:
 
 
 def points_of(file: str) -> Floats:
-    """The points (k, 3) of a path file: CSV x,y,z or a JSON list of points."""
+    """Return the points (k, 3) of a path file: CSV x,y,z or a JSON list of points."""
     path = read_path(file, messages.note)
     if path is None:
         raise InputError(f"{file}: expected a path: CSV x,y,z or a JSON list of points")

@@ -24,15 +24,15 @@ ROW_INTERVAL_S = 0.2
 
 
 class Named(Protocol):
-    """What is solved."""
+    """Problem or mission that is solved."""
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """Name in the first line of the table."""
 
     @property
     def summary(self) -> str:
-        """In a line."""
+        """Description in one line."""
 
 
 class ProgressTable:
@@ -119,7 +119,7 @@ def summary(
     picture: str | None = None,
     trace: str | None = None,
 ) -> str:
-    """What was found, in a few lines."""
+    """Return the result in a few lines."""
     t = solution.timings
     times = (
         f"roadmap {t.roadmap_s:.2f} s, legs {t.matrix_s:.2f} s, solver {t.solve_s:.2f} s, "

@@ -14,7 +14,7 @@ EXAMPLE = "netsp report rows.jsonl -o report.html"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument(
         "results",
         metavar="RESULTS",
@@ -67,7 +67,7 @@ def _written(args: argparse.Namespace) -> None:
 
 
 def _of_mission(source: str) -> bool:
-    """Whether it is a mission, or the folder of one that was flown."""
+    """Return whether a source is a mission, or the folder of a flown one."""
     place = Path(source)
     if place.is_dir():
         return (place / "mission.json").exists() and not (place / "solution.json").exists()

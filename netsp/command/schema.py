@@ -21,7 +21,7 @@ FORMATS = {
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument("format", choices=tuple(FORMATS), help="of a file that netsp reads or writes")
 
 

@@ -17,7 +17,7 @@ EXAMPLE = "netsp simulate missions/basin.json -o run"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument("mission", metavar="MISSION", help="mission file (JSON)")
     p.add_argument(
         "--planner",

@@ -30,13 +30,13 @@ EXAMPLE = "netsp solve problems/wharf.json -o solution.json --plot wharf.png"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     for_all(p)
     _for_problems(p.add_argument_group("for problems only"))
 
 
 def for_all(p: argparse.ArgumentParser) -> None:
-    """What problems and missions take."""
+    """Add the arguments of problems and missions."""
     p.add_argument(
         "problem",
         metavar="PROBLEM",
@@ -90,7 +90,7 @@ def for_all(p: argparse.ArgumentParser) -> None:
 
 
 def _for_problems(p: argparse._ArgumentGroup) -> None:
-    """What says nothing of missions."""
+    """Add the arguments that do not apply to missions."""
     p.add_argument(
         "--roadmap",
         default="taut",
@@ -158,7 +158,7 @@ def _for_problems(p: argparse._ArgumentGroup) -> None:
 
 
 def run_mission(args: argparse.Namespace) -> int:
-    """The same of a mission."""
+    """Solve a mission, and return the exit code."""
     json_output.check_stdout(args)
     from netsp.command import solve_mission
 

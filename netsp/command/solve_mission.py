@@ -44,8 +44,8 @@ FOR_PROBLEMS = {
 
 
 def is_mission(file: str) -> bool:
-    """Whether a file is a mission, be it one that lacks a field or has it misspelt; what cannot be
-    read is left to who reads problems."""
+    """Return whether a file is a mission, even if fields are missing or misspelt. False for files
+    that cannot be read: reading them as problems reports why."""
     from netsp.base.files import read_text
     from netsp.base.validated import MARKS, kind_of, parse_json_object
 
@@ -150,7 +150,7 @@ def solve(
 
 
 def draw(found: SolvedMission, scene: Scene, file: str) -> None:
-    """The flight, or where there was no time for one, the tour in space."""
+    """Draw the flight, or the tour in space if there was no time for a flight."""
     if found.run is not None:
         from netsp.view.pictures.mission_picture import save_runs
 
@@ -173,7 +173,7 @@ def summary(
     plot: str | None,
     units: str,
 ) -> str:
-    """What was found, in a few lines."""
+    """Return the result in a few lines."""
     from netsp.model.bound_scope import LowerBound, Scope
     from netsp.model.solution import Status
     from netsp.plan.space.mission_solver import GOING_ON, seconds_until_home

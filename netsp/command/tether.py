@@ -14,7 +14,7 @@ EXAMPLE = "netsp tether problems/wharf.json --longest 30 --plot tether.png"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
     p.add_argument(
         "--longest",

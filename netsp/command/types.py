@@ -65,7 +65,7 @@ seconds, length = _above_zero(" of seconds"), _above_zero("")
 
 
 def shard(text: str) -> tuple[int, int]:
-    """The I-th of N parts."""
+    """Parse I/N, part I of N parts."""
     part, _, of = text.partition("/")
     if not (part.isdigit() and of.isdigit() and 1 <= int(part) <= int(of)):
         raise argparse.ArgumentTypeError(f"expected I/N with 1 <= I <= N, got {text!r}")
@@ -73,7 +73,7 @@ def shard(text: str) -> tuple[int, int]:
 
 
 def option(text: str) -> tuple[str, str]:
-    """A name and its value."""
+    """Parse a name and its value."""
     name, equals, value = text.partition("=")
     if not (name and equals):
         raise argparse.ArgumentTypeError(f"expected NAME=VALUE, got {text!r}")
@@ -88,7 +88,7 @@ MAX_WHOLE_NUMBER = 2**62
 
 
 def natural(text: str) -> int:
-    """A whole number from 0 on."""
+    """Parse a whole number from 0."""
     try:
         value = int(text)
     except ValueError:
@@ -135,7 +135,7 @@ def count_or_range(text: str) -> int | tuple[int, int]:
 
 
 def positive(text: str) -> int:
-    """A whole number from 1 on."""
+    """Parse a whole number from 1."""
     value = natural(text)
     if value == 0:
         raise argparse.ArgumentTypeError("expected a whole number from 1 on, got '0'")
@@ -194,7 +194,7 @@ def check_writable(*paths: str | None, inputs: Sequence[str | None] = ()) -> Non
 
 
 def roadmap_options(args: argparse.Namespace) -> dict[str, object]:
-    """Those options of a roadmap that were given."""
+    """Return the options of a roadmap that were given."""
     options = {
         "samples": args.samples,
         "shortcut": args.shortcut or None,
@@ -205,7 +205,7 @@ def roadmap_options(args: argparse.Namespace) -> dict[str, object]:
 
 
 def load_pair(problem: str, solution: str) -> tuple[Problem, Solution]:
-    """A problem file and a solution file."""
+    """Load a problem file and a solution file."""
     from netsp.model.problem import Problem
     from netsp.model.solution import Solution
 

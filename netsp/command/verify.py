@@ -17,7 +17,7 @@ EXAMPLE = "netsp verify problems/wharf.json solution.json"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument(
         "problem",
         metavar="PROBLEM",

@@ -13,7 +13,7 @@ EXAMPLE = "netsp world --goals 30 --tether 350 --seed 7 -o world.json"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command."""
     p.add_argument(
         "--family",
         default="icra2017",

@@ -26,7 +26,7 @@ QUEUED_PER_WORKER = 4
 
 
 def dask_executor(address: str) -> Executor:
-    """An executor on the scheduler at ``tcp://host:port``.
+    """Return an executor on the scheduler at ``tcp://host:port``.
 
     Raises InputError if Dask is not installed or nobody answers there.
     """

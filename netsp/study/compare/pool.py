@@ -110,7 +110,7 @@ def _lost(code: int | None) -> TrialRow:
 
 
 def _work(pipe: Connection) -> None:
-    """The worker's loop."""
+    """Run the trials that arrive, until the pipe is closed."""
     from netsp.study.compare.trial import run
 
     for number in INTERRUPTS:  # the parent's to handle: it kills its workers
@@ -134,7 +134,7 @@ def _work(pipe: Connection) -> None:
 
 
 def crashed(error: BaseException) -> TrialRow:
-    """The outcome of a trial that raised what it should not."""
+    """Return the row of a trial that raised an unexpected error."""
     if isinstance(error, PluginError) and error.__cause__ is not None:
         error = error.__cause__
     at = traceback.extract_tb(error.__traceback__)[-1]

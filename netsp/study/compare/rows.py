@@ -36,8 +36,8 @@ _TABLES = ("world", "roadmap", "solver")
 
 
 def read_rows(path: str | Path) -> list[TrialRow]:
-    """All rows of a results file, gzipped if its name ends in .gz; a torn last line is left out.
-    InputError if it is not one."""
+    """Return all rows of a results file; a torn last line is left out. Files whose names end in .gz
+    are unpacked; InputError if the file holds no rows."""
     data = read_gzip(path) if Path(path).suffix == ".gz" else read_bytes(path)
     rows = []
     *lines, torn = data.split(b"\n")
@@ -56,7 +56,7 @@ def read_rows(path: str | Path) -> list[TrialRow]:
 
 
 def _parsed(line: bytes) -> TrialRow | None:
-    """A line as a row; None if it is none."""
+    """Return the row in a line, or None if it holds none."""
     try:
         row = json.loads(line, parse_constant=_no_constant)
     except (ValueError, RecursionError):
@@ -88,7 +88,7 @@ def _parsed(line: bytes) -> TrialRow | None:
 
 
 def _encodable(row: object) -> bool:
-    """Whether no name is something that cannot be written, such as half a character."""
+    """Return whether all names can be written; half a surrogate pair cannot."""
     try:
         json.dumps(row, ensure_ascii=False).encode()
     except UnicodeError:

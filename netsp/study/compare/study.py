@@ -181,7 +181,7 @@ class Study(Model):
 
     @classmethod
     def checked(cls, data: dict[str, Any], source: str, text: str = "") -> Self:
-        """A study from plain data; `text` is where it came from, for the line of a complaint."""
+        """Return a study from plain data; `text`, its source, serves to name lines in errors."""
         try:
             return cls.model_validate(data)
         except ValidationError as error:
@@ -194,7 +194,7 @@ class Study(Model):
         return _digest(self.model_dump(mode="json", exclude={"name"}))
 
     def trials(self) -> Iterator[Trial]:
-        """All trials, those of one world next to one another."""
+        """Yield all trials; those of one world follow one another."""
         for world in range(self.worlds.first, self.worlds.first + self.worlds.count):
             for goals in self.goals:
                 for tether in self.tether_lengths:
@@ -271,7 +271,7 @@ def _digest(data: Any) -> str:
 
 
 def _line(text: str, where: tuple[int | str, ...]) -> str:
-    """``line N: `` of the key in question, as far as it can be found by sight."""
+    """Return ``line N: `` of a key, if it can be found in the text."""
     lines = text.splitlines()
     at, found = 0, None
     for k, part in enumerate(where):

@@ -15,15 +15,16 @@ from netsp.study.compare.trial import check, full_row
 
 
 class Executor(Protocol):
-    """Where trials are run."""
+    """Place where trials run: processes on this machine, or a cluster."""
 
     def __call__(self, trials: list[Trial]) -> Iterator[tuple[Trial, TrialRow]]:
-        """Each trial with its outcome, as they finish."""
+        """Yield each trial with its row as it finishes."""
 
 
 @dataclass(frozen=True)
 class Tally:
-    """How far a comparison has got: trials in all, done (those of earlier runs too), failed now."""
+    """Counts of a comparison: all trials, finished ones (also of earlier runs), and failures
+    now."""
 
     total: int
     done: int

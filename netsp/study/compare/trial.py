@@ -35,7 +35,7 @@ def _world(recipe: tuple[tuple[str, Any], ...]) -> tuple[Problem, int]:
 
 
 def world_of(trial: Trial) -> tuple[Problem, int]:
-    """The problem of a trial, and how many worlds were drawn in vain before it."""
+    """Return the problem of a trial, and the number of unreachable worlds drawn before it."""
     recipe = {k: tuple(v) if isinstance(v, list) else v for k, v in trial.world.items()}
     return _world(tuple(sorted(recipe.items())))
 
@@ -107,7 +107,7 @@ def _cpu_s() -> float:
 
 
 def thinned(history: list[Any]) -> list[Any]:
-    """At most `MAX_PROGRESS_ROWS`, evenly, the first and the last among them."""
+    """Return at most `MAX_PROGRESS_ROWS` entries, evenly spaced, with the first and the last."""
     n = len(history)
     if n <= MAX_PROGRESS_ROWS:
         return history
@@ -115,7 +115,7 @@ def thinned(history: list[Any]) -> list[Any]:
 
 
 def full_row(trial: Trial, outcome: TrialRow, study: str, study_name: str) -> TrialRow:
-    """The immutable row: what was tried, what came of it, where and when."""
+    """Return the row of a trial: what was tried, its result, where and when."""
     return {
         "schema": SCHEMA,
         "study": study,

@@ -42,7 +42,7 @@ RANK_GRACE_S = 10.0
 
 
 class Row(Model):
-    """What a solver found for a problem."""
+    """Result of a solver on a problem."""
 
     schema_version: Annotated[Literal[1], Field(description="of the row's format")] = 1
     solver: Annotated[Name, Field(description="what it is called in the ranking")]
@@ -60,7 +60,8 @@ Solve = Callable[[Problem, Path, float, Callable[[], bool]], Solution]
 
 
 def by_name(name: str, seed: int) -> Solve:
-    """A solver of netsp or of a plug-in, or a function ``module:attribute`` of a travel graph.
+    """Return a solver of netsp or of a plug-in, or a function ``module:attribute`` of a travel
+    graph.
 
     Raises
     ------
@@ -88,7 +89,8 @@ def by_name(name: str, seed: int) -> Solve:
 
 
 def _guarded(function: Callable[..., Any], name: str) -> Callable[..., Any]:
-    """The same, whose errors cost a row and no more; it is asked for the same arguments."""
+    """Return a function with the same parameters whose errors become PluginErrors, so that they
+    cost one row."""
 
     @functools.wraps(function)
     def call(*args: Any, **more: Any) -> Any:
@@ -99,8 +101,8 @@ def _guarded(function: Callable[..., Any], name: str) -> Callable[..., Any]:
 
 
 def by_command(command: str) -> Solve:
-    """A command that reads a problem file and writes a solution file: ``{problem}``, ``{solution}``
-    and ``{seconds}`` stand for these.
+    """Return a solver that runs a command, in which ``{problem}``, ``{solution}`` and ``{seconds}``
+    are replaced.
 
     Raises
     ------
@@ -182,7 +184,7 @@ def run(
 
 
 def _run(library: Library, name: str, label: str, solve: Solve, limit: float, clock: Clock) -> Row:
-    """Of one problem."""
+    """Solve one problem, and return its row."""
     problem = library.problem(name)
     begin = time.perf_counter()
     row: dict[str, Any] = {
@@ -242,8 +244,8 @@ def append_row(path: str | Path, row: Row) -> None:
 
 
 def ranking(library: Library, rows: Iterable[Row]) -> list[dict[str, Any]]:
-    """One entry for each solver and limit, the best first: by the mean share above the best known,
-    where a problem without a verified tour counts as twice the best.
+    """Return one entry for each solver and limit, the best first. They are sorted by the mean share
+    above the best known length; a problem without a verified tour counts as twice that length.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ class Record(Model):
 
     @property
     def proven(self) -> bool:
-        """Whether no tour is shorter."""
+        """True if the tour is proven to be shortest."""
         return self.bound is not None and self.bound.proves(self.length)
 
     @property
@@ -106,7 +106,7 @@ class Comparison:
 
     @property
     def better(self) -> bool:
-        """Whether it is a tour shorter than any known, and passed the judge."""
+        """True if the tour passed the judge and is shorter than any known one."""
         if not self.verification or self.length is None:
             return False
         return self.above is None or self.above < -SAME_LENGTH_TOLERANCE
@@ -147,7 +147,7 @@ class Library:
         return len(self.paths)
 
     def problem(self, name: str) -> Problem:
-        """A problem.
+        """Return the problem of a name.
 
         Parameters
         ----------
