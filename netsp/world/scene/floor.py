@@ -164,7 +164,17 @@ def read_floor(
         x, z = x[::-1], z[:, ::-1]
     if y[0] > y[-1]:
         y, z = y[::-1], z[::-1]
-    bottom = float(z.min()) - policy.base_share * max(np.ptp(x), np.ptp(y))
+    vertices, faces = _closed_mesh(x, y, z, policy.base_share)
+    left_out = (("without a height", grid.gaps),) if grid.gaps else ()
+    tally = Tally("cell", z.size, z.size - grid.gaps, left_out)
+    return FloorReading(vertices, faces, tuple(notes), tally)
+
+
+def _closed_mesh(
+    x: Floats, y: Floats, z: Floats, base_share: float
+) -> tuple[Floats, npt.NDArray[np.int64]]:
+    """Return vertices and outward triangles of a floor of heights z (m, n), walls and bottom."""
+    bottom = float(z.min()) - base_share * max(np.ptp(x), np.ptp(y))
     gx, gy = np.meshgrid(x, y)
     top = np.column_stack([gx.ravel(), gy.ravel(), z.ravel()])
     below = top.copy()
@@ -178,10 +188,7 @@ def read_floor(
     first = np.column_stack([rim, rim + n, after + n])
     walls = np.vstack([first, np.column_stack([rim, after + n, after])])
     vertices = np.vstack([top, below])
-    faces = np.vstack([up, up[:, ::-1] + n, walls]).astype(np.int64)
-    left_out = (("without a height", grid.gaps),) if grid.gaps else ()
-    tally = Tally("cell", rows * columns, rows * columns - grid.gaps, left_out)
-    return FloorReading(vertices, faces, tuple(notes), tally)
+    return vertices, np.vstack([up, up[:, ::-1] + n, walls]).astype(np.int64)
 
 
 @dataclass(frozen=True)

@@ -279,7 +279,18 @@ def read_las(path: str | Path) -> PointCloud:
     surface.leave_out_unmeasured(points)
     surface.leave_out_noise(np.asarray(data.classification), withheld)
     notes = surface.notes
-    system, keys = _system_of(data.header)
+    unit, metres, sign = _las_units(data.header, path, notes)
+    points[:, 2] *= sign
+    if sign < 0.0:
+        notes.append("heights count downwards: converted to z upwards")
+    return PointCloud(
+        points[surface.kept], (unit, unit, metres), tuple(notes), tally=surface.tally()
+    )
+
+
+def _las_units(header: Any, path: str | Path, notes: list[str]) -> tuple[float, float, float]:
+    """Return the metres per unit of map and heights, and the sign of heights; extend the notes."""
+    system, keys = _system_of(header)
     unit, heights = _unit_of_key(keys, _MAP_UNIT, path), HeightAxis()
     if keys.get(_MODEL, 0) == 3:
         raise InputError(f"{path}: geocentric coordinates; expected those of a map, such as UTM")
@@ -293,7 +304,7 @@ def read_las(path: str | Path) -> PointCloud:
             raise InputError(f"{path}: in degrees; expected a cloud in metres, such as UTM")
     elif keys.get(_MODEL, 0) == 2:
         raise InputError(f"{path}: in degrees; expected a cloud in metres, such as UTM")
-    elif keys or any(v.record_id == _WKT for v in data.header.vlrs):
+    elif keys or any(v.record_id == _WKT for v in header.vlrs):
         notes.append(
             f"coordinate system unknown: {'read as metres, ' if unit is None else ''}z upwards"
         )
@@ -305,12 +316,7 @@ def read_las(path: str | Path) -> PointCloud:
         metres = heights.metres if heights.is_stated else unit
     if unit != 1.0 or metres != 1.0:
         notes.append(f"in units of {unit:.7g} m, heights of {metres:.7g} m: converted to metres")
-    points[:, 2] *= heights.sign
-    if heights.sign < 0.0:
-        notes.append("heights count downwards: converted to z upwards")
-    return PointCloud(
-        points[surface.kept], (unit, unit, metres), tuple(notes), tally=surface.tally()
-    )
+    return unit, metres, heights.sign
 
 
 _WKT = 2112

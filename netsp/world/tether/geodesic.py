@@ -254,10 +254,10 @@ class GeodesicTether:
         """
         end_if_abandoned()
         points = _points(path)
+        strand, count = tether.strand.copy(), len(tether.strand)
         strand, count, residual, lengths = drive(
-            self.field.arrays, tether.strand.copy(), len(tether.strand), points, self._settings,
-            floor,
-        )  # fmt: skip
+            self.field.arrays, strand, count, points, self._settings, floor
+        )
         last = lengths[-1] if len(lengths) else None
         return self._state(strand, count, residual, last), lengths
 
@@ -286,10 +286,10 @@ class GeodesicTether:
             Sum of turning angles at each point, radians.
         """
         points = np.ascontiguousarray(path, dtype=float).reshape(-1, 3)
+        strand, count = tether.strand.copy(), len(tether.strand)
         strand, count, residual, payouts, turnings = drive_under(
-            self.field.arrays, tether.strand.copy(), len(tether.strand), points, self._settings,
-            load,
-        )  # fmt: skip
+            self.field.arrays, strand, count, points, self._settings, load
+        )
         return self._state(strand, count, residual), payouts, turnings
 
     def refine(self, tether: Tether) -> Tether:

@@ -121,7 +121,7 @@ class ReactTether:
             New position of the anchor, metres; None if it has not moved.
         """
         nodes = tether.nodes
-        text = self.reading == "text"
+        is_text = self.reading == "text"
         ends = [(True, robot)] if anchor is None else [(False, anchor), (True, robot)]
         for end, target in ends:
             point = self.field.free_point(
@@ -130,9 +130,14 @@ class ReactTether:
             if not end:
                 nodes = nodes[::-1]
             nodes = tighten(
-                self.field.arrays, np.vstack([nodes, point]), self.delta, self.clearance, text,
-                self.tolerance, self.passes,
-            )  # fmt: skip
+                self.field.arrays,
+                np.vstack([nodes, point]),
+                self.delta,
+                self.clearance,
+                is_text,
+                self.tolerance,
+                self.passes,
+            )
             if not end:
                 nodes = nodes[::-1]
         return _tether(nodes)
@@ -191,10 +196,9 @@ def tighten(
 
 @kernel
 def _sees(field: Field, nodes: Floats, i: int, j: int, clearance: float, slack: float) -> bool:
-    return is_segment_free(
-        field, nodes[i, 0], nodes[i, 1], nodes[i, 2], nodes[j, 0], nodes[j, 1], nodes[j, 2],
-        slack - clearance, slack,
-    )  # fmt: skip
+    ax, ay, az = nodes[i, 0], nodes[i, 1], nodes[i, 2]
+    bx, by, bz = nodes[j, 0], nodes[j, 1], nodes[j, 2]
+    return is_segment_free(field, ax, ay, az, bx, by, bz, slack - clearance, slack)
 
 
 @kernel
