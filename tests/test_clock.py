@@ -12,12 +12,12 @@ from netsp.base.clock import (
     NEVER,
     Clock,
     TimingPolicy,
-    abandoned_work_goes_on,
     end_if_abandoned,
+    is_abandoned_work_running,
 )
 from netsp.base.compiled.compile_policy import everything_compiled
 from netsp.base.errors import InputError, LimitReachedError, MemoryLimitError
-from netsp.base.ram import ask, available
+from netsp.base.ram import available_memory, check_available
 from netsp.mip.cutpool import IDLE, CutPool
 from netsp.mip.cuts import Cut
 from netsp.plan.random_worlds import random_world, reachable_world
@@ -34,7 +34,7 @@ def test_a_flag_is_set_when_the_time_is_up_and_not_before():
     assert (flag[0], late.flag[0], Clock().flag[0], NEVER[0]) == (0, 0, 0, 0)
     time.sleep(0.4)
     assert flag[0] == 1
-    assert clock.up
+    assert clock.is_up
     assert late.flag[0] == 0
     with pytest.raises(LimitReachedError, match="while counting"):
         clock.check("counting")
@@ -44,8 +44,8 @@ def test_a_clock_within_another_does_not_outlast_it():
     outer = Clock(5.0)
     assert Clock(50.0, within=outer).left <= 5.0
     assert Clock(1.0, within=outer).left <= 1.0
-    assert Clock.of(outer).left <= 5.0
-    assert Clock.of(None).limit is None
+    assert Clock.from_limit(outer).left <= 5.0
+    assert Clock.from_limit(None).limit is None
 
 
 def test_a_call_in_a_thread_gives_its_result_and_its_error():
@@ -74,10 +74,10 @@ def test_a_graph_made_without_a_limit_keeps_to_that_of_its_solver():
 
 
 def test_memory_is_asked_for_before_it_is_taken():
-    ask(1e3, "a crumb", "nothing")
-    assert available() > 0
+    check_available(1e3, "a crumb", "nothing")
+    assert available_memory() > 0
     with pytest.raises(MemoryLimitError, match=r"legs would take .* GiB of memory.*lower tether"):
-        ask(1e18, "legs", "lower tether_length")
+        check_available(1e18, "legs", "lower tether_length")
 
 
 def test_a_cut_pool_never_gives_one_cut_the_count_of_another():
@@ -264,14 +264,14 @@ def test_work_that_does_not_hear_the_clock_is_abandoned_and_ends_where_it_looks(
     with pytest.raises(LimitReachedError, match="time limit reached while counting"):
         Clock(0.02).bounded("counting", _never_ends)
     assert time.process_time() - begin < 1.0
-    assert not abandoned_work_goes_on(wait=20.0)
+    assert not is_abandoned_work_running(wait=20.0)
 
 
 def test_work_within_abandoned_work_is_abandoned_too():
     inner = Clock(60.0)
     with pytest.raises(LimitReachedError, match="while counting on"):
         Clock(0.02).bounded("counting on", lambda: inner.bounded("counting", _never_ends))
-    assert not abandoned_work_goes_on(wait=20.0)
+    assert not is_abandoned_work_running(wait=20.0)
     assert not [t for t in threading.enumerate() if t.name == BOUNDED]
 
 
@@ -297,7 +297,7 @@ def test_work_of_a_first_result_gets_its_time_whatever_the_limit():
         assert clock.bounded("counting", counts) == 7
     with pytest.raises(LimitReachedError, match="while counting on"):
         clock.bounded("counting on", _never_ends)
-    assert not abandoned_work_goes_on(wait=20.0)
+    assert not is_abandoned_work_running(wait=20.0)
 
 
 def test_without_a_limit_nothing_is_abandoned_and_no_thread_is_started():
@@ -321,4 +321,4 @@ def test_a_mission_ends_in_time_and_says_which_work_was_broken_off():
     with pytest.raises(LimitReachedError, match=r"time limit reached while \w+"):
         solve_mission(mission, scene=scene, time_limit=0.3, policy=at_once)
     assert time.process_time() - begin < 1.3
-    assert not abandoned_work_goes_on(wait=20.0)
+    assert not is_abandoned_work_running(wait=20.0)

@@ -380,4 +380,4 @@ def test_covers_that_are_stopped_keep_what_they_have_proven(press, monkeypatch):
     )
     assert len(heard) >= 1
     assert found.bound == heard[-1][0] > 0.0
-    assert clock.up == (press is KeyboardInterrupt)
+    assert clock.is_up == (press is KeyboardInterrupt)

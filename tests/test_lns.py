@@ -220,7 +220,7 @@ def test_a_descent_ends_whatever_the_costs_and_its_length_is_that_of_its_order(k
     clock = Clock(5.0)
     for seed in range(25):
         i, search = _settled(np.random.default_rng(seed), kind, clock)
-        assert not clock.up
+        assert not clock.is_up
         length, _ = best_classes(search.order[1:], i.start, i.costs)
         assert search.length == pytest.approx(length, rel=1e-12)
         assert sorted(search.order.tolist()) == list(range(i.clusters))

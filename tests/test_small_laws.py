@@ -121,10 +121,10 @@ def test_a_clock_within_another_never_outlasts_it():
     outer = Clock(1.0)
     assert Clock(50.0, within=outer).left <= 1.0
     assert Clock(0.5, within=outer).left <= 0.5
-    assert Clock.of(outer).deadline == outer.deadline
+    assert Clock.from_limit(outer).deadline == outer.deadline
     outer.end()
-    assert outer.up
-    assert Clock(50.0, within=outer).up
+    assert outer.is_up
+    assert Clock(50.0, within=outer).is_up
 
 
 def test_a_clock_is_up_from_its_deadline_on(monkeypatch):
@@ -132,18 +132,18 @@ def test_a_clock_is_up_from_its_deadline_on(monkeypatch):
     monkeypatch.setattr("netsp.base.clock.time.monotonic", lambda: now[0])
     clock = Clock(5.0)
     now[0] = 1004.999
-    assert not clock.up
+    assert not clock.is_up
     now[0] = 1005.0
-    assert clock.up
+    assert clock.is_up
 
 
 def test_a_clock_says_to_compiled_loops_that_it_is_up():
     clock = Clock(0.05)
-    assert not clock.up
+    assert not clock.is_up
     flag = clock.flag
     assert flag[0] == 0
     time.sleep(0.2)
-    assert clock.up
+    assert clock.is_up
     assert flag[0] == 1
     assert Clock(0.0).flag[0] == 1
     assert Clock().flag[0] == 0

@@ -200,7 +200,7 @@ def test_the_bound_among_upright_solids_ends_with_the_clock_of_the_run(monkeypat
 
     def solve_until_stopped(problem, time_limit):
         clock.end()  # as Ctrl-C and SIGTERM do
-        heard.append(time_limit.up and bool(time_limit.flag[0]))
+        heard.append(time_limit.is_up and bool(time_limit.flag[0]))
         return solve(problem, time_limit=time_limit)
 
     monkeypatch.setattr("netsp.plan.space.upright.solve", solve_until_stopped)

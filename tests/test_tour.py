@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from netsp.base.clock import Clock, until_interrupt, whole_or_interrupted
+from netsp.base.clock import Clock, deferred_interrupts, until_interrupt
 from netsp.base.geometry import polylines
 from netsp.command.main import main
 from netsp.model.solution import Status
@@ -350,10 +350,10 @@ def pressed_twice() -> None:
     with until_interrupt(None) as clock:
         signal.raise_signal(signal.SIGINT)
         for _ in range(500):
-            if clock.up:
+            if clock.is_up:
                 break
             threading.Event().wait(0.01)
-        assert clock.up
+        assert clock.is_up
         signal.raise_signal(signal.SIGINT)
 
 
@@ -362,7 +362,7 @@ def test_work_that_ends_at_once_after_ctrl_c_says_so():
     """A thread asks every 20 ms whether it was pressed: short work lost it."""
     with until_interrupt(None) as clock:
         signal.raise_signal(signal.SIGINT)
-    assert clock.stopped
+    assert clock.is_stopped
 
 
 @pytest.mark.usefixtures("ctrl_c")
@@ -370,7 +370,7 @@ def test_whole_work_ends_and_then_interrupts():
     done: list[int] = []
 
     def work() -> None:
-        with whole_or_interrupted():
+        with deferred_interrupts():
             signal.raise_signal(signal.SIGINT)
             done.append(1)
 
@@ -393,7 +393,7 @@ def test_a_handler_of_somebody_else_is_left_alone():
     signal.signal(signal.SIGINT, lambda *_: heard.append(1))
     with until_interrupt(None) as clock:
         signal.raise_signal(signal.SIGINT)
-        assert not clock.up
+        assert not clock.is_up
     assert heard == [1]
 
 

@@ -187,7 +187,7 @@ def _solve(
             on_progress=tell,
             on_graph=graphs.append,
         )
-        if clock.stopped:
+        if clock.is_stopped:
             return None
         if result.tour is None:
             connection.send({"version": version, "stage": "done", "error": result.status.value})
@@ -219,7 +219,7 @@ def _solve(
             }
         )
     except NetspError as error:
-        if not clock.stopped:
+        if not clock.is_stopped:
             connection.send({"version": version, "stage": "done", "error": str(error)})
     finally:
         clock.close()

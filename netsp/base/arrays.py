@@ -11,7 +11,7 @@ Floats = npt.NDArray[np.float64]
 """Lengths, coordinates, costs."""
 
 Singles = npt.NDArray[np.float32]
-"""Of what is held by the million, such as distances at grid points."""
+"""Numbers that are stored by the million, such as distances at grid points."""
 
 Ints = npt.NDArray[np.int64]
 """Indices, letters, counts."""
@@ -21,7 +21,7 @@ Bools = npt.NDArray[np.bool_]
 
 
 class ComparesArrays:
-    """Base of dataclasses with arrays among their fields: equal where all fields are.
+    """Base of dataclasses with arrays among their fields, which are equal if all fields are.
 
     A dataclass compares its fields in one tuple, which raises for arrays of more than one element.
     Derived classes are declared with ``@dataclass(eq=False)``. Arrays are equal if shapes and all

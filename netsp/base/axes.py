@@ -152,19 +152,15 @@ NOISE_CLASSES = {7: "low noise", 18: "high noise"}
 CUSTOMARY_NODATA = (
     -9999.0, 9999.0, -99999.0, 99999.0, -32768.0, -32767.0, 32767.0, -999999.0, 999999.0,
 )  # fmt: skip
-"""Values that usually mark a missing height. If a file does not declare them as nodata, they count
-as missing only where their distance from all other values exceeds the range of those values."""
+"""Sentinel values that usually mark a missing height.
+
+If a file does not declare them as nodata, they count as missing only where their distance from all
+other values exceeds the range of those values.
+"""
 
 MAX_HEIGHT = 1e9
-"""Largest height, in units of the file: heights on earth are below 1.2e7 mm. Larger values, such as
-1e20 or the largest number of a data type, mark a missing height."""
-
-SAMPLE_LINES = 1000
-"""Lines of a table that decide its separator and its decimal sign; later lines must agree."""
-
-
-MAX_LISTED = 200
-"""Characters of a list of unused columns; a longer list is cut off."""
+"""Sentinel limit of heights, in units of the file: larger values, such as 1e20 or the largest
+number of a data type, mark a missing height. Heights on earth are below 1.2e7 mm."""
 
 
 @dataclass(frozen=True)
@@ -555,22 +551,19 @@ class Table:
         known = [self.title(q) for q in self.columns if q not in quantities]
         return (*known, *self.unused)
 
-    def notes(self, quantities: Sequence[Quantity]) -> list[str]:
+    def notes(self, quantities: Sequence[Quantity], max_length: int = 200) -> list[str]:
         """Return notes on how the table was read: decimal commas, and unused columns.
 
         Parameters
         ----------
         quantities : sequence of str
             Quantities that the reader uses.
-
-        Returns
-        -------
-        list of str
-            One line each.
+        max_length : int
+            Maximum number of characters for the names of unused columns.
         """
         out = ["numbers are read with decimal commas"] if self.has_decimal_commas else []
         names = [shown(name) if "," in name else name for name in self.left_out(quantities)]
-        return out + ([f"unused columns: {', '.join(names)[:MAX_LISTED]}"] if names else [])
+        return out + ([f"unused columns: {', '.join(names)[:max_length]}"] if names else [])
 
 
 _COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?$")
@@ -600,9 +593,7 @@ def decode_text(data: bytes, source: str) -> str:
         raise InputError(f"{source}: not a text file in UTF-8") from None
 
 
-def read_path(
-    file: str | Path, on_note: Callable[[str], None] | None = None
-) -> Floats | None:  # fmt: skip
+def read_path(file: str | Path, on_note: Callable[[str], None] | None = None) -> Floats | None:
     """Read a polyline from a table or a JSON list of points.
 
     Parameters
@@ -671,7 +662,11 @@ def _is_point(row: object) -> bool:
 
 
 def read_table(
-    file: str | Path, *, positional: Sequence[Quantity] = (), text: str | None = None
+    file: str | Path,
+    *,
+    positional: Sequence[Quantity] = (),
+    text: str | None = None,
+    sample_lines: int = 1000,
 ) -> Table:
     """Read a table of any separator, decimal sign and order of columns.
 
@@ -685,10 +680,8 @@ def read_table(
         Quantities of the first columns of a table without a head; empty to refuse such a table.
     text : str, optional
         Contents of the file, where they have been read already.
-
-    Returns
-    -------
-    Table
+    sample_lines : int
+        Number of lines that decide the separator and the decimal sign; later lines must agree.
 
     Raises
     ------
@@ -703,7 +696,7 @@ def read_table(
     numbered, comment = _content(text)
     if not numbered:
         raise InputError(f"{source}: expected a table, got nothing")
-    separator = _separator(numbered, source)
+    separator = _separator(numbered, source, sample_lines)
     rows, lines = _cells(numbered, separator, source)
     head: tuple[str, ...] = ()
     if not any(_is_number(cell) for cell in rows[0]):
@@ -714,7 +707,7 @@ def read_table(
             head = names
     columns, unused = _meanings(head, source) if head else ({}, ())
     if not head:
-        columns = _by_position(rows, positional, source)
+        columns = _by_position(rows, positional, source, sample_lines)
         unused = tuple(f"column {k + 1}" for k in range(len(positional), max(map(len, rows))))
         if not positional:
             raise InputError(
@@ -729,9 +722,9 @@ def read_table(
                 f"{len(cells)}{hint}"
             )
     used = [k for q, (k, _) in columns.items() if q not in _TEXTS]
-    commas = _decimal_commas(rows, lines, used, source)
+    commas = _decimal_commas(rows, lines, used, source, sample_lines)
     if not head and separator == "," and not commas:
-        _check_commas(rows, lines, source)
+        _check_commas(rows, lines, source, sample_lines)
     return Table(source, head, columns, unused, rows, lines, commas)
 
 
@@ -751,7 +744,7 @@ def _content(text: str) -> tuple[list[tuple[int, str]], str | None]:
     return numbered, comment
 
 
-def _separator(numbered: Sequence[tuple[int, str]], source: str) -> str:
+def _separator(numbered: Sequence[tuple[int, str]], source: str, sample_lines: int) -> str:
     """Return the separator of a table: a semicolon, a tab, a comma or a blank."""
     first = numbered[0][1].strip()
     stated = re.fullmatch(r"sep=(.)", first.lower())
@@ -760,17 +753,17 @@ def _separator(numbered: Sequence[tuple[int, str]], source: str) -> str:
         if not numbered:
             raise InputError(f"{source}: expected a table, got nothing")
         return str(stated[1])
-    sample = [line for _, line in numbered[:SAMPLE_LINES]]
+    sample = [line for _, line in numbered[:sample_lines]]
     for mark in (";", "\t"):
         if all(mark in line for line in sample):
             return mark
     if not any("," in line for line in sample):
         return " "
     body = [line.split() for line in sample[1:] or sample]
-    if all(
-        len(cells) > 1 and all(_COMMA.match(c) or _WHOLE.match(c) for c in cells)
-        for cells in body
-    ) and any("," in c for cells in body for c in cells):  # fmt: skip
+    are_numbers = all(
+        len(cells) > 1 and all(_COMMA.match(c) or _WHOLE.match(c) for c in cells) for cells in body
+    )
+    if are_numbers and any("," in c for cells in body for c in cells):
         return " "
     if "," in first:
         return ","
@@ -843,11 +836,14 @@ def _meanings(
 
 
 def _by_position(
-    rows: Sequence[Sequence[str]], positional: Sequence[Quantity], source: str
+    rows: Sequence[Sequence[str]],
+    positional: Sequence[Quantity],
+    source: str,
+    sample_lines: int,
 ) -> dict[Quantity, tuple[int, Column]]:
     """Return the columns of a table without a head."""
     width = min(map(len, rows))
-    sample = rows[:SAMPLE_LINES]
+    sample = rows[:sample_lines]
     if width > len(positional) > 0 and len(sample) > 2:
         first = [cells[0].strip() for cells in sample]
         if all(_WHOLE.match(c) for c in first):
@@ -861,7 +857,11 @@ def _by_position(
 
 
 def _decimal_commas(
-    rows: Sequence[Sequence[str]], lines: Sequence[int], used: Sequence[int], source: str
+    rows: Sequence[Sequence[str]],
+    lines: Sequence[int],
+    used: Sequence[int],
+    source: str,
+    sample_lines: int,
 ) -> bool:
     """Return whether numbers are written with decimal commas; refuse a mixture."""
     comma = point = -1
@@ -872,7 +872,7 @@ def _decimal_commas(
                 comma = k
             elif point < 0 and "." in cell and _POINT.match(cell):
                 point = k
-        if k >= SAMPLE_LINES and comma < 0:
+        if k >= sample_lines and comma < 0:
             break
     if comma >= 0 and point >= 0:
         raise InputError(
@@ -882,9 +882,11 @@ def _decimal_commas(
     return comma >= 0
 
 
-def _check_commas(rows: Sequence[Sequence[str]], lines: Sequence[int], source: str) -> None:
+def _check_commas(
+    rows: Sequence[Sequence[str]], lines: Sequence[int], source: str, sample_lines: int
+) -> None:
     """Refuse a table without a head whose commas may be separators or decimal signs."""
-    sample = rows[:SAMPLE_LINES]
+    sample = rows[:sample_lines]
     if not all(_WHOLE.match(c.strip()) for cells in sample for c in cells):
         return
     is_halved = any(re.match(r"0\d", c.strip()) for cells in sample for c in cells[1::2])

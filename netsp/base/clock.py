@@ -1,8 +1,8 @@
-"""One clock for a whole run, which compiled loops can hear.
+"""Clock of a whole run, which compiled loops can check.
 
-A compiled loop cannot look at the time, and Python cannot interrupt it. So every clock has a
-`flag`, an array of one number that a watching thread sets to 1 when the time is up; loops that may
-last look at it now and then and end with what they have.
+A compiled loop cannot read the time, and Python cannot interrupt it. So every clock has a `flag`,
+an array of one number that a watching thread sets to 1 when the time is up. Loops that may last
+check the flag now and then, and end with what they have.
 """
 
 from __future__ import annotations
@@ -24,61 +24,60 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from netsp.base.deprecated import deprecated_method
 from netsp.base.errors import LimitReachedError
 from netsp.base.number_ranges import check_not_negative
 
 Flag = npt.NDArray[np.int64]
 T = TypeVar("T")
 
-ASKED = 0.02
-"""Seconds between two times that `should_stop` is asked."""
-
 NEVER: Flag = np.zeros(1, dtype=np.int64)
-"""The flag of a clock without a limit."""
+"""Flag of a clock without a limit."""
 
 
 @dataclass(frozen=True)
 class TimingPolicy:
-    """Policy of when a clock may end work.
+    """Policy of when a clock may end work. No number is negative.
 
     Parameters
     ----------
     untimed_steps : int
-        Largest number of steps of a compiled innermost loop that run to the end even if the time is
-        up; at least 0. The default takes about a tenth of a second. A smaller number leaves more
-        problems without any tour when the limit is short; a larger one makes runs end later.
+        Maximum number of steps of a compiled innermost loop that run to the end even if the time is
+        up. The default takes about a tenth of a second. With a smaller number, more problems are
+        left without any tour when the limit is short; with a larger one, runs end later.
     grace_s : float
-        CPU seconds for which a run may go on in all after its time was up, so that work that hears
-        the clock returns what it has; at least 0. Then the work is abandoned (`Clock.bounded`). A
-        smaller number leaves more missions without any tour when the limit is short; a larger one
-        makes runs end later.
+        CPU seconds for which a run may go on after its time is up, so that work that checks the
+        clock returns what it has. Then the work is abandoned (`Clock.bounded`). With less, more
+        missions are left without any tour when the limit is short; with more, runs end later.
     stop_grace_s : float
-        CPU seconds more for work that makes a result of what it has, where the clock was stopped,
-        as by Ctrl-C; at least 0. A smaller number loses more of what was found; with a larger one
-        the user waits longer.
+        Additional CPU seconds for work that returns what it has after the clock was stopped, such
+        as by Ctrl-C. With less, more of what was found is lost; with more, the user waits longer.
+    stop_interval_s : float
+        Seconds between two calls of `should_stop`. A shorter interval takes more CPU.
     """
 
     untimed_steps: int = 100_000_000
     grace_s: float = 0.5
     stop_grace_s: float = 5.0
+    stop_interval_s: float = 0.02
 
     def __post_init__(self) -> None:
         check_not_negative(self)
 
 
 class Clock:
-    """Time since the start, and how much of a limit is left.
+    """Time since the start, and time left until a limit.
 
     Parameters
     ----------
-    limit
-        Seconds from now, None for no limit.
-    within
-        A clock that this one may not outlast.
-    should_stop
-        Asked every `ASKED` seconds, in a thread of its own: once it says so, the time is up for
-        this clock and all within it. `close` ends that.
-    begun
+    limit : float, optional
+        Seconds from now; None for no limit.
+    within : Clock, optional
+        Clock that this one may not outlast.
+    should_stop : callable, optional
+        Function called at intervals in a thread of its own. Once it returns True, the time is up
+        for this clock and all within it. `close` ends the calls.
+    begun : (float, float), optional
         Time (`time.monotonic`) from which the limit counts, and CPU seconds of the process at that
         time; default: now.
     """
@@ -86,13 +85,19 @@ class Clock:
     policy = TimingPolicy()
 
     def __init__(
-        self, limit: float | None = None, *, within: Clock | None = None,
-        should_stop: Callable[[], bool] | None = None, begun: tuple[float, float] | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        limit: float | None = None,
+        *,
+        within: Clock | None = None,
+        should_stop: Callable[[], bool] | None = None,
+        begun: tuple[float, float] | None = None,
+    ) -> None:
         begun = begun or (time.monotonic(), time.process_time())
         self.start = begun[0]
         self.deadline = math.inf if limit is None else self.start + limit
-        self._stop = _Stop(should_stop) if should_stop is not None else None
+        self._stop: _Stop | None = None
+        if should_stop is not None:
+            self._stop = _Stop(should_stop, self.policy.stop_interval_s)
         self._family: _Family = _Family(begun) if within is None else within._family
         if within is not None:
             self.deadline = min(self.deadline, within.deadline)
@@ -104,12 +109,18 @@ class Clock:
         return Clock, ()
 
     @classmethod
-    def of(cls, limit: TimeLimit) -> Clock:
-        """A clock that starts now, from seconds, a clock that it may not outlast, or no limit."""
+    def from_limit(cls, limit: TimeLimit) -> Clock:
+        """Return a clock that starts now, from seconds, a clock that it may not outlast, or no
+        limit."""
         return cls(within=limit) if isinstance(limit, Clock) else cls(limit)
 
+    of = deprecated_method("of", "from_limit")
+    up = deprecated_method("up", "is_up")
+    stopped = deprecated_method("stopped", "is_stopped")
+    stoppable = deprecated_method("stoppable", "can_stop")
+
     def part(self, share: float) -> Clock:
-        """A clock for a share of the time that is left."""
+        """Return a clock for a share of the time that is left."""
         return Clock(None if self.limit is None else share * self.left, within=self)
 
     @property
@@ -124,44 +135,46 @@ class Clock:
 
     @property
     def left(self) -> float:
-        """Seconds left; inf without a limit."""
-        if self.stopped:
+        """Seconds left; infinite without a limit."""
+        if self.is_stopped:
             return 0.0
         return self.deadline - time.monotonic()
 
     @property
-    def stopped(self) -> bool:
-        """Whether `should_stop` has said so, or `end` was called."""
+    def is_stopped(self) -> bool:
+        """State of being stopped, by `should_stop` or `end`."""
         return self._family.ended or (self._stop is not None and self._stop.now)
 
     @property
-    def stoppable(self) -> bool:
-        """Whether the time may be up before the deadline."""
+    def can_stop(self) -> bool:
+        """Possibility that the time is up before the deadline."""
         return self._stop is not None
 
     def end(self) -> None:
-        """The time is up for this clock and all that have a clock in common with it: who was
-        interrupted in a part of some work does not want the next part."""
+        """End the time of this clock and of all clocks that share a clock with it.
+
+        A user who interrupts a part of some work does not want the next part.
+        """
         self._family.ended = True
         if self._flag is not None:
             self._flag[0] = 1
 
     def close(self) -> None:
-        """Ask `should_stop` no more; what it raised is raised here."""
+        """End the calls of `should_stop`; raise what it raised."""
         if self._stop is not None:
             self._stop.close()
 
     @property
-    def up(self) -> bool:
-        """Whether the limit is reached."""
+    def is_up(self) -> bool:
+        """State of having reached the limit."""
         return self.left <= 0.0
 
     @property
     def flag(self) -> Flag:
-        """(1,) 0 until the time is up, then 1; for compiled loops."""
+        """Flag (1,) for compiled loops: 0 until the time is up, then 1."""
         if self._flag is None:
             self._flag = np.zeros(1, dtype=np.int64)
-            if self.up:
+            if self.is_up:
                 self._flag[0] = 1
             elif self.deadline < math.inf:
                 _WATCH.add(self.deadline, self._flag)
@@ -170,18 +183,19 @@ class Clock:
         return self._flag
 
     def check(self, doing: str) -> None:
-        """Raise LimitReachedError, which says what was being done, when the time is up."""
-        if self.up:
+        """Raise LimitReachedError, which names the work, if the time is up."""
+        if self.is_up:
             raise self._broken_off(doing)
 
     def _broken_off(self, doing: str) -> LimitReachedError:
-        """Return the error that says which work the clock has broken off."""
+        """Return the error that names the work that the clock has ended."""
         return LimitReachedError(
-            f"{'stopped' if self.stopped else 'time limit reached'} while {doing}"
+            f"{'stopped' if self.is_stopped else 'time limit reached'} while {doing}"
         )
 
     def finish(self, doing: str, steps: float, call: Callable[[Flag], T]) -> T:
-        """Call a function that stops at a flag, as `interruptible` does, and return its result.
+        """Return the result of a call that stops at a flag, as `interruptible` does.
+
         Small work runs to the end whatever the time (`TimingPolicy`).
 
         Parameters
@@ -189,9 +203,9 @@ class Clock:
         doing : str
             Name of the work in messages.
         steps : float
-            Largest number of steps of the innermost loop.
+            Maximum number of steps of the innermost loop.
         call : callable
-            The work; it takes the flag, and may return an incomplete result once the flag is set.
+            Work; it takes the flag, and may return an incomplete result once the flag is set.
 
         Raises
         ------
@@ -214,28 +228,28 @@ class Clock:
 
     @property
     def is_overdue(self) -> bool:
-        """Whether the time is up and the grace of `TimingPolicy` is used up, too, both in CPU
+        """State of having used up the grace of `TimingPolicy`, too, after the time was up, in CPU
         seconds."""
         return self._overdue()
 
     def _overdue(self, more: float = 0.0) -> bool:
         """Return whether the time is up, and the grace and some more CPU seconds are used up.
 
-        Compiling does not count. Nor does time in which the process got no CPU: on a busy machine
-        a run ends later rather than without a result.
+        Compiling does not count. Nor does time in which the process got no CPU: on a busy machine a
+        run ends later rather than without a result.
         """
         self._family.count_compiling()
-        if not self.up:
+        if not self.is_up:
             return False
         family, now = self._family, time.process_time()
-        if not self.stopped and _is_compiling():
+        if not self.is_stopped and _is_compiling():
             family.up_at = None  # else what is compiled would be lost, and compiled again next time
             return False
         if family.up_at is None:
             family.up_at = now
         grace = self.policy.grace_s + more
         due = max(self.deadline - family.begin, family.min_cpu_s) + grace
-        if not self.stopped and now - family.begin_cpu - family.compiling_s <= due:
+        if not self.is_stopped and now - family.begin_cpu - family.compiling_s <= due:
             return False
         return now - family.up_at > grace
 
@@ -268,10 +282,10 @@ class Clock:
         doing : str
             Name of the work in messages.
         call : callable
-            The work.
+            Work.
         winds_down : bool
-            Whether the work makes a result of what it has when the clock is stopped, as by Ctrl-C;
-            then it gets more time for it (`TimingPolicy`).
+            Whether the work returns what it has when the clock is stopped, as by Ctrl-C; then it
+            gets more time for it (`TimingPolicy`).
 
         Raises
         ------
@@ -299,8 +313,8 @@ class Clock:
         thread = threading.Thread(target=context.run, args=(body,), daemon=True, name=BOUNDED)
         thread.start()
         try:
-            while not done.wait(min(0.2, max(ASKED, self.left))):
-                more = self.policy.stop_grace_s if winds_down and self.stopped else 0.0
+            while not done.wait(min(0.2, max(self.policy.stop_interval_s, self.left))):
+                more = self.policy.stop_grace_s if winds_down and self.is_stopped else 0.0
                 if self._overdue(more) or _abandoned.get()[0]:
                     raise self._broken_off(self._family.doing or doing)
         except (KeyboardInterrupt, LimitReachedError):
@@ -312,7 +326,8 @@ class Clock:
         return outcome[0]
 
     def interruptible(self, call: Callable[[], T]) -> T:
-        """Make a call that hears the flag, in a thread, so that Ctrl-C ends it at once."""
+        """Return the result of a call that checks the flag, made in a thread, so that Ctrl-C ends
+        it at once."""
         outcome: list[T] = []
         failure: list[BaseException] = []
 
@@ -337,14 +352,9 @@ class Clock:
         return outcome[0]
 
 
-def abandoned_work_goes_on(wait: float = 0.0) -> bool:
-    """Return whether a thread that `Clock.bounded` has abandoned still runs.
-
-    Parameters
-    ----------
-    wait : float
-        Seconds to wait for its end.
-    """
+def is_abandoned_work_running(wait: float = 0.0) -> bool:
+    """Return whether a thread that `Clock.bounded` has abandoned still runs, after waiting `wait`
+    seconds."""
     until = time.monotonic() + wait
     while _ABANDONED:
         _ABANDONED[0].join(max(0.0, until - time.monotonic()))
@@ -358,7 +368,7 @@ _ABANDONED: list[threading.Thread] = []
 
 
 def _is_compiling() -> bool:
-    """Return whether numba compiles a kernel just now."""
+    """Return whether Numba compiles a kernel just now."""
     lock = sys.modules.get("numba.core.compiler_lock")
     return lock is not None and bool(lock.global_compiler_lock.is_locked())
 
@@ -370,8 +380,10 @@ _abandoned: ContextVar[Flag] = ContextVar("abandoned", default=NEVER)
 
 
 def abandoned() -> Flag:
-    """Return the flag of the enclosing `Clock.bounded`, for compiled loops and other threads: 1
-    once the work is abandoned. It stays 0 outside of `Clock.bounded`."""
+    """Return the flag of the enclosing `Clock.bounded`, for compiled loops and other threads.
+
+    It is 1 once the work is abandoned, and stays 0 outside of `Clock.bounded`.
+    """
     return _abandoned.get()
 
 
@@ -425,23 +437,15 @@ TimeLimit = float | Clock | None
 
 @contextmanager
 def until_interrupt(limit: TimeLimit) -> Iterator[Clock]:
-    """A clock whose time is up at Ctrl-C, too, so that many stages of work end one after another
-    with what they have; pressed again, it interrupts as ever. SIGTERM does the same where it
-    interrupts (`netsp.command.interrupts`). In threads, and where somebody else hears the signal,
-    it does what it did.
+    """Yield a clock whose time is up at Ctrl-C, too, so that successive stages end with what they
+    have.
 
-    Parameters
-    ----------
-    limit : float, Clock or None
-        As of `Clock.of`.
-
-    Yields
-    ------
-    Clock
-        The clock.
+    A second Ctrl-C interrupts as usual. SIGTERM does the same where it interrupts
+    (`netsp.command.interrupts`). In other threads, and where another handler is set, nothing
+    changes.
     """
-    if not _interrupts() or (isinstance(limit, Clock) and limit.stoppable):
-        yield Clock.of(limit)
+    if not _interrupts() or (isinstance(limit, Clock) and limit.can_stop):
+        yield Clock.from_limit(limit)
         return
     pressed = threading.Event()
     within, seconds = (limit, None) if isinstance(limit, Clock) else (None, limit)
@@ -460,9 +464,12 @@ def until_interrupt(limit: TimeLimit) -> Iterator[Clock]:
 
 
 @contextmanager
-def whole_or_interrupted() -> Iterator[None]:
-    """Work that is not broken off in the middle: Ctrl-C interrupts at its end. Compiled code that
-    hands over tuples calls Python for it, and an interrupt just then is more than it can take."""
+def deferred_interrupts() -> Iterator[None]:
+    """Defer Ctrl-C to the end of a block that must not be interrupted.
+
+    Compiled code that returns tuples calls Python to make them, and an interrupt at that moment
+    would crash it.
+    """
     pressed = threading.Event()
     with _on_interrupt(pressed.set):
         yield
@@ -471,9 +478,11 @@ def whole_or_interrupted() -> Iterator[None]:
 
 
 @contextmanager
-def interrupts_remembered() -> Iterator[Callable[[], None]]:
-    """Work that is of no use in part: Ctrl-C interrupts as ever, and again where what it met took
-    it for the wish to have what there is (solvers and flights do).
+def remembered_interrupts() -> Iterator[Callable[[], None]]:
+    """Remember Ctrl-C during work that is useless in part.
+
+    Ctrl-C interrupts as usual, and again at the next check where a callee took it as a request to
+    return what it has, as solvers and flights do.
 
     Yields
     ------
@@ -496,8 +505,10 @@ def interrupts_remembered() -> Iterator[Callable[[], None]]:
 
 
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
-"""Signals that end a command. Python raises KeyboardInterrupt at SIGINT, and
-`netsp.command.interrupts` makes it do so at SIGTERM."""
+"""Signals that end a command.
+
+Python raises KeyboardInterrupt at SIGINT, and `netsp.command.interrupts` makes it do so at SIGTERM.
+"""
 
 
 def _is_default(handler: object) -> bool:
@@ -506,8 +517,10 @@ def _is_default(handler: object) -> bool:
 
 
 def _interrupts(hears: Callable[[object], bool] = _is_default) -> dict[signal.Signals, Any]:
-    """Return the handlers of `INTERRUPTS` that `hears` accepts; none in threads, where no handler
-    can be set."""
+    """Return the handlers of `INTERRUPTS` that `hears` accepts.
+
+    There are none in other threads, where no handler can be set.
+    """
     if threading.current_thread() is not threading.main_thread():
         return {}
     handlers = {number: signal.getsignal(number) for number in INTERRUPTS}
@@ -549,11 +562,12 @@ def _on_interrupt(
 
 
 class _Stop:
-    """Whether somebody asks for an end, and whose flags are then set."""
+    """Thread that calls `should_stop`, and sets flags once it returns True."""
 
-    def __init__(self, asked: Callable[[], bool]) -> None:
+    def __init__(self, should_stop: Callable[[], bool], interval_s: float) -> None:
         self.now = False
-        self._asked, self._flags = asked, list[Flag]()
+        self._should_stop, self._interval_s = should_stop, interval_s
+        self._flags: list[Flag] = []
         self._error: Exception | None = None
         self._closed = threading.Event()
         self._lock = threading.Lock()
@@ -573,7 +587,7 @@ class _Stop:
     def _run(self) -> None:
         while not self._closed.is_set():
             try:
-                stop = self._asked()
+                stop = self._should_stop()
             except Exception as error:  # raised where the run ends: here nobody would hear it
                 self._error, stop = error, True
             if stop:
@@ -582,11 +596,11 @@ class _Stop:
                     for flag in self._flags:
                         flag[0] = 1
                 return
-            self._closed.wait(ASKED)
+            self._closed.wait(self._interval_s)
 
 
 class _Watch:
-    """The one thread that sets flags when their time comes."""
+    """Thread that sets flags when their time comes."""
 
     def __init__(self) -> None:
         self._queue: list[tuple[float, int, Flag]] = []

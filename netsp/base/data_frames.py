@@ -13,17 +13,9 @@ if TYPE_CHECKING:
 
 
 def frame_of(rows: Iterable[Any]) -> pandas.DataFrame:
-    """Return rows as a DataFrame with a column per field.
+    """Return rows (dataclasses or mappings of one kind) as a DataFrame with a column per field.
 
-    Parameters
-    ----------
-    rows : iterable of dataclass or mapping
-        Rows of one kind.
-
-    Returns
-    -------
-    pandas.DataFrame
-        In the order of the rows, numbered from 0. None becomes a missing value.
+    None becomes a missing value.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Exceptions of netsp. Each maps to one exit code of the command line (docs/architecture.md)."""
+"""Exceptions of netsp. Each has one exit code of the command line (docs/architecture.md)."""
 
 from __future__ import annotations
 
@@ -6,40 +6,43 @@ import re
 import warnings
 from collections.abc import Sequence
 
-EXIT_DEFECT, EXIT_BAD_INPUT, EXIT_INFEASIBLE = 1, 2, 3
-"""A defect of ours (whatever moved is safely home); input that cannot be used; no solution."""
+EXIT_DEFECT = 1
+"""Code of a defect of netsp; whatever moved is safely home."""
 
-EXIT_NOT_ALL, EXIT_NOT_VERIFIED, EXIT_INTERRUPTED = 4, 5, 130
-"""No tour, or goals left out; a failed check, or a tether over the limit or not free; Ctrl-C."""
+EXIT_BAD_INPUT = 2
+"""Code of input that cannot be used."""
 
-LONGEST_QUOTE = 80
-"""Characters of a quoted value that a message shows."""
+EXIT_INFEASIBLE = 3
+"""Code of a problem without solution."""
 
-_QUOTED = re.compile(rf"(['\"])((?:(?!\1).){{{LONGEST_QUOTE + 1},}}?)\1", re.S)
-_LIST = re.compile(rf"\[[^\[\]]{{{2 * LONGEST_QUOTE},}}\]")
-_WORD = re.compile(rf"[^\s/'\"]{{{2 * LONGEST_QUOTE},}}")
+EXIT_NOT_ALL = 4
+"""Code of a run without tour, or with goals left out."""
+
+EXIT_NOT_VERIFIED = 5
+"""Code of a failed check, or a tether over the limit or not free."""
+
+EXIT_INTERRUPTED = 130
+"""Code of a command that Ctrl-C ended."""
 
 
-def brief(message: str) -> str:
-    """A message in one line; quoted values, endless lists and words are cut short, what cannot be
-    printed is escaped.
+def brief(message: str, max_quote: int = 80) -> str:
+    """Return a message in one line, with long quotes, lists and words cut, and other characters
+    escaped.
 
     Parameters
     ----------
     message : str
-        The message.
-
-    Returns
-    -------
-    str
-        One line.
+        Message.
+    max_quote : int
+        Maximum length of a quoted value; half of that of a list or word.
     """
 
-    def cut(found: re.Match[str]) -> str:
-        return f"{found[1]}{found[2][: LONGEST_QUOTE - 1]}…{found[1]}"
-
-    text = _LIST.sub(lambda found: found[0][: LONGEST_QUOTE - 2] + "…]", _QUOTED.sub(cut, message))
-    text = _WORD.sub(lambda w: w[0][: LONGEST_QUOTE - 1] + "…", text)
+    quoted = re.compile(rf"(['\"])((?:(?!\1).){{{max_quote + 1},}}?)\1", re.DOTALL)
+    text = quoted.sub(lambda m: f"{m[1]}{m[2][: max_quote - 1]}…{m[1]}", message)
+    long_list = re.compile(rf"\[[^\[\]]{{{2 * max_quote},}}\]")
+    text = long_list.sub(lambda m: m[0][: max_quote - 2] + "…]", text)
+    long_word = re.compile(rf"[^\s/'\"]{{{2 * max_quote},}}")
+    text = long_word.sub(lambda m: m[0][: max_quote - 1] + "…", text)
     return "".join(
         c if c.isprintable() else c.encode("unicode_escape", "backslashreplace").decode()
         for c in text
@@ -47,25 +50,13 @@ def brief(message: str) -> str:
 
 
 def counted(number: int, noun: str) -> str:
-    """A number with its noun, which gets an s unless there is one of it.
-
-    Parameters
-    ----------
-    number : int
-        How many.
-    noun : str
-        In the singular.
-
-    Returns
-    -------
-    str
-        As ``1 goal`` or ``8 goals``.
-    """
+    """Return a number with its singular noun, which gets an s unless the number is 1: ``8
+    goals``."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 class NetspError(Exception):
-    """Base of all netsp errors that a user can act on; `exit_code` is what the CLI returns."""
+    """Base of all netsp errors that a user can act on; `exit_code` is that of the command line."""
 
     exit_code = EXIT_DEFECT
 
@@ -80,16 +71,11 @@ class InputError(NetspError):
 
 
 class SeveralErrors(InputError):
-    """Several complaints about one input, all told at once.
+    """Several complaints about one input, reported together.
 
     Parameters
     ----------
     complaints : sequence of str
-        One line each.
-
-    Attributes
-    ----------
-    complaints : tuple of str
         One line each.
     """
 
@@ -100,23 +86,16 @@ class SeveralErrors(InputError):
 
 
 class UnansweredError(SeveralErrors):
-    """Complaints about an input of which some can be answered by whoever gives it.
+    """Complaints about an input, some of which the user can answer.
 
     Parameters
     ----------
     complaints : sequence of str
         One line each, with the options of the command line that answer them.
     plain : sequence of str
-        The same without these options.
+        The same lines without these options.
     asks : sequence of str
-        What is to be answered, as ``line_width``.
-
-    Attributes
-    ----------
-    plain : tuple of str
-        One line each.
-    asks : tuple of str
-        Each once.
+        Names of the questions, such as ``line_width``.
     """
 
     def __init__(
@@ -128,7 +107,7 @@ class UnansweredError(SeveralErrors):
 
 
 class InfeasibleError(NetspError):
-    """The problem is proven to have no solution; the message names the goal and the reason.
+    """Proof that the problem has no solution; the message names the goal and the reason.
 
     Parameters
     ----------
@@ -137,8 +116,8 @@ class InfeasibleError(NetspError):
     goal : int, optional
         Index of the first goal that cannot be visited.
     needed : float, optional
-        Length of the shortest tether that reaches it, in the problem's units; inf where it is cut
-        off; None where the length is not what is wrong.
+        Length of the shortest tether that reaches it, in the problem's units; infinite where it is
+        cut off; None where the length is not the reason.
     enclosing : sequence of int
         Obstacles that cut it off, or the base.
     """
@@ -146,29 +125,34 @@ class InfeasibleError(NetspError):
     exit_code = EXIT_INFEASIBLE
 
     def __init__(
-        self, message: object = "", *, goal: int | None = None, needed: float | None = None,
+        self,
+        message: object = "",
+        *,
+        goal: int | None = None,
+        needed: float | None = None,
         enclosing: Sequence[int] = (),
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__(message)
         self.goal, self.needed, self.enclosing = goal, needed, tuple(enclosing)
 
 
 class LimitReachedError(NetspError):
-    """The time was up before there was any solution; the message says where the work stood."""
+    """Time limit that was reached before there was any solution; the message says during which
+    work."""
 
     exit_code = EXIT_NOT_ALL
 
 
 class MemoryLimitError(LimitReachedError):
-    """The work would take more memory than there is; the message says what to lower."""
+    """Work that would take more memory than there is; the message says what to lower."""
 
 
 class PluginError(NetspError):
-    """Another package's code failed. The message says which; the error itself is the cause."""
+    """Failure of another package's code. The message says which; the error itself is the cause."""
 
 
 class VerificationError(NetspError):
-    """A solution failed its independent check."""
+    """Failure of a solution's independent check."""
 
     exit_code = EXIT_NOT_VERIFIED
 
@@ -183,26 +167,16 @@ def warn_left_out(what: str) -> None:
     Parameters
     ----------
     what : str
-        One line: what is missing, and what stands in its place.
+        One line: what is missing, and what replaces it.
     """
     warnings.warn(what, LeftOutWarning, stacklevel=3)
 
 
 def interrupted(error: BaseException) -> bool:
-    """Whether an error is Ctrl-C.
+    """Return whether an error is Ctrl-C, or a consequence of it.
 
-    Python says SystemError ("returned a result with an exception set") where the signal comes just
-    as a compiled function returns, and once more for each function that this one was called by.
-
-    Parameters
-    ----------
-    error : BaseException
-        What was raised.
-
-    Returns
-    -------
-    bool
-        Whether it is, or comes of, a KeyboardInterrupt.
+    Python raises SystemError ("returned a result with an exception set") if the signal arrives just
+    as a compiled function returns, and again for each of its callers.
     """
     cause: BaseException | None = error
     while isinstance(cause, SystemError):

@@ -1,4 +1,4 @@
-"""Field types of all file formats: checked numbers, points and names, for pydantic models."""
+"""Types of fields in all file formats: checked numbers, points and names, for pydantic models."""
 
 from __future__ import annotations
 
@@ -13,17 +13,18 @@ from netsp.base.errors import InputError
 from netsp.base.validated import shown
 
 LARGEST = 1e12
-"""Largest coordinate, radius or length in absolute value."""
+"""Format limit of all files: magnitude of a coordinate, radius or length."""
 
 LARGEST_TOTAL = 1e6 * LARGEST
-"""Largest sum of lengths that a solution states."""
+"""Format limit of all files: sum of lengths that a solution states."""
 
 SMALLEST = 1e-100
-"""Smallest length or radius: squares of less underflow."""
+"""Format limit of all files: smallest length or radius; squares of smaller ones underflow."""
 
 
 def checked_number(value: Any, most: float = LARGEST) -> Any:
-    """Numbers only: no strings, no booleans; numpy scalars are welcome."""
+    """Return a number, also one of NumPy; ValueError for strings, booleans and numbers too
+    large."""
     real = isinstance(value, int | float | np.integer | np.floating)
     if isinstance(value, bool | np.bool_ | np.timedelta64) or not real:
         raise ValueError(f"expected a number, got {shown(value)}")
@@ -39,33 +40,20 @@ def checked_number(value: Any, most: float = LARGEST) -> Any:
 
 
 def checked_integer(value: Any) -> int:
-    """Whole numbers only: no strings, no booleans, no fractions; of numpy, too."""
+    """Return a whole number, also one of NumPy; ValueError for strings, booleans and fractions."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
         raise ValueError(f"expected a whole number, got {shown(value)}")
     return int(value)
 
 
 def is_index(value: object, count: int) -> TypeGuard[int]:
-    """Whether it is a whole number from 0 on and below a count; truth values are none.
-
-    Parameters
-    ----------
-    value : object
-        Anything.
-    count : int
-        Of what is numbered.
-
-    Returns
-    -------
-    bool
-        Whether it is.
-    """
+    """Return whether a value is a whole number from 0 to count - 1, and no boolean."""
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     return whole and 0 <= int(value) < count  # type: ignore[call-overload]
 
 
 def _size(value: Any) -> Any:
-    """A length or radius: squares of the smallest underflow."""
+    """Return a length or radius; ValueError for those whose squares underflow."""
     number = checked_number(value)
     if 0.0 < number < SMALLEST:
         raise ValueError(f"expected at least {SMALLEST:g}, got {shown(value)}")
@@ -73,7 +61,8 @@ def _size(value: Any) -> Any:
 
 
 def checked_argument(name: str, value: Any, low: float, high: float = LARGEST) -> float:
-    """An argument of a call as a number within limits; InputError, that names it, for all else."""
+    """Return an argument of a call as a number within limits; InputError, which names it,
+    otherwise."""
     try:
         number = float(checked_number(value))
     except ValueError as error:
@@ -85,17 +74,17 @@ def checked_argument(name: str, value: Any, low: float, high: float = LARGEST) -
 
 
 def checked_instance(name: str, value: object, kind: type) -> None:
-    """InputError, that names the argument, unless a value is of a kind."""
+    """Raise InputError, which names the argument, unless a value is an instance of a class."""
     if not isinstance(value, kind):
         raise InputError(f"{name}: expected a {kind.__name__}, got {shown(value)}")
 
 
 SPACES = dict.fromkeys(map(ord, "\u00a0\u3000\u200c\u200d"), " ")
-"""Spaces and joiners of ordinary names in some scripts, which Python does not call printable."""
+"""Spaces and joiners in names of some scripts, which Python does not call printable."""
 
 
 def _name(value: Any) -> Any:
-    """Names are shown in one line."""
+    """Return a name that fits in one line; ValueError otherwise."""
     plain = isinstance(value, str) and value.translate(SPACES).isprintable()
     if isinstance(value, str) and (len(value) > 200 or not plain):
         raise ValueError(f"expected a name of at most 200 printable characters, got {shown(value)}")
@@ -134,7 +123,7 @@ Number = Annotated[float, BeforeValidator(lambda v: checked_number(v))]
 
 
 Total = Annotated[float, BeforeValidator(lambda v: checked_number(v, LARGEST_TOTAL))]
-"""A sum of lengths."""
+"""Sum of lengths."""
 
 
 Integer = Annotated[int, BeforeValidator(checked_integer)]
@@ -168,7 +157,7 @@ TrackPoint = Annotated[
     BeforeValidator(lambda v: _track_point(v)),
     WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 4, "maxItems": 4}),
 ]
-"""A time in seconds, and where something is then."""
+"""Time in seconds, and the position at that time."""
 
 
 PathPoint = Annotated[
@@ -176,4 +165,4 @@ PathPoint = Annotated[
     BeforeValidator(lambda v: _point3(v, LARGEST_TOTAL)),
     WithJsonSchema(POINT3_SCHEMA),
 ]
-"""Of a drawn path, which may pass beyond the outermost coordinate of a problem."""
+"""Point of a drawn path, which may pass beyond the outermost coordinate of a problem."""

@@ -1,4 +1,4 @@
-"""Reading and writing whole files: kind and size are looked at first, no file is half written."""
+"""Reading and writing whole files: kind and size are checked first, and no file is half written."""
 
 from __future__ import annotations
 
@@ -13,28 +13,49 @@ import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import zip_longest
 from pathlib import Path
 from typing import ClassVar, Self
 
 from netsp.base.errors import InputError
+from netsp.base.number_ranges import check_positive
 from netsp.base.validated import Model, read_model, shown
 
 STANDARD = "-"
-"""The name of a file that stands for standard input, or output."""
+"""Name of a file that stands for standard input or output."""
 
-MOST_BYTES = 256 * 2**20
-"""Largest file that is read, unpacked if it is packed: a problem of a million goals is smaller."""
 
-CHUNK = 2**20
+@dataclass(frozen=True)
+class FilePolicy:
+    """Policy of files that are read. All numbers are positive.
+
+    Attributes
+    ----------
+    max_bytes
+        Maximum size of a file, unpacked if it is packed. A problem of a million goals is smaller.
+    unpack_bytes
+        Number of bytes that are unpacked at a time, so that a file that unpacks to more than
+        `max_bytes` is refused before it fills the memory.
+    """
+
+    max_bytes: int = 256 * 2**20
+    unpack_bytes: int = 2**20
+
+    def __post_init__(self) -> None:
+        check_positive(self)
+
 
 _NUMBERS = re.compile(r"[-+0-9. eE]*")
 
 
-def check_file(path: str | Path, most: int = MOST_BYTES) -> None:
-    """InputError unless this is a regular file of at most so many bytes, for readers that open it
-    by themselves. Pipes and devices may never end, so they are refused."""
+def check_file(path: str | Path, max_bytes: int = FilePolicy.max_bytes) -> None:
+    """Raise InputError unless a path is a regular file of at most `max_bytes`.
+
+    For readers that open the file by themselves. Pipes and devices may never end, so they are
+    refused.
+    """
     if path == STANDARD:
         raise InputError("-: this is not read from standard input; expected the name of a file")
     try:
@@ -45,40 +66,39 @@ def check_file(path: str | Path, most: int = MOST_BYTES) -> None:
     if not stat.S_ISREG(status.st_mode):
         kind = "a directory" if stat.S_ISDIR(status.st_mode) else "a pipe or a device"
         raise InputError(f"{path}: cannot be read: expected a file, got {kind}")
-    if status.st_size > most:
+    if status.st_size > max_bytes:
         raise InputError(
             f"{path}: cannot be read: {status.st_size / 2**20:.4g} MiB; expected at most "
-            f"{most / 2**20:g} MiB"
+            f"{max_bytes / 2**20:g} MiB"
         )
 
 
-def read_bytes(path: str | Path, most: int = MOST_BYTES) -> bytes:
-    """Contents of a regular file of at most so many bytes, or of standard input, or `InputError` in
-    one line."""
+def read_bytes(path: str | Path, max_bytes: int = FilePolicy.max_bytes) -> bytes:
+    """Return the contents of a regular file or of standard input; InputError if they cannot be
+    read."""
     if path == STANDARD:
-        return _standard_input(most)
-    check_file(path, most)
+        return _standard_input(max_bytes)
+    check_file(path, max_bytes)
     try:
         with open(path, "rb") as stream:
-            data = stream.read(most + 1)
+            data = stream.read(max_bytes + 1)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    if len(data) > most:
-        raise InputError(f"{path}: cannot be read: more than {most / 2**20:g} MiB")
+    if len(data) > max_bytes:
+        raise InputError(f"{path}: cannot be read: more than {max_bytes / 2**20:g} MiB")
     return data
 
 
 @lru_cache(maxsize=1)
-def _standard_input(most: int) -> bytes:
-    """All of it: it can be read but once, and is asked for by who looks what kind of file it is,
-    too."""
+def _standard_input(max_bytes: int) -> bytes:
+    """Return all of standard input, which can be read only once but is needed several times."""
     if sys.stdin is None:
         raise InputError("-: standard input is closed; expected a file piped in")
     if sys.stdin.isatty():
         raise InputError("-: standard input is a terminal; expected a file piped in")
-    data = getattr(sys.stdin, "buffer", sys.stdin).read(most + 1)
-    if len(data) > most:
-        raise InputError(f"-: cannot be read: more than {most / 2**20:g} MiB")
+    data = getattr(sys.stdin, "buffer", sys.stdin).read(max_bytes + 1)
+    if len(data) > max_bytes:
+        raise InputError(f"-: cannot be read: more than {max_bytes / 2**20:g} MiB")
     return data if isinstance(data, bytes) else str(data).encode()
 
 
@@ -93,19 +113,20 @@ def read_text(path: str | Path) -> str:
         raise InputError(f"{path}: not a text file in UTF-8") from None
 
 
-def read_gzip(path: str | Path, most: int = MOST_BYTES) -> bytes:
-    """Contents of a gzipped file that unpacks to at most so many bytes, or `InputError`."""
+def read_gzip(path: str | Path, policy: FilePolicy = FilePolicy()) -> bytes:
+    """Return the unpacked contents of a gzipped file; InputError if they are too large."""
     data = read_bytes(path)
     out, size = [], 0
     try:
         while data:
             unpack = zlib.decompressobj(wbits=31)
             while data and not unpack.eof:
-                piece = unpack.decompress(data, CHUNK)
+                piece = unpack.decompress(data, policy.unpack_bytes)
                 data = unpack.unconsumed_tail
                 size += len(piece)
-                if size > most:
-                    raise InputError(f"{path}: unpacks to more than {most / 2**20:g} MiB")
+                if size > policy.max_bytes:
+                    limit = f"{policy.max_bytes / 2**20:g} MiB"
+                    raise InputError(f"{path}: unpacks to more than {limit}")
                 out.append(piece)
                 if not data and not piece:
                     break
@@ -118,19 +139,13 @@ def read_gzip(path: str | Path, most: int = MOST_BYTES) -> bytes:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text to a file in UTF-8, replacing the file as `write_bytes` does.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file; ``-`` is standard output.
-    text : str
-        Text.
+    """Write a text to a file in UTF-8, replacing the file as `write_bytes` does; ``-`` is standard
+    output.
 
     Raises
     ------
     InputError
-        It cannot be written.
+        The file cannot be written.
     """
     if path == STANDARD:
         sys.stdout.write(text)
@@ -146,17 +161,12 @@ def write_text(path: str | Path, text: str) -> None:
 def write_bytes(path: str | Path, data: bytes) -> None:
     """Write a file by renaming a finished one into place, so that it is never half written.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file; through a symbolic link, what it points to is replaced. ``-`` is standard output.
-    data : bytes
-        Contents.
+    Through a symbolic link, its target is replaced; ``-`` is standard output.
 
     Raises
     ------
     InputError
-        It cannot be written.
+        The file cannot be written.
     """
     if path == STANDARD:
         sys.stdout.buffer.write(data)
@@ -192,12 +202,12 @@ def write_bytes(path: str | Path, data: bytes) -> None:
 
 
 def make_folder(folder: str | Path) -> Path:
-    """The folder, made if need be.
+    """Return a folder, after making it if it does not exist.
 
     Raises
     ------
     InputError
-        It cannot be made, or nothing can be written there.
+        It cannot be made, or files cannot be written there.
     """
     place = Path(folder)
     if folder == STANDARD:
@@ -216,24 +226,26 @@ def make_folder(folder: str | Path) -> Path:
 
 @contextmanager
 def output_folder(folder: str | Path | None) -> Iterator[None]:
-    """A folder to write to, tried before long work begins; taken away again if it was made here and
-    the work ends in an error."""
+    """Make a folder before long work begins; remove it if it is new and empty when the work
+    fails."""
     if folder is None:
         yield
         return
-    there = Path(folder).exists()
+    had_folder = Path(folder).exists()
     place = make_folder(folder)
     try:
         yield
     except BaseException:
-        if not there and not any(place.iterdir()):
+        if not had_folder and not any(place.iterdir()):
             place.rmdir()
         raise
 
 
 def cell(text: str | None) -> str:
-    """A text as a cell of a table that a spreadsheet takes for no formula (OWASP, "CSV injection"):
-    what begins like one gets an apostrophe."""
+    """Return a text as a cell of a table that spreadsheets do not take for a formula.
+
+    A text that begins like a formula gets an apostrophe (OWASP, "CSV injection").
+    """
     text = text or ""
     if _NUMBERS.fullmatch(text):
         return text
@@ -242,14 +254,7 @@ def cell(text: str | None) -> str:
 
 
 def csv_lines(text: str, source: str) -> Iterator[list[str]]:
-    """Yield the cells of each line of a CSV text, as `csv.reader`.
-
-    Parameters
-    ----------
-    text : str
-        The text.
-    source : str
-        What messages call it, such as the name of the file.
+    """Yield the cells of each line of a CSV text, as `csv.reader`; `source` names it in messages.
 
     Raises
     ------
@@ -264,19 +269,16 @@ def csv_lines(text: str, source: str) -> Iterator[list[str]]:
 
 
 def csv_rows(text: str, source: str) -> list[dict[str, str]]:
-    """Return the rows of a CSV text by column name; the first line that is not empty has the names.
+    """Return the rows of a CSV text by column name, which the first line with cells states.
+
+    Lines without cells are left out; cells that a short line lacks are empty.
 
     Parameters
     ----------
     text : str
-        The text, with or without a byte order mark.
+        Text, with or without a byte order mark.
     source : str
-        What messages call it, such as the name of the file.
-
-    Returns
-    -------
-    list of dict
-        Cells as text. Lines without cells are left out; cells that a short line lacks are empty.
+        Name in messages, such as that of the file.
 
     Raises
     ------
@@ -301,30 +303,25 @@ def csv_rows(text: str, source: str) -> list[dict[str, str]]:
 
 
 class FileModel(Model):
-    """A model that is a file of its own, JSON of a format version."""
+    """Model that is a JSON file of its own, with a format version."""
 
     file_kind: ClassVar[str] = "file"
 
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str | None = None) -> Self:
-        """Parse and validate the text of a file.
+        """Return the model in the text of a file, after validation.
 
         Parameters
         ----------
         text : str or bytes
             JSON of the format version.
         source : str, optional
-            What messages call it; by default the kind of file.
-
-        Returns
-        -------
-        Self
-            The model.
+            Name in messages; by default the kind of file.
 
         Raises
         ------
         InputError
-            Anything wrong, in one line.
+            The text is not valid, in one line.
         """
         if not isinstance(text, str | bytes):
             raise InputError(f"{cls.file_kind}: expected text, got {shown(text)}")
@@ -333,16 +330,6 @@ class FileModel(Model):
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """Read a file.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file.
-
-        Returns
-        -------
-        Self
-            The model.
 
         Raises
         ------
@@ -354,23 +341,12 @@ class FileModel(Model):
         return cls.from_json(read_text(path), source=str(path))
 
     def to_json(self) -> str:
-        """The model as JSON of format version 1, without what is not given.
-
-        Returns
-        -------
-        str
-            Text of a file.
-        """
+        """Return the model as JSON of format version 1, without fields that are not given."""
         data = self.model_dump(mode="json", exclude_none=True)
         return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
     def save(self, path: str | Path) -> None:
-        """Write the file, whole or not at all.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file; one that is there is replaced. Files that it names are named as they are.
+        """Write the file, whole or not at all; a file of that name is replaced.
 
         Raises
         ------

@@ -1,5 +1,4 @@
-"""How far a piece of work is, told to who listens, without every function in between passing it
-on."""
+"""Progress reporting through a context variable, without a parameter in every function."""
 
 from __future__ import annotations
 
@@ -9,7 +8,7 @@ from contextvars import ContextVar
 from typing import TypeVar
 
 Listener = Callable[[int, int], None]
-"""Called with steps done and steps in all."""
+"""Function that gets the number of steps done, and of all steps."""
 
 _listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
 
@@ -18,13 +17,7 @@ Item = TypeVar("Item")
 
 @contextmanager
 def heard_by(listener: Listener) -> Iterator[None]:
-    """While the body runs, its steps are told to a listener.
-
-    Parameters
-    ----------
-    listener : callable
-        Called with steps done and steps in all.
-    """
+    """Report progress to a listener while the body runs."""
     token = _listener.set(listener)
     try:
         yield
@@ -33,33 +26,14 @@ def heard_by(listener: Listener) -> Iterator[None]:
 
 
 def each(items: Sequence[Item]) -> Iterator[Item]:
-    """The items of a sequence; each is told as done when the next is asked for.
-
-    Parameters
-    ----------
-    items : sequence
-        Any.
-
-    Yields
-    ------
-    object
-        Each of them.
-    """
+    """Yield the items of a sequence, and report each as done when the next is wanted."""
     for done, item in enumerate(items, 1):
         yield item
         tell(done, len(items))
 
 
 def tell(done: int, total: int) -> None:
-    """Tell how far it is.
-
-    Parameters
-    ----------
-    done : int
-        Steps done.
-    total : int
-        In all.
-    """
+    """Report that some steps of a total are done."""
     listener = _listener.get()
     if listener is not None:
         listener(done, total)

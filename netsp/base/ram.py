@@ -1,28 +1,45 @@
-"""How much memory there is, asked before a large array is made rather than after."""
+"""Available memory, checked before a large array is made."""
 
 from __future__ import annotations
 
 import contextlib
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 from netsp.base.errors import MemoryLimitError
-
-SHARE = 0.8
-"""Of the memory that is free, the part that one array may take."""
-
-SMALL = 64 * 2**20
-"""Bytes below which nobody asks."""
+from netsp.base.number_ranges import check_not_negative
 
 
-def available() -> float:
-    """Bytes that this process may still take: what the machine has free, its control group and its
-    own limit leave; inf where none of them can be read."""
+@dataclass(frozen=True)
+class MemoryPolicy:
+    """Policy of when a large array is refused. No number is negative.
+
+    Attributes
+    ----------
+    max_share
+        Maximum size of one array, as a share of the available memory.
+    min_bytes
+        Size below which arrays are not checked.
+    """
+
+    max_share: float = 0.8
+    min_bytes: int = 64 * 2**20
+
+    def __post_init__(self) -> None:
+        check_not_negative(self)
+
+
+def available_memory() -> float:
+    """Return the bytes that this process may still use; infinite where no limit can be read.
+
+    The machine's free memory, the control group and the limit of the process are considered.
+    """
     free = [float("inf")]
     with contextlib.suppress(OSError, ValueError, IndexError):
         rows = dict(r.split(":", 1) for r in Path("/proc/meminfo").read_text().splitlines())
         free.append(1024.0 * float(rows["MemAvailable"].split()[0]))
-    for most, used in (
+    for limit_file, used_file in (
         ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
         (
             "/sys/fs/cgroup/memory/memory.limit_in_bytes",
@@ -30,7 +47,7 @@ def available() -> float:
         ),
     ):
         with contextlib.suppress(OSError, ValueError):
-            free.append(float(Path(most).read_text()) - float(Path(used).read_text()))
+            free.append(float(Path(limit_file).read_text()) - float(Path(used_file).read_text()))
     if sys.platform != "win32":
         import resource
 
@@ -42,21 +59,25 @@ def available() -> float:
     return min(free)
 
 
-def ask(size: float, what: str, advice: str) -> None:
-    """MemoryLimitError, in one line, if `size` bytes are more than are available.
+def check_available(
+    size: float, name: str, advice: str, policy: MemoryPolicy = MemoryPolicy()
+) -> None:
+    """Raise MemoryLimitError, in one line, if `size` bytes are more than are available.
 
     Parameters
     ----------
-    what
-        That is to be made, for the message.
-    advice
+    name : str
+        What the memory is for, for the message.
+    advice : str
         What to lower.
+    policy : MemoryPolicy
+        Share of the memory that may be used.
     """
-    if size < SMALL:
+    if size < policy.min_bytes:
         return
-    there = SHARE * available()
-    if size > there:
+    limit = policy.max_share * available_memory()
+    if size > limit:
         raise MemoryLimitError(
-            f"{what} would take {size / 2**30:.3g} GiB of memory, and {there / 2**30:.3g} GiB are "
+            f"{name} would take {size / 2**30:.3g} GiB of memory, and {limit / 2**30:.3g} GiB are "
             f"available; {advice}"
         )

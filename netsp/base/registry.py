@@ -1,10 +1,9 @@
-"""Named things of one kind, ours and other packages': the doors of netsp.
+"""Registries of named things, netsp's and other packages': the plug-in doors of netsp.
 
-A package adds to a kind by an entry point in its `pyproject.toml`, and the name then works wherever
-ours do, in study files and on the command line too:
+A package adds to a registry by an entry point in its `pyproject.toml`. The name then works wherever
+netsp's own names do, in study files and on the command line too:
 
-    [project.entry-points."netsp.solvers"]
-    my-solver = "my_package:solve"
+    [project.entry-points."netsp.solvers"] my-solver = "my_package:solve"
 
 Without a package, ``module:attribute`` itself is a name.
 """
@@ -27,22 +26,23 @@ R = TypeVar("R")
 
 
 _WHERE = re.compile(r"[\w.]+:[\w.]+")
-"""``module:attribute``."""
+"""Pattern of ``module:attribute``."""
 
 
 class Registry(MutableMapping[str, R], Generic[R]):
-    """Records by name, ours first, in order.
+    """Records by name, netsp's first, in order.
 
     Parameters
     ----------
     kind : str
-        What messages call them.
+        Term for a record in messages.
     group : str
         Name of the entry points of other packages.
     own : dict
-        Our records by name.
+        netsp's records by name.
     record : callable
-        Makes the record of another package's entry point from its name and ``module:attribute``.
+        Function that makes the record of another package's entry point from its name and
+        ``module:attribute``.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class Registry(MutableMapping[str, R], Generic[R]):
 
     @cached_property
     def _foreign(self) -> dict[str, R]:
-        """Of other packages; a name of ours cannot be taken."""
+        """Records of other packages, which cannot replace netsp's."""
         found = importlib.metadata.entry_points(group=self.group)
         return {e.name: self._record(e.name, e.value) for e in found if e.name not in self._own}
 
@@ -74,22 +74,12 @@ class Registry(MutableMapping[str, R], Generic[R]):
         return len({**self._own, **self._foreign})
 
     def named(self, name: object) -> R:
-        """The record of a name.
-
-        Parameters
-        ----------
-        name : object
-            The name.
-
-        Returns
-        -------
-        object
-            The record.
+        """Return the record of a name.
 
         Raises
         ------
         InputError
-            No record has that name; tells the choices.
+            No record has that name; the message lists the choices.
         """
         if isinstance(name, str) and name not in self and _WHERE.fullmatch(name):
             self._check_there(name)
@@ -102,8 +92,10 @@ class Registry(MutableMapping[str, R], Generic[R]):
         return self[name]
 
     def _check_there(self, where: str) -> None:
-        """InputError unless ``module:attribute`` can be imported, also from the folder one is in,
-        where an installed command does not look for modules."""
+        """Raise InputError unless ``module:attribute`` can be imported.
+
+        The current folder is searched, too, where an installed command does not look for modules.
+        """
         module, _, attribute = where.partition(":")
         if (here := os.getcwd()) not in sys.path and "" not in sys.path:
             sys.path.append(here)
@@ -115,41 +107,18 @@ class Registry(MutableMapping[str, R], Generic[R]):
 
 
 def later(name: str, where: str) -> Callable[..., Any]:
-    """The record of kinds whose records are callables: loaded when first called.
-
-    Parameters
-    ----------
-    name : str
-        The name.
-    where : str
-        ``module:attribute``.
-
-    Returns
-    -------
-    callable
-        Calls what is there.
-    """
+    """Return a record that is a callable, loaded from ``module:attribute`` at its first call."""
     del name
     return lambda *args, **more: load(where)(*args, **more)
 
 
 def load(where: str) -> Any:
-    """What ``module:attribute`` names.
-
-    Parameters
-    ----------
-    where : str
-        ``module:attribute``.
-
-    Returns
-    -------
-    Any
-        The attribute.
+    """Return the attribute that ``module:attribute`` names.
 
     Raises
     ------
     InputError
-        It belongs to another package, and is not there.
+        It belongs to another package, and does not exist.
     PluginError
         It belongs to another package, which fails on import.
     """
@@ -172,22 +141,22 @@ def _found(module: str, attribute: str) -> Any:
 
 @contextmanager
 def foreign(what: str) -> Iterator[None]:
-    """Around a call of another package's code: errors of netsp, and Ctrl-C, pass.
+    """Turn errors of another package's code into PluginError; errors of netsp, and Ctrl-C, pass.
 
     Parameters
     ----------
     what : str
-        How messages begin.
+        Beginning of the message.
 
     Yields
     ------
     None
-        Once, to the call.
+        Control, once, for the call.
 
     Raises
     ------
     PluginError
-        Whatever else was raised, an exit as well; the error itself is the cause.
+        Any other error was raised, also an exit; the error itself is the cause.
     """
     try:
         yield

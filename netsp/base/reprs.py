@@ -1,7 +1,7 @@
-"""What a notebook shows of our objects: the short text, and the picture below it.
+"""Representations of netsp's objects in notebooks: the short text, and a picture below it.
 
-The pictures live in an upper layer (`netsp.view.pictures`); what has one names it, and it is loaded
-when it is asked for, so models and graphs stay free of Matplotlib.
+The pictures live in an upper layer (`netsp.view.pictures`). A class names its picture, which is
+loaded when it is shown, so models and graphs stay free of Matplotlib.
 """
 
 from __future__ import annotations
@@ -13,25 +13,24 @@ from netsp.base.registry import load
 
 
 class Drawn:
-    """Something with a picture: `picture` names the function that draws it on an axes."""
+    """Base of classes with a picture; `picture` names the function that draws it on axes."""
 
     picture: ClassVar[str]
 
     def plot(self, ax: Any = None, **more: Any) -> Any:
-        """Draw it with Matplotlib.
+        """Draw the object with Matplotlib.
 
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            Where to draw; by default, axes of a new figure.
+            Axes to draw on; by default, axes of a new figure.
         **more : Any
-            Options of the picture. A solution takes its `problem`, to draw the map underneath; the
-            tour alone is drawn without.
+            Options of the picture. A solution takes its `problem`, to draw the map under the tour.
 
         Returns
         -------
         matplotlib.axes.Axes
-            What it is drawn on; `.figure` of it can be saved.
+            The axes; their `figure` can be saved.
 
         Examples
         --------

@@ -1,17 +1,19 @@
-"""Models from JSON text: one line of complaint for anything wrong, naming field and value."""
+"""Models from JSON text, with one line of complaint that names field and value."""
 
 from __future__ import annotations
 
 import inspect
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Self, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
 
 from netsp.base.errors import InputError
 
 SCHEMA_VERSION = 1
+"""Format version of all files."""
 
 
 MARKS = {
@@ -21,12 +23,14 @@ MARKS = {
     "surprise file": {"events"},
     "scene": {"solids"},
 }
-"""What a file of each kind has and no other."""
+"""Fields that a file of each kind has and no other."""
 
 
 class Model(BaseModel):
-    """Base of all models: frozen, with no unknown fields; a call with wrong values ends in one
-    line, an `InputError`, as a file with wrong values does."""
+    """Base of all models: frozen, without unknown fields.
+
+    A call with wrong values raises `InputError` in one line, as a file with wrong values does.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -47,13 +51,15 @@ class Model(BaseModel):
         cls.__signature__ = _signature(cls)
 
     def __eq__(self, other: object) -> bool:
-        """By the fields: cached properties may be arrays, which are not equal or unequal."""
+        """Compare the fields only: cached properties may be arrays, which are neither equal nor
+        unequal."""
         if not isinstance(other, Model) or type(self) is not type(other):
             return NotImplemented
         return all(getattr(self, name) == getattr(other, name) for name in type(self).model_fields)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A copy without the cached properties of the original, which may not hold of it."""
+        """Return a copy without the cached properties of the original, which may not hold for the
+        copy."""
         copy = super().model_copy(update=update, deep=deep)
         for name in copy.__dict__.keys() - type(self).model_fields.keys():
             del copy.__dict__[name]
@@ -63,17 +69,18 @@ class Model(BaseModel):
 def _signature(model: type[BaseModel]) -> inspect.Signature:
     """Return the signature of a model's constructor for `inspect.signature` and help."""
     types = get_type_hints(model)  # without Annotated, which holds the checks of fields
-    return inspect.Signature(
-        [
+    parameters = []
+    for name, field in model.model_fields.items():
+        default = inspect.Parameter.empty
+        if not field.is_required():
+            default = field.get_default(call_default_factory=True, validated_data={})
+        annotation = types.get(name, field.annotation)
+        parameters.append(
             inspect.Parameter(
-                name, inspect.Parameter.KEYWORD_ONLY, annotation=types.get(name, field.annotation),
-                default=inspect.Parameter.empty if field.is_required() else field.get_default(
-                    call_default_factory=True, validated_data={}
-                ),
+                name, inspect.Parameter.KEYWORD_ONLY, annotation=annotation, default=default
             )
-            for name, field in model.model_fields.items()
-        ]
-    )  # fmt: skip
+        )
+    return inspect.Signature(parameters)
 
 
 M = TypeVar("M", bound=BaseModel)
@@ -82,8 +89,10 @@ M = TypeVar("M", bound=BaseModel)
 def read_model(
     model: type[M], text: str | bytes, source: str, context: Mapping[str, Any] | None = None
 ) -> M:
-    """A model of format version 1 from JSON, or `InputError` in one line; its validators get the
-    context."""
+    """Return a model of format version 1 from JSON; InputError in one line if it is not valid.
+
+    Validators of the model get the context.
+    """
     data = parse_json_object(text, source)
     _check_kind(model, data, source)
     if data.get("type") in ("FeatureCollection", "Feature"):
@@ -100,12 +109,12 @@ def read_model(
 
 
 def kind_of(data: Mapping[str, Any]) -> str | None:
-    """What a file plainly is, by its fields."""
+    """Return the kind of a file with characteristic fields, else None."""
     return next((k for k, marks in MARKS.items() if marks <= data.keys()), None)
 
 
 def _check_kind(model: type[BaseModel], data: dict[str, Any], source: str) -> None:
-    """InputError when a file is plainly of another kind than was asked for."""
+    """Raise InputError if a file is clearly of another kind than that of the model."""
     kind = kind_of(data)
     own = next((k for k, marks in MARKS.items() if marks <= model.model_fields.keys()), None)
     if kind and own and kind != own:
@@ -113,19 +122,14 @@ def _check_kind(model: type[BaseModel], data: dict[str, Any], source: str) -> No
 
 
 def parse_json(text: str | bytes, source: str) -> Any:
-    """Return the value that a JSON text holds; no object in it may repeat a key.
+    """Return the value that a JSON text holds, as `json.loads`; no object in it may repeat a key.
 
     Parameters
     ----------
     text : str or bytes
-        The text; bytes are UTF-8.
+        Text; bytes are UTF-8.
     source : str
-        What messages call it, such as the name of the file.
-
-    Returns
-    -------
-    object
-        Value, as from `json.loads`.
+        Name in messages, such as that of the file.
 
     Raises
     ------
@@ -173,7 +177,7 @@ def parse_json_object(text: str | bytes, source: str) -> dict[str, Any]:
 
 
 def explain(error: ValidationError) -> str:
-    """The first complaint of a validation error in one line: field, complaint, value."""
+    """Return the first complaint of a validation error in one line: field, complaint, value."""
     errors = error.errors(include_url=False)
     first = errors[0]
     where = ""
@@ -202,13 +206,9 @@ def explain(error: ValidationError) -> str:
         message = f"expected an object, {got}"
     else:
         message = f"{_decapitalise(first['msg'])}, {got}"
-    # items that are wrong are missing in pydantic's count of a list, too
+    # pydantic does not count wrong items of a list, and then calls the list too short, too
     short = {e["loc"] for e in errors if e["type"] == "too_short"}
-    counted = [
-        e for e in errors
-        if e["loc"] not in short
-        or not any(o["loc"][: len(e["loc"])] == e["loc"] != o["loc"] for o in errors)
-    ]  # fmt: skip
+    counted = [e for e in errors if e["loc"] not in short or not _has_wrong_item(e, errors)]
     extra = [e["loc"][-1] for e in errors if e["type"] == "extra_forbidden"]
     others = len(counted) - 1
     if kind == "missing" and extra:  # as like as not the same field, misspelt
@@ -217,12 +217,18 @@ def explain(error: ValidationError) -> str:
     return f"{where}: {message}{more}" if where else f"{message}{more}"
 
 
+def _has_wrong_item(error: ErrorDetails, errors: Sequence[ErrorDetails]) -> bool:
+    """Return whether there is an error about an item of the list that an error is about."""
+    place = error["loc"]
+    return any(other["loc"][: len(place)] == place != other["loc"] for other in errors)
+
+
 def _decapitalise(text: str) -> str:
     return text[:1].lower() + text[1:]
 
 
 def shown(value: Any) -> str:
-    """A value in a message, cut at 60 characters."""
+    """Return a value as it is shown in messages, cut at 60 characters."""
     try:
         text = repr(value)
     except Exception:  # of somebody else's class, or a number of more digits than Python writes

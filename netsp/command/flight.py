@@ -62,7 +62,7 @@ def fly(
                 **how,
             )
         except LimitReachedError:
-            if clock.stopped:
+            if clock.is_stopped:
                 raise KeyboardInterrupt from None
             raise
     if output is None or as_json:
@@ -103,7 +103,7 @@ def _flown(
             from netsp.plan.space.judge import check_mission_tour
 
             clock.bounded("judging the tour", lambda: check_mission_tour(mission, scene, field))
-        if clock.stopped:
+        if clock.is_stopped:
             raise KeyboardInterrupt
         if not quiet:
             note_scene(scene.name, field.notes)
@@ -165,7 +165,7 @@ def until_stopped(
     """Return a callback that also ends the flight at Ctrl-C."""
 
     def step(row: LogRow, planner: Planner) -> None:
-        if clock.stopped:
+        if clock.is_stopped:
             raise KeyboardInterrupt
         if on_step is not None:
             on_step(row, planner)

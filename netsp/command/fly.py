@@ -262,11 +262,11 @@ def complain(text: str) -> None:
 def _told_failure(args: argparse.Namespace, done: Execution) -> tuple[Exception | None, bool]:
     """Write the files of the run and print its result; return an exception that this raised, and
     whether Ctrl-C was pressed meanwhile. The caller stands by the vehicle in either case."""
-    from netsp.base.clock import whole_or_interrupted
+    from netsp.base.clock import deferred_interrupts
 
     failure = None
     try:
-        with whole_or_interrupted():
+        with deferred_interrupts():
             try:
                 _tell(args, done)
             except Exception as error:
@@ -303,7 +303,7 @@ def _stand_by(
     as it has printed what the vehicle will do."""
     from netsp.online.fly.standby import stand_by
 
-    has_stopped = clock.stopped
+    has_stopped = clock.is_stopped
     said: list[str] = []
 
     def say(text: str) -> None:
@@ -315,7 +315,7 @@ def _stand_by(
 
     def should_stop() -> bool:
         # where the first Ctrl-C has ended the flight, the next one interrupts
-        return bool(said) if has_pressed_again else clock.stopped and not has_stopped
+        return bool(said) if has_pressed_again else clock.is_stopped and not has_stopped
 
     stand_by(session, args.at_end, say=say, should_stop=should_stop)
 
@@ -391,7 +391,7 @@ def _flown(
 
     def on_step(row: ExecutionRow) -> None:
         rows[:] = [row]
-        if clock.stopped:
+        if clock.is_stopped:
             raise KeyboardInterrupt
         for text in session.texts():
             if not args.quiet:
@@ -408,7 +408,7 @@ def _flown(
             options,
             surprises=surprises,
             on_step=on_step,
-            should_stop=lambda: clock.stopped,
+            should_stop=lambda: clock.is_stopped,
             any_vehicle=args.any_vehicle,
             begins=begins,
             record=None if args.output is None else RunRecord(args.output, solution),

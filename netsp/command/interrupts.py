@@ -73,7 +73,7 @@ def until_interrupted(doing: str, call: Callable[[], T]) -> T:
         try:
             return clock.bounded(doing, call)
         except LimitReachedError:
-            if clock.stopped:
+            if clock.is_stopped:
                 raise KeyboardInterrupt from None
             raise
 

@@ -56,7 +56,7 @@ def _end_abandoned_work(code: int) -> None:
     """End the process at once if work that was abandoned still runs in another language: Python
     would end its thread in the middle of it, which aborts the process."""
     clock = sys.modules.get("netsp.base.clock")
-    if clock is None or not clock.abandoned_work_goes_on(ABANDONED_GRACE_S):
+    if clock is None or not clock.is_abandoned_work_running(ABANDONED_GRACE_S):
         return
     with contextlib.suppress(OSError, ValueError):
         sys.stdout.flush()

@@ -191,7 +191,7 @@ def run(args: argparse.Namespace) -> int:
     from netsp.model.solution import Solution
 
     json_output.check_stdout(args)
-    from netsp.base.clock import whole_or_interrupted
+    from netsp.base.clock import deferred_interrupts
     from netsp.judge import checked
     from netsp.plan import warm_start as warm_starts
     from netsp.plan.solve_problem import solve
@@ -246,7 +246,7 @@ def run(args: argparse.Namespace) -> int:
             if args.json:
                 json_output.tell(json_output.of_infeasible(problem, error))
             raise
-    with whole_or_interrupted():  # Ctrl-C loses no tour
+    with deferred_interrupts():  # Ctrl-C loses no tour
         text = checked(problem, solution).to_json()
         if args.output:
             write_text(args.output, text)

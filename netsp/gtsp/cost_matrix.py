@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Bools, Floats, Ints
-from netsp.base.ram import ask
+from netsp.base.ram import check_available
 from netsp.gtsp.nearest_index import NearestIndex
 from netsp.gtsp.sparse_costs import SparseCosts
 from netsp.gtsp.travel.costs import rounded_down
@@ -75,7 +75,7 @@ class CostMatrix:
         if graph.measured or len(graph) <= MEASURE_AT_ONCE:
             self.values = np.array(graph.costs)
             return
-        ask(
+        check_available(
             (BYTES_ROUNDED if many else BYTES_PER_LEG) * len(graph) ** 2,
             f"bounding every tour over {len(graph)} homotopy classes",
             "lower tether_length or max_classes, or use solver 'lns'",

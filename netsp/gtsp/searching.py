@@ -114,7 +114,7 @@ class SearchingRun(SolverRun):
             self._search(Instance.among(graph, core), clock)
             self.report("begun", vertices=len(graph))
             vain = 0 if self.length < before else vain + 1
-            if clock.up or self.tour is None or vain == IN_VAIN:
+            if clock.is_up or self.tour is None or vain == IN_VAIN:
                 break
             core = self._beside()
         return core
@@ -139,7 +139,7 @@ class SearchingRun(SolverRun):
         instance = Instance.among(graph, core)
         tours = [] if self.tour is None else [self.tour]
         for _ in range(count):
-            if clock.up:
+            if clock.is_up:
                 break
             search = Search(instance, self.rng, clock=clock)
             search.settle()
@@ -267,7 +267,7 @@ class SearchingRun(SolverRun):
             before = self.length
             self._search(self.instance(costs, more), clock, rounded=costs.rounded)
             vain = 0 if self.length < before else vain + 1
-            if self.searches_all_vertices(costs) or clock.up or vain == IN_VAIN:
+            if self.searches_all_vertices(costs) or clock.is_up or vain == IN_VAIN:
                 break
 
     def _search(self, instance: Instance, clock: Clock, *, rounded: bool = False) -> None:

@@ -50,7 +50,7 @@ class SolverRun:
             raise InputError(f"graph: no class of goal {lost[0]}; expected one of every goal")
         self.graph = graph
         self.known_length = limits.cutoff
-        self.clock = Clock.of(limits.time)
+        self.clock = Clock.from_limit(limits.time)
         self.iterations = 0
         self.iteration_limit = math.inf if limits.iterations is None else limits.iterations
         self.on_progress = limits.on_progress
@@ -171,7 +171,7 @@ class SolverRun:
 
     def check(self) -> None:
         """Raise `RunStopped` when a limit is reached."""
-        if self.clock.up or self.iterations >= self.iteration_limit:
+        if self.clock.is_up or self.iterations >= self.iteration_limit:
             raise RunStopped
 
     @property

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.compiled.dynamic_array import order_of
 from netsp.base.compiled.kernel import kernel
-from netsp.base.ram import ask
+from netsp.base.ram import check_available
 
 Columns = npt.NDArray[np.int32]
 
@@ -89,7 +89,7 @@ class SparseCosts:
             kept = Kept(rows, costs, own, longest, mates)
             counts = np.zeros(len(rows), dtype=np.int64)
             _by_rows(partial(_count, kept, counts), len(rows))
-            ask(
+            check_available(
                 BYTES * counts.sum(), f"the legs left between {vertices} homotopy classes",
                 "lower tether_length or max_classes, or use solver 'lns'",
             )  # fmt: skip

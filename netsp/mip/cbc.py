@@ -21,7 +21,7 @@ from pathlib import Path
 
 import pulp
 
-from netsp.base.clock import Clock, TimeLimit, whole_or_interrupted
+from netsp.base.clock import Clock, TimeLimit, deferred_interrupts
 from netsp.base.errors import NetspError
 
 GRACE = 1.0
@@ -63,7 +63,7 @@ def run_cbc(
         renamed = model.writeMPS(str(mps), rename=True, mip=1 if integer else 0)
         variable_names, constraint_names = renamed[1], renamed[2]
         command = [_binary(), str(mps)]
-        clock = Clock.of(limit)
+        clock = Clock.from_limit(limit)
         if (time_left := clock.left) != float("inf"):
             command += ["-sec", f"{max(time_left, 0.05):.3f}", "-timeMode", "elapsed"]
         if integer:
@@ -105,7 +105,7 @@ def _run(command: list[str], log: Path, clock: Clock) -> None:
     with log.open("wb") as stream:
         try:
             # Python calls hooks when it forks, and what is raised in those is lost
-            with whole_or_interrupted():
+            with deferred_interrupts():
                 process = subprocess.Popen(
                     command,
                     stdin=subprocess.DEVNULL,
@@ -115,7 +115,7 @@ def _run(command: list[str], log: Path, clock: Clock) -> None:
                     preexec_fn=_die_with_parent(),
                 )
             end = time.monotonic() + clock.left + GRACE
-            while time.monotonic() < end and not clock.stopped:
+            while time.monotonic() < end and not clock.is_stopped:
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     process.wait(WAIT)
                     break

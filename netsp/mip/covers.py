@@ -100,7 +100,7 @@ def refine_covers(
                 if better is not None and better[1] < level.run.cutoff:
                     tour, length = better
             gap = length - (level.run.bound or 0.0)
-            if level.over or clock.up or gap <= OPTIMALITY_TOLERANCE * length:
+            if level.over or clock.is_up or gap <= OPTIMALITY_TOLERANCE * length:
                 break
             before, covers = level, covers + 1
             if finer is not None and found is not None and covers == COARSE:

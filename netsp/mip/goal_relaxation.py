@@ -90,9 +90,9 @@ def bound_over_goals(
         See `Keep`. If it is given, covers of ways come first, then those of the classes left, whose
         bound says nothing of classes that a roadmap has left out.
     """
-    clock = Clock.of(limits.time)
-    least = graph.between_goals(lambda: clock.up)
-    bound, cuts, cells = one_tree_bound(least, lambda: clock.up), tuple[Cut, ...](), None
+    clock = Clock.from_limit(limits.time)
+    least = graph.between_goals(lambda: clock.is_up)
+    bound, cuts, cells = one_tree_bound(least, lambda: clock.is_up), tuple[Cut, ...](), None
     _holds_in_any_class(graph, bound * (1.0 - ROUNDING))
     if tour is not None and len(graph) > MANY_CLASSES:
         known = None if costs is None else costs()
@@ -141,7 +141,7 @@ def _over_cells(
         tower = ClassCovers(costs, graph.cluster, odd)
     else:
         some = clock.part(WAYS_SHARE)
-        ways = graph.ways_by_parity(lambda: some.up)
+        ways = graph.ways_by_parity(lambda: some.is_up)
         if ways is None:
             return None
         tower = PathCovers(ways, np.inf)

@@ -181,7 +181,7 @@ class HighsRelaxation:
     def solve(self, limit: TimeLimit) -> Point | None:
         """The optimum with duals; None if there is none or the time ran out."""
         h = self._highs
-        clock = Clock.of(limit)
+        clock = Clock.from_limit(limit)
         self._interruption.hear(clock, always=False)
         # from a basis the simplex method can end in numerical trouble, or not at all (100 goals at
         # tether 500, the eighth world: 29,000 steps and no end, where 11,000 from the start are

@@ -77,7 +77,7 @@ class HighsInteger:
     def solve(self, limit: TimeLimit) -> IntegerOutcome:
         """The best integer solution, as far as the time goes."""
         h = self._highs
-        clock = Clock.of(limit)
+        clock = Clock.from_limit(limit)
         # HiGHS can overrun its own limit in presolve and at the root of its tree
         self._interruption.hear(clock, always=True)
         run(h, clock.left)

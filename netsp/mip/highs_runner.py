@@ -52,11 +52,11 @@ class Interruption:
         """Of this clock from now on. Being asked at every step of the simplex method costs time, so
         that it is done only where it is needed."""
         self.clock = clock
-        if (always or clock.stoppable) and not self._on:
+        if (always or clock.can_stop) and not self._on:
             self._on = True
             for event in self._events:
                 event.subscribe(self._interrupt)
 
     def _interrupt(self, event: Any) -> None:
-        if self.clock.up:
+        if self.clock.is_up:
             event.interrupt()

@@ -41,7 +41,7 @@ def search_and_merge(run: SearchingRun, prove: Prove) -> None:
     while run.clock.limit and run.iteration_limit == np.inf and not run.is_done:
         run.check()
         tours = run.search_afresh(MERGED, run.clock.part(SEARCHED))
-        merge(run, tours, prove, Clock.of(run.clock))
+        merge(run, tours, prove, Clock.from_limit(run.clock))
 
 
 def merge(run: SearchingRun, tours: Sequence[Sequence[int]], prove: Prove, clock: Clock) -> None:

@@ -389,7 +389,7 @@ class MipRun(SearchingRun):
         incumbent's, unless they have been merged before. Not where iterations are limited, as
         they would be those of another program."""
         few = self.graph.goal_count < MERGED_FROM or not self.graph.roadmapped
-        idle = self.is_done or self.clock.up or self.iteration_limit < np.inf
+        idle = self.is_done or self.clock.is_up or self.iteration_limit < np.inf
         if few or idle or not self.local_optima or self.tour is None:
             return
         tours = list(dict.fromkeys([self.tour, *self.local_optima]))

@@ -30,7 +30,7 @@ import numpy as np
 
 from netsp.base.arrays import Floats, Ints
 from netsp.base.errors import InputError
-from netsp.base.ram import ask
+from netsp.base.ram import check_available
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.solver_run import RunStopped, SolverRun
 from netsp.gtsp.travel.graph import TravelGraph
@@ -113,7 +113,7 @@ def _all_legs(graph: TravelGraph, max_legs: int) -> tuple[Ints, Floats]:
             f"solver 'mip-2017': the program has {count:.0f} legs; expected at most {max_legs} "
             "(option max_legs): choose fewer goals, a shorter tether or solver mip"
         )
-    ask(BYTES_PER_LEG * count, f"a program of {count:.0f} legs", "choose solver mip")
+    check_available(BYTES_PER_LEG * count, f"a program of {count:.0f} legs", "choose solver mip")
     finite = np.triu(np.isfinite(graph.costs), 1)
     legs = np.argwhere(finite & (graph.cluster[:, None] != graph.cluster[None, :]))
     return legs.astype(np.int64), graph.costs[legs[:, 0], legs[:, 1]]

@@ -102,7 +102,7 @@ def _by_size(graph: TravelGraph, chosen: Params, limits: Limits) -> Result:
         return small.finish("proven" if small.is_done else "exact")
     if len(graph.before):
         return _in_part_ordered(graph, limits, chosen.backend)
-    clock = Clock.of(limits.time)
+    clock = Clock.from_limit(limits.time)
     limits = replace(limits, time=clock)
     if not graph.complete and graph.roadmapped:
         # it says that a proof over the classes that were kept may not come to an end
@@ -155,7 +155,7 @@ def _rounds(graph: TravelGraph) -> int:
 def _in_part_ordered(graph: TravelGraph, limits: Limits, backend: str) -> Result:
     """With precedences: walks, which remember them, prove where goals are few; with many, a search.
     The bound of the tours in any order holds, too, and is quickly had."""
-    clock = Clock.of(limits.time)
+    clock = Clock.from_limit(limits.time)
     limits = replace(limits, time=clock)
     few = walks_fit(graph) and graph.goal_count <= FEW_GOALS
     rounds = _rounds(graph)
@@ -196,7 +196,7 @@ def _from_few(graph: TravelGraph, limits: Limits, backend: str) -> Limits:
     core = least_tethers(graph.costs_to_base, graph.cluster, FEW_CLASSES)
     if len(core) == len(graph):
         return limits
-    share = Clock.of(limits.time).part(FEW_SHARE)
+    share = Clock.from_limit(limits.time).part(FEW_SHARE)
     found = MipRun(
         graph.subgraph(core),
         # bounds over few classes say nothing of the others
@@ -235,8 +235,8 @@ def _over_shortest(graph: TravelGraph, limits: Limits, backend: str) -> Result:
         return with_classes_left_out(found, least, graph.scope, because)
     whole = replace(found, tour=tuple(int(core[v]) for v in found.tour))
     otherwise = min(least, graph.least_by_way_of(graph.least_left_out))
-    clock = Clock.of(limits.time)
-    if otherwise < (whole.length or 0.0) and not clock.up:
+    clock = Clock.from_limit(limits.time)
+    if otherwise < (whole.length or 0.0) and not clock.is_up:
         # of few goals the shortest tour in any class is soon known
         _bound_by_goals(graph, Limits(clock, rng=limits.rng))
     return with_classes_left_out(whole, least, graph.scope, because)

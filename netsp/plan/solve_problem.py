@@ -191,7 +191,7 @@ def solve_graph(
         raise InputError(f"graph: expected a TravelGraph, got {graph!r}")
     tour = None if warm_start is None else _as_tour(warm_start, graph)
     rng = np.random.default_rng(_seed(seed))
-    clock = Clock.of(time_limit)
+    clock = Clock.from_limit(time_limit)
     with graph.on_clock(clock):
         limits = Limits(clock, iteration_limit, rng, tour, graph.progress_listener(on_progress))
         if isinstance(graph, BaselessGraph):
@@ -364,10 +364,10 @@ def solve(
                     winds_down=True,
                 )
             except LimitReachedError:
-                if rest.stopped and not clock.up:  # by Ctrl-C
+                if rest.is_stopped and not clock.is_up:  # by Ctrl-C
                     raise KeyboardInterrupt from None
                 raise
-        rest = rest if rest.stopped else clock
+        rest = rest if rest.is_stopped else clock
         built = clock.elapsed
         if keep_order:
             listener = graph.progress_listener(on_progress)
@@ -440,7 +440,7 @@ def solve_over(
         with until_interrupt(clock) as stoppable:
             carried = with_carried(graph, stoppable, rng, on_progress, on_graph, start)
         graph, start = carried.graph, carried.tour
-        clock = stoppable if stoppable.stopped else clock
+        clock = stoppable if stoppable.is_stopped else clock
     if on_graph is not None:
         on_graph(graph)
     result = solve_graph(

@@ -112,7 +112,7 @@ def with_carried(
 
     # from either start the search may end in a tour that the other leads past
     for along in (True, False):
-        if share.up and best:
+        if share.is_up and best:
             break
         looked = dict.fromkeys([*few, *(best if along else ())])
         if along and not best:
@@ -135,7 +135,7 @@ def _improved(
     most = min(MOST_CLASSES, MOST_PER_GOAL * graph.goal_count)
     best: list[Class] = []
     shortest, vain = np.inf, 0
-    while not share.up and vain < IN_VAIN:
+    while not share.is_up and vain < IN_VAIN:
         try:
             with graph.on_clock(share):
                 length, classes = _searched(graph, list(looked), best, rng, share)
@@ -153,7 +153,7 @@ def _improved(
         wanted: dict[Class, None] = {}
         from_all = not improved and len(looked) < most // 2
         for goal, word in [(0, ()), *(looked if from_all else (*best, *classes))]:
-            if goal not in ways and not share.up:
+            if goal not in ways and not share.is_up:
                 ways[goal] = carrier.ways(goal, NEAR)
             wanted |= dict.fromkeys((k, concatenate(word, way)) for k, way in ways.get(goal, ()))
         graph = _put_back(graph, [c for c in wanted if c not in looked], looked, share)
@@ -175,7 +175,7 @@ def _along_straight_lines(
     out: list[Class] = []
     word: Word = ()
     for start, goal in pairwise(tour):
-        if clock.up:
+        if clock.is_up:
             break
         there = carrier.carried(start, word, goal)
         word = least[goal] if there is None else there
@@ -189,7 +189,7 @@ def _put_back(
     """The graph with more classes, and what is looked at with those that the tether reaches."""
     assert graph.carrier is not None
     order = graph.before
-    graph = graph.carrier.with_classes(new, lambda: clock.up)
+    graph = graph.carrier.with_classes(new, lambda: clock.is_up)
     graph.before = order
     there = set(_classes(graph, np.arange(1, len(graph))))
     looked |= dict.fromkeys(c for c in new if c in there)

@@ -143,7 +143,7 @@ def with_old_classes(
     found = old_tour(problem, solution)
     wanted = [(goal + 1, word) for goal, word in zip(found.goals, found.words, strict=True)]
     before = graph.before
-    graph = graph.carrier.with_classes(wanted, lambda: clock.up)
+    graph = graph.carrier.with_classes(wanted, lambda: clock.is_up)
     graph.before = before
     return graph
 

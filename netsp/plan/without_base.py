@@ -61,7 +61,7 @@ def solve(graph: BaselessGraph, run: Run, limits: Limits, *, proves: bool) -> Re
         bounds, rows = [], list[Progress]()
         for k, root in enumerate(roots.tolist()):
             left = len(roots) - k
-            if clock.up and best.tour is not None:
+            if clock.is_up and best.tour is not None:
                 bounds += [0.0] * left
                 break
             part, vertices = graph.rooted(root)
@@ -111,7 +111,7 @@ def _searched(
 ) -> tuple[Result, Ints]:
     """A first tour from each root; the best of all, and the roots, that of the shortest first."""
     lengths = []
-    clock = Clock.of(limits.time).part(FIRST_SHARE)
+    clock = Clock.from_limit(limits.time).part(FIRST_SHARE)
     rounds = max(1, ROUNDS_PER_CLUSTER // len(roots)) * graph.cluster_count
     for k, root in enumerate(roots.tolist()):
         part, vertices = graph.rooted(root)

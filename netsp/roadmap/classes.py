@@ -124,7 +124,7 @@ class _Search:
             word = signature(contacts.draw(0, g, before), rays)
             nearest = (float(planar[g]), word)
             own, beyond = [nearest], nearest[0]
-            if not (self.clock.up or (self.rule == NON_LOOPING and is_looping(nearest[1]))):
+            if not (self.clock.is_up or (self.rule == NON_LOOPING and is_looping(nearest[1]))):
                 own, beyond = self._shortest_of_goal(g, share)
                 own = own or [nearest]
             rows += [(g, length, word) for length, word in own]
@@ -145,7 +145,7 @@ class _Search:
             found, words = self._classes_up_to(g, rest.to_end, reach, share)
             if found is None:
                 high = excess
-                if self.clock.up:
+                if self.clock.is_up:
                     break
                 excess = max(low + (high - low) / self.policy.shrink, 0.0)
                 continue
@@ -153,7 +153,7 @@ class _Search:
             if reach >= most:
                 known_to = math.inf
                 break
-            if len(words) >= share or self.clock.up:
+            if len(words) >= share or self.clock.is_up:
                 break
             low = excess
             excess = max(self.policy.growth * excess, 1e-6 * most)

@@ -303,7 +303,7 @@ def graph_from_state(
     state = problem.state
     assert state is not None
     policy = policy or RoadmapPolicy()
-    clock = Clock.of(time_limit)
+    clock = Clock.from_limit(time_limit)
     last = len(problem.goals) + 1
     limit = problem.tether_length
     plain = problem.model_copy(update={"state": None})

@@ -92,7 +92,7 @@ class PrmRoadmap:
                 f"roadmap 'prm': samples: expected a positive whole number, got {samples!r}"
             )
         self.problem = problem
-        clock = Clock.of(time_limit)
+        clock = Clock.from_limit(time_limit)
         self.paths = TautPaths(problem, clock=clock, policy=self.policy)
         outline = self.paths.outline
         fixed = problem.points.copy()
@@ -150,7 +150,7 @@ class PrmRoadmap:
         """
         planar = np.zeros(len(self.cluster))
         for v in range(1, len(planar)):
-            if clock.up:
+            if clock.is_up:
                 first = np.unique(self.cluster, return_index=True)[1]
                 keep = np.union1d(np.arange(v), first)
                 self._keep_classes(keep)
@@ -369,7 +369,7 @@ def _sample(
         grow = planner.growRoadmapPtc
     else:  # pragma: no cover - other releases of OMPL overload one name
         grow = planner.growRoadmap
-    grow(ob.PlannerTerminationCondition(lambda: planner.milestoneCount() >= samples or clock.up))
+    grow(ob.PlannerTerminationCondition(lambda: planner.milestoneCount() >= samples or clock.is_up))
     data = ob.PlannerData(info)
     planner.getPlannerData(data)
     count = data.numVertices()

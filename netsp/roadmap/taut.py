@@ -86,7 +86,7 @@ class TautRoadmap:
             raise InputError(f"classes: unknown {classes!r}; expected one of {', '.join(RULES)}")
         self.problem = problem
         self.rule: KeptClasses = "non-looping" if RULES[classes] == NON_LOOPING else "all"
-        self.clock = Clock.of(time_limit)
+        self.clock = Clock.from_limit(time_limit)
         self.paths = TautPaths(
             problem, clock=self.clock if limits_paths else None, policy=self.policy
         )

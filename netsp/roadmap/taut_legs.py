@@ -12,7 +12,7 @@ import numpy as np
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import NEVER, Clock, Flag
 from netsp.base.errors import LimitReachedError
-from netsp.base.ram import ask
+from netsp.base.ram import check_available
 from netsp.gtsp.travel.graph import UNTIMED
 from netsp.hsignature import Word, concatenate, invert
 from netsp.roadmap.branches import OPEN, Branches, Lengths, build_branches, fill, fill_parallel
@@ -118,7 +118,7 @@ class TautLegs:
     ) -> Floats:
         """Return all legs among vertices, found branch by branch (`netsp.roadmap.branches`)."""
         n = len(vertices)
-        ask(
+        check_available(
             float(np.dtype(kind).itemsize) * n**2,
             f"legs between {n} homotopy classes",
             "lower tether_length or max_classes",
@@ -266,7 +266,7 @@ class TautLegs:
         vertices = np.asarray(vertices, dtype=np.int64)
         cluster, planar, z = self.cluster[vertices], self.planar[vertices], self._z
         own = np.arange(len(vertices)) if rows is None else np.asarray(rows, dtype=np.int64)
-        ask(
+        check_available(
             3.0 * 8.0 * len(own) * len(vertices),
             f"bounds on the legs between {len(vertices)} homotopy classes",
             "lower tether_length or max_classes",

@@ -1,1 +1,2 @@
-"""What compiled loops need: random numbers, arrays that grow, hash slots."""
+"""Compiled kernels: when they are compiled, and random numbers, growing arrays and hash tables in
+them."""

@@ -35,7 +35,7 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 from netsp.base.compiled.lazy_library import LINKABLE, is_for_kernel, is_linkable
 
 FORMAT_VERSION = 7
-"""Version of the file format; kernels in files of another version are compiled again."""
+"""Format version of the files; kernels in files of another version are compiled again."""
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _IMPORTS = re.compile(r"^from (netsp[\w.]*) import (\([^)]*\)|[^\n]*)", re.M)
@@ -216,9 +216,16 @@ def is_supported() -> bool:
         pass
 
     methods = {
-        "_load_index", "_save_index", "_load_data", "_save_data", "_data_name", "_data_path",
-        "_dump", "load", "save",
-    }  # fmt: skip
+        "_load_index",
+        "_save_index",
+        "_load_data",
+        "_save_data",
+        "_data_name",
+        "_data_path",
+        "_dump",
+        "load",
+        "save",
+    }
     fields = {"_cache_path", "_index_name", "_index_path", "_source_stamp"}
     try:
         kept = IndexDataCacheFile("", "probe", None)

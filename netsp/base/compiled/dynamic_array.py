@@ -12,8 +12,6 @@ from netsp.base.arrays import Floats, Ints
 from netsp.base.compiled.interpretation import interprets
 from netsp.base.compiled.kernel import kernel
 
-RUN_LENGTH = 16  # entries that `order_of` sorts by insertion before it merges the runs
-
 
 @kernel
 def more_rows(a: Floats) -> Floats:
@@ -49,7 +47,7 @@ def more_int_rows(a: Ints) -> Ints:
 
 @kernel
 def longer(a: Floats) -> Floats:
-    """A float array with room for twice as many."""
+    """Return a copy of a float array with room for twice as many numbers."""
     b = np.empty(2 * len(a))
     for i in range(len(a)):
         b[i] = a[i]
@@ -91,14 +89,14 @@ def order_of(values: Floats) -> Ints:
     """Return the indices that sort numbers without NaN; equal numbers keep their order."""
     n = len(values)
     order, merged = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    for begin in range(0, n, RUN_LENGTH):
-        for i in range(begin, min(begin + RUN_LENGTH, n)):
+    size = 16  # runs of this length are sorted by insertion, then merged
+    for begin in range(0, n, size):
+        for i in range(begin, min(begin + size, n)):
             j = i
             while j > begin and values[order[j - 1]] > values[i]:
                 order[j] = order[j - 1]
                 j -= 1
             order[j] = i
-    size = RUN_LENGTH
     while size < n:
         for begin in range(0, n, 2 * size):
             middle, end = min(begin + size, n), min(begin + 2 * size, n)

@@ -10,7 +10,7 @@ from netsp.base.compiled.kernel import kernel
 
 @kernel
 def rehashed(key: Ints, value: Floats) -> tuple[Ints, Floats]:
-    """The same keys (slots,), -1 where empty, and values (slots,) in twice the slots."""
+    """Return keys (slots,), -1 where empty, and values (slots,) in a table with twice the slots."""
     n = 2 * len(key)
     key2 = np.full(n, -1, dtype=np.int64)
     value2 = np.empty(n)

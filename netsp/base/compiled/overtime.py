@@ -23,7 +23,8 @@ from netsp.base.compiled.compile_policy import current_policy
 T = TypeVar("T")
 
 MAX_STEPS_TO_EXCEPTION = 1000
-"""Loop steps within which Python raises an exception that is pending; it checks at each step."""
+"""Tolerance for the number of loop steps until Python raises a pending exception; it checks at each
+step."""
 
 
 class Overtime(BaseException):

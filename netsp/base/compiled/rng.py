@@ -1,8 +1,8 @@
-"""The random numbers of the compiled loops.
+"""Random numbers of compiled loops.
 
-xorshift64* (Vigna 2016, "An experimental exploration of Marsaglia's xorshift generators,
-scrambled"), its state an array of one word, seeded from the solver's generator: the same on every
-version of numpy and numba, and a tenth of the price of a method call.
+The generator is xorshift64* (Vigna 2016, "An experimental exploration of Marsaglia's xorshift
+generators, scrambled"). Its state is an array of one word, seeded from the solver's generator. So
+the numbers are the same with every version of NumPy and Numba, and cost a tenth of a method call.
 """
 
 from __future__ import annotations
@@ -15,17 +15,18 @@ import numpy.typing as npt
 from netsp.base.compiled.interpretation import interprets
 from netsp.base.compiled.kernel import kernel
 
-UINT64_MASK = 2**64 - 1  # keeps the low 64 bits, as arithmetic with uint64 does
+UINT64_MASK = 2**64 - 1
+"""Format of an unsigned integer of 64 bits: all bits set."""
 
 
 def seeded(rng: np.random.Generator) -> npt.NDArray[np.uint64]:
-    """State of a generator, drawn from another."""
+    """Return the state of a generator that is seeded from another one."""
     return np.array([rng.integers(1, 2**63)], dtype=np.uint64)
 
 
 @kernel
 def uniform(state: npt.NDArray[np.uint64]) -> float:
-    """A double in [0, 1)."""
+    """Return a double in [0, 1)."""
     x = state[0]
     x ^= x >> np.uint64(12)
     x ^= x << np.uint64(25)
@@ -47,12 +48,15 @@ def _uniform_by_integers(state: npt.NDArray[np.uint64]) -> float:
 
 @kernel
 def below(n: int, state: npt.NDArray[np.uint64]) -> int:
-    """A whole number in 0 … n - 1."""
+    """Return a whole number in 0 … n - 1."""
     return int(uniform(state) * n)
 
 
 @kernel
 def metropolis(rise: float, theta: float, state: npt.NDArray[np.uint64]) -> bool:
-    """Whether a change of cost is accepted: always if it falls, else with probability
-    exp(-rise / θ); equation (5) of 2017, (2) of 2016."""
+    """Return whether a change of cost is accepted: always if it falls, else with probability
+    exp(-rise / θ).
+
+    This is equation (5) of 2017, and (2) of 2016.
+    """
     return rise <= 0.0 or uniform(state) < math.exp(-rise / theta)

@@ -1,8 +1,8 @@
-"""Binary trees of boxes over items in a row, for questions that concern few of many items.
+"""Binary trees of boxes over items in a row, for queries that concern few of many items.
 
 The nodes stand in preorder: the left child of node k is k + 1, its right child is ``skip[k + 1]``,
 and ``skip[k]`` is the first node after its subtree. A loop without a stack visits, in the order of
-the items, all nodes whose boxes matter: it goes on at k + 1 where the box matters, else at skip[k].
+the items, all nodes whose boxes matter: it goes on at k + 1 if the box matters, else at skip[k].
 """
 
 from __future__ import annotations
@@ -13,25 +13,18 @@ import numpy as np
 
 from netsp.base.arrays import Floats, Ints
 
-LEAF_ITEMS = 4
-"""Items of a leaf. Fewer make more nodes, more test more items in vain; 2 to 8 cost about the
-same."""
-
-MORTON_BITS = 16
-"""Bits of a coordinate in `spatial_order`: cells of 1/65536 of the whole box."""
-
 
 class BoxTree(NamedTuple):
-    """Nodes in preorder.
+    """Nodes of a tree in preorder.
 
     Attributes
     ----------
     box
-        (nodes, 4) xmin, ymin, xmax, ymax of all items below.
+        Bounds (nodes, 4), xmin, ymin, xmax, ymax, of all items below.
     skip
-        (nodes,) first node after the subtree; node + 1 at a leaf.
+        First node (nodes,) after the subtree; node + 1 at a leaf.
     first, stop
-        (nodes,) items below: first to stop - 1.
+        Items (nodes,) below: first to stop - 1.
     """
 
     box: Floats
@@ -40,10 +33,17 @@ class BoxTree(NamedTuple):
     stop: Ints
 
 
-def build_box_tree(boxes: Floats) -> BoxTree:
-    """Return the tree over items with boxes (n, 4), whose order it keeps."""
+def build_box_tree(boxes: Floats, leaf_items: int = 4) -> BoxTree:
+    """Return the tree over items with boxes (n, 4), whose order it keeps.
+
+    Parameters
+    ----------
+    leaf_items : int
+        Number of items of a leaf. With fewer there are more nodes; with more, more items are tested
+        in vain.
+    """
     n = len(boxes)
-    leaves = -(-n // LEAF_ITEMS)
+    leaves = -(-n // leaf_items)
     nodes = max(2 * leaves - 1, 0)
     box = np.empty((nodes, 4))
     skip, first, stop = (np.empty(nodes, dtype=np.int64) for _ in range(3))
@@ -51,15 +51,15 @@ def build_box_tree(boxes: Floats) -> BoxTree:
     levels = []
     while len(node):
         skip[node] = node + 2 * count - 1
-        first[node] = low * LEAF_ITEMS
-        stop[node] = np.minimum((low + count) * LEAF_ITEMS, n)
+        first[node] = low * leaf_items
+        stop[node] = np.minimum((low + count) * leaf_items, n)
         split = count > 1
         leaf = node[~split]
         bounds = np.array([first[leaf], stop[leaf]]).T
         for column, extreme in enumerate((np.minimum, np.minimum, np.maximum, np.maximum)):
             values = boxes[:, column]
             at = extreme(values[bounds[:, 0]], values[bounds[:, 1] - 1])
-            for k in range(1, LEAF_ITEMS - 1):
+            for k in range(1, leaf_items - 1):
                 at = extreme(at, values[np.minimum(bounds[:, 0] + k, bounds[:, 1] - 1)])
             box[leaf, column] = at
         node, low, count = node[split], low[split], count[split]
@@ -73,15 +73,21 @@ def build_box_tree(boxes: Floats) -> BoxTree:
     return BoxTree(box, skip, first, stop)
 
 
-def spatial_order(boxes: Floats) -> Ints:
-    """Return the order of boxes (n, 4) along a Z-order curve (Morton 1966) of their centres."""
+def spatial_order(boxes: Floats, bits: int = 16) -> Ints:
+    """Return the order of boxes (n, 4) along a Z-order curve (Morton 1966) of their centres.
+
+    Parameters
+    ----------
+    bits : int
+        Number of bits of a coordinate, at most 31; the default means cells of 1/65536 of the whole.
+    """
     if len(boxes) == 0:
         return np.zeros(0, dtype=np.int64)
     centre = 0.5 * (boxes[:, :2] + boxes[:, 2:])
     low = centre.min(axis=0)
     extent = max(float(np.ptp(centre, axis=0).max()), np.finfo(float).tiny)
-    cell = ((centre - low) / extent * (2**MORTON_BITS - 1)).astype(np.int64)
+    cell = ((centre - low) / extent * (2**bits - 1)).astype(np.int64)
     code = np.zeros(len(boxes), dtype=np.int64)
-    for bit in range(MORTON_BITS):
+    for bit in range(bits):
         code |= ((cell[:, 0] >> bit) & 1) << (2 * bit) | ((cell[:, 1] >> bit) & 1) << (2 * bit + 1)
     return np.argsort(code, kind="stable")

@@ -1,7 +1,7 @@
-"""Planar kernels: distances, containment, crossings. Compiled, cached, no policy.
+"""Planar kernels: distances, containment, crossings. Compiled.
 
-Obstacles come as *blockers*: circles ``(x, y, R)`` and polygons given by their edges, each grown by
-a margin. Everything is decided by distances, so a polygon and a circle obey one rule.
+Obstacles are *blockers*: circles ``(x, y, R)`` and polygons given by their edges, each grown by a
+margin. All decisions use distances, so one rule holds for polygons and circles.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ class Blockers(NamedTuple):
     Attributes
     ----------
     circles
-        (n, 3) centre and grown radius, radius negative for a polygon.
+        Centre and grown radius (n, 3) of each obstacle; the radius is negative for a polygon.
     edges
-        (k, 4) polygon edges; obstacle o owns edge_start[o]:edge_start[o + 1], grown by grow[o].
+        Edges (k, 4) of polygons; obstacle o has edge_start[o]:edge_start[o + 1], grown by grow[o].
     box
-        (n, 4) bounding boxes.
+        Bounding boxes (n, 4).
     eps
-        What goes no deeper touches.
+        Depth up to which a point only touches an obstacle.
     part
-        (parts, 2) obstacle and edge, -1 for a circle: all circles and edges, those of one polygon
+        Obstacle and edge (parts, 2), -1 for a circle: all circles and edges, those of one polygon
         in a row and in order.
     part_box
-        (parts, 4) their grown boxes.
+        Grown boxes (parts, 4) of the parts.
     tree
         `BoxTree` over the parts.
     """
@@ -75,7 +75,7 @@ def make_blockers(
 def point_segment_distance(
     px: float, py: float, ax: float, ay: float, bx: float, by: float
 ) -> float:
-    """Distance from a point to the segment ab."""
+    """Return the distance from a point to the segment ab."""
     dx, dy = bx - ax, by - ay
     length2 = dx * dx + dy * dy
     t = 0.0
@@ -88,7 +88,7 @@ def point_segment_distance(
 def segments_cross(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
 ) -> bool:
-    """Whether two segments properly cross."""
+    """Return whether the segments ab and cd properly cross."""
     d1 = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
     d2 = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
     d3 = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
@@ -100,7 +100,7 @@ def segments_cross(
 def segment_segment_distance(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
 ) -> float:
-    """Distance between the segments ab and cd; 0 where they cross."""
+    """Return the distance between the segments ab and cd; 0 if they cross."""
     if segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
         return 0.0
     return min(
@@ -113,7 +113,7 @@ def segment_segment_distance(
 
 @kernel
 def point_in_polygon(px: float, py: float, edges: Floats, start: int, stop: int) -> bool:
-    """Whether a point lies in the polygon of edges (n, 4) start to stop - 1."""
+    """Return whether a point lies in the polygon of edges (n, 4) start to stop - 1."""
     inside = False
     for e in range(start, stop):
         ay, by = edges[e, 1], edges[e, 3]
@@ -126,7 +126,7 @@ def point_in_polygon(px: float, py: float, edges: Floats, start: int, stop: int)
 
 @kernel
 def depth_in_obstacle(px: float, py: float, o: int, blockers: Blockers) -> float:
-    """How deep a point lies inside obstacle `o`; negative outside."""
+    """Return the depth of a point inside obstacle `o`, negative outside."""
     circles, edges, edge_start = blockers.circles, blockers.edges, blockers.edge_start
     if circles[o, 2] >= 0.0:
         return float(circles[o, 2] - math.hypot(px - circles[o, 0], py - circles[o, 1]))
@@ -144,8 +144,8 @@ def depth_in_obstacle(px: float, py: float, o: int, blockers: Blockers) -> float
 def enters_polygon(
     ax: float, ay: float, bx: float, by: float, edges: Floats, start: int, stop: int, growth: float
 ) -> bool:
-    """Whether a segment comes nearer than `growth` to the polygon of edges (n, 4) start to
-    stop - 1."""
+    """Return whether a segment is closer than `growth` to the polygon of edges (n, 4) start to stop
+    - 1."""
     for e in range(start, stop):
         d = segment_segment_distance(
             ax, ay, bx, by, edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
@@ -158,9 +158,8 @@ def enters_polygon(
 @kernel
 def segment_blocked(ax: float, ay: float, bx: float, by: float, blockers: Blockers) -> bool:
     """Return whether the segment ab enters any of the blockers by more than eps."""
-    skip, box, first, stop = (
-        blockers.tree.skip, blockers.tree.box, blockers.tree.first, blockers.tree.stop
-    )  # fmt: skip
+    skip, box = blockers.tree.skip, blockers.tree.box
+    first, stop = blockers.tree.first, blockers.tree.stop
     part, part_box, edges, eps = blockers.part, blockers.part_box, blockers.edges, blockers.eps
     left, right, low, high = min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)
     dx, dy = bx - ax, by - ay
@@ -179,10 +178,9 @@ def segment_blocked(ax: float, ay: float, bx: float, by: float, blockers: Blocke
         if skip[node - 1] > node:
             continue
         for k in range(first[node - 1], stop[node - 1]):
-            if (
-                right < part_box[k, 0] or left > part_box[k, 2]
-                or high < part_box[k, 1] or low > part_box[k, 3]
-            ):  # fmt: skip
+            if right < part_box[k, 0] or left > part_box[k, 2]:
+                continue
+            if high < part_box[k, 1] or low > part_box[k, 3]:
                 continue
             o, e = part[k, 0], part[k, 1]
             if e < 0:
@@ -203,9 +201,8 @@ def segment_blocked(ax: float, ay: float, bx: float, by: float, blockers: Blocke
 @kernel
 def in_polygon_of(px: float, py: float, blockers: Blockers) -> bool:
     """Return whether a point lies in any polygon, not grown, of the blockers."""
-    skip, box, first, stop = (
-        blockers.tree.skip, blockers.tree.box, blockers.tree.first, blockers.tree.stop
-    )  # fmt: skip
+    skip, box = blockers.tree.skip, blockers.tree.box
+    first, stop = blockers.tree.first, blockers.tree.stop
     part, edges = blockers.part, blockers.edges
     obstacle = int(np.int64(-1))  # no literal: callees are compiled once
     inside = False
@@ -236,9 +233,8 @@ def in_polygon_of(px: float, py: float, blockers: Blockers) -> bool:
 @kernel
 def is_covered(px: float, py: float, blockers: Blockers) -> bool:
     """Return whether a point lies in any of the blockers by more than eps."""
-    skip, box, first, stop = (
-        blockers.tree.skip, blockers.tree.box, blockers.tree.first, blockers.tree.stop
-    )  # fmt: skip
+    skip, box = blockers.tree.skip, blockers.tree.box
+    first, stop = blockers.tree.first, blockers.tree.stop
     part, edges, eps = blockers.part, blockers.edges, blockers.eps
     node = int(np.int64(0))  # no literal: callees are compiled once
     while node < len(skip):
@@ -267,7 +263,7 @@ def is_covered(px: float, py: float, blockers: Blockers) -> bool:
 def circle_line_angles(
     cx: float, cy: float, r: float, ax: float, ay: float, bx: float, by: float, out: Floats, n: int
 ) -> int:
-    """Append the angles at which a circle meets the line through two points; returns the count."""
+    """Append the angles at which a circle meets the line through two points; return the count."""
     dx, dy = bx - ax, by - ay
     length = math.hypot(dx, dy)
     if length == 0.0:
@@ -287,7 +283,7 @@ def circle_line_angles(
 def circle_circle_angles(
     cx: float, cy: float, r: float, ox: float, oy: float, q: float, out: Floats, n: int
 ) -> int:
-    """Append the angles (on the first circle) at which two circles meet; returns the count."""
+    """Append the angles on the first circle at which two circles meet; return the count."""
     d = math.hypot(ox - cx, oy - cy)
     if d == 0.0 or r == 0.0:
         return n

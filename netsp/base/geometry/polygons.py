@@ -1,4 +1,4 @@
-"""Simple polygons: validity, an interior point, signed distance. Plain geometry for the door."""
+"""Simple polygons: validity, an interior point, signed distance."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ import numpy.typing as npt
 Vertices = Sequence[tuple[float, float]]
 
 SAME_PLACE = 1e-12
-"""Distance of equal places, as a share of the largest coordinate, that rounding explains."""
+"""Tolerance for the distance of equal places, as a share of the largest coordinate."""
 
 UNION_GRIDS = (0.0, 1e-12, 1e-10, 1e-8)
-"""Grids to which `union` rounds, as shares of the largest coordinate, the finest first."""
+"""Tolerance for coordinates of `union`: grids to which they are rounded, as shares of the largest
+coordinate, the finest first."""
 
 
 def check_polygon(vertices: Vertices) -> None:
@@ -33,7 +34,7 @@ def check_polygon(vertices: Vertices) -> None:
         raise ValueError("polygon has zero area; expected one that encloses something")
     if reason:
         raise ValueError(
-            f"polygon is not simple: {_told(reason)}; expected edges that do not cross"
+            f"polygon is not simple: {_plain_reason(reason)}; expected edges that do not cross"
         )
 
 
@@ -42,16 +43,6 @@ def union(shapes: Sequence[Any]) -> Any:
 
     GEOS 3.14 may lose whole pieces where edges nearly coincide, without an error. A union in which
     corners of the shapes are missing is repeated with coordinates rounded to a grid.
-
-    Parameters
-    ----------
-    shapes : sequence of shapely.Geometry
-        The shapes.
-
-    Returns
-    -------
-    shapely.Geometry
-        The union.
 
     Examples
     --------
@@ -74,16 +65,16 @@ def union(shapes: Sequence[Any]) -> Any:
     return whole
 
 
-def _told(reason: str) -> str:
-    """GEOS's reason, such as "Self-intersection[0.0005 11.5]", as a person would say it."""
+def _plain_reason(reason: str) -> str:
+    """Return GEOS's reason, such as "Self-intersection[0.0005 11.5]", in plain words."""
     kind, _, place = reason.removesuffix("]").partition("[")
     at = ", ".join(f"{float(v):.6g}" for v in place.split())
-    said = {"Self-intersection": "edges cross", "Ring Self-intersection": "it touches itself"}
-    return f"{said.get(kind, kind.lower())} at ({at})" if at else kind.lower()
+    plain = {"Self-intersection": "edges cross", "Ring Self-intersection": "it touches itself"}
+    return f"{plain.get(kind, kind.lower())} at ({at})" if at else kind.lower()
 
 
 def counterclockwise(vertices: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """(k, 2) vertices in counter-clockwise order, without repeated or collinear ones."""
+    """Return vertices (k, 2) in counter-clockwise order, without repeated or collinear ones."""
     v = np.asarray(vertices, dtype=float)
     keep = np.any(v != np.roll(v, 1, axis=0), axis=1)
     v = v[keep]
@@ -117,7 +108,7 @@ def _every_other(flat: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
 
 
 def polygon_signed_distance(vertices: Vertices, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Distance of points (..., 2) to the outline, negative inside."""
+    """Return the distance of points (..., 2) to the outline, negative inside."""
     p = np.asarray(xy, dtype=float)
     a = np.asarray(vertices, dtype=float)
     b = np.roll(a, -1, axis=0)
@@ -136,8 +127,10 @@ def polygon_signed_distance(vertices: Vertices, xy: npt.ArrayLike) -> npt.NDArra
 
 @functools.lru_cache(maxsize=4096)
 def polygon_thickness(vertices: tuple[tuple[float, float], ...]) -> float:
-    """Width of the thinnest part of a simple polygon, to a millionth of its size. Kept, because a
-    scene is made anew whenever one of its obstacles changes."""
+    """Return the width of the thinnest part of a simple polygon, to a millionth of its size.
+
+    The result is cached, because a scene is built anew whenever one of its obstacles changes.
+    """
     import shapely
 
     shape = shapely.Polygon(vertices)
@@ -154,8 +147,11 @@ def polygon_thickness(vertices: tuple[tuple[float, float], ...]) -> float:
 
 
 def polygon_interior_point(vertices: Vertices) -> tuple[float, float]:
-    """A point well inside, the same on every machine: the centroid when it keeps a tenth of the
-    best depth found, else the middle of the deepest horizontal chord at 15 fixed heights."""
+    """Return a point well inside, the same on every machine.
+
+    It is the centroid if that is at least a tenth as deep as the deepest point found, else the
+    middle of the deepest horizontal chord at 15 fixed heights.
+    """
     v = np.asarray(vertices, dtype=float)
     origin = v[0]
     x, y = (v - origin).T
@@ -179,22 +175,24 @@ def polygon_interior_point(vertices: Vertices) -> tuple[float, float]:
     return float(chosen[0]), float(chosen[1])
 
 
-AT_ONCE = 64
-"""Number of points whose distance to an outline is computed at once; bounds the memory."""
-
-
 def _depths(
-    vertices: Vertices, points: npt.NDArray[np.float64], most: npt.NDArray[np.float64]
+    vertices: Vertices,
+    points: npt.NDArray[np.float64],
+    bounds: npt.NDArray[np.float64],
+    chunk_points: int = 64,
 ) -> npt.NDArray[np.float64]:
-    """Return the depths of points (n, 2) in a polygon, given an upper bound `most` on each; -inf
-    for a point whose bound shows that another point lies deeper."""
+    """Return the depths of points (n, 2) in a polygon, given an upper bound on each.
+
+    A point whose bound shows that another point lies deeper gets -inf. Distances of `chunk_points`
+    points are computed at a time, to save memory.
+    """
     out = np.full(len(points), -np.inf)
-    order = np.argsort(-most, kind="stable")
-    for first in range(0, len(order), AT_ONCE):
-        some = order[first : first + AT_ONCE]
-        if most[some[0]] * (1.0 + 1e-9) < out.max():
+    order = np.argsort(-bounds, kind="stable")
+    for first in range(0, len(order), chunk_points):
+        chunk = order[first : first + chunk_points]
+        if bounds[chunk[0]] * (1.0 + 1e-9) < out.max():
             break
-        out[some] = -polygon_signed_distance(vertices, points[some])
+        out[chunk] = -polygon_signed_distance(vertices, points[chunk])
     return out
 
 

@@ -10,18 +10,19 @@ from netsp.base.arrays import Bools, Floats
 
 
 def length(path: Floats) -> float:
-    """Length of a polyline; 0 of fewer than two points."""
+    """Return the length of a polyline; 0 for fewer than two points."""
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
 def along(path: Floats) -> Floats:
-    """(k,) length of a polyline up to each of its points."""
+    """Return the length (k,) of a polyline up to each of its points."""
     steps: Floats = np.linalg.norm(np.diff(path, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def dense(path: Floats, step: float) -> Floats:
-    """Points (n, d) of a polyline at most `step` apart, all of its own among them but the first."""
+    """Return points (n, d) of a polyline at most `step` apart: all of its own but the first, and
+    more."""
     out = []
     for a, b in pairwise(path):
         k = max(1, int(np.ceil(np.linalg.norm(b - a) / step)))
@@ -30,7 +31,7 @@ def dense(path: Floats, step: float) -> Floats:
 
 
 def points_along(path: Floats, step: float) -> Floats:
-    """Points (n, d) of a polyline every `step` or less, both ends among them."""
+    """Return points (n, d) of a polyline at equal distances of at most `step`, with both ends."""
     s = along(path)
     n = max(1, int(np.ceil(s[-1] / step)))
     u = np.linspace(0.0, s[-1], n + 1)
@@ -38,15 +39,15 @@ def points_along(path: Floats, step: float) -> Floats:
 
 
 def part(path: Floats, start: float, end: float) -> Floats:
-    """The part (n, d) of a polyline between two lengths along it, with the points in between."""
+    """Return the part (n, d) of a polyline between two lengths along it."""
     s = along(path)
     ends = np.column_stack([np.interp([start, end], s, path[:, k]) for k in range(path.shape[1])])
     return np.vstack([ends[:1], path[(s > start) & (s < end)], ends[1:]])
 
 
 def telling(path: Floats, tolerance: float) -> Bools:
-    """(k,) which points of a polyline it takes to be nowhere off by more than that (Douglas &
-    Peucker 1973)."""
+    """Return which points (k,) are needed to keep a polyline to a tolerance (Douglas & Peucker
+    1973)."""
     kept = np.zeros(len(path), dtype=bool)
     kept[[0, -1] if len(path) else []] = True
     spans = [(0, len(path) - 1)]
@@ -66,7 +67,7 @@ def telling(path: Floats, tolerance: float) -> Bools:
 
 
 def distance(path: Floats, point: Floats) -> float:
-    """Least distance of a point from a path (n, 3)."""
+    """Return the least distance of a point from a path (n, d)."""
     if len(path) == 1:
         return float(np.linalg.norm(path[0] - point))
     begin, step = path[:-1], np.diff(path, axis=0)

@@ -23,7 +23,7 @@ from xml.parsers import expat
 import numpy as np
 
 from netsp.base.errors import InputError
-from netsp.base.files import MOST_BYTES, read_bytes
+from netsp.base.files import FilePolicy, read_bytes
 from netsp.base.validated import shown
 from netsp.exchange.maps.feature import Change, Feature, Map, Unread, change_notes, with_tags
 from netsp.exchange.maps.import_policy import DEFAULT_READ, ReadPolicy
@@ -120,8 +120,9 @@ class _Archive:
     def read(self, path: str) -> bytes:
         entry = self.pages[path]
         try:
-            if entry.file_size > MOST_BYTES:
-                raise InputError(f"{self.file}: unpacks to more than {MOST_BYTES / 2**20:g} MiB")
+            limit = FilePolicy.max_bytes / 2**20
+            if entry.file_size > FilePolicy.max_bytes:
+                raise InputError(f"{self.file}: unpacks to more than {limit:g} MiB")
             return self.archive.read(entry)
         except (
             zipfile.BadZipFile,
@@ -224,8 +225,9 @@ class _Reader:
     def read_page(self, page: _Page, folders: tuple[str, ...], *, is_root: bool) -> None:
         """Read one page."""
         self.size += len(page.data)
-        if self.size > MOST_BYTES:
-            raise InputError(f"{self.file}: unpacks to more than {MOST_BYTES / 2**20:g} MiB")
+        limit = FilePolicy.max_bytes / 2**20
+        if self.size > FilePolicy.max_bytes:
+            raise InputError(f"{self.file}: unpacks to more than {limit:g} MiB")
         if len(self.seen) > self.policy.max_pages:
             raise InputError(f"{self.file}: links to more than {self.policy.max_pages} pages")
         called = str(self.file) if is_root else f"{self.file}: {page.name}"

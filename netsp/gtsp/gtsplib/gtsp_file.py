@@ -16,7 +16,7 @@ import numpy as np
 from netsp.base.arrays import ComparesArrays, Floats, Ints
 from netsp.base.errors import InputError
 from netsp.base.files import read_text
-from netsp.base.ram import ask
+from netsp.base.ram import check_available
 from netsp.base.validated import shown
 from netsp.gtsp.gtsplib.metrics import METRICS
 from netsp.gtsp.travel.graph import TravelGraph
@@ -170,7 +170,7 @@ class _Reader:
                 f"{shown(kind)}",
             )  # fmt: skip
         n = self.whole("DIMENSION", 1, MOST_VERTICES)
-        ask(
+        check_available(
             BYTES_PER_LEG * n * n, f"{self.path}: the legs among {n} vertices",
             "take a smaller instance",
         )  # fmt: skip

@@ -152,7 +152,7 @@ class Search:
         leg = self.length / n
         # the temperature falls in steps of so many rounds, whatever the time that they take
         step = 1 if progress else max(1, int(rounds) // STEPS)
-        while done < rounds and n > 3 and not clock.up:
+        while done < rounds and n > 3 and not clock.is_up:
             share = progress() if progress else (done - done % step) / rounds
             theta = leg * HOT * (COLD / HOT) ** min(share, 1.0)
             count = int(min(chunk, rounds - done if progress else step - done % step))

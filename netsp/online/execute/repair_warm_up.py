@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from netsp.base.clock import interrupts_remembered
+from netsp.base.clock import remembered_interrupts
 from netsp.base.compiled.compile_policy import compiles, everything_compiled
 from netsp.base.compiled.kernel import runs_compiled
 from netsp.gtsp.dp.label_kernels import extend
@@ -49,7 +49,7 @@ def warm_up_repair() -> None:
     )
     world = random_world(1, goals=9, tether_length=450.0)
     begun = State(position=world.goals[0].position, signature=())
-    with interrupts_remembered() as check, everything_compiled():
+    with remembered_interrupts() as check, everything_compiled():
         repair(
             tiny,
             np.array([4.0, 0.0, 0.0]),

@@ -166,10 +166,10 @@ def repair(
         try:
             made = _repaired(problem, robot, tether, left, speed, why, seed, clock, reserve, policy)
         except NetspError:
-            if clock.stopped:
+            if clock.is_stopped:
                 raise KeyboardInterrupt from None
             raise
-        if clock.stopped:
+        if clock.is_stopped:
             raise KeyboardInterrupt
         return made
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from netsp.base.clock import interrupts_remembered
+from netsp.base.clock import remembered_interrupts
 from netsp.base.compiled.compile_policy import compiles, everything_compiled
 from netsp.model.problem import Problem
 from netsp.online.execute.events import Surprises
@@ -54,7 +54,7 @@ def rehearse() -> None:
     if not compiles():
         return
     site = Problem.model_validate(_SITE)
-    with interrupts_remembered() as check, everything_compiled():
+    with remembered_interrupts() as check, everything_compiled():
         tour = solve(site)
         check()
         execute(

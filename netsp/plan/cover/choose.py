@@ -60,7 +60,7 @@ def choose(
     needed = share * float(weights.sum())
     taken = prune(matrix, weights, choose_greedily(matrix, weights, needed), needed)
     bound = counting_bound(matrix, weights, needed)
-    if matrix.sum() <= policy.max_matrix_entries and not clock.up and bound < len(taken):
+    if matrix.sum() <= policy.max_matrix_entries and not clock.is_up and bound < len(taken):
         better, proven = solve_program(matrix, weights, needed, clock)
         bound = max(bound, proven)
         if better is not None and len(better) < len(taken):

@@ -159,11 +159,11 @@ def find_viewpoints(
         hidden, max(1, math.ceil(len(hidden) / viewer.policy.patches_per_round))
     ):
         left = part[~seen[part]]
-        if clock.up or not len(left):
+        if clock.is_up or not len(left):
             continue
         tell(f"looking for what is hidden, {int((~seen).sum())} patches left")
         for place, patch in zip(*viewer.before(*_around(viewer, left, rng)), strict=True):
-            if seen[patch] or clock.up:
+            if seen[patch] or clock.is_up:
                 continue
             view = viewer.looks(place[None], np.array([patch]))
             if view.sees[0, patch]:

@@ -269,7 +269,7 @@ def _solve_candidates(
         candidate = rated[k]
         if not candidate.possible:
             break
-        if clock.up or (best is not None and not every and _is_worse(candidate, best)):
+        if clock.is_up or (best is not None and not every and _is_worse(candidate, best)):
             continue
         try:
             found = solve(_with_base(problem, candidate.position), time_limit=clock, seed=seed)
@@ -468,7 +468,7 @@ def _tour_bound(problem: Problem, to: Floats, between: Floats, clock: Clock, see
     choices = problem.clusters[within]
     over = TravelGraph.from_costs(costs, [0, *choices.tolist()])
     least = 2.0 * max(float(to[choices == c].min()) for c in np.unique(choices))  # there and back
-    if clock.up:
+    if clock.is_up:
         return least
     bound = solve_graph(over, time_limit=clock, seed=seed).lower_bound or 0.0
     return max(least, bound) * (1.0 - ROUNDING)

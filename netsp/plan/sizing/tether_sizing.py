@@ -269,7 +269,7 @@ def _staircase(
         if len(np.unique(graph.cluster[fits])) <= graph.goal_count:
             whole = True
             break
-        if clock.up:
+        if clock.is_up:
             break
         try:
             result, vertices = _solve_step(graph, fits, solver, clock, seed, limit)

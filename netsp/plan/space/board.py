@@ -120,7 +120,7 @@ class StateGraph:
         is_complete = True
         for v in range(len(self._out), len(self.states.entries)):
             # one way to each waypoint there must be
-            is_complete = is_complete and not clock.up
+            is_complete = is_complete and not clock.is_up
             is_first = self.states.at_place[self.states.entries[v].place][0] == v
             self._out.append(self._path_along_tether(v) if is_complete or is_first else None)
         if self.states.present is not None and self._out[self.states.present] is None:

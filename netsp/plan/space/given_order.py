@@ -66,7 +66,7 @@ def drive_order(
     robot, tether = np.array(mission.begin), context.present_tether
     walked, legs = [robot], []
     for _ in range(context.policy.orders.max_paths_per_waypoint * (2 + len(order))):
-        if clock.up:
+        if clock.is_up:
             return None
         before = len(planner.reached)
         command = planner.step(robot, tether)

@@ -134,7 +134,7 @@ class _Flights:
             True if it was cut short because it took longer than `cutoff_s`.
         """
         clock = clock or self.clock
-        if clock.up:
+        if clock.is_up:
             return None, False
         self.on_progress(f"flying {name}")
         slower = False
@@ -142,7 +142,7 @@ class _Flights:
         def watch(row: LogRow, _: object) -> None:
             nonlocal slower
             slower = row.time > cutoff_s
-            if slower or clock.up:
+            if slower or clock.is_up:
                 raise KeyboardInterrupt  # it ends a flight
 
         if all(w.heading is None for w in mission.waypoints):
@@ -372,7 +372,7 @@ def solve_mission(
                 found = _Incumbents(flights)
                 _begin_as_given(found, clock.part(policy.given_share), seed)
         except LimitReachedError:
-            if clock.stopped and not (isinstance(time_limit, Clock) and time_limit.up):
+            if clock.is_stopped and not (isinstance(time_limit, Clock) and time_limit.is_up):
                 raise KeyboardInterrupt from None
             raise
         searched = _search(found, clock, name, solver, params, iteration_limit, seed)
@@ -390,7 +390,9 @@ def solve_mission(
         _offer_given_flight(found, seed)
         best = _with_bound(found.best, searched.bounds)
         best = replace(best, mission=with_gaps(best.mission, context))
-        return replace(best, given=found.given, plan=planned, interrupted=clock.stopped, gaps=gaps)
+        return replace(
+            best, given=found.given, plan=planned, interrupted=clock.is_stopped, gaps=gaps
+        )
 
 
 def with_gaps(mission: Mission, context: PlanningContext) -> Mission:
@@ -478,7 +480,7 @@ def _search(
 ) -> _SearchResult:
     """Offer the tours of the plane and along states and legs."""
     flights, out = found.flights, _SearchResult()
-    if clock.up and found.best is not None:
+    if clock.is_up and found.best is not None:
         return out  # the stages before the first plan would overrun the limit
     candidates = candidate_plans(
         flights.mission,
@@ -511,7 +513,7 @@ def _search(
                 out.plan = out.plan if out.plan is not None and plan.kind == OUT_AND_BACK else plan
                 found.offer(_solved_from_plan(plan, name, seed), f"the tour ({plan.kind})")
                 has_tour = found.best is not None
-                if has_tour and (plan.kind == TAUT_LEGS or (needs_tour and clock.up)):
+                if has_tour and (plan.kind == TAUT_LEGS or (needs_tour and clock.is_up)):
                     break
     except (InputError, LimitReachedError) as error:
         if found.best is None or not found.best.tour.stops:
@@ -583,7 +585,7 @@ def _offer_going_on(found: _Incumbents, seed: int) -> None:
     """Offer the order by going straight on, in both directions."""
     flights = found.flights
     mission, clock = flights.mission.model_copy(update={"tour": None}), flights.clock
-    if clock.up or mission.state is not None:
+    if clock.is_up or mission.state is not None:
         return  # going straight on begins at the start
     flights.on_progress("order by going straight on")
     context = flights.context

@@ -121,7 +121,7 @@ class Detours:
         DrivenTour or None
             The tour; None if no shorter one was found.
         """
-        if clock.up and best is not None:
+        if clock.is_up and best is not None:
             return None
         states = self.board.states
         shortest, worth = self._shortest_lengths(clock), self.paths.context.policy.bound_worth
@@ -134,7 +134,7 @@ class Detours:
         cutoff = np.inf if best is None else (1.0 - worth) * best.length
         for order in orders:
             for direction in (order, order[::-1]):
-                if clock.up or (direction != order and states.present is not None):
+                if clock.is_up or (direction != order and states.present is not None):
                     continue
                 on_progress(f"detours along {len(order)} legs")
                 stages = self._drive_order(direction, cutoff, clock)
@@ -148,7 +148,7 @@ class Detours:
         while moved:
             moved = False
             for order in self._neighbouring_orders(current, shortest, cutoff):
-                if clock.up or len(seen) >= self._policy.max_orders:
+                if clock.is_up or len(seen) >= self._policy.max_orders:
                     break
                 if tuple(order) in seen:
                     continue
@@ -227,7 +227,7 @@ class Detours:
             for n in (HOME, *range(m)):
                 known = self.paths.between(n, m) if n != HOME else []
                 far = polylines.length(known[0][1]) if known else np.inf
-                if not known and not looking.up:
+                if not known and not looking.is_up:
                     far = min(map(polylines.length, self._taut_paths(n, m)), default=np.inf)
                 out[n, m] = out[m, n] = far
         return out
@@ -316,7 +316,7 @@ class Detours:
             )
             kept: list[_PartialTour] = []
             for far, i, j in ahead:
-                if clock.up or len(kept) >= (1 if last else self.paths.effort.detour_tethers):
+                if clock.is_up or len(kept) >= (1 if last else self.paths.effort.detour_tethers):
                     break
                 line, (path, path_word) = stages[k][i], legs[k][j]
                 word = context.words.multiply(line.word, path_word)

@@ -210,15 +210,15 @@ def _bound_without_tether(legs: LegBounds, clock: Clock, seed: int) -> float | N
         if begin is not None:
             graph = from_state(graph, begin)
         # straight lengths alone give a bound, however little time there is
-        solving = Clock(legs.policy.min_solve_s) if clock.up else clock
+        solving = Clock(legs.policy.min_solve_s) if clock.is_up else clock
         result = solve_graph(graph, "auto", time_limit=solving, seed=seed)
         best = max(best, result.lower_bound or 0.0)
-        if clock.up or result.tour is None:
+        if clock.is_up or result.tour is None:
             return best or None
         tour, grown = list(pairwise((*result.tour, 0))), False
         while not grown and not all(legs.final[u, v] for u, v in tour):
             for u, v in tour:
-                if clock.up:
+                if clock.is_up:
                     return best or None
                 grown = legs.raise_bound(u, v, clock) or grown
         if not grown:

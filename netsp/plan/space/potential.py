@@ -113,7 +113,7 @@ def path_bound(
     for end in (a, b):
         at = np.clip(((end - low) / cell).astype(np.int64), 0, np.array(possible.shape) - 1)
         possible[tuple(at)] = True
-    if clock.up:
+    if clock.is_up:
         return straight
     return max(
         straight,

@@ -221,7 +221,7 @@ def drive_plane_tours(
     usable = context.policy.tether_share
     plane = _PlaneTour(context, scene, places, plan, policy)
     for share in (1.0, usable) if whole_tether else (usable,):
-        if clock.up:
+        if clock.is_up:
             return
         try:
             found = plane.shortest_legs(share, Clock(policy.max_s, within=clock.part(0.5)), seed)

@@ -57,7 +57,7 @@ def short_order_tour(
         seen |= {tuple(order), tuple(order[::-1])}
         # a mission under way has one direction: from the robot to the start
         for direction in (order, order[::-1])[: 1 if places.present is not None else 2]:
-            if clock.up:
+            if clock.is_up:
                 return best
             driven = drive_order(
                 context, [(int(n), int(c)) for n, c in _stops(places, direction)], clock
@@ -89,7 +89,7 @@ def _estimates(
     if len(points) > policy.max_sighted + 1:
         return np.asarray(lengths)
     for u in range(len(points)):
-        if clock.up:
+        if clock.is_up:
             break
         for v in range(u):
             if not is_straight_clear(

@@ -104,7 +104,7 @@ class RobotPaths:
                     word = context.word_number(path)
                     if word is not None and all(word != w for w, _ in paths):
                         paths.append((word, path))
-            if found is None and not (tether_clock is not None and tether_clock.up):
+            if found is None and not (tether_clock is not None and tether_clock.is_up):
                 self._add_along_tethers(n, m, paths)
             paths.sort(key=lambda entry: polylines.length(entry[1]))
             if found is not None and paths:
@@ -154,7 +154,7 @@ class RobotPaths:
         search_clock, tether_clock = clock.part(times.path_search_share), None
         for n in range(len(self.points)):
             on_progress(f"ways of the robot from waypoint {n + 1} of {len(self.points)}")
-            if search_clock.up and tether_clock is None:
+            if search_clock.is_up and tether_clock is None:
                 tether_clock = clock.part(times.tether_path_share)
             self.find_from(n, search=tether_clock is None, tether_clock=tether_clock)
 
@@ -237,7 +237,7 @@ class StateGrowth:
             on_progress(
                 f"legs, {len(self.legs.arrives)} driven between {len(self.states.entries)} states"
             )
-            if clock.up:
+            if clock.is_up:
                 return False
         return True
 

@@ -654,12 +654,12 @@ def _best_driven(
     times = board.context.policy.times
     again, found = 0, None
     warm = None if best is None else best[1].tour
-    while again < times.max_solves or clock.up:
+    while again < times.max_solves or clock.is_up:
         if found is None:
             on_progress(
                 "order" if again == 0 else f"order, {counted(again, 'leg')} at fault forbidden"
             )
-            solving = Clock(times.min_solve_s) if clock.up else clock.part(share)
+            solving = Clock(times.min_solve_s) if clock.is_up else clock.part(share)
             found = board.solve(solving, warm, **how)
             if found is None:
                 return None
@@ -669,10 +669,10 @@ def _best_driven(
         if driven.fault is None:
             return with_status(result, driven, LENGTH_ROUNDING), driven
         joined = board.forbid(driven.fault)
-        if clock.up and not (joined and board.can_reach_all(tour)):
+        if clock.is_up and not (joined and board.can_reach_all(tour)):
             return None  # no time is left, and this tour can no longer be driven
         warm = None  # it may go along that leg
         again += 1
-        if not clock.up:
+        if not clock.is_up:
             found = None
     return None

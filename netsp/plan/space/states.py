@@ -168,7 +168,7 @@ def find_first_states(
         lambda: context.search_words(False, root, effort.words, limit, flag)
     )
     for n in range(len(places)):
-        _add_states(states, n, found, anchor, 1 if clock.up else effort.words)
+        _add_states(states, n, found, anchor, 1 if clock.is_up else effort.words)
     return states
 
 
@@ -192,7 +192,7 @@ def add_states_with_room(states: States, missing: set[int], words: int, clock: C
     flag, limit = clock.flag, context.policy.states.max_robot_ratio * states.limit
     found = clock.interruptible(lambda: context.search_words(True, start, words, limit, flag))
     for n in np.flatnonzero(np.isin(states.places.waypoint, list(missing))):
-        _add_states(states, int(n), found, context.start_tether.nodes, 1 if clock.up else words)
+        _add_states(states, int(n), found, context.start_tether.nodes, 1 if clock.is_up else words)
 
 
 def _add_states(states: States, n: int, found: WordSearch, line: Floats, max_states: int) -> None:

@@ -50,7 +50,7 @@ def _grow(
         waiting.append((far * (1.0 + trade), len(waiting), far, s, states.entries[s].place, -1))
     heapq.heapify(waiting)
     tie, settled = len(waiting), set()
-    while waiting and not clock.up:
+    while waiting and not clock.is_up:
         _, _, far, s, point, k = heapq.heappop(waiting)
         if point in settled:
             continue

@@ -55,7 +55,7 @@ def bound_by_upright_solids(
     # than its model
     dip = max(2.0 * DEPTH_TOLERANCE, DIP_RATIO * mission.delta)
     obstacles = upright_obstacles(context, dip)
-    if not obstacles or clock.up:
+    if not obstacles or clock.is_up:
         return None
     # the problem begins at the start: a tether there is at most the tether from the anchor and the
     # tether laid from the anchor to the start

@@ -178,7 +178,7 @@ def run(
     with until_interrupt(None) as clock:
         for name in names:
             row = _run(library, name, label, solve, limit, clock)
-            if clock.stopped:
+            if clock.is_stopped:
                 return
             yield row
 
@@ -194,7 +194,7 @@ def _run(library: Library, name: str, label: str, solve: Solve, limit: float, cl
         "date": str(datetime.date.today()),
     }
     try:
-        solution = solve(problem, library.paths[name], limit, lambda: clock.stopped)
+        solution = solve(problem, library.paths[name], limit, lambda: clock.is_stopped)
         row["seconds"] = round(time.perf_counter() - begin, 3)
         if row["seconds"] > MAX_OVERTIME_RATIO * limit + MAX_OVERTIME_S:
             row["message"] = f"late: answered after {row['seconds']:.1f} s of {limit:g}"

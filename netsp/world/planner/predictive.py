@@ -375,7 +375,7 @@ class PredictivePlanner(Planner):
     def _while_in_time(self, paths: Iterator[Floats]) -> Iterator[Floats]:
         """Yield paths while there is time."""
         for path in paths:
-            if self.options.clock is not None and self.options.clock.up:
+            if self.options.clock is not None and self.options.clock.is_up:
                 raise KeyboardInterrupt
             yield path
 

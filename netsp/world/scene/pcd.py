@@ -10,7 +10,7 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError, counted
-from netsp.base.files import MOST_BYTES, read_bytes
+from netsp.base.files import FilePolicy, read_bytes
 from netsp.base.validated import shown
 from netsp.world.scene.point_clouds import PointCloud, cloud_of_fields, coordinate_fields
 
@@ -40,7 +40,10 @@ class _Head:
 
 
 def read_pcd(
-    path: str | Path, *, max_head_bytes: int = 100_000, max_unpacked_bytes: int = 4 * MOST_BYTES
+    path: str | Path,
+    *,
+    max_head_bytes: int = 100_000,
+    max_unpacked_bytes: int = 4 * FilePolicy.max_bytes,
 ) -> PointCloud:
     """Read a cloud of the Point Cloud Library.
 

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from netsp.base.arrays import Floats
 from netsp.base.axes import metres_per_unit
 from netsp.base.errors import InputError, counted
-from netsp.base.files import MOST_BYTES
+from netsp.base.files import FilePolicy
 from netsp.world.scene.mesh_checks import (
     binary_stl,
     collada_parts,
@@ -428,10 +428,10 @@ def _exists(path: str | Path) -> None:
     if not Path(path).is_file():
         raise InputError(f"{path}: cannot be read: no such file")
     size = Path(path).stat().st_size
-    if size > MOST_BYTES:
+    if size > FilePolicy.max_bytes:
         raise InputError(
             f"{path}: cannot be read: {size / 2**20:.4g} MiB; expected at most "
-            f"{MOST_BYTES / 2**20:g} MiB"
+            f"{FilePolicy.max_bytes / 2**20:g} MiB"
         )
     if Path(path).suffix.lower() == ".npz":
         try:
@@ -439,8 +439,10 @@ def _exists(path: str | Path) -> None:
                 unpacked = sum(part.file_size for part in archive.infolist())
         except zipfile.BadZipFile:
             raise InputError(f"{path}: cannot be read: not an npz file") from None
-        if unpacked > 4 * MOST_BYTES:
-            raise InputError(f"{path}: unpacks to more than {4 * MOST_BYTES / 2**20:g} MiB")
+        if unpacked > 4 * FilePolicy.max_bytes:
+            raise InputError(
+                f"{path}: unpacks to more than {4 * FilePolicy.max_bytes / 2**20:g} MiB"
+            )
 
 
 def _line(error: Exception) -> str:
