@@ -20,7 +20,7 @@ from netsp import (
     verify,
 )
 from netsp.command.main import main
-from netsp.model.arrangement import closure
+from netsp.model.arrangement import transitive_closure
 from tests.worlds import random_world
 
 ORDERED = ("auto", "dp", "lns")
@@ -110,7 +110,7 @@ def test_walks_with_precedences_prove_what_all_sets_prove(seed, n, ties):
     for _ in range(ties):
         a, b = sorted(rng.choice(n, 2, replace=False))
         direct[hidden[a], hidden[b]] = True
-    graph.before = closure(direct)
+    graph.before = transitive_closure(direct)
     found = solve_graph(graph, "dp", seed=1)
     assert graph.is_tour(found.tour)
     assert found.lower_bound <= found.length * (1 + 1e-9)

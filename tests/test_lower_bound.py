@@ -23,7 +23,7 @@ from netsp.command.progress_table import ProgressTable, summary
 from netsp.gtsp.gtsplib.tour_file import tour_text
 from netsp.gtsp.travel.result import Progress, Result, of_part
 from netsp.model.bound_scope import LowerBound, Scope, above_shortest, gap_of, strongest
-from netsp.model.solution import Status, proof, scope_of
+from netsp.model.solution import Status, proof, solution_scope
 from netsp.plan import auto, exact
 from netsp.plan import solve_problem as by_name
 from netsp.plan.random_worlds import reachable_world
@@ -342,7 +342,7 @@ def test_scopes_of_runs(small):
     assert (found.status, found.lower_bound_of) == (Status.OPTIMAL, Scope.TRAVEL_GRAPH)
     part = solve_graph(travel_graph(small).subgraph([0, 1, 2]))
     assert part.lower_bound_of is Scope.PART
-    assert scope_of("another package's", "all") is Scope.ROADMAP
+    assert solution_scope("another package's", "all") is Scope.ROADMAP
 
 
 @pytest.fixture(scope="module")

@@ -74,7 +74,7 @@ def test_a_curve_that_ran_out_of_time_is_not_whole(monkeypatch):
     whole = tether_curve(problem)
     assert len(whole.steps) > 1
     clock = iter([False])
-    monkeypatch.setattr("netsp.base.clock.Clock.up", property(lambda self: next(clock, True)))
+    monkeypatch.setattr("netsp.base.clock.Clock.is_up", property(lambda self: next(clock, True)))
     part = tether_curve(problem)
     assert not part.whole
     assert not part.proven

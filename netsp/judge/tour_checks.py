@@ -25,7 +25,7 @@ from netsp.judge.solid_distances import Inset, bridges
 from netsp.judge.stringpull import PLACE_TOLERANCE, StringPuller, reduce_sleeve
 from netsp.model.bound_scope import Scope
 from netsp.model.problem import Circle, Problem
-from netsp.model.solution import Solution, Status, scope_of, tension_ratio
+from netsp.model.solution import Solution, Status, solution_scope, tension_ratio
 
 STAND_OFF_ALLOWANCE = 3e-8
 """As a share of the problem's size, what standing off from a boundary may add to a length."""
@@ -606,7 +606,7 @@ class _Judge:
             return f"bound {bound:g} above length {length:g}"
         if gap is None or abs(gap - s.bound.gap(length)) > MAX_GAP_ERROR:
             return f"the stated gap is not that of the bound, {s.bound.percent(length, 6)}"
-        able = scope_of(s.roadmap, s.classes, kept_order=s.kept_order)
+        able = solution_scope(s.roadmap, s.classes, kept_order=s.kept_order)
         if not able.includes(scope) or scope.keeps_order != s.kept_order:
             return f"a bound on {scope.tours}, but a run like this can bound {able.tours}"
         closed = gap <= MAX_CLOSED_GAP

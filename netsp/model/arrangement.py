@@ -1,7 +1,7 @@
-"""What goals say of each other: alternatives, of which one suffices, and which comes after which.
+"""Relations between goals: alternatives, of which one suffices, and precedences.
 
-Goals of one choice are one cluster of the travel graph, whose tours take one vertex of each: the
-theory (McCammon & Hollinger 2017, section IV) needs no more. Precedences make it a sequential
+The goals of one choice are one cluster of the travel graph, whose tours visit one vertex of each
+cluster (McCammon & Hollinger 2017, section IV). With precedences, the problem is a sequential
 ordering problem (Escudero 1988) on that graph.
 """
 
@@ -16,37 +16,30 @@ from netsp.base.arrays import Bools, Ints
 
 
 class Goal(Protocol):
-    """What is asked of goals here (`netsp.model.problem.Goal`)."""
+    """Fields of a goal that matter here (`netsp.model.problem.Goal`)."""
 
     @property
     def name(self) -> str | None:
-        """Of the goal."""
+        """Name of the goal."""
 
     @property
     def choice(self) -> str | None:
-        """What it is an alternative for."""
+        """Name of the choice that the goal is an alternative of."""
 
     @property
     def after(self) -> tuple[str, ...]:
-        """Names of what comes before it."""
+        """Names of goals or choices to be visited before it."""
 
 
 UNORDERED: Bools = np.zeros((0, 0), dtype=bool)
-"""Precedences where there are none."""
+"""Precedences of goals without any."""
 
 
-def clusters_of(goals: Sequence[Goal]) -> Ints:
-    """Numbers the clusters of goals in the order of their first goals.
+def cluster_numbers(goals: Sequence[Goal]) -> Ints:
+    """Return the number (m,) of each goal's cluster, from 1 in the order of the clusters' first
+    goals.
 
-    Parameters
-    ----------
-    goals : sequence of Goal
-        Of a problem.
-
-    Returns
-    -------
-    ndarray of int, shape (m,)
-        From 1; the same for goals of one choice.
+    Goals of one choice have the same number.
     """
     known: dict[str, int] = {}
     out, last = [], 0
@@ -61,65 +54,38 @@ def clusters_of(goals: Sequence[Goal]) -> Ints:
     return np.array(out, dtype=np.int64)
 
 
-def precedences_of(goals: Sequence[Goal]) -> Bools:
-    """Which clusters come before which.
+def precedence_matrix(goals: Sequence[Goal]) -> Bools:
+    """Return which clusters must be visited before which.
 
-    Parameters
-    ----------
-    goals : sequence of Goal
-        Of a problem; names that none of them has are passed over.
+    Names that no goal has are ignored.
 
     Returns
     -------
     ndarray of bool, shape (c + 1, c + 1)
-        True at (a, b) if cluster a must be visited before b, by way of others, too; shape (0, 0)
-        where goals ask for nothing.
+        True at (a, b) if cluster a must be visited before b, directly or through others; shape (0,
+        0) without precedences.
     """
     if not any(goal.after for goal in goals):
         return UNORDERED
-    cluster = clusters_of(goals)
+    cluster = cluster_numbers(goals)
     named = _named(goals)
     direct = np.zeros((int(cluster.max()) + 1,) * 2, dtype=bool)
     for k, goal in enumerate(goals):
         for name in goal.after:
             direct[cluster[named.get(name, [])], cluster[k]] = True
-    return closure(direct) if direct.any() else UNORDERED
+    return transitive_closure(direct) if direct.any() else UNORDERED
 
 
-def closure(direct: Bools) -> Bools:
-    """The transitive closure of a relation (Warshall 1962).
-
-    Parameters
-    ----------
-    direct : ndarray of bool, shape (n, n)
-        The relation.
-
-    Returns
-    -------
-    ndarray of bool, shape (n, n)
-        True wherever a chain leads.
-    """
+def transitive_closure(direct: Bools) -> Bools:
+    """Return the transitive closure (n, n) of a relation (Warshall 1962)."""
     out = direct.copy()
     for k in range(len(out)):
         out |= out[:, k : k + 1] & out[k : k + 1, :]
     return out
 
 
-def keeps(order: Sequence[int], before: Bools) -> bool:
-    """Whether clusters are visited in an order that precedences allow.
-
-    Parameters
-    ----------
-    order : sequence of int
-        Clusters as they are visited.
-    before : ndarray of bool
-        As `precedences_of` gives them.
-
-    Returns
-    -------
-    bool
-        True if they are.
-    """
+def respects_precedences(order: Sequence[int], before: Bools) -> bool:
+    """Return whether an order of clusters is one that precedences allow."""
     if not len(before):
         return True
     o = np.asarray(order, dtype=np.int64)
@@ -127,21 +93,11 @@ def keeps(order: Sequence[int], before: Bools) -> bool:
     return not bool(np.tril(later_first).any())
 
 
-def complaint_of(goals: Sequence[Goal]) -> str | None:
-    """What is wrong with what goals say of each other, if anything.
-
-    Parameters
-    ----------
-    goals : sequence of Goal
-        Of a problem.
-
-    Returns
-    -------
-    str or None
-        In one line, naming the field.
-    """
+def arrangement_complaint(goals: Sequence[Goal]) -> str | None:
+    """Return the first fault in the relations between goals, in one line that names the field, or
+    None."""
     named = _named(goals)
-    cluster = clusters_of(goals)
+    cluster = cluster_numbers(goals)
     for k, goal in enumerate(goals):
         for j, name in enumerate(goal.after):
             field = f"goals[{k}].after[{j}]"
@@ -149,22 +105,23 @@ def complaint_of(goals: Sequence[Goal]) -> str | None:
                 return f"{field}: expected the name of another goal, got {name!r}"
             if (cluster[named[name]] == cluster[k]).any():
                 return f"{field}: {name!r} is the goal itself; expected the name of another"
-    before = precedences_of(goals)
+    before = precedence_matrix(goals)
     for k in range(len(goals) if len(before) else 0):
         c = int(cluster[k])
         if before[c, c]:
             label = goals[k].choice or goals[k].name or f"#{k}"
             ring = [
-                g.choice or g.name or f"#{i}" for i, g in enumerate(goals)
+                g.choice or g.name or f"#{i}"
+                for i, g in enumerate(goals)
                 if before[c, cluster[i]] and before[cluster[i], c] and i != k
-            ]  # fmt: skip
+            ]
             others = ", ".join(dict.fromkeys(r for r in ring if r != label))
             return f"goals[{k}].after: {label} is to come before and after {others}"
     return None
 
 
 def _named(goals: Sequence[Goal]) -> dict[str, list[int]]:
-    """Goals by their names, and by those of their choices."""
+    """Return the indices of goals by their names, and by those of their choices."""
     out: dict[str, list[int]] = {}
     for k, goal in enumerate(goals):
         for name in {goal.name, goal.choice} - {None}:

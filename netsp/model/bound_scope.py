@@ -1,4 +1,4 @@
-"""Lower bounds on tours, each with the tours that it holds for, and the words that say so.
+"""Lower bounds on tours, each with the tours that it holds for, and the words for them.
 
 A bound over the homotopy classes that a roadmap kept is no bound on all tours. A bound along a
 sampled roadmap does not hold in the continuous world, and a bound between the states that were
@@ -17,8 +17,11 @@ from enum import StrEnum
 from types import MappingProxyType
 
 OPTIMALITY_TOLERANCE = 1e-6
-"""Largest relative gap of a tour that is called optimal. Bounds come from dual values in floating
-point, whose rounding errors are orders of magnitude smaller."""
+"""Tolerance for the relative gap of a tour that is called optimal.
+
+Bounds come from dual values in floating point, whose rounding errors are orders of magnitude
+smaller.
+"""
 
 
 class Scope(StrEnum):
@@ -81,61 +84,56 @@ class Scope(StrEnum):
         return "order" in _LIMITS[self]
 
     def includes(self, other: Scope) -> bool:
-        """Return whether every tour of another scope of the same problem is in this scope.
-
-        Parameters
-        ----------
-        other : Scope
-            The other scope.
-
-        Returns
-        -------
-        bool
-            True if a bound of this scope holds for the other scope as well.
-        """
+        """Return whether every tour of another scope of the same problem is in this scope."""
         return _LIMITS[self] <= _LIMITS[other]
 
 
-_LIMITS: Mapping[Scope, frozenset[str]] = MappingProxyType({
-    Scope.ALL_TOURS: frozenset(),
-    Scope.KEPT_CLASSES: frozenset({"kept"}),
-    Scope.ROADMAP: frozenset({"roadmap"}),
-    Scope.STATES: frozenset({"states"}),
-    Scope.GIVEN_ORDER: frozenset({"order"}),
-    Scope.KEPT_IN_ORDER: frozenset({"kept", "order"}),
-    Scope.ROADMAP_IN_ORDER: frozenset({"roadmap", "order"}),
-    Scope.STATES_IN_ORDER: frozenset({"states", "order"}),
-    # a travel graph without a world is no part of all tours of a world
-    Scope.TRAVEL_GRAPH: frozenset({"graph"}),
-    Scope.PART: frozenset({"part"}),
-})  # fmt: skip
+_LIMITS: Mapping[Scope, frozenset[str]] = MappingProxyType(
+    {
+        Scope.ALL_TOURS: frozenset(),
+        Scope.KEPT_CLASSES: frozenset({"kept"}),
+        Scope.ROADMAP: frozenset({"roadmap"}),
+        Scope.STATES: frozenset({"states"}),
+        Scope.GIVEN_ORDER: frozenset({"order"}),
+        Scope.KEPT_IN_ORDER: frozenset({"kept", "order"}),
+        Scope.ROADMAP_IN_ORDER: frozenset({"roadmap", "order"}),
+        Scope.STATES_IN_ORDER: frozenset({"states", "order"}),
+        # a travel graph without a world is no part of all tours of a world
+        Scope.TRAVEL_GRAPH: frozenset({"graph"}),
+        Scope.PART: frozenset({"part"}),
+    }
+)
 """Restrictions of each scope. A scope with a subset of the restrictions of another includes it."""
 
-_TOURS: Mapping[Scope, str] = MappingProxyType({
-    Scope.ALL_TOURS: "all tours",
-    Scope.KEPT_CLASSES: "tours over the classes kept",
-    Scope.ROADMAP: "tours of this roadmap",
-    Scope.STATES: "tours between the states found",
-    Scope.GIVEN_ORDER: "tours in the given order",
-    Scope.KEPT_IN_ORDER: "tours over the classes kept in the given order",
-    Scope.ROADMAP_IN_ORDER: "tours of this roadmap in the given order",
-    Scope.STATES_IN_ORDER: "tours between the states found in the given order",
-    Scope.TRAVEL_GRAPH: "tours of the travel graph",
-    Scope.PART: "tours over a part of the travel graph",
-})  # fmt: skip
+_TOURS: Mapping[Scope, str] = MappingProxyType(
+    {
+        Scope.ALL_TOURS: "all tours",
+        Scope.KEPT_CLASSES: "tours over the classes kept",
+        Scope.ROADMAP: "tours of this roadmap",
+        Scope.STATES: "tours between the states found",
+        Scope.GIVEN_ORDER: "tours in the given order",
+        Scope.KEPT_IN_ORDER: "tours over the classes kept in the given order",
+        Scope.ROADMAP_IN_ORDER: "tours of this roadmap in the given order",
+        Scope.STATES_IN_ORDER: "tours between the states found in the given order",
+        Scope.TRAVEL_GRAPH: "tours of the travel graph",
+        Scope.PART: "tours over a part of the travel graph",
+    }
+)
 
-_COLUMN: Mapping[Scope, str] = MappingProxyType({
-    Scope.ALL_TOURS: "all tours",
-    Scope.KEPT_CLASSES: "kept",
-    Scope.ROADMAP: "roadmap",
-    Scope.STATES: "states",
-    Scope.GIVEN_ORDER: "order",
-    Scope.KEPT_IN_ORDER: "kept+order",
-    Scope.ROADMAP_IN_ORDER: "road+order",
-    Scope.STATES_IN_ORDER: "state+order",
-    Scope.TRAVEL_GRAPH: "graph",
-    Scope.PART: "part",
-})  # fmt: skip
+_COLUMN: Mapping[Scope, str] = MappingProxyType(
+    {
+        Scope.ALL_TOURS: "all tours",
+        Scope.KEPT_CLASSES: "kept",
+        Scope.ROADMAP: "roadmap",
+        Scope.STATES: "states",
+        Scope.GIVEN_ORDER: "order",
+        Scope.KEPT_IN_ORDER: "kept+order",
+        Scope.ROADMAP_IN_ORDER: "road+order",
+        Scope.STATES_IN_ORDER: "state+order",
+        Scope.TRAVEL_GRAPH: "graph",
+        Scope.PART: "part",
+    }
+)
 
 
 def _of_limits(limits: frozenset[str]) -> Scope:
@@ -152,7 +150,7 @@ class LowerBound:
     Parameters
     ----------
     length : float
-        The bound, in the problem's units.
+        Bound, in the problem's units.
     scope : Scope
         Tours that the bound holds for.
     because : str
@@ -182,48 +180,16 @@ class LowerBound:
             raise ValueError(f"lower bound: expected a length of at least 0, got {self.length!r}")
 
     def gap(self, length: float) -> float:
-        """Return the gap of a tour, (length - bound) / length, at least 0.
-
-        Parameters
-        ----------
-        length : float
-            Length of a tour.
-
-        Returns
-        -------
-        float
-            Share of the tour's own length.
-        """
+        """Return the gap of a tour, (length - bound) / length, at least 0."""
         return max(0.0, (length - self.length) / length) if length > 0.0 else 0.0
 
     def proves(self, length: float) -> bool:
-        """Return whether the bound proves that a tour is the shortest of its scope.
-
-        Parameters
-        ----------
-        length : float
-            Length of a tour.
-
-        Returns
-        -------
-        bool
-            True if the gap is at most `OPTIMALITY_TOLERANCE`.
-        """
+        """Return whether the gap of a tour is at most `OPTIMALITY_TOLERANCE`."""
         return length - self.length <= OPTIMALITY_TOLERANCE * max(length, 1e-300)
 
     def at_most(self, length: float) -> LowerBound:
-        """Return the bound, reduced to the length of a tour if rounding lifted it above.
-
-        Parameters
-        ----------
-        length : float
-            Length of a tour of the scope.
-
-        Returns
-        -------
-        LowerBound
-            Bound of the same scope.
-        """
+        """Return the bound, reduced to the length of a tour of the scope if rounding lifted it
+        above."""
         return LowerBound(min(self.length, length), self.scope, self.because)
 
     def for_part(self, scope: Scope, because: str) -> LowerBound:
@@ -235,11 +201,6 @@ class LowerBound:
             Scope whose tours are all in the scope of this bound.
         because : str
             Reason why these tours are in the scope of this bound.
-
-        Returns
-        -------
-        LowerBound
-            Bound of the same length.
 
         Raises
         ------
@@ -254,21 +215,17 @@ class LowerBound:
         return LowerBound(self.length, scope, because)
 
     def or_elsewhere(self, least: float, scope: Scope, because: str) -> LowerBound:
-        """Return a bound for a larger scope, given a bound on its other tours.
+        """Return a bound for a larger scope, the smaller of this one and a bound on its other
+        tours.
 
         Parameters
         ----------
         least : float
             Lower bound on the tours of the larger scope that are not in the scope of this bound.
         scope : Scope
-            The larger scope.
+            Larger scope.
         because : str
             Reason why no other tour is shorter than `least`.
-
-        Returns
-        -------
-        LowerBound
-            The smaller of both bounds, for the larger scope.
 
         Raises
         ------
@@ -279,96 +236,48 @@ class LowerBound:
         return LowerBound(min(self.length, max(least, 0.0)), scope, because)
 
     def above(self, length: float) -> str:
-        """Return in words how far above the shortest tour of the scope a tour may be.
-
-        Parameters
-        ----------
-        length : float
-            Length of a tour.
-
-        Returns
-        -------
-        str
-            As in "at most 3.8 % above the shortest tour".
-        """
+        """Return how far a tour may be above the shortest of the scope: "at most 3.8 % above the
+        shortest tour"."""
         gap = self.gap(length)
         if gap >= 1.0:
             return "no bound"
         return f"at most {100.0 * gap / (1.0 - gap):.3g} % above {self.scope.shortest}"
 
     def says(self, length: float | None = None, units: str = "", digits: int = 6) -> str:
-        """Return the bound and the gap of a tour in words.
+        """Return the bound and the gap of a tour in words: "bound 40 m on all tours, gap 1.20 %".
 
         Parameters
         ----------
         length : float, optional
-            Length of a tour.
+            Length of a tour; without it, there is no gap.
         units : str
             Unit of lengths, such as "m".
         digits : int
             Significant digits of the bound.
-
-        Returns
-        -------
-        str
-            As in "bound 40 m on all tours, gap 1.20 %".
         """
         bound = f"bound {self.length:.{digits}g} {units}".rstrip() + f" on {self.scope.tours}"
         return bound if length is None else f"{bound}, gap {self.percent(length)}"
 
     def percent(self, length: float, decimals: int = 2) -> str:
-        """Return the gap of a tour in per cent, as text.
-
-        Parameters
-        ----------
-        length : float
-            Length of a tour.
-        decimals : int
-            Number of decimals.
-
-        Returns
-        -------
-        str
-            As in "1.20 %".
-        """
+        """Return the gap of a tour as text, such as "1.20 %"."""
         return f"{100.0 * self.gap(length):.{decimals}f} %"
 
 
 def gap_of(length: float | None, bound: LowerBound | None) -> float | None:
-    """Return the gap of a tour, where length and bound may be missing.
+    """Return the gap of a tour; None if length or bound is missing.
 
-    Parameters
-    ----------
-    length : float, optional
-        Length of a tour.
-    bound : LowerBound, optional
-        Lower bound; name its scope wherever the gap is shown.
-
-    Returns
-    -------
-    float or None
-        (length - bound) / length, at least 0; None if either is missing.
+    Name the scope of the bound wherever the gap is shown.
     """
     return None if length is None or bound is None else bound.gap(length)
 
 
 def strongest(*bounds: LowerBound | None) -> LowerBound | None:
-    """Return the largest of several bounds of one scope.
-
-    Parameters
-    ----------
-    *bounds : LowerBound or None
-        Bounds of one scope; derive them for the same scope first (`LowerBound.for_part`).
-
-    Returns
-    -------
-    LowerBound or None
-        The largest bound; None if all are None.
+    """Return the largest of several bounds of one scope; None if all are None.
 
     Raises
     ------
     ValueError
-        Bounds of different scopes.
+        Bounds of different scopes; derive them for the same scope first (`LowerBound.for_part`).
     """
     known = [b for b in bounds if b is not None]
     scopes = {b.scope for b in known}
@@ -381,20 +290,9 @@ def strongest(*bounds: LowerBound | None) -> LowerBound | None:
 
 
 def above_shortest(length: float | None, bound: LowerBound | None) -> str:
-    """Return in words how far above the shortest tour of the bound's scope a tour may be.
+    """Return how far a tour may be above the shortest of the bound's scope, in words.
 
-    Parameters
-    ----------
-    length : float or None
-        Length of a tour.
-    bound : LowerBound or None
-        Lower bound; None if nothing is known.
-
-    Returns
-    -------
-    str
-        As in "at most 3.8 % above the shortest tour"; "no bound" if either is missing or the bound
-        is 0.
+    The answer is "no bound" if length or bound is missing, or the bound is 0.
     """
     if length is None or bound is None or bound.length == 0.0 < length:
         return "no bound"

@@ -15,7 +15,7 @@ UsedAs = Literal["base", "candidate", "goal", "obstacle", "bounds", "path", "flo
 """Kinds of use of a feature of a map."""
 
 MAX_NAMED = 5
-"""Features of a group that a note names; the file counts all of them."""
+"""Format of import records: maximum number of features that a note names; the file counts all."""
 
 
 class OmittedFeatures(Model):
@@ -58,14 +58,14 @@ class LayerRecord(Model):
         return self
 
     def without_goals(self, places: Sequence[str], reason: str) -> LayerRecord:
-        """Return the record with some goals counted as left out.
+        """Return the record with some goals counted as left out for a reason.
 
         Parameters
         ----------
         places : sequence of str
-            Names of their features, by layer and number.
+            Names of the goals' features, by layer and number.
         reason : str
-            Why they are left out.
+            Reason.
 
         Examples
         --------
@@ -80,9 +80,11 @@ class LayerRecord(Model):
             reason=reason, features=len(places), first=tuple(places[:MAX_NAMED])
         )
         return LayerRecord(
-            layer=self.layer, features=self.features, left_out=(*self.left_out, group),
+            layer=self.layer,
+            features=self.features,
+            left_out=(*self.left_out, group),
             used=cast("dict[UsedAs, int]", {k: n for k, n in rest.items() if n}),
-        )  # fmt: skip
+        )
 
 
 class CropCircle(Model):
@@ -120,7 +122,7 @@ class Site(Model):
 
     @property
     def notes(self) -> list[str]:
-        """Return one line for each layer and reason for which features were left out."""
+        """One line for each layer and reason for which features were left out."""
         lines = []
         for layer in self.imported:
             name = f"layer {layer.layer!r}: " if layer.layer else ""
@@ -136,10 +138,7 @@ class Site(Model):
     def table(self) -> list[tuple[str, ...]]:
         """Return the rows of the table that `netsp import` prints, the head first.
 
-        Returns
-        -------
-        list of tuple of str
-            Layer, features, a column for each kind that occurs, and what was left out and why.
+        Columns are layer, features, one for each kind that occurs, and what was left out and why.
         """
         kinds = [k for k in KIND_COLUMNS if any(k in layer.used for layer in self.imported)]
         rows: list[tuple[str, ...]] = [("layer", "features", *kinds, "left out")]
@@ -151,6 +150,12 @@ class Site(Model):
 
 
 KIND_COLUMNS: tuple[UsedAs, ...] = (
-    "base", "candidate", "goal", "obstacle", "bounds", "path", "floor",
-)  # fmt: skip
+    "base",
+    "candidate",
+    "goal",
+    "obstacle",
+    "bounds",
+    "path",
+    "floor",
+)
 """Order of the columns of the table."""

@@ -1,6 +1,6 @@
-"""The problem: what the robot must visit, what stands in the way, how long its tether is.
+"""Problem: what the robot must visit, the obstacles, and the length of the tether.
 
-Frozen and validated at the door, so that nothing further down has to doubt its input. The JSON
+Problems are frozen and validated when they are made, so no other code has to check them. The JSON
 format is version 1; `netsp schema problem` prints its JSON Schema, problems/README.md explains it.
 """
 
@@ -49,28 +49,35 @@ from netsp.base.geometry.polygons import (
 )
 from netsp.base.reprs import Drawn
 from netsp.base.validated import Model, explain, read_model, shown
-from netsp.model.arrangement import clusters_of, complaint_of, precedences_of
+from netsp.model.arrangement import arrangement_complaint, cluster_numbers, precedence_matrix
 from netsp.model.import_record import Site
-from netsp.model.shorthand import Inspection, written_out
+from netsp.model.shorthand import Inspection, expand_shorthand
 
 if TYPE_CHECKING:
     import shapely
 
 
-WIDEST = 1e4
-"""Of an obstacle within reach, in units of the farthest goal: with more, the tolerances would come
-near the distances between goals."""
+MAX_EXTENT_RATIO = 1e4
+"""Tolerance for the extent of an obstacle within reach, in units of the distance of the farthest
+goal.
 
-THINNEST = 1e-7
-"""Width of the narrowest obstacle within reach, in units of the problem's size: with less, sides of
-it would come near the tolerances, and a tether could be wound around it without end."""
+With larger ones, tolerances would come near the distances between goals.
+"""
+
+MIN_WIDTH_RATIO = 1e-7
+"""Tolerance for the width of the narrowest obstacle within reach, in units of the problem's size.
+
+With narrower ones, its sides would come near the tolerances, and a tether could be wound around it
+without end.
+"""
 
 RELATIVE_TOLERANCE = 1e-9
-"""Lengths below this fraction of the problem's size count as zero (touching, on a boundary)."""
+"""Tolerance for lengths that count as zero, such as those of touching shapes, in units of the
+problem's size."""
 
 
 class Circle(Model):
-    """A vertical cylinder of unlimited height, given by its plan: centre and radius."""
+    """Vertical cylinder of unlimited height, given by its plan: centre and radius."""
 
     center: Annotated[Point2, Field(description="(x, y) of the axis, in the problem's units")]
     radius: Annotated[Positive, Field(description="of the circle, in the problem's units")]
@@ -78,45 +85,23 @@ class Circle(Model):
 
     @property
     def representative_point(self) -> tuple[float, float]:
-        """The point that the obstacle's ray starts from: the centre."""
+        """Start of the obstacle's ray: the centre."""
         return self.center
 
     def signed_distance(self, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Distance of points to the outline, negative inside.
-
-        Parameters
-        ----------
-        xy : array_like, shape (..., 2)
-            Points, in the problem's units.
-
-        Returns
-        -------
-        ndarray, shape (...)
-            Distances, in the problem's units.
-        """
+        """Return the distance of points (..., 2) to the outline, negative inside."""
         d = np.asarray(xy, dtype=float) - self.center
         return np.asarray(np.hypot(d[..., 0], d[..., 1]) - self.radius)
 
     def shape(self, grow: float = 0.0) -> shapely.Polygon:
-        """The plan grown by a clearance.
-
-        Parameters
-        ----------
-        grow : float
-            Clearance, in the problem's units.
-
-        Returns
-        -------
-        shapely.Polygon
-            Inscribed polygon of 256 sides.
-        """
+        """Return the plan grown by a clearance, as an inscribed polygon of 256 sides."""
         import shapely
 
         return shapely.Point(self.center).buffer(self.radius + grow, quad_segs=64)
 
 
 class Polygon(Model):
-    """A vertical prism of unlimited height over a simple polygon, convex or not."""
+    """Vertical prism of unlimited height over a simple polygon, convex or not."""
 
     polygon: Annotated[
         Annotated[tuple[Point2, ...], Field(min_length=3)],
@@ -131,38 +116,16 @@ class Polygon(Model):
 
     @cached_property
     def representative_point(self) -> tuple[float, float]:
-        """The point that the obstacle's ray starts from: the centroid if it lies inside, else the
-        middle of the widest horizontal chord at a fixed set of heights."""
+        """Start of the obstacle's ray: the centroid if it lies inside, else the middle of the
+        widest horizontal chord at a fixed set of heights."""
         return polygon_interior_point(self.polygon)
 
     def signed_distance(self, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Distance of points to the outline, negative inside.
-
-        Parameters
-        ----------
-        xy : array_like, shape (..., 2)
-            Points, in the problem's units.
-
-        Returns
-        -------
-        ndarray, shape (...)
-            Distances, in the problem's units.
-        """
+        """Return the distance of points (..., 2) to the outline, negative inside."""
         return polygon_signed_distance(self.polygon, xy)
 
     def shape(self, grow: float = 0.0) -> shapely.Polygon:
-        """The plan grown by a clearance.
-
-        Parameters
-        ----------
-        grow : float
-            Clearance, in the problem's units.
-
-        Returns
-        -------
-        shapely.Polygon
-            The polygon itself without a clearance, else with rounded corners.
-        """
+        """Return the plan grown by a clearance, with rounded corners."""
         import shapely
 
         shape = shapely.Polygon(self.polygon)
@@ -192,7 +155,7 @@ Obstacle = Annotated[
 
 
 class Goal(Model):
-    """A point to inspect; of the goals of one choice, one suffices."""
+    """Point to inspect; of the goals of one choice, one suffices."""
 
     position: Annotated[
         Point3, Field(description="(x, y) or (x, y, z) to visit, in the problem's units; z is up")
@@ -246,7 +209,7 @@ GoalLike = Annotated[
 
 
 class State(Model):
-    """Where a robot on a tether is: its position, and the word of the taut tether there."""
+    """State of a robot on a tether: its position, and the word of the taut tether there."""
 
     position: Annotated[Point3, Field(description="(x, y, z) of the robot, in the problem's units")]
     signature: Annotated[
@@ -259,7 +222,7 @@ class State(Model):
 
 
 class Origin(Model):
-    """Where on the earth the base is, and where the y axis points."""
+    """Place of the base on the earth, and direction of the y axis."""
 
     latitude: Annotated[Number, Field(description="of the base, degrees", ge=-90, le=90)]
     longitude: Annotated[Number, Field(description="of the base, degrees", ge=-180, le=180)]
@@ -270,48 +233,49 @@ class Origin(Model):
 
 
 def _width(o: Circle | Polygon) -> float:
-    """Along the axis where it is widest."""
+    """Return the width of an obstacle along the axis where it is widest."""
     if isinstance(o, Circle):
         return 2.0 * o.radius
     return float(np.ptp(np.array(o.polygon), axis=0).max())
 
 
-OF_A_RUN = {"of": "a run"}
-"""Context of validation: goals may lie in obstacles, which came later."""
+RUN_CONTEXT = {"of": "a run"}
+"""Context of validation for a problem of a run: goals may lie in obstacles, which appeared
+later."""
 
 
 class Problem(Drawn, FileModel):
-    """An instance of the Non-Entangling Travelling Salesperson Problem.
+    """Instance of the Non-Entangling Travelling Salesperson Problem.
 
     Source: McCammon & Hollinger 2017, section III.
 
     Attributes
     ----------
     base : (x, y) or (x, y, z)
-        Where the tether is anchored and the tour starts and ends; z is up.
+        Position where the tether is fixed, and the tour starts and ends; z is up.
     goals : tuple of Goal
-        Points to visit; a bare ``[x, y]`` or ``[x, y, z]`` is accepted, an `Inspection`, which
-        becomes the goals about an obstacle, and ``{"any_of": […]}``, which becomes as many goals of
-        one choice.
+        Points to visit. Accepted are also a bare ``[x, y]`` or ``[x, y, z]``, an `Inspection`,
+        which becomes the goals about an obstacle, and ``{"any_of": […]}``, which becomes the goals
+        of one choice.
     obstacles : tuple of Circle or Polygon
         Vertical projections of circles or simple polygons.
     tether_length : float
-        Longest taut tether, measured in 3D from the base.
+        Maximum length of the taut tether, measured in 3D from the base.
     clearance : float
-        Every obstacle is inflated by this (the vehicle's radius).
+        Length by which every obstacle is grown: the vehicle's radius.
     bounds : (xmin, ymin, xmax, ymax) or None
-        Box that the robot's centre and the tether stay in. Given as the corners of an outline, four
-        walls about it become obstacles, from which the clearance is kept.
+        Box that the robot's centre and the tether stay in. If the corners of an outline are given,
+        four walls about it become obstacles, from which the clearance is kept.
     state : State or None
-        Where the tour starts; None at the base with no tether out. Otherwise the shortest path from
-        there through all goals back to the base is sought, with the whole tether recovered. The
+        Start of the tour; None for the base with no tether out. From a state, the tour is the
+        shortest path through all goals back to the base, with the whole tether recovered. The
         tether may be longer than `tether_length` at the start only.
     units : str
         Name of the unit of length.
     origin : Origin or None
-        Where on the earth the base is, and where the y axis points; for exports.
+        Place of the base on the earth, and direction of the y axis, for exports.
     site : Site or None
-        The map that the problem was imported from, with what became of each of its features.
+        Map that the problem was imported from, with what became of each of its features.
 
     Raises
     ------
@@ -400,8 +364,8 @@ class Problem(Drawn, FileModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _written_out(cls, data: Any) -> Any:
-        return written_out(data) if isinstance(data, dict) else data
+    def _expand(cls, data: Any) -> Any:
+        return expand_shorthand(data) if isinstance(data, dict) else data
 
     @field_validator("bounds", mode="before")
     @classmethod
@@ -420,15 +384,15 @@ class Problem(Drawn, FileModel):
     @model_validator(mode="after")
     def _consistent(self, info: ValidationInfo) -> Self:
         self._check_distinct_goals()
-        if complaint := complaint_of(self.goals) or self.size_complaint():
+        if complaint := arrangement_complaint(self.goals) or self.size_complaint():
             raise ValueError(complaint)
-        self._check_free(goals=info.context != OF_A_RUN)
+        self._check_free(goals=info.context != RUN_CONTEXT)
         self._check_state()
         self._check_crop()
         return self
 
     def _check_crop(self) -> None:
-        """The tether does not reach beyond the part of the map that was imported."""
+        """Raise ValueError if the tether reaches beyond the part of the map that was imported."""
         circle = None if self.site is None else self.site.cropped
         if circle is None:
             return
@@ -441,7 +405,7 @@ class Problem(Drawn, FileModel):
             )
 
     def _check_state(self) -> None:
-        """The robot is in free space, and its word names obstacles."""
+        """Raise ValueError if the robot is not in free space, or its word names no obstacle."""
         if self.state is None:
             return
         xy = np.array(self.state.position[:2])
@@ -449,7 +413,7 @@ class Problem(Drawn, FileModel):
             depth = self.clearance - float(o.signed_distance(xy))
             if depth > self.tolerance:
                 raise ValueError(
-                    f"state.position: {_show(self.state.position)} lies inside "
+                    f"state.position: {_point_text(self.state.position)} lies inside "
                     f"{self._obstacle_field(i)} (by {depth:.6g}); expected a point in free space"
                 )
         for a in self.state.signature:
@@ -465,29 +429,26 @@ class Problem(Drawn, FileModel):
             first = seen.setdefault(goal.position, k)
             if first != k:
                 raise ValueError(
-                    f"{self._goal_field(k)}: same position {_show(goal.position)} as "
+                    f"{self._goal_field(k)}: same position {_point_text(goal.position)} as "
                     f"{self._goal_field(first)}; expected distinct goals"
                 )
 
     def size_complaint(self) -> str | None:
-        """What is wrong with the sizes of obstacles within reach, if anything: tolerances, which go
-        by the largest of all, would hide the goals beside one too large, or hide one too small.
+        """Return what is wrong with the sizes of obstacles within reach, or None.
 
-        Returns
-        -------
-        str or None
-            The complaint; None if there is none.
+        Tolerances follow the largest size, so goals beside an obstacle too large would be hidden,
+        and an obstacle too small, too.
         """
         reach = self.tether_length + self.clearance
         away = float(np.abs(self.points - np.array(self.base)).max())
         for i, o in enumerate(self.obstacles):
             near, far = self._span(o)
-            if near <= reach and far > WIDEST * max(away, 1e-3 * reach):
+            if near <= reach and far > MAX_EXTENT_RATIO * max(away, 1e-3 * reach):
                 return (
                     f"{self._obstacle_field(i)}: reaches {far:.6g} from the base, and no goal is "
-                    f"farther than {away:.6g}; expected at most {WIDEST:g} times as far"
+                    f"farther than {away:.6g}; expected at most {MAX_EXTENT_RATIO:g} times as far"
                 )
-        least = THINNEST * self.scale
+        least = MIN_WIDTH_RATIO * self.scale
         for i, o in enumerate(self.obstacles):
             near, _ = self._span(o)
             width = 2.0 * self.clearance + _width(o)
@@ -499,7 +460,7 @@ class Problem(Drawn, FileModel):
         return None
 
     def _check_free(self, *, goals: bool) -> None:
-        """The base, and goals if they are to, lie within the bounds and outside of every grown
+        """Raise ValueError if the base, or a goal if wanted, is outside the bounds or in a grown
         obstacle."""
         xy, tolerance = self.points[: None if goals else 1, :2], self.tolerance
         outside: npt.NDArray[np.bool_] = np.zeros(len(xy), dtype=bool)
@@ -513,20 +474,23 @@ class Problem(Drawn, FileModel):
             label = "base" if k == 0 else self._goal_field(int(k) - 1)
             if outside[k]:
                 raise ValueError(
-                    f"{label}: {_show(position)} is outside bounds {list(self.bounds or ())}"
+                    f"{label}: {_point_text(position)} is outside bounds {list(self.bounds or ())}"
                 )
             i = int(np.argmax(inside[:, k]))
             grown = f" grown by the clearance {self.clearance:g}" if self.clearance else ""
             raise ValueError(
-                f"{label}: {_show(position)} lies inside {self._obstacle_field(i)}{grown} "
+                f"{label}: {_point_text(position)} lies inside {self._obstacle_field(i)}{grown} "
                 f"(by {self.clearance - distances[i, k]:.6g}); expected a point in free space"
             )
 
     @cached_property
     def scale(self) -> float:
-        """Size of the problem, the unit of every tolerance: the largest coordinate difference from
-        the base to any goal and any obstacle within the tether's reach. Geometry is computed
-        relative to the base, so far-off origins (UTM) cost no precision."""
+        """Size of the problem, the unit of every tolerance.
+
+        It is the largest coordinate difference from the base to any goal, and to any obstacle
+        within the tether's reach. Geometry is computed relative to the base, so far-off origins
+        (UTM) cost no precision.
+        """
         reach = self.tether_length + self.clearance
         away = [float(np.abs(self.points[:, :2] - np.array(self.base[:2])).max())]
         for o in self.obstacles:
@@ -536,7 +500,8 @@ class Problem(Drawn, FileModel):
         return max(*away, 1e-9 * self.tether_length)
 
     def _span(self, o: Circle | Polygon) -> tuple[float, float]:
-        """How near an obstacle comes to the base, and how far it goes from there along an axis."""
+        """Return the distance of an obstacle from the base, and its farthest extent from there
+        along an axis."""
         base = np.array(self.base[:2])
         if isinstance(o, Circle):
             off = np.abs(np.array(o.center) - base)
@@ -552,91 +517,49 @@ class Problem(Drawn, FileModel):
 
     @property
     def representative_points(self) -> npt.NDArray[np.float64]:
-        """(n, 2) starts of the obstacles' rays."""
+        """Starts (n, 2) of the obstacles' rays."""
         return np.array([o.representative_point for o in self.obstacles]).reshape(-1, 2)
 
     @property
     def points(self) -> npt.NDArray[np.float64]:
-        """(1 + m, 3) base, then goals."""
+        """Positions (1 + m, 3) of the base, then of the goals."""
         return np.array([self.base, *(g.position for g in self.goals)], dtype=float)
 
     @cached_property
     def clusters(self) -> Ints:
-        """(m,) number of each goal's cluster, from 1; alternatives have the same."""
-        return clusters_of(self.goals)
+        """Number (m,) of each goal's cluster, from 1; alternatives have the same."""
+        return cluster_numbers(self.goals)
 
     @cached_property
     def precedences(self) -> Bools:
-        """(c + 1, c + 1) whether a cluster must be visited before another; (0, 0) for none."""
-        return precedences_of(self.goals)
+        """Matrix (c + 1, c + 1) of which clusters must be visited before which; (0, 0) without
+        precedences."""
+        return precedence_matrix(self.goals)
 
     @property
     def visits(self) -> int:
-        """How many goals a tour visits: one of each choice."""
+        """Number of goals that a tour visits: one of each choice."""
         return int(self.clusters.max())
 
     def goal_name(self, k: int) -> str:
-        """What tables and pictures call a goal.
-
-        Parameters
-        ----------
-        k : int
-            Index of the goal, from 0.
-
-        Returns
-        -------
-        str
-            Its name, or ``#k`` if it has none.
-        """
+        """Return the name of a goal in tables and pictures, ``#k`` if it has none."""
         return self.goals[k].name or f"#{k}"
 
     def obstacle_name(self, i: int) -> str:
-        """What tables and pictures call an obstacle.
-
-        Parameters
-        ----------
-        i : int
-            Index of the obstacle, from 0.
-
-        Returns
-        -------
-        str
-            Its name, or ``#i`` if it has none.
-        """
+        """Return the name of an obstacle in tables and pictures, ``#i`` if it has none."""
         return self.obstacles[i].name or f"#{i}"
 
     def goal_label(self, k: int) -> str:
-        """What messages call a goal.
-
-        Parameters
-        ----------
-        k : int
-            Index of the goal, from 0.
-
-        Returns
-        -------
-        str
-            ``goal B1``, or ``goal #k`` if it has no name.
-        """
+        """Return the label of a goal in messages: ``goal B1``, or ``goal #k`` if it has no name."""
         return f"goal {self.goal_name(k)}"
 
     def obstacle_label(self, i: int) -> str:
-        """What messages call an obstacle.
-
-        Parameters
-        ----------
-        i : int
-            Index of the obstacle, from 0.
-
-        Returns
-        -------
-        str
-            ``obstacle pier``, or ``obstacle #i`` if it has no name.
-        """
+        """Return the label of an obstacle in messages: ``obstacle pier``, or ``obstacle #i``
+        without name."""
         return f"obstacle {self.obstacle_name(i)}"
 
     def _goal_field(self, k: int) -> str:
-        """Where a goal stands in the file, for what is wrong with it."""
+        """Return the field of a goal in the file, for complaints."""
         name = self.goals[k].name
         return f"goals[{k}]" + (f" ({name})" if name else "")
 
@@ -645,19 +568,15 @@ class Problem(Drawn, FileModel):
         return f"obstacles[{i}]" + (f" ({name})" if name else "")
 
     def grown(self, margin: float, slack: float = 0.0) -> Problem:
-        """The problem with all obstacles grown by a margin, and a part of the tether set aside.
+        """Return the problem with all obstacles grown by a margin, and a part of the tether set
+        aside.
 
         Parameters
         ----------
         margin : float
-            Not negative, in the problem's units.
+            Additional clearance, not negative, in the problem's units.
         slack : float
-            Share of the taut length that is to be out beyond it.
-
-        Returns
-        -------
-        Problem
-            The same with as much more clearance, and as much less tether.
+            Share of the taut length that may be out beyond it.
 
         Raises
         ------
@@ -678,30 +597,26 @@ class Problem(Drawn, FileModel):
 
     @classmethod
     def from_run(cls, text: str | bytes, source: str) -> Self:
-        """The site as it was during a run: obstacles may have come onto goals.
+        """Return the site as it was during a run, when goals may lie in obstacles and are then
+        lost.
 
         Parameters
         ----------
         text : str or bytes
-            JSON, as of a problem file.
+            JSON of a problem file.
         source : str
-            Where it is from, for what is wrong with it.
-
-        Returns
-        -------
-        Problem
-            The site. Goals in obstacles, which no problem file may have, are those that were lost.
+            Name in messages.
 
         Raises
         ------
         InputError
             The text is not valid, in one line.
         """
-        return read_model(cls, text, source, OF_A_RUN)
+        return read_model(cls, text, source, RUN_CONTEXT)
 
     @property
     def summary(self) -> str:
-        """How many goals and obstacles, and how long a tether."""
+        """Numbers of goals and obstacles, and length of the tether."""
         return (
             f"{self._goals_in_words}, {counted(len(self.obstacles), 'obstacle')}, "
             f"tether {self.tether_length:g} {self.units}"
@@ -713,19 +628,13 @@ class Problem(Drawn, FileModel):
         return goals if self.visits == len(self.goals) else f"{goals} of {len(self.goals)} places"
 
     def __repr__(self) -> str:
-        """In a line."""
+        """Return the name and the summary in one line."""
         return f"<Problem {self.name!r}: {self.summary}>"
 
     __str__ = __repr__
 
     def to_json(self) -> str:
-        """The problem as JSON of format version 1, in a form that reads back equal.
-
-        Returns
-        -------
-        str
-            Text of a problem file.
-        """
+        """Return the problem as JSON of format version 1, in a form that reads back equal."""
         data = self.model_dump(mode="json", exclude_none=True)
         for goal in data["goals"]:
             if not goal["after"]:
@@ -734,7 +643,7 @@ class Problem(Drawn, FileModel):
 
     @property
     def sha256(self) -> str:
-        """Hash of what the answer depends on: all values, but no names."""
+        """Hash of all values that the answer depends on, without names."""
         data = self.model_dump(mode="json", exclude={"name", "units", "origin", "site"})
         if data["state"] is None:  # problems had none before: their hashes stay
             del data["state"]
@@ -750,5 +659,5 @@ class Problem(Drawn, FileModel):
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _show(position: Sequence[float]) -> str:
+def _point_text(position: Sequence[float]) -> str:
     return "(" + ", ".join(f"{v:g}" for v in position) + ")"

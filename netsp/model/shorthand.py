@@ -1,7 +1,6 @@
-"""What a problem file may say in short, written out: structures to inspect, goals with
-alternatives, and bounds that are no box.
+"""Shorthand of problem files, and its expansion.
 
-All are a matter of the file alone: nothing further down knows of them.
+Structures to inspect, goals with alternatives, and bounds that are no box exist in files only.
 """
 
 from __future__ import annotations
@@ -18,36 +17,32 @@ from netsp.base.field_types import Integer, Name, Number, Point2, Positive
 from netsp.base.geometry.polygons import check_polygon
 from netsp.base.validated import Model, explain, shown
 
-MOST_VIEWPOINTS = 1000
-"""About one structure at one depth."""
-
-MARGIN = 0.05
-"""How far walls go on beyond the box about their outline, in units of its longer side."""
+MAX_VIEWPOINTS = 1000
+"""Format limit of problem files: viewpoints about one structure at one depth."""
 
 
 class Inspection(Model):
-    """A structure to look at from all sides; it stands for as many goals.
+    """Structure to look at from all sides; it stands for a goal at each viewpoint.
 
     Attributes
     ----------
     inspect : str
         Name of the obstacle.
     viewpoints : int
-        At every depth: evenly about a circle, evenly along the outline of a polygon.
+        Number of viewpoints at every depth, evenly about a circle or along the outline of a
+        polygon.
     standoff : float
-        Distance of the viewpoints from its surface.
+        Distance of the viewpoints from the surface.
     depths : tuple of float
         Heights z of the viewpoints, negative below the surface.
     bearing : float
-        Degrees clockwise from the y axis, where the first viewpoint is.
+        Direction of the first viewpoint, degrees clockwise from the y axis.
     after : tuple of str
-        Names of what is to be visited before any of its goals.
+        Names of goals or choices to be visited before any of its goals.
     """
 
     inspect: Annotated[Name, Field(description="name of the obstacle to look at from all sides")]
-    viewpoints: Annotated[
-        Integer, Field(description="at every depth", ge=1, le=MOST_VIEWPOINTS)
-    ] = 4
+    viewpoints: Annotated[Integer, Field(description="at every depth", ge=1, le=MAX_VIEWPOINTS)] = 4
     standoff: Annotated[
         Positive, Field(description="distance of viewpoints from its surface, problem's units")
     ]
@@ -63,19 +58,12 @@ class Inspection(Model):
     ] = ()
 
     def goals(self, shape: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """The goals that it stands for.
+        """Return the goals that the structure stands for, as a problem file has them.
 
-        Parameters
-        ----------
-        shape : mapping
-            The obstacle as a problem file has it.
-
-        Returns
-        -------
-        list of dict
-            Goals as a problem file has them; the first viewpoint of every depth, the second, …
+        The first viewpoints of all depths come first, then the second ones, and so on. `shape` is
+        the obstacle as a problem file has it.
         """
-        places = self._about(shape)
+        places = self._viewpoint_places(shape)
         return [
             {
                 "name": f"{self.inspect}/{k}" + (f" z{z:g}" if len(self.depths) > 1 else ""),
@@ -86,15 +74,15 @@ class Inspection(Model):
             for z in self.depths
         ]
 
-    def _about(self, shape: Mapping[str, Any]) -> np.ndarray:
-        """(viewpoints, 2) places about the obstacle."""
+    def _viewpoint_places(self, shape: Mapping[str, Any]) -> np.ndarray:
+        """Return the places (viewpoints, 2) about the obstacle."""
         turns = np.arange(self.viewpoints) / self.viewpoints
         if "radius" in shape:
             angle = math.radians(self.bearing) + 2.0 * math.pi * turns
-            away = float(shape["radius"]) + self.standoff
-            # a sine of 1e-16 would be a coordinate that nobody wants to read
-            way = np.round(np.column_stack([np.sin(angle), np.cos(angle)]), 15)
-            return np.asarray(np.array(shape["center"]) + away * way)
+            distance = float(shape["radius"]) + self.standoff
+            # rounded, so that no coordinate is 1e-16
+            directions = np.round(np.column_stack([np.sin(angle), np.cos(angle)]), 15)
+            return np.asarray(np.array(shape["center"]) + distance * directions)
         import shapely
 
         polygon = shapely.Polygon(shape["polygon"])
@@ -105,27 +93,20 @@ class Inspection(Model):
         first = int(np.argmin(np.abs((bearings - self.bearing + 180.0) % 360.0 - 180.0)))
         start = line.project(shapely.Point(off[first] + middle))
         # clockwise, as bearings are counted
-        way = start + (1.0 if not line.is_ccw else -1.0) * turns * line.length
-        return np.array([line.interpolate(s % line.length).coords[0] for s in way])
+        positions = start + (1.0 if not line.is_ccw else -1.0) * turns * line.length
+        return np.array([line.interpolate(s % line.length).coords[0] for s in positions])
 
 
-def written_out(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The fields of a problem with all shorthand written out.
+def expand_shorthand(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the fields of a problem with all shorthand expanded.
 
-    Parameters
-    ----------
-    data : mapping
-        The fields of a problem file, not yet validated: what cannot be understood stays as it is.
-
-    Returns
-    -------
-    mapping
-        The same where there is none; else a copy.
+    Fields need not be valid; shorthand that cannot be understood stays as it is. Data without
+    shorthand are returned themselves.
 
     Raises
     ------
     ValueError
-        Shorthand that cannot be written out, naming its field.
+        Shorthand that cannot be expanded; the message names its field.
     """
     return _with_goals(_with_walls(data))
 
@@ -134,9 +115,11 @@ def _with_goals(data: Mapping[str, Any]) -> Mapping[str, Any]:
     goals = data.get("goals")
     if not isinstance(goals, Sequence) or isinstance(goals, str):
         return data
-    asked = [isinstance(g, Inspection) or (isinstance(g, dict) and "inspect" in g) for g in goals]
+    inspections = [
+        isinstance(g, Inspection) or (isinstance(g, dict) and "inspect" in g) for g in goals
+    ]
     choices = [isinstance(g, dict) and "any_of" in g for g in goals]
-    if not any(asked) and not any(choices):
+    if not any(inspections) and not any(choices):
         return data
     obstacles = [o.model_dump() if isinstance(o, Model) else o for o in data.get("obstacles") or ()]
     named = {o["name"]: o for o in obstacles if isinstance(o, dict) and o.get("name") is not None}
@@ -146,7 +129,7 @@ def _with_goals(data: Mapping[str, Any]) -> Mapping[str, Any]:
         if choices[k]:
             out += _alternatives(goal, k)
             continue
-        if not asked[k]:
+        if not inspections[k]:
             out.append(goal)
             continue
         try:
@@ -162,7 +145,7 @@ def _with_goals(data: Mapping[str, Any]) -> Mapping[str, Any]:
         try:
             made = inspection.goals(obstacle)
         except (KeyError, TypeError, ValueError):
-            # the obstacle is not one: that will be said, and nothing of the goals about it
+            # the obstacle is not valid; its own complaint will follow, none about its goals
             made = [{"name": inspection.inspect, "position": [0.0, 0.0]}]
         inspected.setdefault(inspection.inspect, []).extend(g["name"] for g in made)
         out += made
@@ -170,7 +153,7 @@ def _with_goals(data: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _alternatives(goal: Mapping[str, Any], k: int) -> list[dict[str, Any]]:
-    """The goals of one choice."""
+    """Return the goals of one choice."""
     places = goal["any_of"]
     unknown = sorted(goal.keys() - {"any_of", "name", "after"})
     if unknown:
@@ -193,7 +176,7 @@ def _alternatives(goal: Mapping[str, Any], k: int) -> list[dict[str, Any]]:
 
 
 def _after_all_of(inspected: Mapping[str, list[str]], goal: Any) -> Any:
-    """A goal that comes after a structure comes after all goals about it."""
+    """Return a goal; one that comes after a structure comes after all goals about it."""
     after = goal.get("after") if isinstance(goal, dict) else None
     if not isinstance(after, Sequence) or isinstance(after, str):
         return goal
@@ -202,8 +185,11 @@ def _after_all_of(inspected: Mapping[str, list[str]], goal: Any) -> Any:
 
 
 def _with_walls(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Bounds of any outline as a box and walls about the outline, which go on beyond the box, so
-    that nothing gets around them. Walls are solid: robots keep their clearance from them."""
+    """Return the data with bounds of any outline as a box and walls about the outline.
+
+    The walls extend beyond the box, so that nothing gets around them. They are solid: robots keep
+    their clearance from them.
+    """
     bounds = data.get("bounds")
     if isinstance(bounds, np.ndarray):
         bounds = bounds.tolist()
@@ -222,7 +208,7 @@ def _with_walls(data: Mapping[str, Any]) -> Mapping[str, Any]:
     except ValueError as error:
         raise ValueError(f"bounds: {error}") from None
     xy = np.array(corners)
-    box, walls = _outside(xy)
+    box, walls = _box_and_walls(xy)
     taken = {o.get("name") for o in data.get("obstacles") or () if isinstance(o, dict)}
     free = (n for n in (f"wall {k}" for k in itertools.count(1)) if n not in taken)
     return {
@@ -239,13 +225,18 @@ class _Outline(Model):
     corners: Annotated[tuple[Point2, ...], Field(min_length=3)]
 
 
-def _outside(xy: np.ndarray) -> tuple[np.ndarray, list[list[list[float]]]]:
-    """(low, high) corners of a box about an outline, and corners of what lies between them: four
-    polygons, cut where the outline is farthest to every side."""
+def _box_and_walls(
+    xy: np.ndarray, margin_share: float = 0.05
+) -> tuple[np.ndarray, list[list[list[float]]]]:
+    """Return the corners (low, high) of a box about an outline, and walls between both.
+
+    The walls are four polygons, cut where the outline is farthest to every side. They extend beyond
+    the box by a share of its longer side.
+    """
     import shapely
 
     low, high = xy.min(0), xy.max(0)
-    margin = MARGIN * float((high - low).max())
+    margin = margin_share * float((high - low).max())
     outer = shapely.box(*(low - margin), *(high + margin))
     cuts = []
     for axis in (0, 1):

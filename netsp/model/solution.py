@@ -1,4 +1,4 @@
-"""The solution of a problem, and what is honestly known of it. JSON format version 1."""
+"""Solution of a problem, with what is proven of it. The JSON format is version 1."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class Status(StrEnum):
     ----------
     OPTIMAL
         Proven the shortest of all admissible tours of the continuous world (of those in the given
-        order where the order was kept); of a travel graph that was given as such, the shortest of
-        its tours.
+        order if the order was kept); of a travel graph that was given as such, the shortest of its
+        tours.
     OPTIMAL_OF_KEPT
-        Shortest tour over the homotopy classes that the roadmap kept, where it left others out:
-        they were too many, the time was too short, or a rule excluded them.
+        Shortest tour over the homotopy classes that the roadmap kept, if it left others out: they
+        were too many, the time was too short, or a rule excluded them.
     OPTIMAL_OF_ROADMAP
         Shortest tour along a sampled roadmap (PRM*), or along that of another package. Shorter
         tours may exist beside the roadmap.
@@ -42,11 +42,11 @@ class Status(StrEnum):
     FEASIBLE
         A tour, not proven the shortest.
     INFEASIBLE
-        Proven: there is no tour.
+        Proof that there is no tour.
     NO_SOLUTION_FOUND
         A limit was reached before there was a tour.
     INVALID
-        Tour of a baseline that is blind to the tether: it entangles obstacles or overstretches the
+        Tour of a baseline that ignores the tether: it entangles obstacles or overstretches the
         tether.
     """
 
@@ -66,22 +66,14 @@ class Status(StrEnum):
 
     @property
     def verdict(self) -> str:
-        """Words for people, of an optimal status: which tours the tour is the shortest of."""
+        """Phrase for an optimal status: which tours the tour is the shortest of."""
         return _VERDICTS.get(self, self.value)
 
     @classmethod
     def optimal_of(cls, scope: Scope) -> Status:
         """Return the status of a tour that is the shortest of a scope.
 
-        Parameters
-        ----------
-        scope : Scope
-            Tours that the closing bound holds for.
-
-        Returns
-        -------
-        Status
-            `OPTIMAL` for all tours, all tours in a given order, and all of a given travel graph.
+        It is `OPTIMAL` for all tours, all tours in a given order, and all of a given travel graph.
         """
         return _OPTIMAL_OF.get(scope, cls.OPTIMAL)
 
@@ -105,23 +97,20 @@ _VERDICTS = {
 
 
 KeptClasses = Literal["all", "non-looping", "shortest"]
-"""Which homotopy classes a roadmap held."""
+"""Homotopy classes that a roadmap held."""
 
 
 def max_turning(friction: float, max_tension_ratio: float | None) -> float:
-    """How far a tether may turn about obstacles, by the capstan's formula.
+    """Return the angle by which a tether may turn about obstacles, by the capstan's formula,
+    radians.
 
     Parameters
     ----------
     friction : float
         Coefficient.
     max_tension_ratio : float, optional
-        Most that friction may multiply the tension by; None for no limit.
-
-    Returns
-    -------
-    float
-        Sum of angles, radians; inf for no limit.
+        Maximum factor of friction on the tension; None for no limit, for which the angle is
+        infinite.
     """
     if max_tension_ratio is None or friction == 0.0:
         return math.inf
@@ -129,11 +118,13 @@ def max_turning(friction: float, max_tension_ratio: float | None) -> float:
 
 
 MAX_FRICTION = 10.0
-"""Largest coefficient of friction of tether on obstacle that is taken; ropes have 0.1 to 1."""
+"""Format limit of all files: coefficient of friction of tether on obstacle; ropes have 0.1 to 1."""
 
 
 def tension_ratio(friction: float, turning: float) -> float:
     """Return the factor by which friction multiplies a tether's tension, by the capstan's formula.
+
+    It is e^(friction · turning), and 1e12 where that is more: no tether moves then.
 
     Parameters
     ----------
@@ -141,11 +132,6 @@ def tension_ratio(friction: float, turning: float) -> float:
         Coefficient, at least 0.
     turning : float
         Sum of the angles by which the tether turns about obstacles, radians, at least 0.
-
-    Returns
-    -------
-    float
-        e^(friction · turning), and 1e12 where that is more: no tether moves then.
 
     Examples
     --------
@@ -156,21 +142,9 @@ def tension_ratio(friction: float, turning: float) -> float:
 
 
 def proof(status: Status, length: float | None, bound: LowerBound | None) -> str:
-    """Say what is proven of a tour, and of which tours it is the shortest.
+    """Return in words what is proven of a tour, and of which tours it is the shortest.
 
-    Parameters
-    ----------
-    status : Status
-        Of the tour.
-    length : float or None
-        Its length.
-    bound : LowerBound or None
-        Lower bound with the tours that it holds for.
-
-    Returns
-    -------
-    str
-        As in "proven optimal", "at most 3.8 % above the shortest tour", "no bound".
+    Examples of results are "proven optimal", "at most 3.8 % above the shortest tour", "no bound".
     """
     if status is Status.INVALID:
         return "no tour for a tether: the solver is blind to it"
@@ -187,7 +161,7 @@ EXACT_ROADMAPS = frozenset({"taut"})
 """Names of roadmaps whose travel graph, with all classes, holds every admissible tour."""
 
 
-def scope_of(roadmap: str, classes: KeptClasses | None, *, kept_order: bool = False) -> Scope:
+def solution_scope(roadmap: str, classes: KeptClasses | None, *, kept_order: bool = False) -> Scope:
     """Return the tours that the lower bound of a solution holds for, by what is known of its run.
 
     Parameters
@@ -199,11 +173,6 @@ def scope_of(roadmap: str, classes: KeptClasses | None, *, kept_order: bool = Fa
         left out; if a rule excluded classes, they do not.
     kept_order : bool
         Whether the order of the goals was given.
-
-    Returns
-    -------
-    Scope
-        Scope of its bounds.
     """
     if roadmap not in EXACT_ROADMAPS:
         scope = Scope.ROADMAP
@@ -215,15 +184,18 @@ def scope_of(roadmap: str, classes: KeptClasses | None, *, kept_order: bool = Fa
 
 
 class ProblemReference(Model):
-    """Which problem a solution belongs to."""
+    """Reference to the problem that a solution belongs to."""
 
     name: Annotated[Name, Field(description="of the problem")]
     sha256: Annotated[str, Field(description="of what the answer depends on: all values but names")]
 
 
 class Visit(Model):
-    """One visit of the tour: the goal (0-based), the word of the tether there, its taut length; and
-    the goal's name and position, by which it is found again in a problem that has been edited."""
+    """One visit of the tour.
+
+    It has the goal (from 0), the word and the taut length of the tether there, and the goal's name
+    and position, by which the goal is found again in a problem that has been edited.
+    """
 
     goal: Annotated[
         Annotated[int, Field(ge=0)], Field(description="index in the problem's goals, from 0")
@@ -250,26 +222,27 @@ class Timings(Model):
 
 
 class Solution(Drawn, FileModel):
-    """A tour with its proof status.
+    """Tour with its proof status.
 
     Lengths are in the problem's units. Without a tour, `length` and `gap` are None.
 
     Attributes
     ----------
     margin : float
-        All obstacles were grown by it, besides the problem's clearance; path, tethers, bound and
-        status are those among the grown obstacles.
+        Length by which all obstacles were grown, besides the problem's clearance; path, tethers,
+        bound and status are those among the grown obstacles.
     slack : float
         Share of the taut length that may be out beyond it within the tether's length.
     friction, max_tension_ratio : float, float or None
-        Of tether on obstacle, and most that it may multiply the tension by; at every visit.
+        Coefficient of friction of tether on obstacle, and maximum factor on the tension, at each
+        visit.
     kept_order : bool
-        The goals are visited in the order of the problem; bound, gap and status are those of the
-        tours of that order.
+        Whether the goals are visited in the order of the problem; then bound, gap and status are
+        those of the tours of that order.
     path : tuple of (x, y, z)
         Closed polyline from the base to the base, or from the problem's state to the base.
     start_tether : tuple of (x, y, z)
-        The taut tether at the start of a tour from a state.
+        Taut tether at the start of a tour from a state.
     lower_bound : float or None
         Proven lower bound on the tours that `lower_bound_of` names.
     lower_bound_of : Scope or None
@@ -278,7 +251,7 @@ class Solution(Drawn, FileModel):
     gap : float or None
         (length - lower_bound) / length.
     classes : {"all", "non-looping", "shortest"} or None
-        Which homotopy classes the roadmap held; `shortest` is the shortest of every goal.
+        Homotopy classes that the roadmap held; `shortest` is the shortest of every goal.
     legs_left_out : tuple of (int, int)
         Pairs of goals (from 0), one for each leg whose taut path was not found.
     entangled : tuple of int
@@ -389,14 +362,14 @@ class Solution(Drawn, FileModel):
         roadmap, classes = data.get("roadmap"), data.get("classes")
         if not isinstance(roadmap, str):
             return data  # the check of the field reports it
-        scope = scope_of(roadmap, classes, kept_order=data.get("kept_order") is True)
+        scope = solution_scope(roadmap, classes, kept_order=data.get("kept_order") is True)
         out = {**data, "lower_bound_of": scope}
         if data.get("status") == Status.OPTIMAL:
             out["status"] = Status.optimal_of(scope)
         return out
 
     def __repr__(self) -> str:
-        """In a line."""
+        """Return problem, solver, status, length, bound and number of visits in one line."""
         length = "" if self.length is None else f", length {self.length:.6g}"
         bound = "" if self.bound is None else f", {self.bound.says(self.length)}"
         return (
@@ -409,11 +382,8 @@ class Solution(Drawn, FileModel):
     def to_frame(self) -> pandas.DataFrame:
         """Return the visits as a pandas DataFrame, a row for each in the order of the tour.
 
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``goal`` (from 0), ``name``, ``x``, ``y``, ``z``, ``signature`` and
-            ``tether_length``, in the problem's units.
+        Columns are ``goal`` (from 0), ``name``, ``x``, ``y``, ``z``, ``signature`` and
+        ``tether_length``, in the problem's units.
 
         Raises
         ------
@@ -422,23 +392,26 @@ class Solution(Drawn, FileModel):
         """
         return frame_of(
             {
-                "goal": v.goal, "name": v.name,
+                "goal": v.goal,
+                "name": v.name,
                 **dict(zip("xyz", v.position or (None, None, None), strict=True)),
-                "signature": v.signature, "tether_length": v.tether_length,
+                "signature": v.signature,
+                "tether_length": v.tether_length,
             }
             for v in self.tour
-        )  # fmt: skip
+        )
 
     @property
     def bound(self) -> LowerBound | None:
-        """The lower bound with the tours that it holds for; None where nothing is known."""
+        """Lower bound with the tours that it holds for; None if nothing is known."""
         if self.lower_bound is None or self.lower_bound_of is None:
             return None
         return LowerBound(self.lower_bound, self.lower_bound_of)
 
     @property
     def max_turning(self) -> float:
-        """Sum of angles (radians) by which the tether may turn; inf where friction has no limit."""
+        """Sum of angles by which the tether may turn, radians; infinite without a limit of
+        friction."""
         return max_turning(self.friction, self.max_tension_ratio)
 
     @property
@@ -447,13 +420,7 @@ class Solution(Drawn, FileModel):
         return proof(self.status, self.length, self.bound)
 
     def to_json(self) -> str:
-        """The solution as JSON of format version 1.
-
-        Returns
-        -------
-        str
-            Text of a solution file.
-        """
+        """Return the solution as JSON of format version 1."""
         data = self.model_dump(mode="json")
         path = data.pop("path")
         for name in ("start_tether", "legs_left_out"):

@@ -13,7 +13,7 @@ from netsp.base.errors import InputError
 from netsp.gtsp.search.layers import Instance, best_classes
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import OnProgress, Progress, Result
-from netsp.model.arrangement import keeps
+from netsp.model.arrangement import respects_precedences
 from netsp.model.bound_scope import LowerBound
 from netsp.model.solution import Status
 
@@ -44,7 +44,7 @@ def solve_in_order(graph: TravelGraph, clock: Clock, on_progress: OnProgress | N
     """
     if graph.start is not None:
         raise InputError("keep_order: a tour from a state is planned afresh; expected none")
-    if not keeps(range(1, graph.goal_count + 1), graph.before):
+    if not respects_precedences(range(1, graph.goal_count + 1), graph.before):
         raise InputError(
             "keep_order: the order of the file breaks an 'after' of its goals; expected one that "
             "keeps them all"

@@ -19,7 +19,7 @@ from netsp.gtsp.search import Instance, best_classes
 from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.hsignature import Word, concatenate
 from netsp.hsignature.rays import crossings
-from netsp.model.arrangement import keeps
+from netsp.model.arrangement import respects_precedences
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
 
@@ -186,7 +186,7 @@ def tour_from(problem: Problem, solution: Solution, graph: TravelGraph) -> list[
     new = [c for c in range(1, graph.goal_count + 1) if c not in order and c in place_of]
     for c in new:
         _insert(order, c, problem.points, place_of)
-    if len(order) != graph.goal_count or not keeps(order, graph.before):
+    if len(order) != graph.goal_count or not respects_precedences(order, graph.before):
         return None
     if len(known) == len(order):
         return [0, *known]

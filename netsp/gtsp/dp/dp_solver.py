@@ -24,7 +24,7 @@ from netsp.gtsp.limits import Limits
 from netsp.gtsp.searching import SearchingRun
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
-from netsp.model.arrangement import keeps
+from netsp.model.arrangement import respects_precedences
 
 STEP, SHORTER = 0.5, 0.7
 """First step of the prices as a share of the gap, and its factor after `STALL` passes in vain."""
@@ -144,7 +144,7 @@ def bound_by_walks(
         goals = costs.cluster[walk.rows]
         visits = np.bincount(goals, minlength=walks.n + 1)
         once = bool((visits[1:] == 1).all())
-        whole = once and keeps(goals.tolist(), before)
+        whole = once and respects_precedences(goals.tolist(), before)
         if whole:
             measured = costs.exact is None
             costs.measure(np.concatenate([[0], walk.rows]))

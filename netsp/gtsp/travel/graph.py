@@ -30,7 +30,7 @@ from netsp.gtsp.travel.leg_provider import Legs
 from netsp.gtsp.travel.parity_distances import WaysByParity
 from netsp.gtsp.travel.tether_blind_legs import Detours
 from netsp.hsignature import Word
-from netsp.model.arrangement import UNORDERED, keeps
+from netsp.model.arrangement import UNORDERED, respects_precedences
 from netsp.model.bound_scope import LowerBound, Scope, strongest
 from netsp.model.solution import EXACT_ROADMAPS
 
@@ -719,7 +719,7 @@ class TravelGraph(Drawn):
             of[cluster] = v
         if missing := set(range(self.goal_count + 1)) - of.keys():
             return f"no vertex of cluster {min(missing)}"
-        if not keeps(own, self.before):
+        if not respects_precedences(own, self.before):
             return "it breaks a precedence"
         return None
 

@@ -12,7 +12,7 @@ from netsp.base.errors import InputError
 from netsp.base.field_types import NonNegative, Point2, Point3, Positive, checked_integer, is_index
 from netsp.base.files import FileModel
 from netsp.base.validated import Model, shown
-from netsp.model.problem import WIDEST, Circle, GoalLike, Obstacle, Polygon, Problem
+from netsp.model.problem import MAX_EXTENT_RATIO, Circle, GoalLike, Obstacle, Polygon, Problem
 from netsp.online.execute.execute_policy import ExecutePolicy
 
 
@@ -156,11 +156,11 @@ def problem_after(
             )
     if event.add_goal is not None:
         away = float(np.abs(np.array(event.add_goal.position) - np.array(problem.base)).max())
-        max_distance = WIDEST * max(problem.tether_length, problem.scale)
+        max_distance = MAX_EXTENT_RATIO * max(problem.tether_length, problem.scale)
         if away > max_distance:
             raise InputError(
                 f"add_goal: is {away:.4g} from the base; expected at most {max_distance:.4g}, "
-                f"{WIDEST:g} times the size of the problem"
+                f"{MAX_EXTENT_RATIO:g} times the size of the problem"
             )
     base = np.array([out.base[:2]])
     for i, o in enumerate(out.obstacles):

@@ -10,7 +10,7 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.model.bound_scope import LowerBound, Scope
-from netsp.model.solution import Status, scope_of
+from netsp.model.solution import Status, solution_scope
 from netsp.study.compare.rows import FAILED, TrialRow
 
 SAME_RESULT_TOLERANCE = 1e-6
@@ -143,7 +143,7 @@ def bound_of(row: TrialRow) -> LowerBound | None:
     if named in set(Scope):
         return LowerBound(row["lower_bound"], Scope(named))
     rule = row["roadmap"].get("options", {}).get("classes")
-    scope = scope_of(row["roadmap"]["name"], "non-looping" if rule == "non-looping" else None)
+    scope = solution_scope(row["roadmap"]["name"], "non-looping" if rule == "non-looping" else None)
     return LowerBound(row["lower_bound"], scope)
 
 
