@@ -112,8 +112,7 @@ def _told(
 
 
 def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
-    """(h, w, 3) pixels of one picture after the other. What stands still is drawn once for each
-    map."""
+    """Yield the pixels (h, w, 3) of each picture. What does not move is drawn once for each map."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -160,7 +159,7 @@ def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
 
 
 def _moving(ax: Any, film: Film) -> tuple[Any, ...]:
-    """What is drawn again at every moment: marks, path, tether, robot, and the words above."""
+    """Return what is drawn again at every moment: marks, path, tether, robot and caption."""
     none: tuple[list[float], ...] = ([], [], []) if film.scene else ([], [])
     size = 0.6 if film.scene else 1.0
     marks = []
@@ -176,7 +175,7 @@ def _moving(ax: Any, film: Film) -> tuple[Any, ...]:
 
 
 def _legend(films: Sequence[Film]) -> list[Any]:
-    """What the lines and marks mean."""
+    """Return the handles of the legend."""
     from matplotlib.lines import Line2D
 
     what = "waypoint" if any(film.scene for film in films) else "goal"
@@ -200,7 +199,7 @@ def _legend(films: Sequence[Film]) -> list[Any]:
 
 
 def _draw_space(ax: Any, film: Film) -> None:
-    """A scene, seen as far as the robot goes."""
+    """Draw a scene as far as the robot goes."""
     assert film.scene is not None
     every = np.vstack([m.nodes for m in film.moments] + [film.moments[-1].path])
     stops = WaypointMarks(film.places, anchor=film.anchor)
@@ -212,7 +211,7 @@ def _draw_space(ax: Any, film: Film) -> None:
 
 
 def _title(film: Film) -> str:
-    """In lines that fit, with room below for what is said of the moment."""
+    """Return the title in lines that fit, with space below for the caption."""
     lines = [
         part for line in film.title.split("\n") for part in textwrap.wrap(line, CAPTION_LETTERS)
     ]
@@ -220,7 +219,7 @@ def _title(film: Film) -> str:
 
 
 def _draw_maps(panels: Any, films: Sequence[Film], shown: Sequence[Problem | None]) -> None:
-    """All that stands still, in place of what stood there before."""
+    """Draw what does not move, in place of the map before."""
     for ax, film, problem in zip(panels, films, shown, strict=True):
         if film.scene is not None:
             if not ax.collections:
@@ -237,7 +236,7 @@ def _draw_maps(panels: Any, films: Sequence[Film], shown: Sequence[Problem | Non
 
 
 def _view(film: Film) -> tuple[float, float, float, float]:
-    """What is seen of all its maps."""
+    """Return the box around all maps of a film."""
     maps = {id(m.problem): m.problem for m in film.moments if m.problem is not None}
     views = np.array([view(problem) for problem in maps.values()])
     low, high = views[:, :2].min(0), views[:, 2:].max(0)
@@ -253,7 +252,7 @@ def _height(film: Film) -> float:
 
 
 def _palette(picture: Any) -> Any:
-    """The colours of a picture, and those of the roles, however small they are in it."""
+    """Return the colours of a picture, always with those of the roles."""
     from PIL import Image
 
     roles = (

@@ -27,7 +27,7 @@ from netsp.world.scene.scene import Scene
 
 @dataclass(frozen=True)
 class Film:
-    """What one panel shows.
+    """Contents of one panel.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Film:
 
     @property
     def measured_in(self) -> str:
-        """What its length is of, with the unit."""
+        """Name of the measured length, with its unit."""
         if self.by_time:
             return "time (s)"
         problem = self.moments[0].problem
@@ -66,7 +66,7 @@ class Film:
 
     @property
     def every_fate(self) -> set[str]:
-        """What becomes of any goal or waypoint."""
+        """Fates of all goals or waypoints."""
         return {fate for m in self.moments for fate, which in m.fates.items() if which}
 
 
@@ -117,7 +117,7 @@ def steps_of(films: Sequence[Film], count: int) -> tuple[str, list[Step]]:
 
 
 def film_of_plan(problem: Problem, solution: Solution, count: int) -> Film:
-    """Of a tour that is to be carried out.
+    """Return the film of a tour that is to be carried out.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def film_of_run(
     since: Mapping[str, Mapping[int, float]],
     count: int,
 ) -> Film:
-    """Of a tour that was carried out.
+    """Return the film of a tour that was carried out.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def film_of_run(
 
 
 def film_of_flight(run: Run, scene: Scene, count: int) -> Film:
-    """Of a flight in space.
+    """Return the film of a flight in space.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def film_of_flight(run: Run, scene: Scene, count: int) -> Film:
 
 
 def film_of_mission(mission: Mission, scene: Scene, count: int) -> Film:
-    """Of a planned mission.
+    """Return the film of a planned mission.
 
     Parameters
     ----------

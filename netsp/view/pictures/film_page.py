@@ -34,7 +34,7 @@ PAGE_CAPTION_LETTERS = 150
 
 
 def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
-    """A page that needs nothing else, with one slider for all films.
+    """Write a self-contained page with one slider for all films.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
 
 
 def _moving(film: Film, moment: Moment) -> list[dict[str, Any]]:
-    """What changes from moment to moment."""
+    """Return what changes from moment to moment."""
     visited, left = (list(moment.fates.get(fate, ())) for fate in (VISITED, LEFT_OUT))
     rest = sorted(set(range(len(film.places))) - {*visited, *left})
     return [

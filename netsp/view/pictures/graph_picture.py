@@ -9,8 +9,8 @@ from netsp.view.pictures import style
 
 
 def draw_classes(graph: TravelGraph, *, ax: Any = None) -> Any:
-    """A mark for each class, by goal and tether length, on axes of the caller or on new ones;
-    returns the axes. Graphs of given costs have no tethers: there it is the leg from the base."""
+    """Mark each class by goal and tether length, on the given or on new axes, and return the axes.
+    Graphs of given costs have no tethers; their leg from the base is shown instead."""
     from matplotlib.figure import Figure
 
     if ax is None:

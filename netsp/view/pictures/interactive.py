@@ -102,12 +102,12 @@ def _packed_library() -> str:
 
 
 def _packed(text: str) -> str:
-    """The same text, the same bytes: without a time in them."""
+    """Compress a text to the same bytes every time, without a time stamp."""
     return base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
 
 
 def _plain(value: Any) -> Any:
-    """What plotly draws as JSON has it: short numbers pack better than plotly's binary ones."""
+    """Return what plotly draws as JSON: short numbers compress better than plotly's binary ones."""
     if hasattr(value, "to_plotly_json"):
         value = value.to_plotly_json()
     if isinstance(value, dict):
@@ -134,7 +134,7 @@ def write_scene(
     stops: WaypointMarks | None,
     file: str | Path,
 ) -> None:
-    """A page of a scene, as of `netsp.view.pictures.scene_picture.save`."""
+    """Write a page of a scene, as `netsp.view.pictures.scene_picture.save` does."""
     go = plotly_objects()
     figure = go.Figure()
     for name, (vertices, faces) in parts:
@@ -188,7 +188,7 @@ def plotly_objects() -> Any:
 
 
 def mesh_trace(name: str, vertices: Floats, faces: npt.NDArray[np.int64]) -> Any:
-    """A part of the scene on an interactive page."""
+    """Return a part of the scene on an interactive page."""
     x, y, z = np.round(vertices, 4).T
     i, j, k = faces.T
     return plotly_objects().Mesh3d(
@@ -264,7 +264,7 @@ def marks_trace(
 
 
 def layout(title: str, units: str) -> dict[str, Any]:
-    """The layout of an interactive page."""
+    """Return the layout of an interactive page."""
     axes = {f"{a}axis": {"title": {"text": f"{a} ({units})"}} for a in "xyz"}
     return {
         "title": {"text": title},

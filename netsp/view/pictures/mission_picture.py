@@ -28,12 +28,12 @@ DASHES = ("-", "-.")
 
 
 def path_of(run: Run) -> Floats:
-    """(n, 3) where the robot was."""
+    """Return the path of the robot (n, 3)."""
     return np.array([[r.x, r.y, r.z] for r in run.log])
 
 
 def title_of(run: Run) -> str:
-    """A run in one line."""
+    """Return a run in one line."""
     s = run.summary
     return (
         f"{s['planner']}: {s['visited']} of {s['waypoints']} in {s['inspection_s']:.0f} s"
@@ -48,7 +48,7 @@ def title_of(run: Run) -> str:
 
 
 def stops_of(run: Run) -> WaypointMarks:
-    """Its waypoints, and which of them were not visited."""
+    """Return the waypoints of a run, and which of them were not visited."""
     visited = {int(stop["waypoint"]) for stop in run.summary["stops"]}
     left = tuple(sorted(set(range(len(run.mission.waypoints))) - visited))
     return WaypointMarks(run.mission.places, left, visited=True)
@@ -108,8 +108,8 @@ def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
 
 
 def draw_tether(runs: Sequence[Run], *, ax: Any = None, units: str = "m") -> Any:
-    """The length of the taut tether over time, with slack and sag where there are any, on axes of
-    the caller or on new ones; returns the axes. Of one run tether recovery is marked."""
+    """Draw the length of the taut tether over time, with slack and sag if there are any, on the
+    given or on new axes, and return the axes. For one run, tether recovery is marked."""
     from matplotlib.figure import Figure
 
     if ax is None:
@@ -146,12 +146,13 @@ def draw_tether(runs: Sequence[Run], *, ax: Any = None, units: str = "m") -> Any
 
 
 def draw_run(run: Run, *, ax: Any = None) -> Any:
-    """The length of the taut tether of one run over time; see `draw_tether`."""
+    """Draw the length of the taut tether of one run over time; see `draw_tether`."""
     return draw_tether([run], ax=ax)
 
 
 def draw_coverage(runs: Sequence[Run], *, ax: Any = None) -> Any:
-    """What the camera has seen over time, on axes of the caller or on new ones; returns them."""
+    """Draw the area that the camera has seen over time, on the given or on new axes, and return the
+    axes."""
     from matplotlib.figure import Figure
 
     if ax is None:
@@ -167,8 +168,8 @@ def draw_coverage(runs: Sequence[Run], *, ax: Any = None) -> Any:
 
 
 def tethers_along(run: Run, scene: Scene, moments: npt.NDArray[np.int64]) -> list[Tether]:
-    """The tether at some rows of the log, ascending: the run is driven again,
-    unless its tethers were kept because the scene has changed."""
+    """Return the tether at some rows of the log, in ascending order. The run is driven again,
+    unless its tethers were kept because the scene changed."""
     if run.tethers:
         rows = np.array([row for row, _ in run.tethers])
         return [run.tethers[k][1] for k in np.searchsorted(rows, moments, side="right") - 1]

@@ -59,7 +59,7 @@ class Moment:
 
 
 def moments_of_plan(problem: Problem, solution: Solution, count: int) -> list[Moment]:
-    """The tether at even steps along the tour, by the model that watches it online.
+    """Return the tether at even steps along the tour, by the model that follows it online.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def moments_of_plan(problem: Problem, solution: Solution, count: int) -> list[Mo
 
 
 def _reached(path: Floats, problem: Problem, solution: Solution) -> list[tuple[int, int]]:
-    """Each goal of the tour, and the vertex of the path at which it is visited."""
+    """Return each goal of the tour, with the vertex of the path at which it is visited."""
     out, at = [], 0
     for visit in solution.tour:
         apart = np.linalg.norm(path[at:] - np.array(problem.goals[visit.goal].position), axis=1)
@@ -262,7 +262,7 @@ def moments_of_mission(mission: Mission, scene: Scene, count: int) -> list[Momen
 
 
 def next_of(problem: Problem, goal: int) -> str:
-    """What a run calls where it is going.
+    """Return the name of a run's next goal.
 
     Parameters
     ----------

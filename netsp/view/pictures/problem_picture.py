@@ -98,8 +98,8 @@ def _edges(lines: shapely.Geometry) -> Floats:
 
 
 def draw(problem: Problem, solution: Solution | None = None) -> Any:
-    """A matplotlib Figure: the map with the tour on it, and beside it, for each visit of the tour,
-    the taut tether from the base to the robot."""
+    """Return a matplotlib Figure: the map with the tour, and next to it, for each visit, the taut
+    tether from the base to the robot."""
     from matplotlib.figure import Figure
 
     visits = solution.tour if solution is not None else ()
@@ -217,7 +217,7 @@ def save_trace(rows: Sequence[Progress], title: str, units: str, path: str | Pat
 
 
 def _mark(points: Sequence[object]) -> str | None:
-    """A marker where there is but one point to see."""
+    """Return a marker if all points coincide, else None."""
     return "o" if len(points) == 1 else None
 
 
@@ -265,7 +265,7 @@ def save_classes(problem: Problem, goal: int, path: str | Path) -> None:
 
 
 def _letter(i: int) -> str:
-    """The letter of obstacle i in words, which count from 1 for the sign's sake."""
+    """Return the letter of obstacle i in words, which count from 1 so that letters have signs."""
     return str(i + 1)
 
 
@@ -286,8 +286,8 @@ def draw_map(
     ax: Axes | None = None,
     tethers: bool = False,
 ) -> Axes:
-    """The map of a problem, with the path of a solution if given, on axes of the caller or on new
-    ones; returns the axes.
+    """Draw the map of a problem, with the path of a solution if given, on the given or on new axes,
+    and return the axes.
 
     Parameters
     ----------
@@ -410,7 +410,7 @@ def _label_goals(ax: Axes, problem: Problem, radius: float, *, is_numbered: bool
 
 
 def draw_path(solution: Solution, *, ax: Any = None) -> Any:
-    """The path of a solution without its problem, on axes of the caller or on new ones; returns the
+    """Draw the path of a solution without its problem, on the given or on new axes, and return the
     axes."""
     from matplotlib.figure import Figure
 
@@ -428,8 +428,8 @@ def draw_path(solution: Solution, *, ax: Any = None) -> Any:
 def draw_solution(
     solution: Solution, *, ax: Axes | None = None, problem: Problem | None = None
 ) -> Axes:
-    """A solution's path, over its problem if that is given, on axes of the caller or on new ones;
-    returns the axes."""
+    """Draw a solution's path, over its problem if given, on the given or on new axes, and return
+    the axes."""
     if problem is not None:
         return draw_map(problem, solution, ax=ax)
     path: Axes = draw_path(solution, ax=ax)
@@ -544,7 +544,7 @@ def _arrows(ax: Axes, path: Any, count: int) -> None:
 
 
 def view(problem: Problem, solution: Solution | None = None) -> tuple[float, float, float, float]:
-    """The box that holds everything of interest, with a margin.
+    """Return the box that holds everything of interest, with a margin.
 
     Parameters
     ----------

@@ -62,7 +62,7 @@ def save(
 
 
 def figure_of(scene: Scene, path: Floats, title: str, stops: WaypointMarks) -> Any:
-    """The same as a Matplotlib figure.
+    """Return the picture of a scene as a Matplotlib figure.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def _title(scene: Scene, path: Floats, tether: Tether | None) -> str:
 
 
 def parts_of(scene: Scene, low: Floats, high: Floats) -> list[tuple[str, Triangles]]:
-    """What is drawn of the scene, by name."""
+    """Return the parts of the scene that are drawn, by name."""
     out = []
     for k, solid in enumerate(scene.all_solids()):
         if isinstance(solid.shape, HalfSpace) and len(scene.all_solids()) > 1:
@@ -114,7 +114,7 @@ def _figure(
     title: str,
     stops: WaypointMarks | None = None,
 ) -> Any:
-    """A view in space, and the plans from above and from two sides."""
+    """Return a view in space, with plans from above and from two sides."""
     from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator

@@ -21,7 +21,7 @@ MAX_LABELS = 12
 
 
 def draw_tether_curve(curve: TetherCurve, *, ax: Axes | None = None) -> Any:
-    """The shortest tour against the tether's length, on axes of the caller or on new ones; returns
+    """Draw the shortest tour against the tether's length, on the given or on new axes, and return
     the axes."""
     if ax is None:
         from matplotlib.figure import Figure
@@ -79,9 +79,9 @@ CONTOUR_LEVELS = 12
 
 
 def draw_base_search(search: BaseSearch, *, ax: Any = None) -> Any:
-    """Two maps of the candidates, on axes of the caller or on new ones: the shortest sufficient
-    tether, and the shortest tour; returns both axes. Contours are drawn between candidates that lie
-    all over the plane."""
+    """Draw two maps of the candidates, on the given or on new axes, and return both axes: the
+    shortest sufficient tether, and the shortest tour. Contours are drawn if the candidates spread
+    over the plane."""
     problem = search.problem
     if ax is None:
         from matplotlib.figure import Figure

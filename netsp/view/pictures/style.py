@@ -96,14 +96,14 @@ def load_matplotlib() -> None:
 
 
 def halo() -> list[Any]:
-    """A white edge around letters, so that lines may pass beneath them."""
+    """Return the effect of a white edge around letters, so that lines may pass beneath them."""
     from matplotlib.patheffects import withStroke
 
     return [withStroke(linewidth=2.0, foreground="white")]
 
 
 def svg(figure: Any, **more: Any) -> str:
-    """A matplotlib Figure as the SVG element of a page.
+    """Return a matplotlib Figure as the SVG element of a page.
 
     Parameters
     ----------
@@ -155,8 +155,8 @@ def _steps_told(figure: Any) -> Iterator[None]:
 
 
 def literal(figure: Any) -> Any:
-    """The figure (Matplotlib's), its texts not read as mathematics but for the labels of ticks,
-    which Matplotlib writes itself, and cut where they are endless."""
+    """Return a Matplotlib figure whose texts are not read as mathematics, and are cut where words
+    are endless. Labels of ticks, which Matplotlib writes, stay as they are."""
     for text in _texts(figure):
         text.set_parse_math(False)
         content = text.get_text()
@@ -180,7 +180,7 @@ def _texts(artist: Any) -> Iterator[Any]:
 
 @cache
 def _fonts_of_other_scripts() -> tuple[str, ...]:
-    """Of this machine, for letters that Matplotlib's own font lacks."""
+    """Return fonts of this machine with letters that Matplotlib's own font lacks."""
     from matplotlib import font_manager
 
     there = set(font_manager.get_font_names())

@@ -27,7 +27,7 @@ th.words, td.words { text-align: left } td { vertical-align: top }
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[int] = ()) -> str:
-    """A table that scrolls sideways on a narrow screen.
+    """Return a table that scrolls sideways on a narrow screen.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def imported(site: Site) -> str:
 
 
 def checks(verdict: Verification) -> str:
-    """The judge's checks.
+    """Return the judge's checks.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def checks(verdict: Verification) -> str:
 
 
 def planned_with(solution: Solution) -> str:
-    """What a tour was planned to bear, as a sentence; empty if nothing."""
+    """Return the margins that a tour was planned with as a sentence, or an empty string."""
     parts = []
     if solution.margin:
         parts.append(f"obstacles that are off by {solution.margin:g}")
@@ -119,7 +119,7 @@ def planned_with(solution: Solution) -> str:
 
 
 def stops(problem: Problem, solution: Solution, found: Margins | None) -> str:
-    """The visits in numbers.
+    """Return the visits in numbers.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def _course(problem: Problem, path: np.ndarray) -> str:
 
 
 def tethers(problem: Problem, solution: Solution) -> str:
-    """How the tether runs at every visit, and what to do if it snags there or on the way on.
+    """Return how the tether runs at every visit, and what to do if it snags there or on the way on.
 
     Parameters
     ----------
@@ -225,14 +225,15 @@ def tethers(problem: Problem, solution: Solution) -> str:
 
 
 def of_tour(problem: Problem, solution: Solution) -> Margins | None:
-    """The margins of a tour from the base that keeps the tether's length; None for others."""
+    """Return the margins of a tour from the base within the tether's length; None for other
+    tours."""
     if problem.state is not None or solution.status is Status.INVALID:
         return None
     return margins(problem, solution, solution.friction)
 
 
 def margin_list(problem: Problem, found: Margins) -> str:
-    """How far the world may be off, as a list."""
+    """Return the margins as a list: by how much the world may differ from the map."""
     u = problem.units
     lines = [
         "every obstacle may be elsewhere or larger, as long as it is all open water now"
@@ -251,7 +252,7 @@ def margin_list(problem: Problem, found: Margins) -> str:
 
 
 def first_words(problem: Problem, solution: Solution) -> str:
-    """The tour in a sentence for the head of the sheet."""
+    """Return the tour in one sentence for the head of the sheet."""
     longest = max(solution.tour, key=lambda v: v.tether_length)
     return (
         f"{counted(len(solution.tour), 'visit')}; "

@@ -74,7 +74,7 @@ _PLANNED = f'<path d="M0 8H16" stroke="{style.PLAN}" stroke-width="2" stroke-das
 
 
 class View:
-    """From the plan to the picture.
+    """Transformation from the plan to the picture.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class View:
 
     @classmethod
     def of(cls, problem: Problem, film: Film) -> View:
-        """Of a problem, and of all that a film shows.
+        """Return the view of a problem, and of all that a film shows.
 
         Parameters
         ----------
@@ -127,7 +127,7 @@ class View:
         return cls(problem, np.vstack([m.nodes for m in film.moments]))
 
     def point(self, p: npt.ArrayLike) -> list[float]:
-        """Where a place is in the picture."""
+        """Return a place in the picture."""
         x, y = np.asarray(p, dtype=float)[:2]
         return [
             round(LEFT_MARGIN + float(x - self.low[0]) * self.scale, 2),
@@ -135,7 +135,7 @@ class View:
         ]
 
     def points(self, line: Floats) -> str:
-        """A line in the picture."""
+        """Return a line in the picture."""
         return " ".join(f"{x},{y}" for x, y in (self.point(p) for p in line))
 
 
@@ -148,7 +148,7 @@ def draw(
     driven: Floats | None = None,
     order: Mapping[int, int] | None = None,
 ) -> str:
-    """The map as SVG, with the elements that the page's script moves.
+    """Return the map as SVG, with the elements that the page's script moves.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def draw(
 
 
 def legend(*, run: bool = False) -> str:
-    """What the marks of the map mean, as a list.
+    """Return the marks of the map and their meanings as a list.
 
     Parameters
     ----------
@@ -224,8 +224,8 @@ def legend(*, run: bool = False) -> str:
 
 
 def round_step(span: float, parts: float) -> float:
-    """A round number (1, 2 or 5 times a power of ten) that divides a span into at most so many
-    parts.
+    """Return a round number (1, 2 or 5 times a power of ten) that divides a span into at most
+    `parts` parts.
 
     Parameters
     ----------
@@ -346,7 +346,7 @@ def _passing(maps: Maps, view: View) -> list[str]:
 
 
 def _planned(path: Floats, view: View) -> list[str]:
-    """What was to be gone at first."""
+    """Return the path that was planned at first."""
     return [
         f'<polyline points="{view.points(path)}" fill="none" stroke="{style.PLAN}" '
         'stroke-width="1.5" stroke-dasharray="6 4"/>'
@@ -354,7 +354,7 @@ def _planned(path: Floats, view: View) -> list[str]:
 
 
 def _tour(path: Floats, view: View) -> list[str]:
-    """A path, with an arrowhead in the middle of every long piece."""
+    """Return a path, with an arrowhead in the middle of every long piece."""
     path = path[polylines.telling(path, 1e-3 / view.scale)]
     out = [
         f'<polyline points="{view.points(path)}" fill="none" stroke="{style.PATH}" '

@@ -43,7 +43,8 @@ def by_goals(
     *,
     log: bool,
 ) -> Any:
-    """One panel for each tether length: the median of a number against goals, with intervals."""
+    """Draw one panel for each tether length: the median of a number against goals, with
+    intervals."""
     tethers = sorted({c.tether for c in cells})
     names = list(dict.fromkeys(c.method for c in cells))
     figure, axes = _figure(len(tethers))

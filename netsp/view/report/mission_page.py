@@ -63,7 +63,7 @@ def report_mission(source: str | Path, output: str | Path) -> None:
 
 
 def page(mission: Mission, scene: Scene, run: Path | None) -> str:
-    """The page as HTML.
+    """Return the page as HTML.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def _stops(mission: Mission) -> int:
 
 
 def _line(mission: Mission, rows: list[dict[str, str]]) -> Floats:
-    """(k, 3) where the robot was, or is to be."""
+    """Return the flown or planned path (k, 3)."""
     if rows:
         return np.array([[float(r[k]) for k in "xyz"] for r in rows])
     assert mission.tour is not None
@@ -190,7 +190,7 @@ def _planned(tour: PlannedTour, mission: Mission, unit: str) -> str:
 
 
 def _picture(scene: Scene, line: Floats, name: str, stops: WaypointMarks) -> str:
-    """A figure as an image: drawn as lines, the triangles of a mesh would take megabytes."""
+    """Return a figure as an image made of lines; the triangles of a mesh would take megabytes."""
     out = io.BytesIO()
     style.literal(figure_of(scene, line, name, stops)).savefig(out, format="png", dpi=110)
     data = base64.b64encode(out.getvalue()).decode()
@@ -201,7 +201,7 @@ def _picture(scene: Scene, line: Floats, name: str, stops: WaypointMarks) -> str
 
 
 def _waypoints(mission: Mission, summary: dict[str, Any]) -> str:
-    """A row for each."""
+    """Return a row for each waypoint."""
     tour = mission.tour
     flown = {int(s["waypoint"]): s for s in summary.get("stops", ())}
     words = {int(s["waypoint"]): s for s in (summary.get("words") or {}).get("stops", ())}

@@ -88,7 +88,7 @@ button.addEventListener("click", () => {
 
 
 def script(films: Sequence[Film], views: Sequence[View]) -> str:
-    """What moves the maps of a page, in their order.
+    """Return the script that moves the maps of a page, in order.
 
     Parameters
     ----------

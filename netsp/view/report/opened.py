@@ -28,7 +28,7 @@ from netsp.world.mission.run_log import check_log
 
 @dataclass(frozen=True)
 class Opened:
-    """What was read.
+    """Contents of a file or folder that a report is about.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Opened:
 
     @property
     def order(self) -> dict[int, int] | None:
-        """Of the goals that a run has visited, the numbers of their visits; None of a solution.
+        """Numbers of the visits to the goals that a run visited; None for a solution.
 
         Raises
         ------
@@ -90,7 +90,7 @@ class Opened:
             ) from None
 
     def film(self, count: int) -> Film:
-        """The tour, or the run, as a moving picture.
+        """Return the film of the tour or run.
 
         Parameters
         ----------
@@ -117,7 +117,7 @@ class Opened:
             ) from None
 
     def _since(self) -> dict[str, dict[int, float]]:
-        """For what has become of goals in a run, seconds since when it has."""
+        """Times in seconds at which the fates of goals in a run were decided, by fate."""
         assert self.run is not None
         visits = run_page.rows_of(self.run / "visits.csv")
         summary = json_of(self.run / "summary.json")
@@ -224,5 +224,5 @@ def _maps_of(file: Path) -> list[tuple[float, Problem]]:
 
 
 def json_of(file: Path) -> Any:
-    """What a file of a run holds; InputError if that is no JSON."""
+    """Return the contents of a JSON file of a run; InputError if it is no JSON."""
     return parse_json(read_text(file), str(file))

@@ -211,7 +211,7 @@ def _failures_table(rows: list[TrialRow]) -> str:
 
 
 def _rows_link(rows: list[TrialRow], best: dict[str, float]) -> str:
-    """Every row as CSV within the page."""
+    """Return a link to every row as CSV within the page."""
     out = io.StringIO()
     names = [
         "status",

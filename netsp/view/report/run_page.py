@@ -13,7 +13,7 @@ from netsp.view.pictures import style
 
 
 def rows_of(file: Path) -> list[dict[str, str]]:
-    """The rows of a table of a run.
+    """Return the rows of a table of a run.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def rows_of(file: Path) -> list[dict[str, str]]:
 
 
 def over_time(t: Floats, length: Floats, limit: Floats, units: str) -> str:
-    """The tether and its limit over time.
+    """Return the chart of the tether and its limit over time.
 
     Parameters
     ----------

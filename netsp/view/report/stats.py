@@ -26,7 +26,7 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Cell:
-    """Where a row belongs in a table."""
+    """Place of a row in a table."""
 
     method: str
     goals: int
@@ -35,7 +35,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Summary:
-    """Of one number over the trials of a cell: median, its interval, mean, how many."""
+    """Median of a number over the trials of a cell, with its interval, mean and count."""
 
     median: float
     low: float
@@ -148,9 +148,9 @@ def bound_of(row: TrialRow) -> LowerBound | None:
 
 
 def profile(by_method: dict[str, list[TrialRow]]) -> dict[str, Floats]:
-    """For each method the sorted ratios of its time to proof to the fastest's, over the problems
-    that any of them proved (Dolan & Moré 2002); inf where it proved nothing. Methods that prove
-    nothing at all are left out."""
+    """Return, for each method, the sorted ratios of its time to proof to the fastest method's
+    (Dolan & Moré 2002), over the problems that any method proved. Unproven problems are inf;
+    methods without any proof are left out."""
     times: dict[str, dict[tuple[str, int], float]] = {}
     for method, rows in by_method.items():
         proven = {(r["problem_sha256"], r["seed"]): r["total_s"] for r in rows if is_proven(r)}

@@ -60,7 +60,7 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
 
 
 def page(what: Opened) -> str:
-    """The page as HTML.
+    """Return the page as HTML.
 
     Parameters
     ----------
