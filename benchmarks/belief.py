@@ -34,14 +34,14 @@ def shares_of_truth(kind: str, seed: int, noise_seed: int) -> np.ndarray:
     letters, word, out = guard.site.letters, (), []
     for k in range(len(true)):
         if k:
-            (step,) = letters.written(true[k - 1][None], true[k][None])
+            (step,) = letters.words_of_steps(true[k - 1][None], true[k][None])
             word = letters.join(word, step or ())
-        guard.take(Fix(k * DT, tuple(told[k]), estimate=True))
+        guard.update(Fix(k * DT, tuple(told[k]), estimate=True))
         if k % round(1.0 / DT) or not guard.strands.all:
             continue
         share = 0.0
         for strand in guard.strands.all:
-            (way,) = letters.written(true[k][None], strand.tether.robot[None])
+            (way,) = letters.words_of_steps(true[k][None], strand.tether.robot[None])
             share += strand.likely * (letters.join(word, way or ()) == strand.word)
         out.append(share)
     return np.array(out)

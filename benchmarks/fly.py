@@ -88,12 +88,12 @@ class TrueSession(Session):
         self.earth, self.places_told = Earth(latitude, longitude), []
         super().__init__(UdpLink(Address(True, "127.0.0.1", vehicle.port)), frame, 1, pace)
 
-    def _take(self, message: Any, peer: tuple[str, int]) -> None:
-        super()._take(message, peer)
-        if message.get_type() == "SIMSTATE" and self.now.position is not None:
+    def _receive(self, message: Any, peer: tuple[str, int]) -> None:
+        super()._receive(message, peer)
+        if message.get_type() == "SIMSTATE" and self.latest.position is not None:
             # it tells no depth; that of the filter comes from pressure and does not drift
             east, north = self.earth.local(message.lat, message.lng)
-            self.places_told.append((self.now.time, east, north, self.now.position[2]))
+            self.places_told.append((self.latest.time, east, north, self.latest.position[2]))
 
     @property
     def truth(self) -> np.ndarray:
@@ -114,7 +114,7 @@ class Vehicle:
         """Seconds of the vehicle's clock, also while it is not heard."""
         if isinstance(self.session, SimulatedSession):
             return float(self.session.simulation.now)
-        return float(self.session.now.time)
+        return float(self.session.latest.time)
 
     @property
     def truth(self) -> np.ndarray:
@@ -126,7 +126,7 @@ class Vehicle:
         if isinstance(self.session, SimulatedSession):
             true = self.session.simulation.vehicle
             return true.armed, mode_name(true.mode)
-        return self.session.now.armed, self.session.now.mode
+        return self.session.latest.armed, self.session.latest.mode
 
 
 @contextmanager
@@ -146,9 +146,9 @@ def vehicle(
     with ArduSub(pace, {"WPNAV_SPEED": 100.0 * speed}) as ardusub:
         session = TrueSession(ardusub, Frame(problem, "local"), pace)
         try:
-            ardusub.until(lambda: session.now.position is not None and session.now.estimate)
+            ardusub.until(lambda: session.latest.position is not None and session.latest.estimate)
             session.command(400, 1, 21196)
-            ardusub.until(lambda: session.now.armed is True)
+            ardusub.until(lambda: session.latest.armed is True)
             yield Vehicle(session, lambda **what: befall_ardusub(session, **what))
         finally:
             session.close()
@@ -553,7 +553,7 @@ def packets(count: int) -> None:
         try:
             for message in messages_in(bytes(data)):
                 read += 1
-                understood += listener.understand(message) is not None
+                understood += listener.read(message) is not None
         except Exception as error:  # counted: that is what this is for
             print(repr(error))
             raised += 1

@@ -157,9 +157,9 @@ def one(job: tuple[str, int, int, bool]) -> Outcome:
     said: dict[Level, list[bool]] = {Level.WARNING: [], Level.CAUTION: []}
     for k in range(len(true)):
         begin = time.perf_counter()
-        report = guard.take(told[k])
+        report = guard.update(told[k])
         out.updates_ms.append(1e3 * (time.perf_counter() - begin))
-        exact = clear.take(Fix(k * DT, tuple(true[k]), estimate=True))
+        exact = clear.update(Fix(k * DT, tuple(true[k]), estimate=True))
         near.append(exact.loop_s is not None or bool(exact.loops))
         for level, on in said.items():
             on.append(warned(report, level))
@@ -207,8 +207,8 @@ def put_in(
     before = here
     for k, place in enumerate(path):
         t = now + (k + 1) * DT
-        report = watching.take(told[k])
-        exact = seeing.take(Fix(t, tuple(place), estimate=True))
+        report = watching.update(told[k])
+        exact = seeing.update(Fix(t, tuple(place), estimate=True))
         if warned(report, Level.WARNING) and first is None:
             first = k
         if warned(report, Level.CAUTION) and spoken is None:

@@ -47,7 +47,7 @@ def hour_of(name: str) -> list[str]:
     while count < 36_000:
         for place in drifted(true, rng, begin):
             began = time.perf_counter()
-            report = guard.take(Fix(count * DT, tuple(place), estimate=True))
+            report = guard.update(Fix(count * DT, tuple(place), estimate=True))
             updates.append(1e3 * (time.perf_counter() - began))
             began = time.perf_counter()
             json.dumps(report.as_row())

@@ -31,7 +31,7 @@ from netsp.model.problem import Problem
 from netsp.online.guard.alarms import Level
 from netsp.online.guard.guard_report import Report
 from netsp.online.guard.replay import read_fixes
-from netsp.online.guard.stream import replayed
+from netsp.online.guard.stream import replay_fixes
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_guard import Guard, GuardOptions
 from netsp.online.link.geo_frame import Frame
@@ -155,7 +155,7 @@ def watched(
     out = Outcome([None] * len(flight.loops))
     second = math.ceil(flight.begin)
     last: Report | None = None
-    for report in replayed(Guard(problem, options), fixes):
+    for report in replay_fixes(Guard(problem, options), fixes):
         if report.time > flight.end + 1.0:
             break
         for alarm in report.raised:
@@ -197,7 +197,7 @@ def mission_row(folder: Path, options: GuardOptions) -> None:
     fixes = fixes_of(folder / "auto-space-basin.BIN.gz", Frame(mission))
     told = as_planned = 0
     longest, last = 0.0, None
-    for report in replayed(Guard(mission, options), fixes):
+    for report in replay_fixes(Guard(mission, options), fixes):
         if report.as_planned is not None:
             told += 1
             as_planned += report.as_planned

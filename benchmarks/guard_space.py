@@ -46,7 +46,7 @@ def beside_flight(
         )
         place = true + off + noise * rng.normal(size=3) * (1, 1, 0.2)
         begin = time.perf_counter()
-        report = guard.take(Fix(r.time, tuple(place), estimate=True))
+        report = guard.update(Fix(r.time, tuple(place), estimate=True))
         updates.append(1e3 * (time.perf_counter() - begin))
         if report.classes:
             longest = max(longest, report.classes[0].taut)

@@ -16,15 +16,15 @@ SITE = Problem(base=(0, 0), goals=[(6, 2, -1)], tether_length=40)
 class Scripted:
     """A session whose vehicle goes where a function of time says, ten positions a second."""
 
-    system, others, broken, pace = 1, (), None, 1.0
-    silent_s = unplaced_s = stalled_s = 0.0
+    system, others, fault, pace = 1, (), None, 1.0
+    silent_s = position_age_s = stalled_s = 0.0
     kind = VehicleKind(12, 3)
 
     def __init__(self, motion, echo=None, velocity=None):
         self.motion, self.frame, self.link = motion, Frame(SITE), self
         velocity = velocity or (lambda t: None)
         self.velocity = velocity
-        self.now = Fix(0.0, motion(0.0), armed=True, mode="GUIDED", estimate=True,
+        self.latest = Fix(0.0, motion(0.0), armed=True, mode="GUIDED", estimate=True,
                        velocity=velocity(0.0))  # fmt: skip
         self.sent, self.asked, self.fresh = [], [], []
         self.answers = echo
@@ -38,13 +38,13 @@ class Scripted:
     def targets(self):
         return [self.frame.from_local(m.x, m.y, m.z) for _, m in self.sent]
 
-    def watch(self, holds):
-        self.holds = holds
+    def watch(self, check):
+        self.check = check
 
-    def source_lost(self, *_):
+    def aiding_fault(self, *_):
         pass
 
-    def ask_for_positions(self):
+    def request_positions(self):
         self.asked.append("positions")
 
     def distrust(self, why):
@@ -55,17 +55,17 @@ class Scripted:
         return True
 
     def send(self, message):
-        self.sent.append((self.now.time, message))
+        self.sent.append((self.latest.time, message))
         return True
 
     def sleep(self, seconds):
-        time = self.now.time + seconds
-        self.now = replace(
-            self.now, time=time, position=self.motion(time), velocity=self.velocity(time)
+        time = self.latest.time + seconds
+        self.latest = replace(
+            self.latest, time=time, position=self.motion(time), velocity=self.velocity(time)
         )
-        self.fresh.append(np.array(self.now.position))
+        self.fresh.append(np.array(self.latest.position))
 
-    def places(self):
+    def new_places(self):
         found, self.fresh = self.fresh, []
         return found
 

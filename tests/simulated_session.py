@@ -7,7 +7,7 @@ from typing import Any
 
 from netsp.online.link.dialect import GROUND_STATION, ONBOARD_COMPUTER, parser
 from netsp.online.link.geo_frame import Frame
-from netsp.online.link.session import HEARTBEAT_S, Session
+from netsp.online.link.session import Session
 from tests.autopilot import STEP, Simulation
 
 VEHICLE = ("vehicle", 1)
@@ -57,14 +57,14 @@ class SimulatedSession(Session):
     def sleep(self, seconds: float) -> None:
         for _ in range(max(1, round(seconds / STEP))):
             if self.simulation.now >= self._beat_due:
-                self._beat_due = self.simulation.now + HEARTBEAT_S
+                self._beat_due = self.simulation.now + self.policy.heartbeat_s
                 if not self._stop.is_set():
                     self._send_heartbeat()
                 self._pass_on_stations()
             self.simulation.step()
             if not self.link.is_cut:
                 for message in self.simulation.wire.messages():
-                    self._take(message, VEHICLE)
+                    self._receive(message, VEHICLE)
 
     def _pass_on_stations(self) -> None:
         from netsp.online.link.dialect import dialect
@@ -74,7 +74,7 @@ class SimulatedSession(Session):
                 beat = dialect().MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
                 beat.pack(parser(*ids))
                 self.simulation.vehicle.receive(beat)
-                self._take(beat, VEHICLE)
+                self._receive(beat, VEHICLE)
 
     def arm(self) -> SimulatedSession:
         """Have the vehicle armed, and heard."""

@@ -8,7 +8,7 @@ import pytest
 from netsp import Circle, Problem
 from netsp.base.errors import InputError
 from netsp.online.guard.replay import read_fixes
-from netsp.online.guard.stream import replayed
+from netsp.online.guard.stream import replay_fixes
 from netsp.online.guard.tether_guard import Guard, GuardOptions
 from netsp.online.link.geo_frame import Frame
 from tests.dataflash_bytes import TYPES, header, packed, place
@@ -144,6 +144,6 @@ def test_a_guard_replays_a_log_round_an_obstacle(tmp_path):
     file = tmp_path / "log.bin"
     file.write_bytes(header() + b"".join(rows))
     guard = Guard(SITE, GuardOptions(noise=0.01, drift=0.01))
-    reports = list(replayed(guard, read_fixes(file, Frame(SITE))))
+    reports = list(replay_fixes(guard, read_fixes(file, Frame(SITE))))
     assert reports[0].claims
     assert reports[-1].loops == (("A",),)

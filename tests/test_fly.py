@@ -20,8 +20,8 @@ from netsp.online.execute.tour_execution import StopsFlightError
 from netsp.online.fly.flight_policy import FlightPolicy
 from netsp.online.fly.flight_rehearsal import rehearse
 from netsp.online.fly.flight_time import predicted_flight
-from netsp.online.fly.inputs import event_of
-from netsp.online.fly.preflight_checks import ready
+from netsp.online.fly.inputs import parse_event
+from netsp.online.fly.preflight_checks import make_ready
 from netsp.online.fly.stopped import RefusedError
 from netsp.online.fly.tour_flight import fly
 from netsp.online.fly.vehicle import LinkedVehicle
@@ -70,10 +70,10 @@ class Flown:
         self.autopilot.__enter__()
         link = UdpLink(Address(True, "127.0.0.1", self.autopilot.port))
         self.session = Session(link, Frame(SITE), 1, self.pace)
-        assert self.autopilot.until(lambda: self.session.now.position is not None)
+        assert self.autopilot.until(lambda: self.session.latest.position is not None)
         if self.arm:
             self.session.command(400, 1)
-            assert self.autopilot.until(lambda: self.session.now.armed is True)
+            assert self.autopilot.until(lambda: self.session.latest.armed is True)
         return self
 
     def __exit__(self, *error):
@@ -118,9 +118,9 @@ def test_ardusub_s_own_simulator_flies_a_tour_and_is_stopped_by_what_stops_the_f
             link = UdpLink(Address(True, "127.0.0.1", vehicle.port))
             session = Session(link, Frame(SITE), 1, 1.0)
             try:
-                vehicle.until(lambda s=session: s.now.position is not None and s.now.estimate)
+                vehicle.until(lambda s=session: s.latest.position is not None and s.latest.estimate)
                 session.command(400, 1)
-                vehicle.until(lambda s=session: s.now.armed is True)
+                vehicle.until(lambda s=session: s.latest.armed is True)
                 what = {
                     None: None,
                     "disarmed": after(5.0, lambda s=session: s.command(400, 0, 21196)),
@@ -145,7 +145,7 @@ def test_a_vehicle_that_is_not_ready_is_not_moved(tour):
         with Flown(**how) as flown:
             if before:
                 flown.autopilot.tell(**before)
-                assert flown.autopilot.until(lambda f=flown: f.session.now.estimate is False)
+                assert flown.autopilot.until(lambda f=flown: f.session.latest.estimate is False)
             with pytest.raises(RefusedError, match=why):
                 flown.fly(tour)
             assert flown.targets == []
@@ -158,15 +158,15 @@ def test_an_armed_vehicle_is_not_refused_before_it_has_said_whether_it_is():
 
     class Heard:
         silent_s, kind = 0.0, VehicleKind(12, 3)
-        now = property(lambda self: next(said, replace(placed, armed=True, mode="GUIDED")))
+        latest = property(lambda self: next(said, replace(placed, armed=True, mode="GUIDED")))
 
-        def ask_for_positions(self):
+        def request_positions(self):
             pass
 
         def sleep(self, seconds):
             pass
 
-    ready(Heard(), np.zeros(3), 2.0)
+    make_ready(Heard(), np.zeros(3), 2.0)
 
 
 def test_a_clock_that_stands_still_ends_the_flight(monkeypatch):
@@ -180,7 +180,7 @@ def test_a_clock_that_stands_still_ends_the_flight(monkeypatch):
             m.MAVLink_local_position_ned_message(time_ms, 0.0, 0.0, 0.0, 0, 0, 0),
         ):
             for heard in messages_in(bytes(message.pack(pack))):
-                session._take(heard, ("127.0.0.1", 1))
+                session._receive(heard, ("127.0.0.1", 1))
 
     try:
         for second in range(4):
@@ -206,11 +206,11 @@ def test_positions_without_heartbeats_are_told_from_silence():
         def sleep(self, seconds):
             pass
 
-        def ask_for_positions(self):
+        def request_positions(self):
             pass
 
     with pytest.raises(RefusedError, match="positions come from system 7, but no heartbeat"):
-        ready(Heard(), np.zeros(3), 2.0)
+        make_ready(Heard(), np.zeros(3), 2.0)
 
 
 @pytest.mark.parametrize("number", ["0", "256", "-1", "one"])
@@ -263,7 +263,7 @@ def test_a_flight_stops_when_the_vehicle_is_not_ours_any_more_and_says_why(
         flown.autopilot.sleep(3.0)
         assert len(flown.targets) == sent
         if what["do"] == "lose_estimate":
-            assert flown.autopilot.until(lambda: flown.session.now.mode == "ALT_HOLD")
+            assert flown.autopilot.until(lambda: flown.session.latest.mode == "ALT_HOLD")
 
 
 def test_ctrl_c_has_the_vehicle_hold_its_place(tour):
@@ -294,10 +294,10 @@ def test_what_appears_in_the_way_is_gone_round(tour):
 
 
 def test_events_that_come_in_are_asked_first():
-    assert event_of('{"cancel_goal": "A3"}').kind == "cancel_goal"
+    assert parse_event('{"cancel_goal": "A3"}').kind == "cancel_goal"
     for line in ("[]", "{", '{"appear": 3}', '{"tether_length": -1}', "{}"):
         with pytest.raises(InputError, match="event"):
-            event_of(line)
+            parse_event(line)
 
 
 @pytest.mark.parametrize("sent", [b"", b'{"cancel_goal": 1}\nrubbish\n{"cancel'])
@@ -305,8 +305,8 @@ def test_a_command_that_waits_for_events_ends_with_its_own_exit_code(sent):
     """Standard input stays open, as that of a shell does."""
     program = (
         "import sys, time\n"
-        "from netsp.online.fly.inputs import events_of\n"
-        "events, found = events_of(sys.stdin.buffer, print), []\n"
+        "from netsp.online.fly.inputs import read_events\n"
+        "events, found = read_events(sys.stdin.buffer, print), []\n"
         "time.sleep(0.2)  # so that it waits for a line when the program ends\n"
         "while len(found) < int(sys.argv[1]):\n"
         "    found += events()\n"
@@ -328,8 +328,8 @@ def test_nobody_else_is_listened_to():
         packs = parser(system, component)
         message = m.MAVLink_local_position_ned_message(1000, 1.0, 2.0, 3.0, 0, 0, 0)
         (read,) = messages_in(message.pack(packs))
-        assert (listener.understand(read) is not None) is heard
-    assert listener.strangers == 2
+        assert (listener.read(read) is not None) is heard
+    assert listener.n_foreign == 2
 
 
 def test_malformed_packets_neither_raise_nor_say_anything():
@@ -347,10 +347,10 @@ def test_malformed_packets_neither_raise_nor_say_anything():
             data[rng.randrange(len(data))] = rng.randrange(256)
         data = data[: rng.randint(0, len(data))] + rng.randbytes(rng.randint(0, 20))
         for message in messages_in(bytes(data)):
-            listener.understand(message)
+            listener.read(message)
     for x in (float("nan"), float("inf"), 1e30):
         (read,) = messages_in(m.MAVLink_local_position_ned_message(1, x, 0, 0, 0, 0, 0).pack(packs))
-        assert listener.understand(read) is None
+        assert listener.read(read) is None
 
 
 def test_links_are_this_machine_s_unless_told_otherwise():
@@ -472,9 +472,9 @@ def test_a_vehicle_that_is_not_where_it_was_sent_is_stopped(tour, what):
 def test_disarming_that_nobody_looked_at_in_time_is_not_forgotten(tour):
     def rearm():
         flown.autopilot.tell(do="disarm")
-        assert flown.autopilot.until(lambda: flown.session.now.armed is False)
+        assert flown.autopilot.until(lambda: flown.session.latest.armed is False)
         flown.autopilot.tell(do="arm")
-        assert flown.autopilot.until(lambda: flown.session.now.armed is True)
+        assert flown.autopilot.until(lambda: flown.session.latest.armed is True)
 
     with Flown(params={"FS_GCS_ENABLE": 0}) as flown:
         done = flown.fly(tour, on_step=after(6.0, rearm))

@@ -67,7 +67,9 @@ def test_a_vehicle_is_held_until_somebody_says_otherwise(tour, how):
     done = fly(SITE, tour, session, OPTIONS, on_step=on_step)
     assert (done.summary["status"] == "done") is (how == "done"), done.stopped
     end, said = session.simulation.now, []
-    why = stand_by(session, say=said.append, should_stop=lambda: session._seconds() > end + BEYOND)
+    why = stand_by(
+        session, on_note=said.append, should_stop=lambda: session._seconds() > end + BEYOND
+    )
     assert why == "Ctrl-C"
     assert session.heard("disarmed") == []
     track = session.truth
@@ -93,7 +95,9 @@ def test_another_ground_station_that_the_vehicle_counts_on_takes_over(tour):
     fly(SITE, tour, session, OPTIONS, on_step=after(session, 8.0, stop))
     end, said = session.simulation.now, []
     session.stations = {(254, 190): end + 5.0, (255, 190): end + 20.0}
-    why = stand_by(session, say=said.append, should_stop=lambda: session._seconds() > end + 60.0)
+    why = stand_by(
+        session, on_note=said.append, should_stop=lambda: session._seconds() > end + 60.0
+    )
     assert "ground station" in why
     assert end + 20.0 <= session.simulation.now < end + 22.0
     assert any("254" in text and "goes on" in text for text in said)
@@ -115,7 +119,7 @@ def test_what_the_vehicle_will_do_is_asked_for_until_it_is_told(tour):
         receive(message)
 
     session.simulation.vehicle.receive = deaf
-    stand_by(session, say=said.append, should_stop=lambda: bool(said))
+    stand_by(session, on_note=said.append, should_stop=lambda: bool(said))
     assert "after 42 s" in said[0]
 
 
@@ -138,7 +142,7 @@ def test_a_pilot_who_has_taken_over_is_left_alone_and_the_link_kept_alive(tour):
     fly(SITE, tour, session, OPTIONS, on_step=pilot)
     end, said = session.simulation.now, []
     sent = len(session.heard("target"))
-    stand_by(session, "position-hold", say=said.append,
+    stand_by(session, "position-hold", on_note=said.append,
              should_stop=lambda: session._seconds() > end + BEYOND)  # fmt: skip
     assert session.simulation.vehicle.mode == 19
     assert (session.heard("disarmed"), len(session.heard("target"))) == ([], sent)

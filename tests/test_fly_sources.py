@@ -12,7 +12,7 @@ from netsp.online.fly import tour_flight
 from netsp.online.fly.standby import stand_by
 from netsp.online.fly.tour_flight import fly
 from netsp.online.fly.vehicle import LinkedVehicle
-from netsp.online.link.position_source import PositionSources
+from netsp.online.link.position_aiding import PositionAiding
 from tests.scripted_vehicle import Scripted, driven
 from tests.simulated_session import SimulatedSession
 
@@ -120,23 +120,23 @@ def ekf(position, velocity=0.01):
     ],
 )
 def test_a_source_counts_from_when_it_worked_and_while_no_other_does(told, why):
-    sources = PositionSources()
+    sources = PositionAiding()
     for k, message in enumerate(told):
-        sources.take(message, 10.0 + 0.1 * k)
+        sources.observe(message, 10.0 + 0.1 * k)
     end = 10.0 + 0.1 * (len(told) - 1)
-    assert sources.lost(end + 0.1, 0.5, 1.5) is None
-    found = sources.lost(end + 0.6, 0.5, 1.5)
+    assert sources.confirmed_fault(end + 0.1, 0.5, 1.5) is None
+    found = sources.confirmed_fault(end + 0.6, 0.5, 1.5)
     assert (found is None) if why is None else (why in found)
 
 
 @pytest.mark.parametrize(("period", "silence"), [(0.2, 1.2), (1.0, 3.0)])
 def test_a_gps_is_silent_after_a_second_or_three_of_its_intervals(period, silence):
-    sources = PositionSources()
+    sources = PositionAiding()
     for k in range(20):
-        sources.take(gps(3), period * k)
+        sources.observe(gps(3), period * k)
     last = 19 * period
-    assert sources.lost(last + silence - 0.05, 0.5, 1.2) is None
-    assert "silent" in sources.lost(last + silence + 0.05, 0.5, 1.2)
+    assert sources.confirmed_fault(last + silence - 0.05, 0.5, 1.2) is None
+    assert "silent" in sources.confirmed_fault(last + silence + 0.05, 0.5, 1.2)
 
 
 @pytest.mark.parametrize("when", [0.0, 4.0, 7.3, 13.0])
@@ -219,5 +219,5 @@ def test_a_vehicle_that_may_have_missed_its_target_gets_it_again_before_it_is_ca
     with pytest.raises(StopsFlightError, match="frozen"):
         vehicle.go(np.array(FAR), 30.0, 0.0, np.zeros(3), True)
     assert [round(t) for t, _ in session.sent] == [0, 2]
-    assert 3.0 < session.now.time < 5.0
+    assert 3.0 < session.latest.time < 5.0
     assert "20.0 m away" in session.distrusted

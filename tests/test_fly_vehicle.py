@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from netsp.online.execute.tour_execution import StopsFlightError
-from netsp.online.fly.preflight_checks import ready
+from netsp.online.fly.preflight_checks import make_ready
 from netsp.online.fly.stopped import RefusedError
 from netsp.online.fly.vehicle import LinkedVehicle
 from netsp.online.link.dialect import dialect, parser
@@ -64,9 +64,9 @@ def test_only_a_submarine_with_ardupilot_is_commanded_unless_any_vehicle_is(kind
     session = Scripted(lambda t: (0.0, 0.0, -0.1))
     session.kind = VehicleKind(*kind)
     with pytest.raises(RefusedError, match=named):
-        ready(session, np.zeros(3), 2.0)
+        make_ready(session, np.zeros(3), 2.0)
     assert session.asked == session.sent == []
-    ready(session, np.zeros(3), 2.0, any_vehicle=True)
+    make_ready(session, np.zeros(3), 2.0, any_vehicle=True)
 
 
 def test_the_kind_of_a_vehicle_is_that_of_its_heartbeat():
@@ -75,7 +75,7 @@ def test_the_kind_of_a_vehicle_is_that_of_its_heartbeat():
     for component, kind, autopilot in ((1, 12, 3), (154, 26, 8), (190, 6, 8)):
         beat = m.MAVLink_heartbeat_message(kind, autopilot, 128, 4, 4, 3)
         (read,) = messages_in(beat.pack(parser(1, component)))
-        listener.understand(read)
+        listener.read(read)
     assert listener.kind == VehicleKind(12, 3)
     assert listener.kind.is_ardusub
 
@@ -143,8 +143,8 @@ def test_echoes_in_degrees_lead_to_the_site_by_the_origin_of_the_estimate():
     told = m.MAVLink_position_target_global_int_message(
         0, 0, 0x0DF8, 556_000_898, 129_501_591, 2.5 - 3.0, *(0.0,) * 8
     )
-    assert echoes.understand(told) is None
-    echoes.understand(m.MAVLink_gps_global_origin_message(556_000_000, 129_500_000, 2500))
-    assert np.allclose(echoes.understand(told), (10.0, 10.0, -3.0), atol=0.02)
+    assert echoes.read(told) is None
+    echoes.read(m.MAVLink_gps_global_origin_message(556_000_000, 129_500_000, 2500))
+    assert np.allclose(echoes.read(told), (10.0, 10.0, -3.0), atol=0.02)
     local = m.MAVLink_position_target_local_ned_message(0, 1, 0x0DF8, 10.0, 5.0, 3.0, *(0.0,) * 8)
-    assert np.allclose(echoes.understand(local), (5.0, 10.0, -3.0))
+    assert np.allclose(echoes.read(local), (5.0, 10.0, -3.0))

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, InputError, Problem
-from netsp.online.guard.frozen_position import FreezePolicy
+from netsp.online.guard.guard_policy import FreezePolicy
 from netsp.online.guard.position_track import Track
-from netsp.online.guard.stream import replayed
+from netsp.online.guard.stream import replay_fixes
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_guard import Guard, GuardOptions
 from netsp.online.link.geo_frame import Frame
@@ -26,7 +26,7 @@ SITE = Problem(
 
 def watched(fixes):
     """Reports of a guard."""
-    return list(replayed(Guard(SITE, GuardOptions(noise=0.05, drift=0.1)), fixes))
+    return list(replay_fixes(Guard(SITE, GuardOptions(noise=0.05, drift=0.1)), fixes))
 
 
 def told(reports, kind):
@@ -41,7 +41,7 @@ def fixes_of(simulation, seconds, until=lambda: None):
         until()
         simulation.step()
         for message in simulation.wire.messages():
-            fix = listener.understand(message)
+            fix = listener.read(message)
             if fix is not None:
                 out.append(fix)
     return out
@@ -126,8 +126,8 @@ def test_a_robot_that_slows_down_and_rests_is_not_frozen_however_its_position_is
         v = 0.4 if k < 60 else 0.95 * v
         x += 0.1 * v
         told = v + chance.gauss(0.0, 0.02)
-        track.take(row(0.1 * k, round(x / step) * step, told))
-        assert not track.frozen, k
+        track.observe(row(0.1 * k, round(x / step) * step, told))
+        assert not track.is_frozen, k
 
 
 def test_a_slow_sensor_repeats_its_position_between_two_measurements():
@@ -135,8 +135,8 @@ def test_a_slow_sensor_repeats_its_position_between_two_measurements():
     frozen = []
     for k in range(300):
         t = 0.1 * k
-        track.take(row(t, 0.4 * (t // 0.9) * 0.9, 0.4))
-        frozen.append(track.frozen)
+        track.observe(row(t, 0.4 * (t // 0.9) * 0.9, 0.4))
+        frozen.append(track.is_frozen)
     assert not any(frozen)
 
 

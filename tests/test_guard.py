@@ -28,24 +28,25 @@ from netsp.hsignature import concatenate, crossings, signature
 from netsp.model.solution import Solution
 from netsp.online.guard.alarms import Alarm, Alarms, Level
 from netsp.online.guard.belief import Belief
-from netsp.online.guard.correct import agrees
-from netsp.online.guard.dropout import ways_between
+from netsp.online.guard.correct import passes_on_side
+from netsp.online.guard.dropout import paths_between
 from netsp.online.guard.guard_page import Page
+from netsp.online.guard.guard_policy import GuardPolicy
 from netsp.online.guard.live import watch
-from netsp.online.guard.lookahead import Ahead, Look
-from netsp.online.guard.loops import closed_by, loops_in
+from netsp.online.guard.lookahead import Lookahead, LookaheadResult
+from netsp.online.guard.loops import loop_closed_by, loops_in
 from netsp.online.guard.plane import PlaneSite, RayLetters
-from netsp.online.guard.position_track import RESTART_S, Motion, Track
-from netsp.online.guard.reasons import OF_VELOCITIES, soon_looped
+from netsp.online.guard.position_track import Motion, Track
+from netsp.online.guard.reasons import Situation, loop_ahead
 from netsp.online.guard.replay import read_fixes
 from netsp.online.guard.site import Loop
 from netsp.online.guard.state_file import restore, save
-from netsp.online.guard.stream import replayed
+from netsp.online.guard.stream import replay_fixes
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_belief import Strands
 from netsp.online.guard.tether_guard import Guard, GuardOptions
 from netsp.online.link.geo_frame import Frame
-from netsp.online.link.modes import GUIDED
+from netsp.online.link.modes import Mode
 from tests.autopilot import Autopilot
 
 RECORDED = Path(__file__).parent / "data" / "ardusub"
@@ -103,7 +104,7 @@ def test_recorded_flights_have_the_words_of_their_tours_at_every_goal(name, goal
     guard = Guard(problem, GuardOptions(noise=0.02, drift=0.01))
     nearest, most = {}, 0.0
     file = RECORDED / f"ardusub-{name}.csv.gz"
-    for report in replayed(guard, every_other(read_fixes(file, Frame(problem)))):
+    for report in replay_fixes(guard, every_other(read_fixes(file, Frame(problem)))):
         now = report.classes[0]
         most = max(most, now.taut)
         for visit in tour.tour:
@@ -132,8 +133,8 @@ def test_the_likeliest_class_is_right_under_noise_and_drift_on_a_recorded_flight
         drift = 0.992 * drift + 0.5 * math.sqrt(1 - 0.992**2) * rng.normal(size=2)
         x, y, z = (float(r[k]) for k in "xyz")
         noisy = (x + drift[0] + 0.3 * rng.normal(), y + drift[1] + 0.3 * rng.normal(), z)
-        report = guard.take(Fix(float(r["t"]), noisy, estimate=True))
-        true = exact.take(Fix(float(r["t"]), (x, y, z), estimate=True)).classes[0]
+        report = guard.update(Fix(float(r["t"]), noisy, estimate=True))
+        true = exact.update(Fix(float(r["t"]), (x, y, z), estimate=True)).classes[0]
         end = np.array([report.position, (x, y, z)])
         back = crossings(end, problem.representative_points)
         words = [concatenate(c.word, back) for c in report.classes]
@@ -149,7 +150,7 @@ def test_the_likeliest_class_is_right_under_noise_and_drift_on_a_recorded_flight
 def test_a_loop_is_foreseen_then_closed_then_undone():
     guard, seen = Guard(SITE, EXACT), []
     for fix in along(*ROUND_A):
-        report = guard.take(fix)
+        report = guard.update(fix)
         seen += [(a.kind, a.level, report.time) for a in report.raised if "loop" in a.kind]
     kinds = [kind for kind, _, _ in seen]
     assert "loop" in kinds
@@ -157,17 +158,17 @@ def test_a_loop_is_foreseen_then_closed_then_undone():
     warning = next(t for kind, level, t in seen if (kind, level) == ("loop-ahead", Level.WARNING))
     closed = next(t for kind, _, t in seen if kind == "loop")
     assert closed - warning >= 10.0
-    text = guard.alarms.on["loop"].text
+    text = guard.alarms.active["loop"].text
     assert "a loop around A is closed" in text
     assert "to undo it go back" in text
     back = along(*ROUND_A[::-1], begin=report.time + 0.1)
     for fix in back:
-        report = guard.take(fix)
+        report = guard.update(fix)
     for k in range(60):
         place = (1e-4 * (k % 7), 0.0, 0.0)
-        report = guard.take(Fix(back[-1].time + 0.1 * (k + 1), place, estimate=True))
+        report = guard.update(Fix(back[-1].time + 0.1 * (k + 1), place, estimate=True))
     assert report.loops == ()
-    assert "loop" not in guard.alarms.on
+    assert "loop" not in guard.alarms.active
     assert report.classes[0].word == ()
 
 
@@ -175,7 +176,7 @@ def test_passing_by_and_coming_back_the_same_way_raises_nothing():
     guard = Guard(SITE, EXACT)
     way = [(0, 0, 0), (5, 2, 0), (9, 0, 0), (5, 2, 0), (0, 0, 0)]
     for fix in along(*way):
-        report = guard.take(fix)
+        report = guard.update(fix)
         assert not any("loop" in a.kind and a.level >= Level.WARNING for a in report.raised)
     assert report.classes[0].word == ()
 
@@ -186,7 +187,7 @@ def test_going_straight_home_past_the_other_side_of_a_pile_closes_a_loop():
     for corner in ((5, 2, 0), (8, 0, 0), (6, -2, 0)):
         tether = strands.site.model.update(tether, corner)
     assert loops_in(SITE, tether.nodes[:, :2]) == []
-    found = closed_by(SITE, tether.nodes[:, :2], np.array([(6, -2), (-0.5, 0.3)]))
+    found = loop_closed_by(SITE, tether.nodes[:, :2], np.array([(6, -2), (-0.5, 0.3)]))
     assert found is not None
     assert found.around == (0,)
 
@@ -224,7 +225,7 @@ GRID = st.tuples(st.integers(3, 11), st.integers(-3, 6))
 @example([(3, 0), (3.0, 2.2e-311), (3, 1), (4, 0)])
 def test_a_line_has_a_loop_exactly_if_one_of_its_steps_closes_one(corners):
     line = np.array(corners, dtype=float).reshape(-1, 2)
-    closing = [closed_by(SITE, line[: j + 1], line[j : j + 2]) for j in range(len(line) - 1)]
+    closing = [loop_closed_by(SITE, line[: j + 1], line[j : j + 2]) for j in range(len(line) - 1)]
     around = {loop.around for loop in loops_in(SITE, line)}
     assert bool(around) == any(closing)
     assert {loop.around for loop in closing if loop} <= around
@@ -236,11 +237,11 @@ def test_a_line_has_a_loop_exactly_if_one_of_its_steps_closes_one(corners):
 def test_a_pile_within_the_error_leaves_two_classes_and_one_far_off_leaves_one():
     near, far = Guard(SITE), Guard(SITE)
     for fix in along((0, 0, 0), (5, 0.6, 0), (9, 0, 0)):
-        close = near.take(fix)
+        close = near.update(fix)
     for fix in along((0, 0, 0), (2, 3, 0), (6, 3.4, 0), (7, 1.5, 0)):
-        away = far.take(fix)
+        away = far.update(fix)
     assert {c.word for c in close.classes} >= {(), (1,)}
-    assert "class" in near.alarms.on
+    assert "class" in near.alarms.active
     assert close.classes[0].word == (1,)
     assert len(away.classes) == 1
 
@@ -248,12 +249,12 @@ def test_a_pile_within_the_error_leaves_two_classes_and_one_far_off_leaves_one()
 def test_the_operator_knows_better():
     guard = Guard(SITE)
     for fix in along((0, 0, 0), (5, 0.6, 0), (9, 0, 0)):
-        guard.take(fix)
+        guard.update(fix)
     report = guard.correct("south", "A")
-    report = guard.take(Fix(report.time + 0.1, (9.0, 0.0, 0.0), estimate=True))
+    report = guard.update(Fix(report.time + 0.1, (9.0, 0.0, 0.0), estimate=True))
     assert [c.word for c in report.classes] == [()]
     report = guard.correct("north", "A")
-    report = guard.take(Fix(report.time + 0.1, (9.0, 0.0, 0.0), estimate=True))
+    report = guard.update(Fix(report.time + 0.1, (9.0, 0.0, 0.0), estimate=True))
     assert report.classes[0].word == (1,)
     for side in ("up", ["north"]):
         with pytest.raises(InputError, match="side"):
@@ -271,10 +272,10 @@ def test_a_correction_leaves_the_classes_that_agree_where_they_are(at):
     """Here the robot is on one side of the obstacle's ray in one class, on the other in another."""
     guard = Guard(SITE)
     for k, fix in enumerate(every_other(along(*NORTH_OF_A))):
-        guard.take(fix)
+        guard.update(fix)
         if k == at:
-            agrees_so = functools.partial(guard.site.agrees, side="north", obstacle="A")
-            agree = {s.word for s in guard.strands.all if agrees_so(s.tether.nodes)}
+            passes_north = functools.partial(guard.site.passes_on_side, side="north", obstacle="A")
+            agree = {s.word for s in guard.strands.all if passes_north(s.tether.nodes)}
             report = guard.correct("north", "A")
             assert {c.word for c in report.classes} == agree
     report = guard.report
@@ -287,12 +288,12 @@ def test_a_state_file_has_the_classes_at_one_place(tmp_path):
     guard, again = Guard(SITE), Guard(SITE)
     fixes = list(every_other(along(*NORTH_OF_A)))
     for fix in fixes[:58]:
-        guard.take(fix)
+        guard.update(fix)
     assert len(guard.strands.all) > 1
     save(guard, tmp_path / "state.json")
     restore(again, tmp_path / "state.json")
     for fix in fixes[58:]:
-        report = again.take(fix)
+        report = again.update(fix)
     assert report.classes[0].word == (1,)
     assert report.classes[0].likely > 0.9
 
@@ -300,24 +301,26 @@ def test_a_state_file_has_the_classes_at_one_place(tmp_path):
 def test_what_the_operator_says_of_one_obstacle_changes_nothing_about_others():
     guard = Guard(SITE, EXACT)
     for fix in along((0, 0, 0), (4.5, 1, 0), (7, 1, 0), (7, 0, 0)):
-        guard.take(fix)
+        guard.update(fix)
     assert [c.word for c in guard.correct("south", "A").classes] == [()]
 
 
 def test_what_was_ahead_in_another_class_is_forgotten_at_once():
     guard = Guard(SITE, EXACT)
-    guard.remember({(): 0.0, (1,): 0.0}, np.zeros(3), 0.0)
+    guard.begin_with({(): 0.0, (1,): 0.0}, np.zeros(3), 0.0)
     told = 0
     for k, fix in enumerate(along(*ROUND_A)):
-        guard.take(fix)
+        guard.update(fix)
         if k % 7 == 0:
             watching = copy.deepcopy(guard)
             with contextlib.suppress(InputError):
                 report = watching.correct("south", "A")
-                afresh = Look(watching.site, watching.strands.all[0].tether, watching._motion, 0.5)
-                afresh.go_on(10_000)
+                afresh = Lookahead(
+                    watching.site, watching.strands.all[0].tether, watching._motion, 0.05
+                )
+                afresh.advance(10_000)
                 told += guard.report.loop_s is not None
-                assert report.loop_s in (None, afresh.ahead.loop_s)
+                assert report.loop_s in (None, afresh.result.loop_s)
                 assert report.loops or all(a.kind != "loop" for a in report.alarms)
     assert told > 0
 
@@ -331,54 +334,54 @@ def test_a_tether_that_begins_or_ends_on_a_ray_does_not_cross_it(side):
     over = np.array([(0, 0), (-0.5, 5), (0, 5.5), (1, 8)], dtype=float)
     away = np.array([(0, 0), (3, -2)], dtype=float)
     back = np.array([(0, 0), (0, 3), (0.5, 5), (0, 7)], dtype=float)
-    assert agrees(site, east, side, "A") == (side == "east")
-    assert agrees(site, over, side, "A") == (side in ("north", "west"))
-    assert not agrees(site, away, side, "A")
-    assert agrees(site, back, side, "A") == (side == "east")
+    assert passes_on_side(site, east, side, "A") == (side == "east")
+    assert passes_on_side(site, over, side, "A") == (side in ("north", "west"))
+    assert not passes_on_side(site, away, side, "A")
+    assert passes_on_side(site, back, side, "A") == (side == "east")
 
 
 def test_a_gap_leaves_every_class_that_the_robot_can_have_reached():
     short, long = Guard(SITE, EXACT), Guard(SITE, EXACT)
     for guard in (short, long):
         for fix in along((0, 0, 0), (3.8, 0.9, 0)):
-            report = guard.take(fix)
-    few = short.take(Fix(report.time + 3.0, (4.6, 1.2, 0.0), estimate=True))
-    many = long.take(Fix(report.time + 25.0, (6.2, 0.9, 0.0), estimate=True))
+            report = guard.update(fix)
+    few = short.update(Fix(report.time + 3.0, (4.6, 1.2, 0.0), estimate=True))
+    many = long.update(Fix(report.time + 25.0, (6.2, 0.9, 0.0), estimate=True))
     assert len(few.classes) == 1
     assert {c.word for c in many.classes} >= {(), (1,)}
 
 
 def test_ways_are_those_no_longer_than_the_robot_can_have_gone():
     a, b = np.array([3.0, 0.0, 0.0]), np.array([7.0, 0.0, 0.0])
-    assert {word for word, _ in ways_between(SITE, a, b, 4.6)} == {(), (1,)}
-    lengths = [length for _, length in ways_between(SITE, a, b, 12.0)]
+    assert {word for word, _ in paths_between(SITE, a, b, 4.6)} == {(), (1,)}
+    lengths = [length for _, length in paths_between(SITE, a, b, 12.0)]
     assert lengths == sorted(lengths)
-    assert len(ways_between(SITE, a, b, 12.0)) > 2
+    assert len(paths_between(SITE, a, b, 12.0)) > 2
 
 
 def test_long_gaps_and_places_beyond_any_tether_take_no_time_to_think_about():
     problem = Problem.load(PROBLEMS / "wharf.json")
     guard = Guard(problem)
     for fix in along((0, 0, 0), (3.8, 4.0, -1)):
-        report = guard.take(fix)
-    report = guard.take(Fix(report.time + 600.0, (12.0, 5.0, -1.0), estimate=True))
+        report = guard.update(fix)
+    report = guard.update(Fix(report.time + 600.0, (12.0, 5.0, -1.0), estimate=True))
     assert len(report.classes) > 1
-    report = guard.take(Fix(report.time + 0.1, (9e6, 9e6, 0.0), estimate=True))
-    report = guard.take(Fix(report.time + 3.0, (9e6, 9e6, 0.0), estimate=True))
+    report = guard.update(Fix(report.time + 0.1, (9e6, 9e6, 0.0), estimate=True))
+    report = guard.update(Fix(report.time + 3.0, (9e6, 9e6, 0.0), estimate=True))
     assert not report.claims
 
 
 def test_nothing_is_claimed_while_the_position_is_lost_and_it_is_said_when_it_comes_back():
     guard = Guard(SITE, EXACT)
     for fix in along((0, 0, 0), (3, 2, 0)):
-        report = guard.take(fix)
+        report = guard.update(fix)
     assert report.claims
-    lost = guard.take(Fix(report.time + 1.0, (3.0, 2.0, 0.0), estimate=False))
+    lost = guard.update(Fix(report.time + 1.0, (3.0, 2.0, 0.0), estimate=False))
     assert not lost.claims
     assert lost.classes == ()
-    lost = guard.take(Fix(report.time + 3.0, (3.0, 2.0, 0.0)))
+    lost = guard.update(Fix(report.time + 3.0, (3.0, 2.0, 0.0)))
     assert any(a.kind == "estimate" and a.level == Level.ALARM for a in lost.alarms)
-    back = guard.take(Fix(report.time + 4.0, (3.2, 2.1, 0.0), estimate=True))
+    back = guard.update(Fix(report.time + 4.0, (3.2, 2.1, 0.0), estimate=True))
     assert back.claims
     assert back.classes[0].word == ()
 
@@ -386,22 +389,22 @@ def test_nothing_is_claimed_while_the_position_is_lost_and_it_is_said_when_it_co
 def test_silence_is_told_and_positions_frozen_to_the_last_digit_are_none():
     guard = Guard(SITE, EXACT)
     for fix in along((0, 0, 0), (4, 2, 0)):
-        report = guard.take(fix)
-    assert not guard.wait(report.time + 4.0).claims
+        report = guard.update(fix)
+    assert not guard.advance_to(report.time + 4.0).claims
     frozen = Guard(SITE, EXACT)
     for fix in along((0, 0, 0), (4, 2, 0)):
-        report = frozen.take(fix)
+        report = frozen.update(fix)
     for k in range(1, 80):
-        report = frozen.take(Fix(fix.time + 0.1 * k, fix.position, estimate=True))
+        report = frozen.update(Fix(fix.time + 0.1 * k, fix.position, estimate=True))
     assert not report.claims
 
 
 def test_a_jump_is_no_motion():
     track = Track(0.05, 0.5)
     for fix in along((0, 0, 0), (4, 0, 0)):
-        motion = track.take(fix)
+        motion = track.observe(fix)
     assert motion.lost_s == 0.0
-    jumped = track.take(Fix(fix.time + 0.1, (9.0, 5.0, 0.0), estimate=True))
+    jumped = track.observe(Fix(fix.time + 0.1, (9.0, 5.0, 0.0), estimate=True))
     assert jumped.reason == "the position jumped"
     assert np.allclose(track.velocity, 0.0)
 
@@ -443,11 +446,11 @@ def test_a_robot_is_not_believed_inside_a_pile():
 def test_the_winch_rules_classes_out():
     guard = Guard(SITE)
     for fix in along((0, 0, 0), (5, 0.8, 0), (9, 0.6, 0), (9, -3, 0)):
-        report = guard.take(fix)
+        report = guard.update(fix)
     assert len(report.classes) > 1
     least = min(c.taut for c in report.classes)
     for k in range(3):
-        report = guard.take(
+        report = guard.update(
             Fix(fix.time + 0.1 * (k + 1), (9.0, -3.0, 0.0), estimate=True, paid_out=least / 1.4)
         )
     assert len(report.classes) <= len(guard.strands.all)
@@ -460,14 +463,14 @@ def test_the_winch_rules_classes_out():
 def test_alarms_do_not_flicker():
     alarms = Alarms()
     reason = Alarm("loop-ahead", Level.WARNING, "because")
-    assert all(a.level == Level.NOTICE for a in alarms.take(0.0, [reason]))
-    (raised,) = alarms.take(0.6, [reason])
+    assert all(a.level == Level.NOTICE for a in alarms.update(0.0, [reason]))
+    (raised,) = alarms.update(0.6, [reason])
     assert raised.level == Level.WARNING
     for t in np.arange(0.7, 4.0, 0.1):
-        assert alarms.take(float(t), [reason] if int(10 * t) % 2 else []) == []
-    assert alarms.on
-    alarms.take(9.0, [])
-    assert not alarms.on
+        assert alarms.update(float(t), [reason] if int(10 * t) % 2 else []) == []
+    assert alarms.active
+    alarms.update(9.0, [])
+    assert not alarms.active
 
 
 # from one run to the next
@@ -476,11 +479,11 @@ def test_alarms_do_not_flicker():
 def test_a_class_survives_a_restart_and_no_other_site_takes_it(tmp_path):
     guard = Guard(SITE, EXACT)
     for fix in along((0, 0, 0), (5, 2, 0), (9, 0, 0)):
-        guard.take(fix)
+        guard.update(fix)
     save(guard, tmp_path / "state.json")
     again = Guard(SITE, EXACT)
     assert restore(again, tmp_path / "state.json") is not None
-    report = again.take(Fix(0.0, (9.0, 0.1, 0.0), estimate=True))
+    report = again.update(Fix(0.0, (9.0, 0.1, 0.0), estimate=True))
     assert report.classes[0].word == (1,)
     other = Guard(SITE.model_copy(update={"tether_length": 25.0}), EXACT)
     with pytest.raises(InputError, match="another site"):
@@ -537,7 +540,7 @@ def test_a_telemetry_log_is_read_as_it_was_heard(tmp_path):
     data = b"\x00rest of something"
     for k in range(60):
         for message in (
-            m.MAVLink_heartbeat_message(12, 3, 128, GUIDED, 4, 3),
+            m.MAVLink_heartbeat_message(12, 3, 128, Mode.GUIDED, 4, 3),
             m.MAVLink_local_position_ned_message(100 * k, 0.02 * k, 0.15 * k, 1.0, 0, 0, 0),
             m.MAVLink_ekf_status_report_message(31, 0, 0, 0, 0, 0),
         ):
@@ -557,7 +560,7 @@ def test_a_guard_beside_a_vehicle_hears_it_and_tells_it_nothing_to_do(tmp_path):
         work = threading.Thread(
             target=watch,
             args=(guard, Frame(SITE), f"udpin:{autopilot.port}", reports.append),
-            kwargs={"system": 1, "state": str(state), "publish": True, "until": ended.is_set},
+            kwargs={"system": 1, "state": str(state), "publish": True, "should_stop": ended.is_set},
         )
         work.start()
         assert autopilot.until(lambda: len(reports) > 40)
@@ -576,7 +579,7 @@ def test_a_guard_that_hears_another_vehicle_says_so():
         work = threading.Thread(
             target=watch,
             args=(Guard(SITE), Frame(SITE), f"udpin:{autopilot.port}", lambda _: None),
-            kwargs={"system": 2, "say": said.append, "until": ended.is_set},
+            kwargs={"system": 2, "on_note": said.append, "should_stop": ended.is_set},
         )
         work.start()
         assert autopilot.until(lambda: "heard from system 1, but nothing from system 2 yet" in said)
@@ -628,15 +631,14 @@ def test_a_guard_asks_for_a_link_or_a_recording(capsys):
 # what is believed, and what is ahead
 
 
-def test_a_class_that_is_too_long_takes_no_other_with_it(monkeypatch):
+def test_a_class_that_is_too_long_takes_no_other_with_it():
     """Classes beyond those that have a tether of their own once went, too."""
-    monkeypatch.setattr("netsp.online.guard.tether_guard.MOST_TETHERS", 2)
-    guard = Guard(SITE, GuardOptions(noise=0.1, drift=0.1))
+    guard = Guard(SITE, GuardOptions(noise=0.1, drift=0.1), GuardPolicy(max_tethers=2))
     for fix in along((0, 0, 0), (3, 1, 0), (9, 0.5, 0)):
-        report = guard.take(fix)
+        report = guard.update(fix)
     guard.belief.begin({(1,): 0.0, (1,) * 6: 0.1, (): 2.0})
     for fix in along((9, 0.5, 0), (9.2, 0.5, 0), begin=report.time + 0.1):
-        guard.take(fix)
+        guard.update(fix)
     assert guard.belief.words == {(1,), ()}
 
 
@@ -692,12 +694,16 @@ def test_a_look_in_pieces_sees_what_one_at_once_sees(x, course, turn, pieces):
     tether = site.model.start((0, 0, 0), (x, 2.0, 0.0))
     velocity = 0.5 * np.array([math.cos(course), math.sin(course), 0.0])
     motion = Motion(0.0, tether.robot, tether.robot, velocity, turn)
-    once, often = (Look(site, tether, motion, 0.5) for _ in range(2))
-    assert once.go_on(10_000) > 0
-    while not often.done:
-        assert often.go_on(pieces) <= pieces
-    one, other = once.ahead, often.ahead
-    assert (one.loop_s, one.short_s, one.turning) == (other.loop_s, other.short_s, other.turning)
+    once, often = (Lookahead(site, tether, motion, 0.05) for _ in range(2))
+    assert once.advance(10_000) > 0
+    while not often.is_done:
+        assert often.advance(pieces) <= pieces
+    one, other = once.result, often.result
+    assert (one.loop_s, one.short_s, one.is_turning) == (
+        other.loop_s,
+        other.short_s,
+        other.is_turning,
+    )
     if one.loop is not None:
         assert one.loop.around == other.loop.around
         np.testing.assert_array_equal(one.loop.line, other.loop.line)
@@ -716,24 +722,28 @@ def test_leaps_over_open_water_miss_nothing(there, course, turn):
         tether = site.model.update(tether, place)
     velocity = 0.5 * np.array([math.cos(course), math.sin(course), 0.0])
     motion = Motion(0.0, tether.robot, tether.robot, velocity, turn)
-    leaping, walking = (Look(site, tether, motion, 0.5) for _ in range(2))
-    leaping.go_on(10_000)
-    site.leap = lambda *_: 0
-    walking.go_on(10_000)
-    one, other = leaping.ahead, walking.ahead
-    assert (one.loop_s, one.short_s, one.turning) == (other.loop_s, other.short_s, other.turning)
+    leaping, walking = (Lookahead(site, tether, motion, 0.05) for _ in range(2))
+    leaping.advance(10_000)
+    site.safe_prefix = lambda *_: 0
+    walking.advance(10_000)
+    one, other = leaping.result, walking.result
+    assert (one.loop_s, one.short_s, one.is_turning) == (
+        other.loop_s,
+        other.short_s,
+        other.is_turning,
+    )
 
 
 def test_an_alarm_flickers_neither_on_nor_off():
     alarms, warning = Alarms(), Alarm("loop-ahead", Level.WARNING, "x")
     raised = []
     for k in range(40):  # a reason at every second look
-        raised += alarms.take(0.3 * k, [warning] if k % 2 else [])
+        raised += alarms.update(0.3 * k, [warning] if k % 2 else [])
     assert [a.level for a in raised] == [Level.NOTICE, Level.WARNING]
-    assert alarms.take(12.3, []) == []
-    assert "loop-ahead" in alarms.on
-    alarms.take(20.0, [])
-    assert not alarms.on
+    assert alarms.update(12.3, []) == []
+    assert "loop-ahead" in alarms.active
+    alarms.update(20.0, [])
+    assert not alarms.active
 
 
 @pytest.mark.parametrize(
@@ -759,26 +769,28 @@ def test_a_loop_ahead_is_warned_of_where_it_closes_in_nearly_every_class(
 def test_after_a_restart_the_robot_may_have_gone_for_ten_seconds_at_least(vouched):
     guard = Guard(SITE, EXACT)
     for fix in along((0, 0, 0), (3, 0.9, 0), begin=100.0):
-        guard.take(fix)
+        guard.update(fix)
     if not vouched:
-        guard.take(Fix(guard.report.time, estimate=False))
+        guard.update(Fix(guard.report.time, estimate=False))
     before = guard.report.time
-    guard.restarted(Fix(0.5))
-    assert guard.track.silence(0.5) >= RESTART_S
-    motion = guard.track.take(Fix(2.5, (3.0, 0.9, 0.0)))
+    guard.restart_vehicle(Fix(0.5))
+    assert guard.track.silence_s(0.5) >= guard.policy.track.restart_s
+    motion = guard.track.observe(Fix(2.5, (3.0, 0.9, 0.0)))
     assert before > 100.0
     assert 12.0 <= motion.lost_s < 13.0
 
 
-def levels_ahead(seconds, *how, **more):
+def levels_ahead(seconds, share=1.0, on_plan=False, likeliest=1.0, **more):
     line = np.array([[4.0, 0.0], [5.0, 1.0], [6.0, 0.0], [5.0, -1.0], [4.0, 0.0]])
-    ahead = Ahead(loop_s=seconds, loop=Loop((0,), line))
-    told = soon_looped(PlaneSite(SITE), ahead, np.array([4.0, -1.0, 0.0]), *how, **more)
+    ahead = LookaheadResult(loop_s=seconds, loop=Loop((0,), line))
+    place = np.array([4.0, -1.0, 0.0])
+    situation = Situation(PlaneSite(SITE), place, likeliest, is_on_plan=on_plan, **more)
+    told = loop_ahead(ahead, situation, share)
     return [a.level for a in told]
 
 
 def test_with_velocities_fewer_classes_are_asked_for_and_less_is_added_for_noise():
-    how = {"noise": 0.3, "course": OF_VELOCITIES}
+    how = {"noise": 0.3, "has_velocities": True}
     assert levels_ahead(8.0, 0.75, False, 0.5, **how) == [Level.WARNING]
     assert levels_ahead(8.0, 0.65, False, 0.5, **how) == [Level.CAUTION]
     assert levels_ahead(8.0, 0.75, False, 0.5, noise=0.3) == [Level.CAUTION]
@@ -790,15 +802,15 @@ def test_what_is_ahead_in_two_classes_is_half_a_second_old_at_most():
     """A look that took many updates would tell of a robot that turns what it did before."""
     guard = Guard(SITE, EXACT)
     for fix in along((0, 0, 0), (3, 2.5, 0)):
-        guard.take(fix)
+        guard.update(fix)
     (strand,) = guard.strands.all
     half = replace(strand, likely=0.5)
     motion = replace(guard._motion, velocity=np.array([0.35, 0.35, 0.0]), turn=0.1)
-    guard._looks, guard._looked = [], -math.inf
+    guard._looks, guard._look_began = [], -math.inf
     updates = 1
-    guard._look([half, half], [[], []], motion)
+    guard._look_ahead([half, half], [[], []], motion)
     while guard._looks:
-        guard._look([half, half], [[], []], motion)
+        guard._look_ahead([half, half], [[], []], motion)
         updates += 1
     assert updates <= 5
 
@@ -807,7 +819,7 @@ def levels_on_the_way_round_a(guard):
     """Of loops ahead, from each fix to where the loop closes."""
     levels = []
     for fix in along(*ROUND_A):
-        report = guard.take(fix)
+        report = guard.update(fix)
         if report.loops:
             return levels
         levels.append(max((a.level for a in report.alarms if a.kind == "loop-ahead"), default=0))
@@ -817,8 +829,8 @@ def levels_on_the_way_round_a(guard):
 def test_a_loop_in_an_unlikely_class_keeps_nothing_from_being_said_of_the_likely_one():
     """There it is closed already, around the very obstacle that the robot is about to go round."""
     guard = Guard(SITE, EXACT)
-    guard.remember({(): 0.0, (1,): 2.6}, np.zeros(3), 0.0)
-    assert guard.take(along(*ROUND_A)[0]).classes[1].likely == pytest.approx(0.07, abs=0.01)
+    guard.begin_with({(): 0.0, (1,): 2.6}, np.zeros(3), 0.0)
+    assert guard.update(along(*ROUND_A)[0]).classes[1].likely == pytest.approx(0.07, abs=0.01)
     levels = levels_on_the_way_round_a(guard)
     assert max(levels) == Level.WARNING
     assert levels[-100] == Level.WARNING  # ten seconds before
@@ -827,12 +839,12 @@ def test_a_loop_in_an_unlikely_class_keeps_nothing_from_being_said_of_the_likely
 def test_where_a_loop_is_closed_already_it_counts_as_one_that_going_on_leads_to():
     """In one of two classes there is one around A: going on, there is one in both."""
     guard = Guard(SITE, EXACT)
-    guard.remember({(): 0.0, (1,): 0.0}, np.zeros(3), 0.0)
+    guard.begin_with({(): 0.0, (1,): 0.0}, np.zeros(3), 0.0)
     sure = []
     for fix in along(*ROUND_A):
-        report = guard.take(fix)
+        report = guard.update(fix)
         if any("A in" in a.text and a.kind == "loop-ahead" for a in report.alarms):
-            sure.append(guard._sure)
+            sure.append(guard._ahead_share)
     assert np.median(sure) == 1.0
 
 
@@ -855,12 +867,12 @@ def test_a_robot_that_goes_round_an_obstacle_is_seen_to_close_its_loop_whatever_
     course = angles[-1] + way * 0.5 * math.pi + off
     velocity = 0.5 * np.array([math.cos(course), math.sin(course), 0.0])
     motion = Motion(0.0, tether.robot, tether.robot, velocity, way * rate * 0.5 / far)
-    look = Look(site, tether, motion, 0.5)
-    look.go_on(10_000)
-    assert look.ahead.loop is not None
-    assert look.ahead.loop.around == (0,)
+    look = Lookahead(site, tether, motion, 0.05)
+    look.advance(10_000)
+    assert look.result.loop is not None
+    assert look.result.loop.around == (0,)
     # the loop closes where the tether comes to the obstacle, or before if it turns more tightly
-    assert look.ahead.loop_s <= 0.76 * math.pi * far / 0.5 + 2.0
+    assert look.result.loop_s <= 0.76 * math.pi * far / 0.5 + 2.0
 
 
 @pytest.mark.parametrize("exact", [True, False])
@@ -869,10 +881,10 @@ def test_a_robot_under_way_begins_with_the_tether_of_its_state(exact):
     state = {"position": (7.0, 0.3, 0.0), "signature": (1,)}
     site = Problem.from_json(json.dumps({**json.loads(SITE.to_json()), "state": state}))
     guard = Guard(site, EXACT if exact else None)
-    report = guard.take(Fix(0.0, (7.0, 0.3, 0.0), estimate=True))
+    report = guard.update(Fix(0.0, (7.0, 0.3, 0.0), estimate=True))
     assert report.classes[0].word == (1,)
     for fix in along((7.0, 0.3, 0), (7.0, -1.5, 0), begin=0.1):
-        report = guard.take(fix)
+        report = guard.update(fix)
     assert report.classes[0].word == (1,)
     assert report.classes[0].taut > math.dist((0, 0), (7.0, -1.5)) + 0.05
 
@@ -888,7 +900,7 @@ def test_goals_with_alternatives_and_polygons_change_nothing_for_the_tether():
     for site in sites:
         guard = Guard(site, EXACT)
         for fix in along((0, 0, 0), (4, 2, 0), (8, 0, 0)):
-            report = guard.take(fix)
+            report = guard.update(fix)
         told.append((report.classes[0].word, report.classes[0].taut))
     assert told[0] == told[1]
     assert told[0][0] == (1,)
@@ -914,7 +926,7 @@ def test_shares_of_classes_add_to_one_however_uncertain_the_position_is(seed):
     for k in range(40):
         here[:2] += rng.normal(0.0, 0.3, 2)
         place = here + rng.normal(0.0, 1.0, 3)
-        report = guard.take(Fix(0.5 * k, tuple(place), estimate=True))
+        report = guard.update(Fix(0.5 * k, tuple(place), estimate=True))
         if report.classes:
             assert sum(c.likely for c in report.classes) == pytest.approx(1.0)
 

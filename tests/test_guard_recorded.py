@@ -10,7 +10,7 @@ import numpy as np
 from netsp import Problem
 from netsp.hsignature import concatenate, crossings
 from netsp.online.guard.alarms import Level
-from netsp.online.guard.stream import replayed
+from netsp.online.guard.stream import replay_fixes
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_guard import Guard
 
@@ -33,7 +33,7 @@ def test_a_loop_of_a_recorded_flight_is_warned_of_and_the_class_is_right_at_ever
         words.append(concatenate(words[-1], crossings(true[k - 1 : k + 1], rays)))
     warned, compared = [], 0
     second = np.ceil(BEGIN)
-    for report in replayed(Guard(site), fixes):
+    for report in replay_fixes(Guard(site), fixes):
         warned += [
             report.time for a in report.raised
             if a.kind == "loop-ahead" and a.level >= Level.WARNING and "A1" in a.text

@@ -16,7 +16,7 @@ from netsp.online.guard.space_site import SpaceSite
 from netsp.online.guard.state_file import restore, save
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_guard import Guard, GuardOptions
-from netsp.online.guard.winding import closing, loops_of
+from netsp.online.guard.winding import space_loop_closed_by, space_loops_in
 from netsp.plan.space.mission_solver import solve_mission
 from netsp.world.mission.mission import Mission
 from netsp.world.scene.scene import Scene
@@ -92,7 +92,7 @@ def test_the_tether_is_as_planned_at_every_stop_of_the_flight_and_free_at_its_en
     longest = 0.0
     # every one of them: between two, a tether may slip off a bar
     for row in flown.log:
-        report = guard.take(Fix(row.time, (row.x, row.y, row.z), estimate=True))
+        report = guard.update(Fix(row.time, (row.x, row.y, row.z), estimate=True))
         for k, stop in enumerate(solved.tour.stops):
             if np.linalg.norm(np.array(report.position) - stop.path[-1]) <= 0.1:
                 told.setdefault(k, []).append(report.as_planned)
@@ -116,7 +116,7 @@ def test_another_class_than_the_planned_one_is_told(solved):
     )  # fmt: skip
     guard = Guard(mission, EXACT)
     for fix in along(mission.start, (x, y, z), (x, y, z)):
-        report = guard.take(fix)
+        report = guard.update(fix)
         if report.as_planned is False:
             break
     assert report.as_planned is False
@@ -139,13 +139,15 @@ def taut_along(site, *points):
 )  # fmt: skip
 def test_loops_are_what_a_tether_is_wound_around_bodies_with_free_ends_too(site, way, around):
     tether = taut_along(site, tuple(site.start), *way)
-    assert [loop.around for loop in loops_of(site.field, site.model, tether.nodes)] == around
+    assert [
+        loop.around for loop in space_loops_in(site.field, site.model, tether.nodes, site.policy)
+    ] == around
 
 
 def test_a_loop_is_told_before_it_closes_and_is_gone_once_it_is_undone(mission, site):
     guard, first, closed = Guard(site, EXACT), None, None
     for fix in along(tuple(mission.start), *ROUND_THE_PILE, (0, 1.5, -2.2)):
-        report = guard.take(fix)
+        report = guard.update(fix)
         if first is None and report.loop_s is not None and report.loop_around == ("pile",):
             first = fix.time
         if closed is None and report.loops:
@@ -155,23 +157,33 @@ def test_a_loop_is_told_before_it_closes_and_is_gone_once_it_is_undone(mission, 
     assert first < closed
     back = [(0, 1.5, -2.2), *ROUND_THE_PILE[::-1][1:], tuple(mission.start)]
     for later in along(*back, t=fix.time + 0.2):
-        report = guard.take(later)
+        report = guard.update(later)
     assert report.loops == ()
     assert report.classes[0].word == guard.site.start_word()
 
 
 def test_a_robot_that_goes_straight_home_on_the_other_side_closes_a_loop(site):
     tether = taut_along(site, tuple(site.start), *BY_THE_PILE)
-    assert closing(site.field, site.model, tether.nodes, np.array([-2.0, -1.0, -2.0])) is None
-    assert closing(site.field, site.model, tether.nodes, np.array([-3.0, 0.6, -1.5])) is not None
+    assert (
+        space_loop_closed_by(
+            site.field, site.model, tether.nodes, np.array([-2.0, -1.0, -2.0]), site.policy
+        )
+        is None
+    )
+    assert (
+        space_loop_closed_by(
+            site.field, site.model, tether.nodes, np.array([-3.0, 0.6, -1.5]), site.policy
+        )
+        is not None
+    )
 
 
 def test_what_is_near_a_pile_is_in_doubt_and_what_is_far_from_all_is_not(mission, site):
     near, far = Guard(site), Guard(site)
     for fix in along(tuple(mission.start), (-1, 0.6, -2), (2, 0.2, -2), (4, 0, -1)):
-        one = near.take(fix)
+        one = near.update(fix)
     for fix in along(tuple(mission.start), (-4.5, -4, -2), (-4, -5, -2)):
-        other = far.take(fix)
+        other = far.update(fix)
     assert len(one.classes) > 1
     assert len(other.classes) == 1
 
@@ -180,10 +192,10 @@ def test_a_step_through_a_solid_has_no_word_and_none_is_sought(site, monkeypatch
     """Walks along such steps took up to a second."""
     through = np.array([[(-0.6, 0.1, -2), (0.6, 0.0, -2)], [(0, 7, -1.5), (0, 7, -2.9)]])
     beside = np.array([[(-1, 0.6, -2), (1, 0.6, -2)], [(1, 0, -2), (1, -1, -2)]])
-    words = site.letters.written(*beside.swapaxes(0, 1))
+    words = site.letters.words_of_steps(*beside.swapaxes(0, 1))
     assert words == [site.water.words.word(step) for step in beside]
     monkeypatch.setattr(site.letters, "words", replace(site.water.words, labels=None))
-    assert site.letters.written(*through.swapaxes(0, 1)) == [None, None]
+    assert site.letters.words_of_steps(*through.swapaxes(0, 1)) == [None, None]
 
 
 @pytest.mark.parametrize("every", [0.1, 0.2])
@@ -191,7 +203,7 @@ def test_the_operator_says_on_which_side_of_a_solid_the_tether_passes(mission, s
     guard = Guard(site)
     way = [tuple(mission.start), (-1, 0.6, -2), (2, 0.2, -2), (3.5, 0, -1.5)]
     for fix in along(*way, every=every):
-        guard.take(fix)
+        guard.update(fix)
     words = {}
     for side, meant, opposite in (("north", "+y", "−y"), ("south", "−y", "+y")):
         guard.correct(side, "pile")
@@ -210,7 +222,7 @@ def test_the_operator_may_say_how_it_passes_a_body_with_free_ends(mission, site)
     guard = Guard(site, EXACT)
     under = [(-1, 0.9, -2), (3.5, 0.9, -4.2), (6.9, 0.1, -4.2), (6.9, 0.1, -2.6)]
     for fix in along(tuple(mission.start), *under):
-        guard.take(fix)
+        guard.update(fix)
     guard.correct("below", "mooring")
     hangs = guard.report.classes[0]
     assert "below mooring" in hangs.passes
@@ -223,18 +235,18 @@ def test_the_operator_may_say_how_it_passes_a_body_with_free_ends(mission, site)
 
 def test_a_straight_tether_passes_a_solid_on_the_side_where_it_comes_nearest(site):
     nodes = np.array([(-5, 2, -1), (5, 2, -1.5)], dtype=float)
-    assert site.agrees(nodes, "north", "pile")
-    assert not any(site.agrees(nodes, side, "pile") for side in ("south", "east", "west"))
+    assert site.passes_on_side(nodes, "north", "pile")
+    assert not any(site.passes_on_side(nodes, side, "pile") for side in ("south", "east", "west"))
 
 
 def test_the_class_outlives_a_restart(mission, site, tmp_path):
     guard = Guard(site, EXACT)
     for fix in along(tuple(mission.start), *BY_THE_PILE):
-        report = guard.take(fix)
+        report = guard.update(fix)
     save(guard, tmp_path / "state.json")
     again = Guard(SpaceSite(mission), EXACT)
     restore(again, tmp_path / "state.json")
-    later = again.take(fix)
+    later = again.update(fix)
     assert later.classes[0].word == report.classes[0].word
     assert later.classes[0].taut == pytest.approx(report.classes[0].taut, abs=0.05)
     data = json.loads((tmp_path / "state.json").read_text())

@@ -13,7 +13,7 @@ from netsp.online.guard.position_track import Track
 from netsp.online.guard.replay import read_fixes
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_guard import Guard
-from netsp.online.guard.velocities import Velocities
+from netsp.online.guard.velocities import VelocityCheck
 from netsp.online.link.dialect import dialect, parser
 from netsp.online.link.geo_frame import Frame
 from netsp.online.link.mavlink_messages import Listener
@@ -45,12 +45,12 @@ def test_true_velocities_are_believed_after_some_metres_and_stay_so(seed, wide, 
     times, _, _, places, speeds = drive(40.0, wide=wide, seed=seed)
     c, s = math.cos(course), math.sin(course)
     turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    velocities, since = Velocities(0.3, 0.5), None
+    velocities, since = VelocityCheck(0.3, 0.5), None
     for t, place, speed in zip(times, places @ turn, speeds @ turn, strict=True):
-        velocities.take(t, place[:2], speed[:2])
-        if velocities.believed and since is None:
+        velocities.observe(t, place[:2], speed[:2])
+        if velocities.is_believed and since is None:
             since = t
-        assert since is None or velocities.believed
+        assert since is None or velocities.is_believed
     assert since is not None
     assert since < 10.0
 
@@ -62,18 +62,18 @@ def test_true_velocities_are_believed_after_some_metres_and_stay_so(seed, wide, 
 def test_velocities_by_which_the_vehicle_did_not_go_are_not_believed(wrong):
     for seed in range(20):
         times, _, _, places, speeds = drive(40.0, seed=seed)
-        velocities = Velocities(0.3, 0.5)
+        velocities = VelocityCheck(0.3, 0.5)
         for t, place, speed in zip(times, places, wrong(speeds), strict=True):
-            velocities.take(t, place[:2], speed[:2])
-            assert not velocities.believed
+            velocities.observe(t, place[:2], speed[:2])
+            assert not velocities.is_believed
 
 
 def test_belief_is_lost_when_the_vehicle_goes_otherwise_and_comes_back():
     times, _, _, places, speeds = drive(60.0)
-    velocities, believed = Velocities(0.3, 0.5), {}
+    velocities, believed = VelocityCheck(0.3, 0.5), {}
     for t, place, speed in zip(times, places, speeds, strict=True):
-        velocities.take(t, place[:2], np.zeros(2) if 20.0 <= t < 35.0 else speed[:2])
-        believed[round(t)] = velocities.believed
+        velocities.observe(t, place[:2], np.zeros(2) if 20.0 <= t < 35.0 else speed[:2])
+        believed[round(t)] = velocities.is_believed
     assert believed[19]
     assert not believed[26]
     assert not believed[34]
@@ -84,8 +84,8 @@ def test_a_vehicle_that_says_zero_whatever_it_does_is_one_that_says_nothing():
     times, _, _, places, _ = drive(30.0)
     silent, zero = Guard(SITE), Guard(SITE)
     for t, place in zip(times, places, strict=True):
-        one = silent.take(Fix(t, tuple(place), estimate=True))
-        other = zero.take(Fix(t, tuple(place), estimate=True, velocity=(0.0, 0.0, 0.0)))
+        one = silent.update(Fix(t, tuple(place), estimate=True))
+        other = zero.update(Fix(t, tuple(place), estimate=True, velocity=(0.0, 0.0, 0.0)))
         assert one.as_row() == other.as_row()
 
 
@@ -94,10 +94,10 @@ def test_a_vehicle_that_says_zero_whatever_it_does_is_one_that_says_nothing():
 def test_zero_is_never_believed_whatever_the_noise_and_the_speed(noise, speed):
     for seed in range(5):
         times, _, _, places, _ = drive(60.0, noise=noise, seed=seed)
-        velocities = Velocities(noise, speed)
+        velocities = VelocityCheck(noise, speed)
         for t, place in zip(times, places, strict=True):
-            velocities.take(t, place[:2], np.zeros(2))
-            assert not velocities.believed
+            velocities.observe(t, place[:2], np.zeros(2))
+            assert not velocities.is_believed
 
 
 def test_one_that_freezes_at_zero_is_found_out_before_the_place_is_off_by_a_metre():
@@ -106,12 +106,12 @@ def test_one_that_freezes_at_zero_is_found_out_before_the_place_is_off_by_a_metr
         track = Track(0.3, 0.5)
         for t, place, speed, real in zip(times, places, speeds, true, strict=True):
             said = np.zeros(3) if t > 20.0 else speed
-            motion = track.take(Fix(t, tuple(place), velocity=tuple(said)))
+            motion = track.observe(Fix(t, tuple(place), velocity=tuple(said)))
             if 19.0 < t < 20.0:
-                assert track.velocities.believed
+                assert track.velocities.is_believed
             if t > 20.0:
                 assert np.linalg.norm((motion.after - real)[:2]) < 1.0
-        assert not track.velocities.believed
+        assert not track.velocities.is_believed
 
 
 @given(
@@ -124,9 +124,9 @@ def test_a_single_wrong_velocity_moves_a_robot_by_centimetres_at_most(seed, wron
     good, bad = Track(0.3, 0.5), Track(0.3, 0.5)
     k = int(np.searchsorted(times, at))
     for i, (t, place, speed) in enumerate(zip(times, places, speeds, strict=True)):
-        one = good.take(Fix(t, tuple(place), velocity=tuple(speed)))
+        one = good.observe(Fix(t, tuple(place), velocity=tuple(speed)))
         said = (*wrong, 0.0) if i == k else tuple(speed)
-        other = bad.take(Fix(t, tuple(place), velocity=said))
+        other = bad.observe(Fix(t, tuple(place), velocity=said))
         assert np.linalg.norm(one.after - other.after) < 0.1
         assert np.linalg.norm(one.velocity - other.velocity) < 0.35
 
@@ -135,8 +135,8 @@ def test_what_is_said_of_going_up_or_down_has_no_effect():
     times, _, _, places, speeds = drive(30.0)
     one, other = Track(0.3, 0.5), Track(0.3, 0.5)
     for t, place, speed in zip(times, places, speeds, strict=True):
-        a = one.take(Fix(t, tuple(place), velocity=tuple(speed)))
-        b = other.take(Fix(t, tuple(place), velocity=(*speed[:2], 9.0)))
+        a = one.observe(Fix(t, tuple(place), velocity=tuple(speed)))
+        b = other.observe(Fix(t, tuple(place), velocity=(*speed[:2], 9.0)))
         assert (a.after == b.after).all()
         assert (a.velocity == b.velocity).all()
 
@@ -149,14 +149,14 @@ def test_after_a_pause_velocities_have_to_prove_themselves_again(pause):
         if 20.0 <= t < 25.0 and pause == "gap":
             continue
         if pause == "restart" and abs(t - 20.0) < 0.05:
-            track.lose(t)
+            track.invalidate(t)
         said = None if 20.0 <= t < 25.0 and pause == "silence" else tuple(speed)
-        track.take(Fix(t, tuple(place), velocity=said))
+        track.observe(Fix(t, tuple(place), velocity=said))
         if 19.0 < t < 19.5:
-            assert track.velocities.believed
+            assert track.velocities.is_believed
         if 23.0 < t < 24.0 or (25.0 <= t < 26.0 and pause != "restart"):
-            assert not track.velocities.believed
-    assert track.velocities.believed
+            assert not track.velocities.is_believed
+    assert track.velocities.is_believed
 
 
 def test_with_velocities_a_course_and_its_turning_are_known_better_and_sooner():
@@ -167,7 +167,9 @@ def test_with_velocities_a_course_and_its_turning_are_known_better_and_sooner():
         for told, errors in off.items():
             track, seen = Track(0.3, 0.5), None
             for t, place, speed, real in zip(times, places, speeds, true, strict=True):
-                motion = track.take(Fix(t, tuple(place), velocity=tuple(speed) if told else None))
+                motion = track.observe(
+                    Fix(t, tuple(place), velocity=tuple(speed) if told else None)
+                )
                 if t > 12.0:
                     errors.append(np.linalg.norm(motion.velocity - real))
                 if t > 10.0 and seen is None and motion.turn > 0.125:  # half of what it does
@@ -203,14 +205,14 @@ def test_messages_tell_velocities_with_places_and_nonsense_is_none():
     ):  # fmt: skip
         listener = Listener(Frame(turned, kind), 1)
         (read,) = messages_in(message.pack(packs))
-        said[kind] = listener.understand(read).velocity
+        said[kind] = listener.read(read).velocity
         assert said[kind] == pytest.approx(Frame(turned, kind).velocity(0.3, -0.2, 0.1), abs=1e-6)
     assert said["local"] == pytest.approx(said["global"], abs=1e-6)
     for bad in (math.nan, math.inf, 1e9):
         (read,) = messages_in(
             m.MAVLink_local_position_ned_message(1000, 1, 2, 3, 0.3, bad, 0.1).pack(packs)
         )
-        fix = Listener(Frame(SITE), 1).understand(read)
+        fix = Listener(Frame(SITE), 1).read(read)
         assert fix.position is not None
         assert fix.velocity is None
 

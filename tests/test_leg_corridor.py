@@ -43,7 +43,7 @@ def test_a_vehicle_may_stop_beyond_a_bend_and_go_on_straight_from_there(
     corridor = LegCorridor(begin, velocity, end, POLICY)
     stop = begin + brake * POLICY.stopping_s * velocity
     for place in polylines.dense(np.array([begin, stop, end]), 0.5):
-        corridor.take(place)
+        corridor.observe(place)
         assert corridor.distance(place) < POLICY.min_return + 1e-6
         assert corridor.depth_error(place)[0] < POLICY.min_return + 1e-6
 

@@ -14,13 +14,14 @@ from netsp import Circle, InputError, Problem
 from netsp.online.guard import live
 from netsp.online.guard.alarms import Level
 from netsp.online.guard.dead_reckoning import DeadReckoning
-from netsp.online.guard.message_rates import MessageRates, RatePolicy
+from netsp.online.guard.guard_policy import RatePolicy
+from netsp.online.guard.message_rates import MessageRates
 from netsp.online.guard.replay import read_fixes
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_guard import Guard, GuardOptions
 from netsp.online.link.geo_frame import Frame
+from netsp.online.link.link_policy import AidingPolicy
 from netsp.online.link.mavlink_messages import Listener
-from netsp.online.link.position_aiding import AidingPolicy
 
 pytest.importorskip("pymavlink")
 
@@ -62,7 +63,7 @@ def heard(messages):
         clock = M.MAVLink_local_position_ned_message(round(1000 * t), 0, 0, 1, 0, 0, 0)
         for one in (clock, message):
             data = one.pack(parser(1, 1))
-            fix = listener.understand(parser().decode(bytearray(data)))
+            fix = listener.read(parser().decode(bytearray(data)))
             if fix is not None:
                 out.append((t, fix.aiding_fault))
     return out
@@ -135,7 +136,7 @@ def drive(faults):
         t, fault = 0.1 * k, None
         fault = next((why for begin, why in reversed(faults) if t >= begin), "")
         place = (0.4 * min(t, 15.0), 1e-3 * (k % 7), -1.0)
-        out.append(guard.take(Fix(t, place, estimate=True, aiding_fault=fault)))
+        out.append(guard.update(Fix(t, place, estimate=True, aiding_fault=fault)))
     return out
 
 
@@ -172,7 +173,7 @@ def test_a_position_that_jumps_when_fixes_are_taken_again_is_told():
         t = 0.1 * k
         why = "the filter rejects the fixes" if 3.0 <= t < 10.0 else ""
         place = (0.2 * t, 4.8 if t >= 10.0 else 0.0, -1.0)
-        report = guard.take(Fix(t, place, estimate=True, aiding_fault=why))
+        report = guard.update(Fix(t, place, estimate=True, aiding_fault=why))
     assert any("set anew, 4.8 m" in a.text for a in report.alarms)
 
 
@@ -193,11 +194,11 @@ class Wire:
     def __init__(self, heard):
         self.heard, self.sent, self.peer = list(heard), [], None
 
-    def hear(self, seconds):
-        del seconds
+    def receive(self, timeout_s):
+        del timeout_s
         return [(self.heard.pop(0), ("127.0.0.1", 5))] if self.heard else []
 
-    def answer(self, peer):
+    def set_peer(self, peer):
         self.peer = peer
 
     def send(self, message):
@@ -222,8 +223,8 @@ def beside(monkeypatch, hz, *, seconds=12.0, kind=(12, 3), accepts=True, **optio
     monkeypatch.setattr(live, "rehearse", lambda **_: None)
     said = []
     live.watch(
-        Guard(SITE), Frame(SITE), "udpin:14550", lambda _: None, say=said.append,
-        until=lambda: not wire.heard, **options,
+        Guard(SITE), Frame(SITE), "udpin:14550", lambda _: None, on_note=said.append,
+        should_stop=lambda: not wire.heard, **options,
     )  # fmt: skip
     return said, wire.sent
 
@@ -264,8 +265,8 @@ class SimulatedWire(Wire):
     def is_over(self):
         return self.simulation.now >= self.end
 
-    def hear(self, seconds):
-        del seconds
+    def receive(self, timeout_s):
+        del timeout_s
         self.simulation.advance(0.1)
         heard = self.simulation.wire.messages()
         self.positions += [self.simulation.now for m in heard if "LOCAL_POSITION" in m.get_type()]
@@ -274,7 +275,7 @@ class SimulatedWire(Wire):
         return [(parser().decode(bytearray(m.get_msgbuf())), ("here", 5)) for m in (*heard, other)]
 
     def send(self, message):
-        message.pack(parser(live.SYSTEM, 191))
+        message.pack(parser(live.GUARD_SYSTEM, 191))
         if len(self.sent) >= self.loses:
             self.simulation.vehicle.receive(message)
         return super().send(message)
@@ -287,8 +288,8 @@ def listens(monkeypatch, wire, **options):
     monkeypatch.setattr(live.time, "monotonic", lambda: 1e5 + wire.simulation.now)
     said = []
     live.watch(
-        Guard(SITE), Frame(SITE), "udpin:14550", lambda _: None, say=said.append,
-        until=lambda: wire.is_over, **options,
+        Guard(SITE), Frame(SITE), "udpin:14550", lambda _: None, on_note=said.append,
+        should_stop=lambda: wire.is_over, **options,
     )  # fmt: skip
     return said
 
@@ -327,17 +328,19 @@ def test_a_vehicle_that_refuses_rates_is_not_asked_again_and_it_is_said(
 
 
 def test_an_answer_to_another_ground_station_is_no_refusal():
-    rates = MessageRates(Frame(SITE), True, sender=live.SYSTEM)
+    rates = MessageRates(Frame(SITE), True, sender=live.GUARD_SYSTEM)
     rates.requests(1, 0.0)
-    assert not list(rates.take_ack(M.MAV_CMD_SET_MESSAGE_INTERVAL, M.MAV_RESULT_DENIED, 255))
-    assert list(rates.take_ack(M.MAV_CMD_SET_MESSAGE_INTERVAL, M.MAV_RESULT_DENIED, live.SYSTEM))
+    assert not list(rates.on_ack(M.MAV_CMD_SET_MESSAGE_INTERVAL, M.MAV_RESULT_DENIED, 255))
+    assert list(
+        rates.on_ack(M.MAV_CMD_SET_MESSAGE_INTERVAL, M.MAV_RESULT_DENIED, live.GUARD_SYSTEM)
+    )
 
 
 def test_rates_are_counted_by_the_vehicle_s_clock_also_when_it_is_set():
     rates = MessageRates(Frame(SITE))
-    said = [line for k in range(200) for line in rates.take(1000.0 + 0.1 * k)]
+    said = [line for k in range(200) for line in rates.count(1000.0 + 0.1 * k)]
     assert rates.hz == pytest.approx(10.0)
-    said += [line for k in range(200) for line in rates.take(0.4 * k)]
+    said += [line for k in range(200) for line in rates.count(0.4 * k)]
     assert rates.hz == pytest.approx(2.5, abs=0.1)
     assert len(said) == 1
 

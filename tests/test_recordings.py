@@ -12,15 +12,16 @@ from netsp import Circle, InputError, Problem
 from netsp.command.main import main
 from netsp.model.problem import Origin
 from netsp.online.guard.alarms import Level
+from netsp.online.guard.guard_policy import RecordingPolicy
 from netsp.online.guard.message_tally import MessageTally
 from netsp.online.guard.recorded_path import read_any_paths
-from netsp.online.guard.recording_checks import RecordingPolicy
 from netsp.online.guard.replay import read_fixes
-from netsp.online.guard.stream import Stream, replayed
+from netsp.online.guard.stream import Stream, replay_fixes
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_guard import Guard, GuardOptions
 from netsp.online.link.geo_frame import Frame
-from netsp.online.link.vehicle_clock import ClockPolicy, VehicleClock
+from netsp.online.link.link_policy import ClockPolicy
+from netsp.online.link.vehicle_clock import VehicleClock
 
 SITE = Problem(
     base=(0, 0), goals=[(9, 0, -1)], tether_length=30,
@@ -432,7 +433,7 @@ def test_a_clock_that_is_set_is_not_a_restart(begin, step, every):
     """The guard goes on as with a clock that is not set: without an alarm and without a gap."""
     notes = []
     fixes = drive(TIMES[::every], lambda t: begin - (step if t >= 8.0 else 0.0))
-    reports = list(replayed(Guard(SITE, EXACT), fixes, notes.append))
+    reports = list(replay_fixes(Guard(SITE, EXACT), fixes, notes.append))
     assert not [a for r in reports for a in r.raised]
     assert all(r.claims for r in reports)
     assert reports[-1].time == pytest.approx(TIMES[::every][-1] + begin - step)
@@ -448,7 +449,7 @@ def test_a_clock_that_is_set_is_not_a_restart(begin, step, every):
 def test_a_clock_that_begins_anew_near_zero_is_a_restart(begin, boot):
     notes = []
     fixes = drive(TIMES, lambda t: begin if t < 6.0 else boot - 6.0)
-    reports = list(replayed(Guard(SITE, EXACT), fixes, notes.append))
+    reports = list(replay_fixes(Guard(SITE, EXACT), fixes, notes.append))
     assert "the vehicle restarted" in notes[0]
     assert reports[-1].time == pytest.approx(TIMES[-1] + boot - 6.0)
     assert reports[-1].claims
@@ -457,9 +458,9 @@ def test_a_clock_that_begins_anew_near_zero_is_a_restart(begin, boot):
 def test_a_message_that_comes_late_is_left_out():
     stream = Stream(Guard(SITE, EXACT))
     for fix in drive(TIMES[:50]):
-        stream.take(fix)
-    assert stream.take(Fix(1.0, (0.4, 0.0, -1.0))) is None
-    assert stream.take(Fix(5.0, (2.0, 0.0, -1.0))).claims
+        stream.add(fix)
+    assert stream.add(Fix(1.0, (0.4, 0.0, -1.0))) is None
+    assert stream.add(Fix(5.0, (2.0, 0.0, -1.0))).claims
 
 
 @settings(max_examples=50, deadline=None)
@@ -469,7 +470,7 @@ def test_a_clock_that_is_set_again_and_again_never_goes_back(steps):
     for n, back in steps:
         for _ in range(n):
             own += 0.1
-            reading = clock.take(own)
+            reading = clock.read(own)
             assert reading.event != "restart"
             if reading.event != "late":
                 times.append(reading.time)
@@ -503,7 +504,7 @@ def test_the_path_of_a_recording_keeps_its_order_when_the_clock_is_set(tmp_path)
 
 def test_an_estimate_that_was_never_vouched_for_is_an_alarm_at_once(tmp_path, m, capsys):
     file = tlog(tmp_path / "a.tlog", *vehicle(m, flags=NONE))
-    reports = list(replayed(Guard(SITE, EXACT), told(file)[0]))
+    reports = list(replay_fixes(Guard(SITE, EXACT), told(file)[0]))
     assert [a.kind for a in reports[0].raised] == ["estimate"]
     assert "never vouched" in reports[0].raised[0].text
     assert not any(r.claims for r in reports)
@@ -518,7 +519,7 @@ def test_a_gap_in_a_recording_is_told_as_beside_the_vehicle():
     rows = [f for f in drive(TIMES) if not 3.0 < f.time < 9.0]
     gaps = [Fix(t) for t in TIMES if 3.0 < t < 9.0]
     for fixes in (rows, sorted([*rows, *gaps], key=lambda f: f.time)):
-        reports = list(replayed(Guard(SITE, EXACT), fixes))
+        reports = list(replay_fixes(Guard(SITE, EXACT), fixes))
         raised = [a.text for r in reports for a in r.raised if a.level == Level.ALARM]
         assert len(raised) == 1
         assert "no position has come" in raised[0]
@@ -555,7 +556,7 @@ def test_beside_the_vehicle_it_is_said_once_which_option_would_help(m):
     for system, _, packet in [*vehicle(m, 2, local=False, degrees=NO_FIX),
                               *vehicle(m, 1, local=False, degrees=FIX)]:  # fmt: skip
         (message,) = parser().parse_buffer(packet.pack(parser(system, 1)))
-        said += hints.about(message, listener.understand(message), listener)
+        said += hints.about(message, listener.read(message), listener)
     assert len(said) == 2
     assert "--frame local" in said[0]
     assert "--system 1" in said[1]
@@ -565,13 +566,13 @@ def test_beside_the_vehicle_it_is_said_once_which_option_would_help(m):
 def test_damaged_messages_of_a_log_are_told_by_the_checksum_as_pymavlink_tells_them(m, wire):
     import random
 
-    from netsp.online.guard.telemetry_log import STAMP_BYTES, messages_of
+    from netsp.online.guard.telemetry_log import STAMP_BYTES, messages_of_log
     from netsp.online.link.dialect import parser
 
     chance, stamp = random.Random(wire), (10**15).to_bytes(STAMP_BYTES, "big")
     packets = [bytes(packet.pack(parser(1, 1), force_mavlink1=wire == 1))
                for _, _, packet in vehicle(m, 1)]  # fmt: skip
-    assert len(list(messages_of(b"".join(stamp + p for p in packets)))) == len(packets)
+    assert len(list(messages_of_log(b"".join(stamp + p for p in packets)))) == len(packets)
     for _ in range(200):
         good = bytearray(chance.choice(packets))
         at = chance.randrange(1, len(good))
@@ -581,6 +582,6 @@ def test_damaged_messages_of_a_log_are_told_by_the_checksum_as_pymavlink_tells_t
             is_known = not found.get_type().startswith("UNKNOWN")
         except Exception:
             is_known = False
-        heard = [x for x in messages_of(stamp + bytes(good))
+        heard = [x for x in messages_of_log(stamp + bytes(good))
                  if not x.get_type().startswith("UNKNOWN")]  # fmt: skip
         assert len(heard) == is_known, (at, bytes(good).hex())

@@ -82,7 +82,7 @@ except KeyboardInterrupt:
     for k, place in enumerate(track):
         time += 15.0 if k == 100 else 0.2
         noise = 0.2 * rng.normal(size=3)
-        report = guard.take(Fix(time, tuple(map(float, place + noise)), estimate=k % 40 != 39))
+        report = guard.update(Fix(time, tuple(map(float, place + noise)), estimate=k % 40 != 39))
         words |= {c.word for c in report.classes}
     print(json.dumps([len(words), len(opened[0]), sorted(loaded() - opened[0])]))
 """

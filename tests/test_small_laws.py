@@ -55,19 +55,20 @@ from netsp.model.bound_scope import LowerBound, Scope
 from netsp.model.solution import Status
 from netsp.online.execute.temporary_obstacles import lasting_problem, temporary_obstacles
 from netsp.online.execute.tour_repair import free_position, plan_fault, split_reachable
-from netsp.online.fly.preflight_checks import ready
+from netsp.online.fly.preflight_checks import make_ready
 from netsp.online.fly.stopped import RefusedError
-from netsp.online.fly.vehicle import POSITION_ONLY, LinkedVehicle, _wrong
+from netsp.online.fly.vehicle import POSITION_ONLY, LinkedVehicle, _fault
 from netsp.online.guard.alarms import Alarm, Alarms, Level
-from netsp.online.guard.lookahead import Ahead
+from netsp.online.guard.lookahead import LookaheadResult
 from netsp.online.guard.position_track import Track
 from netsp.online.guard.reasons import (
+    Situation,
     in_doubt,
-    little_left,
-    looped,
+    little_slack,
+    loop_ahead,
+    loop_closed,
     names_of,
-    otherwise,
-    soon_looped,
+    off_plan,
     soon_short,
 )
 from netsp.online.guard.site import Loop
@@ -400,7 +401,7 @@ def test_tight_plans_are_warned_of(posts):
 
 
 def levels(alarms, now, *reasons):
-    return [a.level for a in alarms.take(now, reasons)]
+    return [a.level for a in alarms.update(now, reasons)]
 
 
 def test_a_reason_may_be_away_for_less_than_a_second():
@@ -422,18 +423,18 @@ def test_alarms_are_raised_in_time_and_lowered_late():
     assert levels(alarms, 0.35, loop) == [Level.ALARM]
     assert levels(alarms, 0.5, loop) == []
     assert levels(alarms, 4.4) == []
-    assert alarms.on["loop"].level is Level.ALARM
+    assert alarms.active["loop"].level is Level.ALARM
     assert levels(alarms, 4.6) == []
-    assert alarms.on == {}
+    assert alarms.active == {}
 
 
 def test_the_gravest_alarm_is_told_first():
     alarms = Alarms()
     notice, alarm = Alarm("class", Level.NOTICE, "n"), Alarm("loop", Level.ALARM, "a")
-    alarms.take(0.0, [notice, alarm])
+    alarms.update(0.0, [notice, alarm])
     alarms = Alarms()
-    alarms.take(0.0, [alarm])
-    told = alarms.take(0.4, [notice, alarm])
+    alarms.update(0.0, [alarm])
+    told = alarms.update(0.4, [notice, alarm])
     assert [a.level for a in told] == [Level.ALARM, Level.NOTICE]
 
 
@@ -472,7 +473,7 @@ def class_now(slack=10.0, likely=1.0, taut=10.0):
     [(3.0, None), (1.9, Level.CAUTION), (0.5, Level.WARNING), (-0.1, Level.ALARM)],
 )
 def test_little_tether_is_told_by_what_is_left(slack, level):
-    told = little_left(Place(), class_now(slack, taut=20.0 - slack))
+    told = little_slack(Place(), class_now(slack, taut=20.0 - slack))
     assert [a.level for a in told] == ([] if level is None else [level])
 
 
@@ -480,7 +481,7 @@ def test_little_tether_is_told_by_what_is_left(slack, level):
     ("seconds", "level"), [(None, None), (11.0, None), (9.0, Level.CAUTION), (3.0, Level.WARNING)]
 )
 def test_a_tether_that_gets_short_is_told_by_when(seconds, level):
-    told = soon_short(Place(), Ahead(short_s=seconds))
+    told = soon_short(Place(), LookaheadResult(short_s=seconds))
     assert [a.level for a in told] == ([] if level is None else [level])
 
 
@@ -497,17 +498,18 @@ LOOP = Loop((0,), np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]]))
     ],
 )  # fmt: skip
 def test_a_loop_ahead_is_told_by_when_and_how_likely(seconds, share, turning, on_plan, level):
-    ahead = Ahead(loop_s=seconds, loop=LOOP, turning=turning)
-    told = soon_looped(Place(), ahead, np.zeros(3), share, on_plan)
+    ahead = LookaheadResult(loop_s=seconds, loop=LOOP, is_turning=turning)
+    situation = Situation(Place(), np.zeros(3), is_on_plan=on_plan)
+    told = loop_ahead(ahead, situation, share)
     assert [a.level for a in told] == ([] if level is None else [level])
     assert all("keep east of P0" in a.text for a in told)
 
 
 def test_a_loop_in_a_class_that_is_not_clear_is_no_warning():
-    ahead = Ahead(loop_s=15.0, loop=LOOP)
-    (told,) = soon_looped(Place(), ahead, np.zeros(3), 0.9, clear=0.4)
+    ahead = LookaheadResult(loop_s=15.0, loop=LOOP)
+    (told,) = loop_ahead(ahead, Situation(Place(), np.zeros(3), 0.4), 0.9)
     assert told.level is Level.CAUTION
-    (told,) = soon_looped(Place(), ahead, np.zeros(3), 0.96, clear=0.4)
+    (told,) = loop_ahead(ahead, Situation(Place(), np.zeros(3), 0.4), 0.96)
     assert told.level is Level.WARNING
 
 
@@ -517,7 +519,7 @@ def test_a_loop_in_a_class_that_is_not_clear_is_no_warning():
      (0.04, False, None), (1.0, True, Level.NOTICE)],
 )  # fmt: skip
 def test_a_closed_loop_is_told_by_how_likely_it_is(share, on_plan, level):
-    told = looped(Place(), [LOOP], np.zeros(3), share, on_plan)
+    told = loop_closed([LOOP], Situation(Place(), np.zeros(3), is_on_plan=on_plan), share)
     assert [a.level for a in told] == ([] if level is None else [level])
 
 
@@ -525,9 +527,9 @@ def test_doubts_and_departures_from_the_plan_are_told():
     sure, rest = class_now(likely=0.96), class_now(likely=0.04)
     assert in_doubt([sure, rest]) == []
     assert len(in_doubt([class_now(likely=0.9), class_now(likely=0.1)])) == 1
-    assert otherwise(False, class_now(likely=0.9))[0].level is Level.CAUTION
-    assert otherwise(False, class_now(likely=0.5)) == []
-    assert otherwise(True, class_now()) == otherwise(None, class_now()) == []
+    assert off_plan(False, class_now(likely=0.9))[0].level is Level.CAUTION
+    assert off_plan(False, class_now(likely=0.5)) == []
+    assert off_plan(True, class_now()) == off_plan(None, class_now()) == []
     assert names_of(Place(), [0]) == "P0"
     assert names_of(Place(), [0, 1, 2]) == "P0, P1 and P2"
     assert names_of(Place(), [0, 1, 2, 3]) == "P0, P1, P2 and 1 more"
@@ -544,46 +546,46 @@ def track_at(speed=0.5):
     """A track that has gone 5 s along the x axis."""
     track = Track(0.01, 1.0)
     for k in range(51):
-        track.take(fix(0.1 * k, speed * 0.1 * k))
+        track.observe(fix(0.1 * k, speed * 0.1 * k))
     return track
 
 
 def test_a_gap_of_more_than_two_seconds_is_one():
-    assert track_at().take(fix(6.9, 3.45)).lost_s == 0.0
-    motion = track_at().take(fix(7.1, 3.55))
+    assert track_at().observe(fix(6.9, 3.45)).lost_s == 0.0
+    motion = track_at().observe(fix(7.1, 3.55))
     assert motion.lost_s == pytest.approx(2.1)
     assert motion.reason == "no position came"
 
 
 def test_a_jump_that_no_speed_explains_is_one():
-    assert track_at().take(fix(5.1, 3.0)).lost_s == 0.0
-    assert track_at().take(fix(5.1, 3.5)).reason == "the position jumped"
+    assert track_at().observe(fix(5.1, 3.0)).lost_s == 0.0
+    assert track_at().observe(fix(5.1, 3.5)).reason == "the position jumped"
 
 
 def test_a_moving_robot_whose_estimate_repeats_is_lost_since_it_did():
     track = track_at()
     for k in range(1, 32):
-        motion = track.take(fix(5.0 + 0.1 * k, 2.5))
-    assert track.frozen
+        motion = track.observe(fix(5.0 + 0.1 * k, 2.5))
+    assert track.is_frozen
     assert motion is None
-    assert track.silence(8.2) == pytest.approx(3.2)
-    assert track.take(fix(8.2, 2.6)).lost_s == pytest.approx(3.2)
+    assert track.silence_s(8.2) == pytest.approx(3.2)
+    assert track.observe(fix(8.2, 2.6)).lost_s == pytest.approx(3.2)
 
 
 def test_a_robot_at_rest_may_repeat_its_estimate():
     track = Track(0.01, 1.0)
     for k in range(100):
-        track.take(fix(0.1 * k, min(k, 5) * 1e-4))
-    assert not track.frozen
+        track.observe(fix(0.1 * k, min(k, 5) * 1e-4))
+    assert not track.is_frozen
 
 
 def test_doubt_lasts_from_when_it_was_told():
     track = track_at()
-    track.lose(5.0)
-    track.lose(6.0)
-    assert track.silence(7.0) == pytest.approx(2.0)
-    assert track.take(fix(7.0, 3.5)).reason == "the estimate was lost"
-    assert track.silence(7.5) == pytest.approx(0.5)
+    track.invalidate(5.0)
+    track.invalidate(6.0)
+    assert track.silence_s(7.0) == pytest.approx(2.0)
+    assert track.observe(fix(7.0, 3.5)).reason == "the estimate was lost"
+    assert track.silence_s(7.5) == pytest.approx(0.5)
 
 
 def test_velocity_and_turn_are_those_of_the_motion():
@@ -592,9 +594,9 @@ def test_velocity_and_turn_are_those_of_the_motion():
     track, motion = Track(0.01, 1.0), None
     for k in range(150):  # a circle of radius 5, counter-clockwise, 0.1 rad/s
         a = 0.01 * k
-        motion = track.take(fix(0.1 * k, 5 * math.sin(a), 5 * (1 - math.cos(a))))
+        motion = track.observe(fix(0.1 * k, 5 * math.sin(a), 5 * (1 - math.cos(a))))
     assert motion.turn == pytest.approx(0.1, abs=0.02)
-    assert track.take(fix(10.0, 0.0)) is None  # older than the last
+    assert track.observe(fix(10.0, 0.0)) is None  # older than the last
 
 
 # before and during a flight
@@ -603,18 +605,18 @@ def test_velocity_and_turn_are_those_of_the_motion():
 class Vehicle:
     """The part of a session that is used before a flight; it answers everything at once."""
 
-    system, others, broken = 1, (), None
-    silent_s = unplaced_s = stalled_s = 0.0
+    system, others, fault = 1, (), None
+    silent_s = position_age_s = stalled_s = 0.0
     kind, echo = VehicleKind(12, 3), None
 
     def __init__(self, **told):
         kept = {"position": (0.0, 0.0, -1.0), "estimate": True, "armed": True, "mode": "GUIDED"}
-        self.now = SimpleNamespace(**{**kept, "time": 0.0, "heading": None, **told})
+        self.latest = SimpleNamespace(**{**kept, "time": 0.0, "heading": None, **told})
 
-    def source_lost(self, *_):
+    def aiding_fault(self, *_):
         """Return that nothing is wrong."""
 
-    def ask_for_positions(self):
+    def request_positions(self):
         """Send nothing."""
 
     def sleep(self, seconds):
@@ -623,8 +625,8 @@ class Vehicle:
     def command(self, *_):
         return True
 
-    def watch(self, holds):
-        self.holds = holds
+    def watch(self, check):
+        self.check = check
 
 
 @pytest.mark.parametrize(
@@ -638,10 +640,10 @@ class Vehicle:
 )  # fmt: skip
 def test_a_vehicle_is_asked_for_all_that_a_flight_needs(told, why):
     if why is None:
-        ready(Vehicle(**told), np.zeros(3), 2.0)
+        make_ready(Vehicle(**told), np.zeros(3), 2.0)
         return
     with pytest.raises(RefusedError, match=why):
-        ready(Vehicle(**told), np.zeros(3), 2.0)
+        make_ready(Vehicle(**told), np.zeros(3), 2.0)
 
 
 @pytest.mark.parametrize(
@@ -651,7 +653,7 @@ def test_a_vehicle_is_asked_for_all_that_a_flight_needs(told, why):
      ({"armed": None}, None)],
 )  # fmt: skip
 def test_a_flight_ends_when_something_it_needs_is_gone(told, why):
-    said = _wrong(Vehicle(**told).now)
+    said = _fault(Vehicle(**told).latest)
     assert (said is None) if why is None else (why in said)
 
 
@@ -662,7 +664,7 @@ def test_a_flight_ends_when_something_it_needs_is_gone(told, why):
 def test_a_link_is_lost_without_heartbeats_or_positions(silent, unplaced, why):
     session = Vehicle()
     vehicle = LinkedVehicle(session, 0.3)
-    session.silent_s, session.unplaced_s = silent, unplaced
+    session.silent_s, session.position_age_s = silent, unplaced
     if why is None:
         vehicle.check()
         return
@@ -681,8 +683,8 @@ def test_position_targets_ask_for_positions_alone():
 
 def test_a_vertex_at_the_surface_is_reached_at_a_decimetre():
     vehicle = LinkedVehicle(Vehicle(position=(1.0, 0.0, -0.1)), 0.05)
-    assert vehicle._at(np.array([1.0, 0.0, 0.0]))
-    assert not vehicle._at(np.array([1.06, 0.0, 0.0]))
+    assert vehicle._is_at(np.array([1.0, 0.0, 0.0]))
+    assert not vehicle._is_at(np.array([1.06, 0.0, 0.0]))
     assert vehicle.yaw == 0.0
     assert LinkedVehicle(Vehicle(heading=0.0), 0.1).yaw == pytest.approx(math.pi / 2)
 

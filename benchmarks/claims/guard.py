@@ -79,9 +79,9 @@ def flown() -> tuple[str, bool]:
         link = UdpLink(Address(True, "127.0.0.1", autopilot.port))
         session = Session(link, Frame(problem), 1, pace)
         try:
-            autopilot.until(lambda: session.now.position is not None)
+            autopilot.until(lambda: session.latest.position is not None)
             session.command(400, 1)
-            autopilot.until(lambda: session.now.armed is True)
+            autopilot.until(lambda: session.latest.armed is True)
             s = fly(problem, tour, session, ExecutionOptions(speed=0.5, reach=0.3)).summary
         finally:
             session.close()

@@ -309,7 +309,7 @@ def _stand_by(
     def say(text: str) -> None:
         said.append(text)
         with contextlib.suppress(OSError, ValueError):  # the terminal may have gone
-            for line in session.texts():
+            for line in session.new_texts():
                 print(f"the vehicle says: {line}", file=sys.stderr)
             print(f"netsp: {text}", file=sys.stderr, flush=True)
 
@@ -317,7 +317,7 @@ def _stand_by(
         # where the first Ctrl-C has ended the flight, the next one interrupts
         return bool(said) if has_pressed_again else clock.is_stopped and not has_stopped
 
-    stand_by(session, args.at_end, say=say, should_stop=should_stop)
+    stand_by(session, args.at_end, on_note=say, should_stop=should_stop)
 
 
 def _flown(
@@ -364,13 +364,13 @@ def _flown(
     rehearse()
     page, sources = None, []
     if args.events:
-        from netsp.online.fly.inputs import events_of
+        from netsp.online.fly.inputs import read_events
 
-        sources.append(events_of(getattr(sys.stdin, "buffer", sys.stdin), complain))
+        sources.append(read_events(getattr(sys.stdin, "buffer", sys.stdin), complain))
     if args.page is not None:
         from netsp.online.guard.guard_page import Page
 
-        page = stack.enter_context(Page(problem, args.page, takes_events=True))
+        page = stack.enter_context(Page(problem, args.page, accepts_events=True))
         print(f"the page is {page.address}", file=sys.stderr)
         sources.append(_from(page, complain))
     shows = not args.quiet and sys.stderr.isatty()
@@ -393,7 +393,7 @@ def _flown(
         rows[:] = [row]
         if clock.is_stopped:
             raise KeyboardInterrupt
-        for text in session.texts():
+        for text in session.new_texts():
             if not args.quiet:
                 print(f"\nthe vehicle says: {text}", file=sys.stderr)
         for call in (told, watched):
@@ -417,22 +417,22 @@ def _flown(
     except (Exception, KeyboardInterrupt) as error:
         if not rows:
             raise
-        session.say(f"flight ended by {type(error).__name__}: {error}", urgent=True)
+        session.send_text(f"flight ended by {type(error).__name__}: {error}", is_urgent=True)
         return error, session, clock
     if done.stopped:
-        session.say(f"flight stopped: {done.stopped}", urgent=True)
+        session.send_text(f"flight stopped: {done.stopped}", is_urgent=True)
     return done, session, clock
 
 
 def _from(page: Page, complain: Callable[[str], None]) -> Callable[[], list[Event]]:
     """Events that pages have sent."""
-    from netsp.online.fly.inputs import event_of
+    from netsp.online.fly.inputs import parse_event
 
     def since() -> list[Event]:
         found = []
         while True:
             try:
-                found.append(event_of(page.events.get_nowait()))
+                found.append(parse_event(page.events.get_nowait()))
             except queue.Empty:
                 return found
             except InputError as error:
@@ -452,7 +452,7 @@ def _watched(problem: Problem, page: Page, speed: float) -> Callable[[ExecutionR
 
     def on_step(row: ExecutionRow) -> None:
         place = (row.x, row.y, row.z)
-        page.tell(guard.take(Fix(row.time, place, mode=row.mode, estimate=True)).as_row())
+        page.send(guard.update(Fix(row.time, place, mode=row.mode, estimate=True)).as_row())
 
     return on_step
 

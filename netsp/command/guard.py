@@ -146,14 +146,14 @@ def run(args: argparse.Namespace) -> int:
             if lines is not None:
                 lines.write(json.dumps(row, allow_nan=False) + "\n")
             if page is not None and row is not None:
-                page.tell(row)
+                page.send(row)
 
         try:
             if args.replay is not None:
-                from netsp.online.guard.stream import replayed
+                from netsp.online.guard.stream import replay_fixes
 
                 say = None if args.quiet else messages.note
-                for report in replayed(guard, fixes, say):
+                for report in replay_fixes(guard, fixes, say):
                     take(report)
             else:
                 from netsp.online.guard.live import watch
@@ -167,7 +167,7 @@ def run(args: argparse.Namespace) -> int:
                     state=args.state,
                     publish=args.publish,
                     corrections=None if page is None else page.corrections,
-                    say=None if args.quiet else told.say,
+                    on_note=None if args.quiet else told.say,
                     ask_rates=args.ask_rates,
                 )
         except KeyboardInterrupt:

@@ -1,1 +1,1 @@
-"""A tour carried out by a real vehicle, over MAVLink."""
+"""Tours carried out by a real vehicle, over MAVLink."""

@@ -1,8 +1,9 @@
-"""A tour carried out before the flight, with all that may happen on the way.
+"""Rehearsal: a made-up tour is carried out before the flight, with all that may happen on the way.
 
 On a machine that never flew, everything that a flight needs is compiled at its first use, a minute
-or two in all. A vehicle that waits for its next target meanwhile is not looked after, so that
-`netsp fly` opens no link until this is done.
+or
+two in all. A vehicle that waits for its next target drifts meanwhile, so `netsp fly` opens no link
+until this is done.
 """
 
 from __future__ import annotations
@@ -18,15 +19,17 @@ from netsp.online.execute.tour_execution import execute
 from netsp.plan.solve_problem import solve
 
 _SITE = {
-    "schema_version": 1, "base": [0, 0], "tether_length": 14,
+    "schema_version": 1,
+    "base": [0, 0],
+    "tether_length": 14,
     "goals": [[4, 1, -1], [6, -2, -2], [9, 0, -1]],
     "obstacles": [
         {"name": "pile", "center": [2, 0], "radius": 0.5},
         {"name": "pier", "polygon": [[5, 0], [6, 0], [6, 1], [5, 1]]},
         *({"center": [x, 9], "radius": 0.3} for x in range(-3, 6)),
     ],
-}  # fmt: skip
-"""With as many obstacles as it takes to be looked up by place."""
+}
+"""Problem with enough obstacles that they are looked up by place."""
 
 _EVENTS = {
     "schema_version": 1,
@@ -44,12 +47,12 @@ _EVENTS = {
 
 @cache
 def rehearse() -> None:
-    """Have everything loaded that a flight needs, and compiled on a machine that never flew.
+    """Load everything that a flight needs, and compile it on a machine that never flew.
 
     Raises
     ------
     KeyboardInterrupt
-        Ctrl-C, which planning and flying take for the wish to have what there is.
+        Ctrl-C was pressed, which planning and flying would take as the wish to stop early.
     """
     if not compiles():
         return
@@ -58,6 +61,9 @@ def rehearse() -> None:
         tour = solve(site)
         check()
         execute(
-            site, tour, ExecutionOptions(speed=0.5, reach=0.3),
-            surprises=Surprises.model_validate(_EVENTS), on_step=lambda _: check(),
-        )  # fmt: skip
+            site,
+            tour,
+            ExecutionOptions(speed=0.5, reach=0.3),
+            surprises=Surprises.model_validate(_EVENTS),
+            on_step=lambda _: check(),
+        )

@@ -40,9 +40,13 @@ class FlightTime:
 
 
 def predicted_flight(
-    problem: Problem, solution: Solution, speed: float, reach: float,
-    policy: FlightPolicy | None = None, motion: VehicleMotion | None = None,
-) -> FlightTime:  # fmt: skip
+    problem: Problem,
+    solution: Solution,
+    speed: float,
+    reach: float,
+    policy: FlightPolicy = FlightPolicy(),
+    motion: VehicleMotion | None = None,
+) -> FlightTime:
     """Return the times that `fly` takes for a tour.
 
     Parameters
@@ -55,19 +59,18 @@ def predicted_flight(
         Horizontal speed of the vehicle, m/s.
     reach : float
         Distance to a vertex at which the next target is sent, m.
-    policy : FlightPolicy, optional
+    policy : FlightPolicy
         Limits of the flight; the largest change of depth between targets counts.
     motion : VehicleMotion, optional
-        Motion of the vehicle; by default that of ArduSub as it comes.
+        Motion of the vehicle; by default that of ArduSub without changes.
     """
-    policy = policy or FlightPolicy()
     legs = legs_of(problem, solution)
     places = [_target(legs[0].path[0])]
     counts = []
     for leg in legs:
         before = len(places)
         for a, b in pairwise(leg.path):
-            places += _stages(_target(a), _target(b), reach, policy.max_depth_step)
+            places += _targets_to(_target(a), _target(b), reach, policy.max_depth_step)
         counts.append(len(places) - before)
     times = iter(target_times(places, reach, speed, motion, notice_s=policy.notice_s))
     return FlightTime(
@@ -115,13 +118,19 @@ def _target(place: Floats) -> Point3:
     return x, y, altitude(z)
 
 
-def _stages(a: Point3, b: Point3, reach: float, max_depth_step: float) -> list[Point3]:
-    """Return the targets on the way to a vertex, as the flight sends them on a leg that slopes."""
+def _targets_to(a: Point3, b: Point3, reach: float, max_depth_step: float) -> list[Point3]:
+    """Return the targets on the path to a vertex, as the flight sends them on a sloping leg."""
     if math.dist(a[:2], b[:2]) <= 2.0 * reach:
         return [b]
     count = max(1, math.ceil(abs(b[2] - a[2]) / max_depth_step))
     return [
-        (a[0] + (b[0] - a[0]) * k / count, a[1] + (b[1] - a[1]) * k / count,
-         a[2] + (b[2] - a[2]) * k / count)
-        for k in range(1, count)
-    ] + [b]  # fmt: skip
+        *(
+            (
+                a[0] + (b[0] - a[0]) * k / count,
+                a[1] + (b[1] - a[1]) * k / count,
+                a[2] + (b[2] - a[2]) * k / count,
+            )
+            for k in range(1, count)
+        ),
+        b,
+    ]

@@ -33,7 +33,7 @@ from netsp.roadmap.roadmap_policy import RoadmapPolicy
 BeginsAt = Callable[[Floats], ResumePoint]
 """Function that returns how a flight begins, given the position of the vehicle, shape (3,)."""
 
-SAY_CLASS = "say with --class on which sides of the obstacles the tether lies"
+CLASS_HINT = "say with --class on which sides of the obstacles the tether lies"
 
 
 def parse_class(text: str) -> Word:
@@ -63,12 +63,7 @@ def parse_class(text: str) -> Word:
 
 
 def read_run(folder: str | Path) -> tuple[Problem, Solution, RunState]:
-    """Read the record of a flight: its problem as it was last, its plan and its state.
-
-    Parameters
-    ----------
-    folder : str or Path
-        Folder of the run.
+    """Read the record of a flight: its latest problem, its plan and its state.
 
     Raises
     ------
@@ -86,60 +81,40 @@ def read_run(folder: str | Path) -> tuple[Problem, Solution, RunState]:
     return problem, solution, state
 
 
-def from_record(problem: Problem, state: RunState, policy: FlightPolicy | None = None) -> BeginsAt:
-    """Return how an interrupted flight goes on.
+def from_record(
+    problem: Problem, state: RunState, policy: FlightPolicy = FlightPolicy()
+) -> BeginsAt:
+    """Return a function that begins an interrupted flight again, by its last state.
 
-    Parameters
-    ----------
-    problem : Problem
-        Problem as it was last.
-    state : RunState
-        State of the flight.
-    policy : FlightPolicy, optional
-        Limits.
-
-    Returns
-    -------
-    callable
-        Raises RefusedError if the class is not known any more.
+    The function raises RefusedError if the class is not known any more.
     """
     before = np.array(state.tether, dtype=float)
-    policy = policy or FlightPolicy()
 
-    def begins(place: Floats) -> ResumePoint:
-        way = float(np.linalg.norm(place - before[-1]))
-        if way > policy.max_unwatched_way:
+    def begin_at(place: Floats) -> ResumePoint:
+        distance = float(np.linalg.norm(place - before[-1]))
+        if distance > policy.max_unwatched_distance:
             raise RefusedError(
-                f"the vehicle is {way:.1f} m from where it was last; expected at most "
-                f"{policy.max_unwatched_way:g} m, because nobody saw how it got there: {SAY_CLASS}"
+                f"the vehicle is {distance:.1f} m from where it was last; expected at most "
+                f"{policy.max_unwatched_distance:g} m, because nobody saw how it got there: "
+                f"{CLASS_HINT}"
             )
         blocked = _between(problem, before[-1], place)
         if blocked is not None:
             raise RefusedError(
                 f"{problem.obstacle_label(blocked)} lies between the vehicle and where it was "
-                f"last: {SAY_CLASS}"
+                f"last: {CLASS_HINT}"
             )
         return _resume_point(problem, state, np.vstack([before, place]))
 
-    return begins
+    return begin_at
 
 
 def from_word(problem: Problem, word: Word, state: RunState) -> BeginsAt:
-    """Return how a flight begins with a tether of a given class.
+    """Return a function that begins a flight with a tether of a given class.
 
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
-    word : Word
-        Class of the tether where the vehicle is.
-    state : RunState
-        Goals that are left.
-
-    Returns
-    -------
-    callable
-        Raises RefusedError if no tether of that class reaches the vehicle.
+    The function raises RefusedError if no tether of the class reaches the vehicle. `state` says
+    which
+    goals are left.
 
     Raises
     ------
@@ -152,7 +127,7 @@ def from_word(problem: Problem, word: Word, state: RunState) -> BeginsAt:
             f"{', '.join(map(str, word))}"
         )
 
-    def begins(place: Floats) -> ResumePoint:
+    def begin_at(place: Floats) -> ResumePoint:
         goal = Goal(position=free_position(problem, place))
         placed = problem.model_copy(update={"goals": (goal,), "state": None})
         try:
@@ -165,29 +140,17 @@ def from_word(problem: Problem, word: Word, state: RunState) -> BeginsAt:
             ) from None
         return _resume_point(problem, state, np.asarray(path))
 
-    return begins
+    return begin_at
 
 
 def from_guard(
-    problem: Problem, file: str | Path, state: RunState, policy: FlightPolicy | None = None
+    problem: Problem, file: str | Path, state: RunState, policy: FlightPolicy = FlightPolicy()
 ) -> BeginsAt:
-    """Return how a flight begins with the tether that a guard has watched.
+    """Return a function that begins a flight with the tether that a guard has watched.
 
-    Parameters
-    ----------
-    problem : Problem
-        The problem that the guard watched.
-    file : str or Path
-        Its state file.
-    state : RunState
-        Goals that are left.
-    policy : FlightPolicy, optional
-        Limits.
-
-    Returns
-    -------
-    callable
-        Raises RefusedError if the class is not known where the vehicle is.
+    The function raises RefusedError if the class is not known where the vehicle is. `file` is
+    the
+    state file of the guard, and `state` says which goals are left.
 
     Raises
     ------
@@ -198,30 +161,21 @@ def from_guard(
 
     known = GuardState.load(file)
     known.words(PlaneSite(problem))
-    sure, *others = known.classes
-    odds = min((math.exp(c.cost - sure.cost) for c in others), default=math.inf)
-    policy = policy or FlightPolicy()
+    likeliest, *others = known.classes
+    odds = min((math.exp(c.cost - likeliest.cost) for c in others), default=math.inf)
     if odds < policy.min_class_odds:
         raise InputError(
             f"{file}: classes: the likeliest is only {odds:.3g} times as likely as the next; "
-            f"expected {policy.min_class_odds:g}: {SAY_CLASS}"
+            f"expected {policy.min_class_odds:g}: {CLASS_HINT}"
         )
-    if sure.tether is None:
-        return from_word(problem, sure.word, state)
-    at = state.model_copy(update={"tether": sure.tether})
-    return from_record(problem, at, policy)
+    if likeliest.tether is None:
+        return from_word(problem, likeliest.word, state)
+    resumed = state.model_copy(update={"tether": likeliest.tether})
+    return from_record(problem, resumed, policy)
 
 
 def whole_tour(problem: Problem, solution: Solution) -> RunState:
-    """Return the state of a flight that has not visited any goal.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
-    solution : Solution
-        The plan.
-    """
+    """Return the state of a flight that has not visited any goal."""
     left = tuple(leg.goal for leg in legs_of(problem, solution) if leg.goal != HOME)
     base = problem.base
     reserve = ReservePolicy().of_plan(problem, solution)
@@ -232,16 +186,17 @@ def _resume_point(problem: Problem, state: RunState, tether: Floats) -> ResumePo
     tether = tether.copy()
     tether[0] = problem.base
     length = polylines.length(tether)
-    return ResumePoint(
-        tether, list(state.left),
+    reason = (
         f"resumed with {counted(len(state.left), 'goal')} left, {length:.1f} {problem.units} along "
-        "the tether from the base",
-        {g.goal: g.reason for g in state.left_out}, tuple(state.cancelled), state.reserve,
-    )  # fmt: skip
+        "the tether from the base"
+    )
+    left_out = {g.goal: g.reason for g in state.left_out}
+    cancelled = tuple(state.cancelled)
+    return ResumePoint(tether, list(state.left), reason, left_out, cancelled, state.reserve)
 
 
 def _between(problem: Problem, before: Floats, after: Floats) -> int | None:
-    """Return an obstacle that the straight way between two places enters; None if it is free."""
+    """Return an obstacle that the straight line between two places enters; None if it is free."""
     line = shapely.LineString([before[:2], after[:2]])
     for i, o in enumerate(problem.obstacles):
         if isinstance(o, Circle):

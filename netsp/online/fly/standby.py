@@ -1,8 +1,8 @@
 """Standby after a flight: hold the vehicle until another ground station takes over.
 
-A few seconds after the last heartbeat of a ground station, ArduSub disarms and drifts, or does what
-its parameter FS_GCS_ENABLE says. So netsp keeps sending heartbeats after the flight, and holds the
-vehicle where it is.
+Some seconds after the last heartbeat of a ground station (FS_GCS_TIMEOUT, 5 s by default), ArduSub
+disarms and drifts, or does what its parameter FS_GCS_ENABLE says. So netsp keeps sending heartbeats
+after the flight, and holds the vehicle in place.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from netsp.online.execute.tour_execution import StopsFlightError
 from netsp.online.fly.flight_policy import FlightPolicy
 from netsp.online.fly.vehicle import LinkedVehicle
 from netsp.online.link.dialect import GROUND_STATION, dialect
-from netsp.online.link.modes import ALT_HOLD, GUIDED, POSHOLD, SURFACE, mode_name
+from netsp.online.link.modes import Mode, mode_name
 from netsp.online.link.session import Session
 
 Ending = Literal["hold", "position-hold", "surface", "leave"]
@@ -25,14 +25,14 @@ or stay as it is with no heartbeats from us."""
 
 ENDINGS: tuple[Ending, ...] = get_args(Ending)
 
-ASKED = {"position-hold": POSHOLD, "surface": SURFACE}
-"""Mode that each ending asks for."""
+ENDING_MODES = {"position-hold": Mode.POSHOLD, "surface": Mode.SURFACE}
+"""Mode of each ending but holding in GUIDED."""
 
-FAILSAFE, FAILSAFE_TIME = "FS_GCS_ENABLE", "FS_GCS_TIMEOUT"
-"""Parameters: what the vehicle does without a ground station, and after how many seconds."""
+FAILSAFE = "FS_GCS_ENABLE"
+"""Parameter for what the vehicle does without a ground station."""
 
-FAILSAFE_S = 5.0
-"""Seconds that ArduSub waits where FS_GCS_TIMEOUT is not known."""
+FAILSAFE_TIME = "FS_GCS_TIMEOUT"
+"""Parameter for the seconds without a ground station after which it does so."""
 
 CONSEQUENCES = {
     2: "disarms and drifts",
@@ -41,17 +41,18 @@ CONSEQUENCES = {
 }
 """Action of the vehicle without a ground station, by FS_GCS_ENABLE; none at 0 and 1."""
 
-LOOK_S = 0.1
-"""Period of standby, s: messages are read and conditions checked this often."""
+
+POSITION_MODES = (mode_name(Mode.GUIDED), mode_name(Mode.POSHOLD))
+"""Modes in which a vehicle holds its place by its position estimate."""
 
 
 def stand_by(
     session: Session,
     ending: Ending = "hold",
     *,
-    say: Callable[[str], None] = lambda text: None,
+    on_note: Callable[[str], None] = lambda text: None,
     should_stop: Callable[[], bool] = lambda: False,
-    policy: FlightPolicy | None = None,
+    policy: FlightPolicy = FlightPolicy(),
 ) -> str:
     """Hold a vehicle and keep its link alive until another ground station takes over.
 
@@ -61,47 +62,39 @@ def stand_by(
         The vehicle, after a flight.
     ending : {"hold", "position-hold", "surface", "leave"}
         Action of the vehicle.
-    say : callable, optional
+    on_note : callable, optional
         Called with lines about the present and the next action of the vehicle.
     should_stop : callable, optional
         Polled; True ends standby, as does a KeyboardInterrupt.
-    policy : FlightPolicy, optional
+    policy : FlightPolicy
         Limits.
 
     Returns
     -------
     str
-        Reason why it ended.
+        Reason why standby ended.
     """
     if ending == "leave":
         return "as asked for"
-    if session.now.position is None:
+    if session.latest.position is None:
         return "the vehicle was never there"
     try:
-        return _Standby(session, ending, say, policy).run(should_stop)
+        return _Standby(session, ending, on_note, policy).run(should_stop)
     except KeyboardInterrupt:
         return "Ctrl-C"
 
 
 def do_without_estimate(session: Session, policy: FlightPolicy) -> None:
-    """Put a vehicle that would follow a wrong estimate into ALT_HOLD; ask again until it is.
-
-    Parameters
-    ----------
-    session : Session
-        The vehicle.
-    policy : FlightPolicy
-        Limits.
-    """
-    waited, ask_at = 0.0, 0.0
-    while session.now.mode in (mode_name(GUIDED), mode_name(POSHOLD)):
+    """Put a vehicle that would follow a wrong estimate into ALT_HOLD; request it until it is."""
+    waited, request_at = 0.0, 0.0
+    while session.latest.mode in POSITION_MODES:
         if waited >= policy.max_answer_s or session.silent_s > policy.max_silence_s:
             return
-        if waited >= ask_at:
-            ask_at = waited + policy.retry_s
-            session.command(dialect().MAV_CMD_DO_SET_MODE, 1, ALT_HOLD)
-        session.sleep(LOOK_S)
-        waited += LOOK_S
+        if waited >= request_at:
+            request_at = waited + policy.retry_s
+            session.command(dialect().MAV_CMD_DO_SET_MODE, 1, Mode.ALT_HOLD)
+        session.sleep(policy.standby_poll_s)
+        waited += policy.standby_poll_s
 
 
 class _Standby:
@@ -110,80 +103,95 @@ class _Standby:
     Attributes
     ----------
     is_held
-        True once it was commanded where to stay, since the link was last up.
+        Whether it was commanded to stay since the link was last up.
     is_unaided
-        True once it was put into ALT_HOLD because it has no estimate.
-    has_told
-        True once the loss of the estimate was reported.
+        Whether it was put into ALT_HOLD because it has no estimate.
+    has_reported_loss
+        Whether the loss of the estimate was reported.
     unaided_since
-        Time by the vehicle's clock since which it has no source of its estimate.
-    ask_again
-        Time by the vehicle's clock at which the mode is asked for again.
-    strangers
+        Time by the vehicle's clock since which nothing corrects its estimate, s.
+    request_mode_at
+        Time by the vehicle's clock at which the mode is requested again, s.
+    other_stations
         Ground stations that were heard, but that the vehicle does not count on.
     """
 
     def __init__(
-        self, session: Session, ending: Ending, say: Callable[[str], None],
-        policy: FlightPolicy | None,
-    ) -> None:  # fmt: skip
-        self.session, self.ending, self.say = session, ending, say
+        self,
+        session: Session,
+        ending: Ending,
+        on_note: Callable[[str], None],
+        policy: FlightPolicy,
+    ) -> None:
+        self.session, self.ending, self.on_note = session, ending, on_note
         self.vehicle = LinkedVehicle(session, 1.0, policy)
-        self.policy = self.vehicle.policy
-        self.is_held = self.is_unaided = self.has_told = False
-        self.ask_again = -np.inf
+        self.policy = policy
+        self.is_held = self.is_unaided = self.has_reported_loss = False
+        self.request_mode_at = -np.inf
         self.unaided_since: float | None = None
-        self.strangers: set[int] = set()
+        self.other_stations: set[int] = set()
 
     def run(self, should_stop: Callable[[], bool]) -> str:
         """Stand by until a reason to end arises; return the reason."""
-        session = self.session
+        policy = self.policy
         self._hold()
-        waited, ask_at, told = 0.0, 0.0, False
+        waited, request_at, has_outlook = 0.0, 0.0, False
         while True:
-            if waited >= ask_at and waited < self.policy.max_answer_s:
-                ask_at = waited + self.policy.retry_s
-                for name in (FAILSAFE, FAILSAFE_TIME):
-                    if session.parameter(name) is None:
-                        session.ask_parameter(name)
+            if waited >= request_at and waited < policy.max_answer_s:
+                request_at = waited + policy.retry_s
+                self._request_parameters()
             if should_stop():
                 return "Ctrl-C"
-            if session.now.armed is False:
-                return self._ended("the vehicle is disarmed: nothing is left to hold")
-            station = session.ground_station(self.policy.max_silence_s)
-            if station == GROUND_STATION:
-                return self._ended(f"a ground station (system {station}) has taken over")
-            if station is not None and station not in self.strangers:
-                self.strangers.add(station)
-                self.say(
-                    f"ground station {station} is heard, but the vehicle counts on system "
-                    f"{GROUND_STATION}: netsp goes on"
-                )
-            if session.silent_s > self.policy.max_standby_silence_s:
-                return self._ended(f"the vehicle was not heard for {session.silent_s:.0f} s")
-            if not self.is_settled and waited < self.policy.max_answer_s:
-                pass
-            elif self.needs_nobody:
-                return self._ended("the vehicle stays so without a ground station (FS_GCS_ENABLE)")
-            elif not told:
-                told = True
-                self.say(self._outlook())
+            reason = self._reason_to_end()
+            if reason is not None:
+                return self._end(reason)
+            if self.is_settled or waited >= policy.max_answer_s:
+                if self.needs_nobody:
+                    return self._end(
+                        "the vehicle stays so without a ground station (FS_GCS_ENABLE)"
+                    )
+                if not has_outlook:
+                    has_outlook = True
+                    self.on_note(self._outlook())
             self._hold()
-            session.sleep(LOOK_S)
-            waited += LOOK_S
+            self.session.sleep(policy.standby_poll_s)
+            waited += policy.standby_poll_s
+
+    def _request_parameters(self) -> None:
+        """Request the parameters of the failsafe that are not known yet."""
+        for name in (FAILSAFE, FAILSAFE_TIME):
+            if self.session.parameter(name) is None:
+                self.session.request_parameter(name)
+
+    def _reason_to_end(self) -> str | None:
+        """Return why nobody needs to stand by; None if somebody does."""
+        session, policy = self.session, self.policy
+        if session.latest.armed is False:
+            return "the vehicle is disarmed: nothing is left to hold"
+        station = session.ground_station(policy.max_silence_s)
+        if station == GROUND_STATION:
+            return f"a ground station (system {station}) has taken over"
+        if station is not None and station not in self.other_stations:
+            self.other_stations.add(station)
+            self.on_note(
+                f"ground station {station} is heard, but the vehicle counts on system "
+                f"{GROUND_STATION}: netsp goes on"
+            )
+        if session.silent_s > policy.max_standby_silence_s:
+            return f"the vehicle was not heard for {session.silent_s:.0f} s"
+        return None
 
     @property
     def is_settled(self) -> bool:
-        """Return whether the vehicle has told what it does without a ground station, and has the
-        mode that it is to have."""
-        asked = ASKED.get(self.ending)
-        is_so = asked is None or self.session.now.mode == mode_name(asked)
+        """Return whether the parameters of the failsafe are known, and the vehicle has its mode."""
+        mode = ENDING_MODES.get(self.ending)
+        has_mode = mode is None or self.session.latest.mode == mode_name(mode)
         names = (FAILSAFE, FAILSAFE_TIME)
-        return is_so and all(self.session.parameter(name) is not None for name in names)
+        return has_mode and all(self.session.parameter(name) is not None for name in names)
 
     @property
     def needs_nobody(self) -> bool:
-        """Return whether the vehicle has said that it does nothing without a ground station."""
+        """Return whether the vehicle reports that it does nothing without a ground station."""
         enabled = self.session.parameter(FAILSAFE)
         return enabled is not None and round(enabled) not in CONSEQUENCES
 
@@ -202,33 +210,33 @@ class _Standby:
             self.vehicle.hold()
         else:
             self.vehicle.keep()
-        if self.ending in ASKED and session.now.time >= self.ask_again:
-            self.ask_again = session.now.time + self.policy.max_answer_s
-            session.command(dialect().MAV_CMD_DO_SET_MODE, 1, ASKED[self.ending])
+        if self.ending in ENDING_MODES and session.latest.time >= self.request_mode_at:
+            self.request_mode_at = session.latest.time + self.policy.max_answer_s
+            session.command(dialect().MAV_CMD_DO_SET_MODE, 1, ENDING_MODES[self.ending])
 
     def _do_without_estimate(self) -> None:
         """Put a vehicle whose estimate is lost, or drifts for some seconds, into ALT_HOLD."""
-        now, lost = self.session.now, self.vehicle.source_lost
-        if now.estimate is not False and lost is None:
+        now, fault = self.session.latest, self.vehicle.aiding_fault
+        if now.estimate is not False and fault is None:
             self.unaided_since = None
             return
-        if now.mode not in (mode_name(GUIDED), mode_name(POSHOLD)):
+        if now.mode not in POSITION_MODES:
             return
         if self.unaided_since is None:
             self.unaided_since = now.time
         is_useless = now.estimate is False or self.session.is_distrusted
-        wait = 0.0 if is_useless else self.policy.max_unaided_hold_s
+        wait_s = 0.0 if is_useless else self.policy.max_unaided_hold_s
         is_heard = self.session.silent_s <= self.policy.max_silence_s
-        if is_heard and now.time - self.unaided_since >= wait and not self.is_unaided:
-            if not self.has_told:
-                self.has_told = True
-                self.say(f"the position estimate is unusable ({lost or 'lost'}): ALT_HOLD")
+        if is_heard and now.time - self.unaided_since >= wait_s and not self.is_unaided:
+            if not self.has_reported_loss:
+                self.has_reported_loss = True
+                self.on_note(f"the position estimate is unusable ({fault or 'lost'}): ALT_HOLD")
             do_without_estimate(self.session, self.policy)
-            self.is_unaided = self.session.now.mode == mode_name(ALT_HOLD)
+            self.is_unaided = self.session.latest.mode == mode_name(Mode.ALT_HOLD)
 
     def _outlook(self) -> str:
         """Return a line about what the vehicle does now, and what it will do without netsp."""
-        session, mode = self.session, self.session.now.mode
+        session, mode = self.session, self.session.latest.mode
         doing = {
             "GUIDED": "the vehicle holds its place",
             "POSHOLD": "the vehicle holds its place in POSHOLD",
@@ -237,13 +245,13 @@ class _Standby:
         enabled = session.parameter(FAILSAFE)
         consequence = CONSEQUENCES.get(2 if enabled is None else round(enabled), "stays as it is")
         after = session.parameter(FAILSAFE_TIME)
-        seconds = FAILSAFE_S if after is None or not np.isfinite(after) else after
+        seconds = self.policy.failsafe_s if after is None or not np.isfinite(after) else after
         return (
             f"{doing}; netsp keeps its link alive until a ground station (system "
             f"{GROUND_STATION}) is heard. Ctrl-C ends that: the vehicle then {consequence} after "
             f"{seconds:g} s"
         )
 
-    def _ended(self, why: str) -> str:
-        self.say(why)
+    def _end(self, why: str) -> str:
+        self.on_note(why)
         return why

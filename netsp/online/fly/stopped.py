@@ -1,4 +1,4 @@
-"""A flight that ends before the tour does."""
+"""Error of a flight that does not begin."""
 
 from __future__ import annotations
 
@@ -6,6 +6,6 @@ from netsp.base.errors import EXIT_NOT_ALL, NetspError
 
 
 class RefusedError(NetspError):
-    """The flight did not begin: nothing was sent that moves the vehicle."""
+    """Refusal of a flight: nothing was sent that moves the vehicle."""
 
     exit_code = EXIT_NOT_ALL

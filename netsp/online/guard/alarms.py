@@ -6,9 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import IntEnum
 
+from netsp.online.guard.guard_policy import AlarmPolicy
+
 
 class Level(IntEnum):
-    """How urgent it is."""
+    """Urgency of an alarm."""
 
     NOTICE = 1
     CAUTION = 2
@@ -18,18 +20,18 @@ class Level(IntEnum):
 
 @dataclass(frozen=True)
 class Alarm:
-    """Something that the operator should know.
+    """Message to the operator.
 
-    Parameters
+    Attributes
     ----------
-    kind : str
-        What it is about: estimate, position, class, slack, short, loop-ahead, loop.
-    level : Level
-        How urgent.
-    text : str
-        One or two sentences: why, and what to do.
-    is_immediate : bool
-        True to raise the alarm at once, without waiting for its reason to last.
+    kind
+        Subject: estimate, position, class, plan, slack, short, loop-ahead or loop.
+    level
+        Urgency.
+    text
+        One or two sentences: the reason, and what to do.
+    is_immediate
+        Whether the alarm is raised at once, without waiting for its reason to last.
     """
 
     kind: str
@@ -38,81 +40,83 @@ class Alarm:
     is_immediate: bool = False
 
 
-RAISED_S = {Level.NOTICE: 0.0, Level.CAUTION: 1.0, Level.WARNING: 0.5, Level.ALARM: 0.3}
-"""Seconds for which there must be a reason before an alarm is raised to a level."""
-
-AWAY_S = 0.7
-"""Seconds that a reason may be away meanwhile: what is ahead comes and goes with the noise."""
-
-LOWERED_S = 4.0
-"""Seconds without a reason after which it is lowered."""
-
-
 @dataclass
-class _Kept:
+class _AlarmState:
+    """State of the alarm of one kind."""
+
     since: dict[Level, float] = field(default_factory=dict)
     seen: dict[Level, float] = field(default_factory=dict)
     shown: Alarm | None = None
     last: float = 0.0
 
+    def level(self, now: float, reason: Alarm | None, policy: AlarmPolicy) -> Level | None:
+        """Note the present reason, and return the highest level that has lasted long enough."""
+        delays = {
+            Level.NOTICE: policy.notice_delay_s,
+            Level.CAUTION: policy.caution_delay_s,
+            Level.WARNING: policy.warning_delay_s,
+            Level.ALARM: policy.alarm_delay_s,
+        }
+        for level in Level:
+            if reason is not None and reason.level >= level:
+                self.since.setdefault(level, now)
+                self.seen[level] = now
+            elif level in self.since and now - self.seen[level] > policy.max_absence_s:
+                del self.since[level]
+        if reason is None:
+            return None
+        lasting = (
+            level
+            for level, since in self.since.items()
+            if reason.level >= level and (reason.is_immediate or now - since >= delays[level])
+        )
+        return max(lasting, default=None)
+
+    def show(
+        self, now: float, level: Level | None, reason: Alarm | None, policy: AlarmPolicy
+    ) -> list[Alarm]:
+        """Raise or lower the alarm to a level, and return it if it was raised."""
+        old = None if self.shown is None else self.shown.level
+        new = None if level is None or reason is None else Alarm(reason.kind, level, reason.text)
+        if new is not None and (old is None or new.level >= old):
+            self.shown, self.last = new, now
+            return [new] if old is None or new.level > old else []
+        if old is not None and now - self.last >= policy.lowering_s:
+            self.shown, self.last = new, now
+        return []
+
 
 @dataclass
 class Alarms:
-    """The alarms that are on.
+    """Alarms that are raised and lowered with hysteresis.
 
     Attributes
     ----------
-    on : dict of str to Alarm
-        By kind.
+    policy
+        Delays of raising and lowering.
+    active
+        Alarms that are raised, by kind.
     """
 
-    on: dict[str, Alarm] = field(default_factory=dict)
-    _kept: dict[str, _Kept] = field(default_factory=dict)
+    policy: AlarmPolicy = field(default_factory=AlarmPolicy)
+    active: dict[str, Alarm] = field(default_factory=dict)
+    _states: dict[str, _AlarmState] = field(default_factory=dict)
 
-    def take(self, now: float, reasons: Iterable[Alarm]) -> list[Alarm]:
-        """Reasons that there are now.
-
-        Parameters
-        ----------
-        now : float
-            Seconds.
-        reasons : iterable of Alarm
-            One of a kind at most.
+    def update(self, now: float, reasons: Iterable[Alarm]) -> list[Alarm]:
+        """Update the alarms by the present reasons, at most one of each kind.
 
         Returns
         -------
         list of Alarm
-            Those raised, to a higher level than before.
+            Alarms that were raised to a higher level, the gravest first.
         """
         by_kind = {a.kind: a for a in reasons}
         raised = []
-        for kind in {*by_kind, *self._kept}:
-            kept = self._kept.setdefault(kind, _Kept())
-            reason = by_kind.get(kind)
-            for level in Level:
-                if reason is not None and reason.level >= level:
-                    kept.since.setdefault(level, now)
-                    kept.seen[level] = now
-                elif level in kept.since and now - kept.seen[level] > AWAY_S:
-                    del kept.since[level]
-            new = max(
-                (
-                    v for v, t in kept.since.items()
-                    if reason is not None and reason.level >= v
-                    and (reason.is_immediate or now - t >= RAISED_S[v])
-                ),
-                default=None,
-            )  # fmt: skip
-            was = None if kept.shown is None else kept.shown.level
-            if new is not None and (was is None or new >= was):
-                assert reason is not None
-                kept.shown, kept.last = Alarm(kind, new, reason.text), now
-                if was is None or new > was:
-                    raised.append(kept.shown)
-            elif was is not None and now - kept.last >= LOWERED_S:
-                kept.shown = (
-                    None if new is None or reason is None else Alarm(kind, new, reason.text)
-                )  # fmt: skip
-                kept.last = now
-        self.on = {k: kept.shown for k, kept in self._kept.items() if kept.shown is not None}
+        for kind in {*by_kind, *self._states}:
+            state = self._states.setdefault(kind, _AlarmState())
+            level = state.level(now, by_kind.get(kind), self.policy)
+            raised += state.show(now, level, by_kind.get(kind), self.policy)
+        self.active = {
+            k: state.shown for k, state in self._states.items() if state.shown is not None
+        }
         return sorted(raised, key=lambda a: -a.level)

@@ -1,4 +1,4 @@
-"""What the operator knows: on which side of an obstacle the tether passes."""
+"""Correction of the class by the side of an obstacle on which the tether passes."""
 
 from __future__ import annotations
 
@@ -16,28 +16,16 @@ from netsp.roadmap.tether_classes import Tethers
 from netsp.world.side_names import AXES
 
 SIDES = {"north": 0, "east": 2, "south": 4, "west": 6}
-"""Where in `WINDS`; `AXES` has the same order."""
+"""Index of each side in `WINDS` and in `AXES`."""
 
 
-def direction_of(problem: Problem, side: str) -> Floats:
-    """Where a side of an obstacle is.
-
-    Parameters
-    ----------
-    problem : Problem
-        The site.
-    side : str
-        One of `SIDES`, or `AXES` where north is not known.
-
-    Returns
-    -------
-    ndarray, shape (2,)
-        A unit vector in the plan.
+def side_direction(problem: Problem, side: str) -> Floats:
+    """Return the direction of a side of an obstacle, a unit vector in the plan.
 
     Raises
     ------
     InputError
-        No such side.
+        The side is none of `SIDES`, nor of `AXES`, which are for sites whose north is unknown.
     """
     names = {**SIDES, **{AXES[k]: k for k in range(0, 8, 2)}}
     if not isinstance(side, str) or side not in names:
@@ -47,28 +35,16 @@ def direction_of(problem: Problem, side: str) -> Floats:
     return np.array([np.sin(angle), np.cos(angle)])
 
 
-def crosses(path: Floats, begin: Floats, way: Floats) -> bool:
-    """Whether a path goes over a ray from one of its sides to the other; what begins or ends on it
-    does not.
+def crosses_ray(path: Floats, begin: Floats, direction: Floats) -> bool:
+    """Return whether a path, shape (n, 2), crosses a ray from one of its sides to the other.
 
-    Parameters
-    ----------
-    path : ndarray, shape (n, 2)
-        Metres.
-    begin : ndarray, shape (2,)
-        Of the ray, metres.
-    way : ndarray, shape (2,)
-        Its direction, a unit vector.
-
-    Returns
-    -------
-    bool
-        Whether it does.
+    A path that begins or ends on the ray does not cross it there. The ray's direction is a unit
+    vector.
     """
     off = path - begin
-    along, side = off @ way, off[:, 1] * way[0] - off[:, 0] * way[1]
+    along, side = off @ direction, off[:, 1] * direction[0] - off[:, 0] * direction[1]
     clear = np.flatnonzero(np.abs(side) > 1e-9 * (1.0 + np.abs(off).max()))
-    # between the places that are clear of the ray's line
+    # between places that are clear of the ray's line
     for i, j in pairwise(clear):
         if side[i] * side[j] < 0.0:
             k = j - 1  # on the line, or before it
@@ -78,39 +54,25 @@ def crosses(path: Floats, begin: Floats, way: Floats) -> bool:
     return False
 
 
-def agrees(problem: Problem, path: Floats, side: str, obstacle: int | str) -> bool:
-    """Whether a tether passes an obstacle on one side, and not on the opposite one.
-
-    Parameters
-    ----------
-    problem : Problem
-        The site.
-    path : ndarray, shape (n, 2) or (n, 3)
-        The tether, metres.
-    side : str
-        Side of the obstacle.
-    obstacle : int or str
-        Its index or name.
-
-    Returns
-    -------
-    bool
-        Whether it does.
+def passes_on_side(problem: Problem, path: Floats, side: str, obstacle: int | str) -> bool:
+    """Return whether a tether passes an obstacle on one side, and not on the opposite one.
 
     Raises
     ------
     InputError
-        No such obstacle or side.
+        There is no such obstacle or side.
     """
     index = index_of(obstacle, list(problem.obstacles), "obstacle")
-    way, middle = direction_of(problem, side), problem.representative_points[index]
-    return crosses(path[:, :2], middle, way) and not crosses(path[:, :2], middle, -way)
+    ray, middle = side_direction(problem, side), problem.representative_points[index]
+    return crosses_ray(path[:, :2], middle, ray) and not crosses_ray(path[:, :2], middle, -ray)
 
 
-def corrected(
+def classes_on_side(
     problem: Problem, believed: Iterable[Word], robot: Floats, side: str, obstacle: int | str
 ) -> dict[Word, Floats]:
-    """The classes that agree with what the operator says.
+    """Return the taut tethers to the robot that pass an obstacle on a side, by their class.
+
+    Of these, only the classes that differ least from a believed one are returned.
 
     Parameters
     ----------
@@ -119,26 +81,20 @@ def corrected(
     believed : iterable of Word
         Classes that were believed; at least one.
     robot : ndarray, shape (3,)
-        Where the robot is, metres.
+        Place of the robot, m.
     side : str
         Side of the obstacle on which the tether passes.
     obstacle : int or str
-        Its index or name.
-
-    Returns
-    -------
-    dict of Word to ndarray, shape (n, 3)
-        Of all classes that the tether reaches the robot in and that agree, those that differ least
-        from one that was believed, and the taut tethers.
+        Index or name of the obstacle.
 
     Raises
     ------
     InputError
-        No such obstacle or side; no class agrees.
+        There is no such obstacle, side or class.
     """
     index = index_of(obstacle, list(problem.obstacles), "obstacle")
-    ways = Tethers(problem).classes(*robot)
-    agree = {t.word: t.path for t in ways if agrees(problem, t.path, side, index)}
+    tethers = Tethers(problem).classes(*robot)
+    agree = {t.word: t.path for t in tethers if passes_on_side(problem, t.path, side, index)}
     if not agree:
         raise InputError(
             f"side: no tether within {problem.tether_length:g} {problem.units} reaches the robot "
@@ -148,28 +104,15 @@ def corrected(
 
 
 def least_changed(others: Iterable[Word], believed: Iterable[Word]) -> set[Word]:
-    """Of some classes those that differ least from one that was believed.
-
-    Parameters
-    ----------
-    others : iterable of Word
-        At least one.
-    believed : iterable of Word
-        At least one.
-
-    Returns
-    -------
-    set of Word
-        One or more.
-    """
+    """Return the words, of `others`, that differ least from a believed one."""
     known = list(believed)
-    apart = {w: min(_apart(w, one) for one in known) for w in others}
-    least = min(apart.values())
-    return {w for w, far in apart.items() if far == least}
+    distances = {w: min(_edit_distance(w, other) for other in known) for w in others}
+    smallest = min(distances.values())
+    return {w for w, distance in distances.items() if distance == smallest}
 
 
-def _apart(a: Word, b: Word) -> int:
-    """Letters that must be put in or left out to make one word of the other."""
+def _edit_distance(a: Word, b: Word) -> int:
+    """Return how many letters must be inserted or deleted to make one word of the other."""
     row = list(range(len(b) + 1))
     for i, x in enumerate(a, 1):
         before, row[0] = row[0], i

@@ -51,17 +51,7 @@ class DeadReckoning:
                 raise InputError(f"{name}: expected {expected}, got {getattr(self, name)!r}")
 
     def error(self, seconds: float) -> float:
-        """Return the error some seconds after the loss was noticed.
-
-        Parameters
-        ----------
-        seconds : float
-            Time since the loss was noticed, s.
-
-        Returns
-        -------
-        float
-            Metres.
+        """Return the error some seconds after the loss was noticed, m.
 
         Examples
         --------

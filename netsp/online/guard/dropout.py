@@ -1,4 +1,4 @@
-"""Which ways may a robot have gone that nobody saw?"""
+"""Paths that a robot may have taken during a dropout, and the classes after it."""
 
 from __future__ import annotations
 
@@ -10,98 +10,86 @@ from netsp.base.arrays import Floats
 from netsp.hsignature import Word, crossings
 from netsp.model.problem import Problem
 from netsp.online.execute.tour_repair import free_position
+from netsp.online.guard.guard_policy import SitePolicy
 from netsp.online.guard.site import Site
 from netsp.roadmap.tether_classes import Tethers
 
-MOST_WAYS = 12
-"""Ways that are kept, the shortest."""
 
-TRIES, GROWTH = 16, 1.25
-"""Lengths up to which ways are looked for, each longer by that than the one before."""
-
-
-def ways_between(
-    problem: Problem, before: Floats, after: Floats, farthest: float
+def paths_between(
+    problem: Problem,
+    before: Floats,
+    after: Floats,
+    max_length: float,
+    policy: SitePolicy = SitePolicy(),
 ) -> list[tuple[Word, float]]:
-    """The classes of paths from one place to another that are no longer than that.
+    """Return the words and lengths of paths from one place to another, shortest first.
 
     Parameters
     ----------
     problem : Problem
-        The site. Obstacles count as they are, without the clearance.
-    before : ndarray, shape (3,)
-        Where the robot was, metres.
-    after : ndarray, shape (3,)
-        Where it is.
-    farthest : float
-        Metres that it can have gone; the shortest way counts whatever it is.
-
-    Returns
-    -------
-    list of (Word, float)
-        Words, and the lengths of the shortest paths, metres; shortest first.
+        The site; obstacles count without the clearance.
+    before, after : ndarray, shape (3,)
+        Places, m.
+    max_length : float
+        Largest length, m; the shortest path counts at any length.
+    policy : SitePolicy
+        Limits of the search.
     """
     bare = problem.model_copy(update={"clearance": 0.0, "bounds": None})
     begin, end = free_position(bare, before), free_position(bare, after)
     straight = math.dist(begin, end)
     if straight <= 1e-6 * problem.scale:
         end = begin
-    # ever longer, until there are enough: all ways at once may be more than anybody can count
+    # up to ever larger lengths, until there are enough: all paths at once may be too many
     longest, found = max(1.05 * straight, 1e-6 * problem.scale), []
-    for _ in range(TRIES):
+    for _ in range(policy.max_searches):
         free = bare.model_copy(update={"base": begin, "goals": (), "tether_length": longest})
         found = Tethers(free).classes(*end)
-        if len(found) >= MOST_WAYS or (found and longest >= farthest):
+        if len(found) >= policy.max_paths or (found and longest >= max_length):
             break
-        longest = (
-            min(GROWTH * longest + 0.5, max(farthest, longest + 0.5))
-            if found
-            else (GROWTH * longest + 0.5)
-        )
-    kept = [(t.word, t.length) for t in found if t.length <= max(farthest, found[0].length)]
+        longer = policy.length_growth * longest + 0.5
+        longest = min(longer, max(max_length, longest + 0.5)) if found else longer
+    kept = [(t.word, t.length) for t in found if t.length <= max(max_length, found[0].length)]
     if kept:
-        return kept[:MOST_WAYS]
-    # between obstacles that overlap there may be none: then it went straight
+        return kept[: policy.max_paths]
+    # between obstacles that overlap there may be none: then the robot moved straight
     line = np.array([before, after])
     return [(crossings(line, problem.representative_points), math.dist(before, after))]
 
 
-def after_gap(
-    site: Site, words: dict[Word, float], before: Floats, after: Floats, seconds: float,
-    speed: float, reach: float,
-) -> dict[Word, float]:  # fmt: skip
-    """Classes of the tether after a gap, with their costs: a way is the less likely the longer it
-    is than the shortest, in units of a quarter of what the robot can have gone.
+def classes_after_dropout(
+    site: Site,
+    words: dict[Word, float],
+    before: Floats,
+    after: Floats,
+    max_travel: float,
+    reach: float,
+) -> dict[Word, float]:
+    """Return the classes of the tether after a dropout, with their costs.
+
+    A path is the less likely the longer it is than the shortest one, in units of a quarter of
+    the
+    distance that the robot can have travelled.
 
     Parameters
     ----------
     site : Site
-        Where.
+        The site.
     words : dict of Word to float
         Classes before, and their costs.
-    before : ndarray, shape (3,)
-        Where the robot was, metres.
-    after : ndarray, shape (3,)
-        Where it is.
-    seconds : float
-        Between the two.
-    speed : float
-        Of the robot, at most, m/s.
+    before, after : ndarray, shape (3,)
+        Places of the robot before and after, m.
+    max_travel : float
+        Largest distance that the robot can have travelled, m.
     reach : float
-        How far off either place may be, metres.
-
-    Returns
-    -------
-    dict of Word to float
-        Classes now, and their costs.
+        Largest error of either place, m.
     """
-    gone = speed * seconds
-    ways = site.ways(before, after, gone + reach)
-    scale = max(0.25 * gone, 0.5 * reach, 1e-9)
+    paths = site.paths_between(before, after, max_travel + reach)
+    scale = max(0.25 * max_travel, 0.5 * reach, 1e-9)
     out: dict[Word, float] = {}
     for word, cost in words.items():
-        for way, length in ways:
-            to = site.letters.join(word, way)
-            dearer = cost + (length - ways[0][1]) / scale
-            out[to] = min(out.get(to, np.inf), dearer)
+        for path, length in paths:
+            joined = site.letters.join(word, path)
+            joined_cost = cost + (length - paths[0][1]) / scale
+            out[joined] = min(out.get(joined, np.inf), joined_cost)
     return out

@@ -1,8 +1,7 @@
-"""The page beside a guard: map, taut tether, way home, slack over time, alarms.
+"""Web page of a guard: map, taut tether, way home, slack over time, alarms.
 
 Served from this machine only, to whoever has the token in the address; reports go out as
-server-sent events. The only thing that a page can say is on which side of an obstacle the tether
-passes.
+server-sent events. A page can send only corrections of the class, or events of a flight.
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ from typing import Any, Self
 
 from netsp.base.errors import InputError
 from netsp.model.problem import Problem
+from netsp.online.guard.guard_policy import PagePolicy
 from netsp.online.guard.site import Site
 from netsp.online.guard.site_files import site_of
 from netsp.world.mission.mission import Mission
@@ -31,51 +31,52 @@ FILES = {
     "page.js": ("page.js", "text/javascript; charset=utf-8"),
     "page.css": ("page.css", "text/css; charset=utf-8"),
 }
-"""Address below the token → file and its type."""
+"""File and type of each address below the token."""
 
-MOST_BODY = 1000
-"""Bytes that a page may send."""
-
-POLICY = (
+CONTENT_SECURITY_POLICY = (
     "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'; "
     "form-action 'none'"
 )
-
-BACKLOG = 50
-"""Reports that wait for a slow page; older ones are dropped."""
+"""Header that lets a page load files from this server only."""
 
 
 class Page:
-    """Serves the page while it is open, from threads of its own.
+    """Server of the page, in threads of its own while it is entered as a context.
 
     Parameters
     ----------
     site : Problem, Mission or Site
-        What it shows.
+        Site that the page shows.
     port : int
-        On this machine; 0 takes any.
-    takes_events : bool
-        Whether operators may tell of obstacles, goals and tethers, as of a tour that is flown.
+        Port on this machine; 0 takes any.
+    accepts_events : bool
+        Whether operators may report events of a tour that is flown, instead of corrections.
+    policy : PagePolicy
+        Limits.
 
     Attributes
     ----------
     corrections : Queue of (side, obstacle)
-        What operators say of the class.
+        Corrections of the class by operators.
     events : Queue of str
-        Events that they tell of, as JSON.
+        Events reported by operators, as JSON.
 
     Raises
     ------
     InputError
-        The port is taken.
+        The port is in use.
     """
 
     def __init__(
-        self, site: Problem | Mission | Site, port: int, takes_events: bool = False
+        self,
+        site: Problem | Mission | Site,
+        port: int,
+        accepts_events: bool = False,
+        policy: PagePolicy = PagePolicy(),
     ) -> None:
-        self.shows, self.takes_events = site_of(site), takes_events
-        self.events: queue.Queue[str] = queue.Queue(maxsize=20)
-        self.corrections: queue.Queue[tuple[str, str]] = queue.Queue(maxsize=20)
+        self.site, self.accepts_events, self.policy = site_of(site), accepts_events, policy
+        self.events: queue.Queue[str] = queue.Queue(policy.max_waiting_inputs)
+        self.corrections: queue.Queue[tuple[str, str]] = queue.Queue(policy.max_waiting_inputs)
         self.token = secrets.token_urlsafe(16)
         self._pages: set[queue.Queue[str]] = set()
         self._lock = threading.Lock()
@@ -100,20 +101,16 @@ class Page:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None,
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
         trace: TracebackType | None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._server.shutdown()
         self._server.server_close()
 
-    def tell(self, row: dict[str, Any]) -> None:
-        """Send a report to all pages.
-
-        Parameters
-        ----------
-        row : dict
-            As of `Report.as_row`.
-        """
+    def send(self, row: dict[str, Any]) -> None:
+        """Send a report, as of `Report.as_row`, to all pages."""
         text = json.dumps(row, allow_nan=False)
         with self._lock:
             self._last = text
@@ -128,32 +125,36 @@ class Page:
                 except (queue.Empty, queue.Full):
                     pass
 
-    def subscribed(self) -> queue.Queue[str]:
-        """A queue of reports for one more page, the last one first."""
-        page: queue.Queue[str] = queue.Queue(maxsize=BACKLOG)
+    def subscribe(self) -> queue.Queue[str]:
+        """Return a queue of reports for one more page, the last one first."""
+        page: queue.Queue[str] = queue.Queue(self.policy.max_waiting_reports)
         with self._lock:
             if self._last is not None:
                 page.put_nowait(self._last)
             self._pages.add(page)
         return page
 
-    def left(self, page: queue.Queue[str]) -> None:
-        """A page is gone."""
+    def unsubscribe(self, page: queue.Queue[str]) -> None:
+        """Forget the queue of a page that is closed."""
         with self._lock:
             self._pages.discard(page)
 
-    def site(self) -> dict[str, Any]:
-        """What the map shows of the site."""
-        site = self.shows
+    def site_data(self) -> dict[str, Any]:
+        """Return the site as a JSON object for the map."""
+        site = self.site
         return {
-            "name": site.name, "units": site.units, "tether_length": site.tether_length,
-            "sides": list(site.sides), "events": self.takes_events, **site.shown(),
-        }  # fmt: skip
+            "name": site.name,
+            "units": site.units,
+            "tether_length": site.tether_length,
+            "sides": list(site.sides),
+            "events": self.accepts_events,
+            **site.map_data(),
+        }
 
 
 class _Server(ThreadingHTTPServer):
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A page that went away unread is none."""
+        """Ignore the error of a page that was closed; report others."""
         if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)
 
@@ -164,69 +165,72 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = 30
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Nothing is logged."""
+        """Log nothing."""
 
-    def _asked(self) -> str | None:
-        """The address below the token; None for who does not have it, or comes by another name of
-        this machine (as pages of others would, after a change of what their name means)."""
+    def _requested(self) -> str | None:
+        """Return the address below the token; None without the token.
+
+        None also for another name of this machine, as that of a foreign page whose name resolves to
+        this machine (DNS rebinding).
+        """
         host = (self.headers.get("Host") or "").rsplit(":", 1)[0]
         parts = self.path.split("?", 1)[0].split("/", 2)
-        known = len(parts) == 3 and secrets.compare_digest(
+        has_token = len(parts) == 3 and secrets.compare_digest(
             parts[1].encode("utf-8", "replace"), self.owner.token.encode()
         )
-        return parts[2] if known and host in ("127.0.0.1", "localhost") else None
+        return parts[2] if has_token and host in ("127.0.0.1", "localhost") else None
 
     def do_GET(self) -> None:
-        """Files, the site, and the stream of reports."""
-        asked = self._asked()
-        if asked is None:
+        """Answer with a file, the site, or the stream of reports."""
+        requested = self._requested()
+        if requested is None:
             self._answer(HTTPStatus.NOT_FOUND, b"not found\n", "text/plain")
-        elif asked == "site":
-            data = json.dumps(self.owner.site(), allow_nan=False).encode()
+        elif requested == "site":
+            data = json.dumps(self.owner.site_data(), allow_nan=False).encode()
             self._answer(HTTPStatus.OK, data, "application/json")
-        elif asked == "reports":
+        elif requested == "reports":
             self._stream()
-        elif asked in FILES:
-            name, kind = FILES[asked]
+        elif requested in FILES:
+            name, kind = FILES[requested]
             self._answer(HTTPStatus.OK, (STATIC / name).read_bytes(), kind)
         else:
             self._answer(HTTPStatus.NOT_FOUND, b"not found\n", "text/plain")
 
     def do_POST(self) -> None:
-        """On which side of an obstacle the tether passes; an event."""
-        length, asked = self.headers.get("Content-Length") or "", self._asked()
-        taken = ("event",) if self.owner.takes_events else ("correct",)
-        number = len(length) <= 5 and length.isascii() and length.isdigit()
-        if asked not in taken or not number or int(length) > MOST_BODY:
+        """Accept a correction of the class, or an event."""
+        length, requested = self.headers.get("Content-Length") or "", self._requested()
+        accepted = "event" if self.owner.accepts_events else "correct"
+        is_number = len(length) <= 5 and length.isascii() and length.isdigit()
+        max_bytes = self.owner.policy.max_body_bytes
+        if requested != accepted or not is_number or int(length) > max_bytes:
             self._answer(HTTPStatus.NOT_FOUND, b"not found\n", "text/plain")
             return
         origin = self.headers.get("Origin")
         ours = (f"http://127.0.0.1:{self.owner.port}", f"http://localhost:{self.owner.port}")
         body = self.rfile.read(int(length))
-        good = origin in (None, *ours)
-        if good:
-            good = self._event(body) if asked == "event" else self._correction(body)
-        status = HTTPStatus.OK if good else HTTPStatus.BAD_REQUEST
+        is_accepted = origin in (None, *ours)
+        if is_accepted:
+            is_event = requested == "event"
+            is_accepted = self._add_event(body) if is_event else self._add_correction(body)
+        status = HTTPStatus.OK if is_accepted else HTTPStatus.BAD_REQUEST
         self._answer(status, b"{}", "application/json")
 
-    def _event(self, body: bytes) -> bool:
-        """Whether it was taken; what it says is asked by who flies."""
+    def _add_event(self, body: bytes) -> bool:
+        """Add an event for the flight, which parses it; return False if too many wait."""
         try:
             self.owner.events.put_nowait(body.decode())
         except (UnicodeError, queue.Full):
             return False
         return True
 
-    def _correction(self, body: bytes) -> bool:
-        """Whether it was taken."""
+    def _add_correction(self, body: bytes) -> bool:
+        """Add a correction; return False if it is not valid or too many wait."""
         try:
-            said = json.loads(body)
-            side, obstacle = str(said["side"]), said["obstacle"]
+            data = json.loads(body)
+            side, obstacle = str(data["side"]), data["obstacle"]
         except (ValueError, KeyError, TypeError, RecursionError):
             return False
-        if not (
-            isinstance(side, str) and side in self.owner.shows.sides and isinstance(obstacle, str)
-        ):
+        if side not in self.owner.site.sides or not isinstance(obstacle, str):
             return False
         try:
             self.owner.corrections.put_nowait((side, obstacle))
@@ -238,7 +242,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_response(status)
         self.send_header("Content-Type", kind)
         self.send_header("Content-Length", str(len(data)))
-        self.send_header("Content-Security-Policy", POLICY)
+        self.send_header("Content-Security-Policy", CONTENT_SECURITY_POLICY)
         self.send_header("Cache-Control", "no-store")
         self.send_header("X-Content-Type-Options", "nosniff")
         self.end_headers()
@@ -250,17 +254,17 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Cache-Control", "no-store")
         self.send_header("Connection", "close")
         self.end_headers()
-        page = self.owner.subscribed()
+        page = self.owner.subscribe()
         try:
             while True:
                 try:
                     text = page.get(timeout=5.0)
                 except queue.Empty:
-                    self.wfile.write(b": still here\n\n")  # to find out who is gone
+                    self.wfile.write(b": still here\n\n")  # fails if the page is closed
                     continue
                 self.wfile.write(f"data: {text}\n\n".encode())
         except OSError:
             pass  # the page was closed
         finally:
-            self.owner.left(page)
+            self.owner.unsubscribe(page)
             self.close_connection = True

@@ -1,4 +1,4 @@
-"""What the guard says after every update."""
+"""Report of a guard after an update."""
 
 from __future__ import annotations
 
@@ -12,25 +12,27 @@ from netsp.online.guard.alarms import Alarm
 
 
 @dataclass(frozen=True, eq=False)
-class ClassNow(ComparesArrays):
-    """A class that the tether may be in.
+class ClassReport(ComparesArrays):
+    """Class that the tether may be in.
 
-    Parameters
+    Attributes
     ----------
-    word : Word
-        Its h-signature.
-    likely : float
-        Its share among those believed.
-    passes : str
-        How the tether runs, by the names of obstacles.
-    taut : float
+    word
+        h-signature of the class.
+    likely
+        Share among the classes believed.
+    passes
+        Path of the tether by the names of obstacles.
+    taut
         Length of the taut tether, in the site's units.
-    slack : float
-        What is left of the tether.
-    turning : float
-        Radians that it turns by in the plan, all in all.
-    path : ndarray, shape (n, 3)
-        The taut tether from the base on; back along it is the shortest path home in this class.
+    slack
+        Length of the tether that is left.
+    turning
+        Sum of the angles by which the tether turns, rad.
+    path
+        Taut tether from the base on, shape (n, 3); back along it is the shortest path home in
+        this
+        class.
     """
 
     word: Word
@@ -42,59 +44,62 @@ class ClassNow(ComparesArrays):
     path: Floats
 
     def as_row(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the class as a JSON object."""
         return {
-            "word": list(self.word), "likely": round(self.likely, 4), "passes": self.passes,
-            "taut": round(self.taut, 4), "slack": round(self.slack, 4),
+            "word": list(self.word),
+            "likely": round(self.likely, 4),
+            "passes": self.passes,
+            "taut": round(self.taut, 4),
+            "slack": round(self.slack, 4),
             "turning_deg": round(self.turning * 57.29577951308232, 1),
             "path": [[round(float(v), 3) for v in p] for p in self.path],
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True)
 class Report:
-    """The state of the tether.
+    """State of the tether and of the vehicle.
 
-    Parameters
+    Attributes
     ----------
-    time : float
-        Seconds.
-    position : (x, y, z) or None
-        Of the robot, smoothed, out of obstacles; None before the first estimate.
-    heading : float or None
-        Degrees.
-    speed : float
-        Over ground, units per second.
-    armed : bool or None
+    time
+        Time, s.
+    position
+        Position of the robot, smoothed, outside of obstacles; None before the first estimate.
+    heading
+        Heading, degrees.
+    speed
+        Speed over ground, units per second.
+    armed
         Whether the motors may turn.
-    mode : str or None
-        Of the vehicle.
-    claims : bool
-        Whether anything is claimed: not while the position is lost.
-    classes : tuple of ClassNow
-        The likeliest first.
-    home_s : float or None
-        Seconds home along the likeliest tether at full speed.
-    loop_s : float or None
-        Seconds until the present motion closes a loop.
-    loop_around : tuple of str
-        What it would be around.
-    short_s : float or None
-        Seconds until the present motion needs more tether than there is.
-    loops : tuple of tuple of str
-        What the tether is wound around once or more by now.
-    alarms : tuple of Alarm
-        That are on, the most urgent first.
-    raised : tuple of Alarm
-        That were raised just now.
-    paid_out : float or None
-        By the winch.
-    as_planned : bool or None
-        Whether the likeliest class is the one that the tour means it to be in; None where the robot
-        is at none of its stops, or there is no tour.
-    drift : float or None
-        Standard deviation of the position's error, metres: as given, and more while the position is
-        frozen or no fixes correct it.
+    mode
+        Mode of the vehicle.
+    claims
+        Whether the guard claims anything; not while the position is lost.
+    classes
+        Classes that the tether may be in, the likeliest first.
+    home_s
+        Time home along the likeliest tether at full speed, s.
+    loop_s
+        Time until the present motion closes a loop, s.
+    loop_around
+        Obstacles that the loop would be around.
+    short_s
+        Time until the present motion needs more tether than there is, s.
+    loops
+        Obstacles that each closed loop is around.
+    alarms
+        Active alarms, the gravest first.
+    raised
+        Alarms that were raised in this update.
+    paid_out
+        Length of tether that the winch has let out.
+    as_planned
+        Whether the likeliest class is the planned one; None if the robot is at no visit of a
+        tour.
+    drift
+        Standard deviation of the position's error, m: larger while the position is frozen or no
+        fixes correct it.
     """
 
     time: float
@@ -104,7 +109,7 @@ class Report:
     armed: bool | None
     mode: str | None
     claims: bool
-    classes: tuple[ClassNow, ...]
+    classes: tuple[ClassReport, ...]
     home_s: float | None
     loop_s: float | None
     loop_around: tuple[str, ...]
@@ -117,27 +122,33 @@ class Report:
     drift: float | None = None
 
     def as_row(self) -> dict[str, Any]:
-        """For JSON lines and the page; no number is infinite or not one."""
+        """Return the report as a JSON object of finite numbers, for JSON lines and the page."""
 
         def brief(value: float | None) -> float | None:
             return None if value is None else round(value, 3)
 
+        home = None
+        if self.home_s is not None:
+            home = {"length": round(self.classes[0].taut, 3), "seconds": brief(self.home_s)}
         return {
             "t": round(self.time, 3),
             "position": None if self.position is None else [round(v, 3) for v in self.position],
-            "heading": brief(self.heading), "speed": brief(self.speed),
-            "armed": self.armed, "mode": self.mode, "claims": self.claims,
+            "heading": brief(self.heading),
+            "speed": brief(self.speed),
+            "armed": self.armed,
+            "mode": self.mode,
+            "claims": self.claims,
             "classes": [c.as_row() for c in self.classes],
-            "home": None if self.home_s is None else {
-                "length": round(self.classes[0].taut, 3), "seconds": brief(self.home_s),
-            },
-            "loop_s": brief(self.loop_s), "loop_around": list(self.loop_around),
-            "short_s": brief(self.short_s), "loops": [list(names) for names in self.loops],
-            "paid_out": brief(self.paid_out), "as_planned": self.as_planned,
+            "home": home,
+            "loop_s": brief(self.loop_s),
+            "loop_around": list(self.loop_around),
+            "short_s": brief(self.short_s),
+            "loops": [list(names) for names in self.loops],
+            "paid_out": brief(self.paid_out),
+            "as_planned": self.as_planned,
             "drift": brief(self.drift),
             "alarms": [
-                {"kind": a.kind, "level": a.level.name.lower(), "text": a.text}
-                for a in self.alarms
+                {"kind": a.kind, "level": a.level.name.lower(), "text": a.text} for a in self.alarms
             ],
             "raised": [a.kind for a in self.raised],
-        }  # fmt: skip
+        }

@@ -1,4 +1,4 @@
-"""A guard beside a vehicle: messages in, reports out, ten times a second, until it is ended."""
+"""Guard of a real vehicle: messages in, reports out, ten times a second, until it is stopped."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from netsp.online.guard.message_rates import MessageRates
 from netsp.online.guard.plane import PlaneSite
 from netsp.online.guard.space_site import SpaceSite
 from netsp.online.guard.state_file import restore, save
-from netsp.online.guard.stream import SILENT_S, Stream
+from netsp.online.guard.stream import Stream
 from netsp.online.guard.telemetry import Fix
 from netsp.online.guard.tether_guard import Guard
 from netsp.online.link.address import Address
@@ -25,129 +25,74 @@ from netsp.online.link.geo_frame import Frame
 from netsp.online.link.mavlink_messages import AUTOPILOT, NO_GPS_FIX, POSITIONS, Listener
 from netsp.online.link.statustext import status_texts
 from netsp.online.link.udp import UdpLink
-from netsp.online.link.vehicle_kind import other_vehicle
+from netsp.online.link.vehicle_kind import other_vehicle_warning
 
-SAVE_S = 1.0
-"""Seconds between two times that the class is written down."""
-
-BEAT_S = 1.0
-"""Seconds between two heartbeats to a vehicle that waits to be spoken to."""
-
-PUBLISH_S = 1.0
-"""Seconds between two times that figures are sent."""
-
-SYSTEM = 245
-"""Our system id where we only listen: 255 is the ground station's."""
+GUARD_SYSTEM = 245
+"""Code MAVLink system id of a guard: 255 is the ground station's."""
 
 
 def watch(
-    guard: Guard, frame: Frame, address: str, take: Callable[[Report], None], *,
-    system: int | None = None, state: str | None = None, publish: bool = False,
+    guard: Guard,
+    frame: Frame,
+    address: str,
+    on_report: Callable[[Report], None],
+    *,
+    system: int | None = None,
+    state: str | None = None,
+    publish: bool = False,
     corrections: queue.Queue[tuple[str, str]] | None = None,
-    say: Callable[[str], None] | None = None, until: Callable[[], bool] | None = None,
+    on_note: Callable[[str], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
     ask_rates: bool = False,
-) -> None:  # fmt: skip
-    """Watch a vehicle.
+) -> None:
+    """Watch a vehicle until the guard is stopped.
 
     Parameters
     ----------
     guard : Guard
-        A new one.
+        New guard.
     frame : Frame
-        Of the site.
+        Frame of the site.
     address : str
-        Of the link.
-    take : callable
+        Address of the link.
+    on_report : callable
         Called with every report.
     system : int, optional
-        System id of the vehicle.
+        System id of the vehicle; by default that of the first autopilot heard.
     state : str, optional
-        File that the class is kept in.
+        State file of the guard.
     publish : bool
         Whether figures and alarms are sent to the link.
     corrections : Queue of (side, obstacle), optional
-        What the operator says.
-    say : callable, optional
+        Corrections of the class by the operator.
+    on_note : callable, optional
         Called with a line of text now and then.
-    until : callable, optional
-        Asked whether to end.
+    should_stop : callable, optional
+        Polled; True ends the watch.
     ask_rates : bool
-        True to ask the vehicle for the rates that the guard needs; it is asked for nothing else.
+        Whether to ask the vehicle for the rates that the guard needs, and for nothing else.
 
     Raises
     ------
     InputError
-        The link cannot be had, or the state file is not of this site.
+        The link cannot be opened, or the state file is not of this site.
     """
-    tell = say or (lambda _: None)
+    note = on_note or (lambda _: None)
     where = Address.parse(address)
-    if state is not None:
-        restore(guard, state)  # what is wrong with it is told before anything takes long
-    if not isinstance(guard.site, SpaceSite):
-        rehearse(in_space=False)
-    if not isinstance(guard.site, PlaneSite):
-        rehearse(in_space=True)
-    if state is not None:
-        known = restore(guard, state)
-        if known is not None:
-            tell(f"going on from {state}, {known.age:.0f} s old")
-    link = UdpLink(where, SYSTEM)
-    only = None if where.listens else link.peer
-    beat = dialect().MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)  # a computer on board
-    beaten = float("-inf")
-    listener, stream = Listener(frame, system), Stream(guard, on_note=tell)
-    heard = saved = sent = told = time.monotonic()
-    others: set[int] = set()
-    hints, rates = _Hints(), MessageRates(frame, ask_rates, sender=SYSTEM)
-    numbers = itertools.count()
+    _prepare(guard, state, note)
+    link = UdpLink(where, GUARD_SYSTEM)
+    live = _Watch(guard, frame, link, on_report, note, system, publish, ask_rates)
+    if not where.listens:
+        live.only_peer = link.peer
+    saved = time.monotonic()
     try:
-        tell(f"listening on {address}")
-        while until is None or not until():
-            messages = link.hear(0.05)
-            now = time.monotonic()
-            if only is not None and now - beaten >= BEAT_S:
-                beaten = now  # who waits to be spoken to answers nobody else
-                link.send(beat)
-            for message, peer in messages:
-                if only is not None and peer != only:
-                    continue
-                fix = listener.understand(message)
-                for line in hints.about(message, fix, listener):
-                    tell(line)
-                if (message.get_srcSystem(), message.get_srcComponent()) != (
-                    listener.system, AUTOPILOT
-                ):  # fmt: skip
-                    continue
-                clock = now if listener.time is None else listener.time
-                for line in _rate_lines(rates, message, fix, clock):
-                    tell(line)
-                link.answer(peer)
-                for request in rates.requests(message.get_srcSystem(), clock):
-                    link.send(request)
-                if fix is None:
-                    continue
-                heard = now
-                report = stream.take(fix)
-                if report is not None:
-                    told = now
-                    take(report)
-                    if publish and (report.raised or now - sent >= PUBLISH_S):
-                        sent = now
-                        _publish(link, report, numbers)
-            if now - heard >= SILENT_S and now - told >= SILENT_S and listener.time is not None:
-                told = now
-                report = stream.wait(listener.time + now - heard)
-                take(report)
-                if publish and report.raised:
-                    _publish(link, report, numbers)
-            if not listener.heard and listener.others - others:
-                others |= listener.others
-                who = ", ".join(map(str, sorted(others)))
-                tell(f"heard from system {who}, but nothing from system {listener.system} yet")
+        note(f"listening on {address}")
+        while should_stop is None or not should_stop():
+            live.step()
             if corrections is not None:
-                _correct(guard, corrections, tell)
-            if state is not None and now - saved >= SAVE_S:
-                saved = now
+                _correct(guard, corrections, note)
+            if state is not None and time.monotonic() - saved >= guard.policy.pace.save_s:
+                saved = time.monotonic()
                 save(guard, state)
     finally:
         link.close()
@@ -155,51 +100,156 @@ def watch(
             save(guard, state)
 
 
+def _prepare(guard: Guard, state: str | None, note: Callable[[str], None]) -> None:
+    """Rehearse, and restore the state of the guard if there is one."""
+    if state is not None:
+        restore(guard, state)  # an error in it is raised before anything takes long
+    if not isinstance(guard.site, SpaceSite):
+        rehearse(in_space=False)
+    if not isinstance(guard.site, PlaneSite):
+        rehearse(in_space=True)
+    if state is not None:
+        known = restore(guard, state)
+        if known is not None:
+            note(f"going on from {state}, {known.age:.0f} s old")
+
+
+class _Watch:
+    """Watch of one vehicle over a link.
+
+    Attributes
+    ----------
+    only_peer
+        Address of the vehicle, if it waits to be spoken to; others are not listened to.
+    """
+
+    def __init__(
+        self,
+        guard: Guard,
+        frame: Frame,
+        link: UdpLink,
+        on_report: Callable[[Report], None],
+        note: Callable[[str], None],
+        system: int | None,
+        publishes: bool,
+        ask_rates: bool,
+    ) -> None:
+        self.pace, self.link = guard.policy.pace, link
+        self.on_report, self.note, self.publishes = on_report, note, publishes
+        self.only_peer: tuple[str, int] | None = None
+        self.listener = Listener(frame, system, guard.policy.link)
+        self.stream = Stream(guard, on_note=note)
+        self.hints = _Hints()
+        rates = guard.policy.rates
+        self.rates = MessageRates(frame, ask_rates, rates, sender=GUARD_SYSTEM)
+        self._heartbeat_at = float("-inf")
+        self._heard_at = self._published_at = self._reported_at = time.monotonic()
+        self._others: set[int] = set()
+        self._text_numbers = itertools.count()
+
+    def step(self) -> None:
+        """Wait shortly for messages, and report on them, or on their absence."""
+        messages = self.link.receive(0.05)
+        now = time.monotonic()
+        if self.only_peer is not None and now - self._heartbeat_at >= self.pace.heartbeat_s:
+            self._heartbeat_at = now  # a vehicle that waits to be spoken to answers nobody else
+            computer_on_board = dialect().MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)
+            self.link.send(computer_on_board)
+        for message, peer in messages:
+            if self.only_peer is None or peer == self.only_peer:
+                self._read(message, peer, now)
+        self._report_silence(now)
+        listener = self.listener
+        if not listener.has_heard and listener.others - self._others:
+            self._others |= listener.others
+            who = ", ".join(map(str, sorted(self._others)))
+            self.note(f"heard from system {who}, but nothing from system {listener.system} yet")
+
+    def _read(self, message: Any, peer: tuple[str, int], now: float) -> None:
+        """Update the guard with a message."""
+        listener = self.listener
+        fix = listener.read(message)
+        for line in self.hints.about(message, fix, listener):
+            self.note(line)
+        if (message.get_srcSystem(), message.get_srcComponent()) != (listener.system, AUTOPILOT):
+            return
+        clock = now if listener.time is None else listener.time
+        for line in _rate_lines(self.rates, message, fix, clock):
+            self.note(line)
+        self.link.set_peer(peer)
+        for request in self.rates.requests(message.get_srcSystem(), clock):
+            self.link.send(request)
+        if fix is None:
+            return
+        self._heard_at = now
+        report = self.stream.add(fix)
+        if report is not None:
+            self._report(report, now)
+            is_due = now - self._published_at >= self.pace.publish_s
+            if self.publishes and (report.raised or is_due):
+                self._published_at = now
+                _publish(self.link, report, self._text_numbers)
+
+    def _report(self, report: Report, now: float) -> None:
+        self._reported_at = now
+        self.on_report(report)
+
+    def _report_silence(self, now: float) -> None:
+        """Report that nothing comes, at times."""
+        silent_s = now - self._heard_at
+        is_due = min(silent_s, now - self._reported_at) >= self.pace.silence_s
+        if is_due and self.listener.time is not None:
+            report = self.stream.advance_to(self.listener.time + now - self._heard_at)
+            self._report(report, now)
+            if self.publishes and report.raised:
+                _publish(self.link, report, self._text_numbers)
+
+
 def _rate_lines(rates: MessageRates, message: Any, fix: Fix | None, clock: float) -> Iterator[str]:
     """Yield lines about the rates of a vehicle's messages, after one of them."""
     if message.get_type() == "COMMAND_ACK":
         target = int(getattr(message, "target_system", 0))  # which MAVLink 1 does not have
-        yield from rates.take_ack(int(message.command), int(message.result), target)
-    yield from rates.take(clock, fix is not None and fix.position is not None)
+        yield from rates.on_ack(int(message.command), int(message.result), target)
+    yield from rates.count(clock, fix is not None and fix.position is not None)
 
 
 class _Hints:
-    """Hints at helpful options while no position is understood, and a warning about unknown kinds
-    of vehicles; each is given once."""
+    """Hints at helpful options, and the warning of an unknown vehicle; each is given once."""
 
     def __init__(self) -> None:
         self._has_position = False
-        self._is_kind_told = False
-        self._told: set[str] = set()
+        self._has_warned = False
+        self._given: set[str] = set()
 
     def about(self, message: Any, fix: Fix | None, listener: Listener) -> Iterator[str]:
-        """Yield the hint for a position message that is not understood, and the warning of a
-        vehicle that is no submarine of ArduPilot's."""
+        """Yield the hint for a position message that is not used, and the warning of an unknown
+        vehicle."""
         kind = listener.kind
-        if kind is not None and not self._is_kind_told:
-            self._is_kind_told = True
+        if kind is not None and not self._has_warned:
+            self._has_warned = True
             if not kind.is_ardusub:
-                yield other_vehicle(kind)
+                yield other_vehicle_warning(kind)
         self._has_position = self._has_position or (fix is not None and fix.position is not None)
         if self._has_position or fix is not None or message.get_type() not in POSITIONS:
             return
         line = ""
         if message.get_srcSystem() != listener.system:
-            if message.get_srcComponent() == AUTOPILOT and listener.heard:
+            if message.get_srcComponent() == AUTOPILOT and listener.has_heard:
                 line = (
                     f"system {message.get_srcSystem()} sends positions, system {listener.system} "
                     f"none yet; follow the other one with --system {message.get_srcSystem()}"
                 )
         elif listener.left_out == NO_GPS_FIX:
             line = f"GLOBAL_POSITION_INT: {NO_GPS_FIX}; read metres with --frame local"
-        if line and line not in self._told:
-            self._told.add(line)
+        if line and line not in self._given:
+            self._given.add(line)
             yield line
 
 
 def _correct(
-    guard: Guard, corrections: queue.Queue[tuple[str, str]], tell: Callable[[str], None]
+    guard: Guard, corrections: queue.Queue[tuple[str, str]], note: Callable[[str], None]
 ) -> None:
+    """Correct the class as the operator says."""
     while True:
         try:
             side, obstacle = corrections.get_nowait()
@@ -207,27 +257,32 @@ def _correct(
             return
         try:
             guard.correct(side, obstacle)
-            tell(f"corrected: the tether passes {side} of {obstacle}")
+            note(f"corrected: the tether passes {side} of {obstacle}")
         except InputError as error:
-            tell(f"not corrected: {error}")
+            note(f"not corrected: {error}")
 
 
-def _publish(link: UdpLink, report: Report, numbers: Iterator[int]) -> None:
+def _publish(link: UdpLink, report: Report, text_numbers: Iterator[int]) -> None:
+    """Send the figures of a report, and its new alarms, to the link."""
     m = dialect()
     boot = int(report.time * 1000.0) & 0xFFFFFFFF
     figures: dict[bytes, float | None] = {b"loop_s": report.loop_s, b"short_s": report.short_s}
     if report.classes:
         figures |= {
-            b"tether": report.classes[0].taut, b"slack": report.classes[0].slack,
-            b"home_s": report.home_s, b"classes": float(len(report.classes)),
-        }  # fmt: skip
+            b"tether": report.classes[0].taut,
+            b"slack": report.classes[0].slack,
+            b"home_s": report.home_s,
+            b"classes": float(len(report.classes)),
+        }
     for name, value in figures.items():
-        # no seconds are left where nothing lies ahead: a number all the same, for graphs
+        # graphs need a number even if nothing lies ahead
         link.send(m.MAVLink_named_value_float_message(boot, name, -1.0 if value is None else value))
+    severities = {
+        Level.NOTICE: m.MAV_SEVERITY_NOTICE,
+        Level.CAUTION: m.MAV_SEVERITY_WARNING,
+        Level.WARNING: m.MAV_SEVERITY_CRITICAL,
+        Level.ALARM: m.MAV_SEVERITY_ALERT,
+    }
     for alarm in report.raised:
-        severity = {
-            Level.NOTICE: m.MAV_SEVERITY_NOTICE, Level.CAUTION: m.MAV_SEVERITY_WARNING,
-            Level.WARNING: m.MAV_SEVERITY_CRITICAL, Level.ALARM: m.MAV_SEVERITY_ALERT,
-        }[alarm.level]  # fmt: skip
-        for part in status_texts(severity, alarm.text, next(numbers)):
+        for part in status_texts(severities[alarm.level], alarm.text, next(text_numbers)):
             link.send(part)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 
-MAX_KINDS = 6
-"""Kinds of messages that a note names; the tally counts all of them."""
+from netsp.online.guard.guard_policy import RecordingPolicy
 
 
 class MessageTally:
     """Tally with one entry for each message or row of a recording.
+
+    Parameters
+    ----------
+    policy : RecordingPolicy
+        Maximum number of kinds of messages that a note names.
 
     Attributes
     ----------
@@ -27,36 +31,26 @@ class MessageTally:
     (3, ['2 left out: no GPS fix (2 GLOBAL_POSITION_INT)'])
     """
 
-    def __init__(self) -> None:
+    def __init__(self, policy: RecordingPolicy = RecordingPolicy()) -> None:
+        self.policy = policy
         self.used: Counter[str] = Counter()
         self.left_out: dict[str, Counter[str]] = {}
 
     def use(self, kind: str, count: int = 1) -> None:
-        """Count messages that are used.
-
-        Parameters
-        ----------
-        kind : str
-            Name of the message, or "row".
-        count : int
-            Number of messages.
-        """
+        """Count messages, or rows, that are used."""
         self.used[kind] += count
 
     def leave_out(self, kind: str, reason: str, count: int = 1) -> None:
-        """Count messages that are left out.
-
-        Parameters
-        ----------
-        kind : str
-            Name of the message, or "row".
-        reason : str
-            Why, as "no GPS fix".
-        count : int
-            Number of messages.
-        """
+        """Count messages, or rows, that are left out for a reason, such as "no GPS fix"."""
         if count:
             self.left_out.setdefault(reason, Counter())[kind] += count
+
+    def add(self, other: MessageTally) -> None:
+        """Add the counts of another tally."""
+        self.used.update(other.used)
+        for reason, kinds in other.left_out.items():
+            for kind, n in kinds.items():
+                self.leave_out(kind, reason, n)
 
     @property
     def total(self) -> int:
@@ -68,7 +62,7 @@ class MessageTally:
         """Return one line for each reason for which messages are left out."""
         lines = []
         for reason, kinds in self.left_out.items():
-            named = [f"{n:,} {kind}" for kind, n in kinds.most_common(MAX_KINDS)]
+            named = [f"{n:,} {kind}" for kind, n in kinds.most_common(self.policy.max_named_kinds)]
             more = len(kinds) - len(named)
             text = ", ".join(named) + (f" and {more} more kinds" if more > 0 else "")
             lines.append(f"{sum(kinds.values()):,} left out: {reason} ({text})")

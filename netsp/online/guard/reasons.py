@@ -1,4 +1,4 @@
-"""Why the operator should be told something, and in which words."""
+"""Reasons for alarms, and their texts."""
 
 from __future__ import annotations
 
@@ -8,77 +8,61 @@ from dataclasses import dataclass
 from netsp.base.arrays import Floats
 from netsp.base.geometry import polylines
 from netsp.online.guard.alarms import Alarm, Level
-from netsp.online.guard.guard_report import ClassNow
-from netsp.online.guard.lookahead import Ahead
+from netsp.online.guard.guard_policy import AlarmPolicy
+from netsp.online.guard.guard_report import ClassReport
+from netsp.online.guard.lookahead import LookaheadResult
 from netsp.online.guard.site import Loop, Site, beside
-
-LOOP_S = {Level.CAUTION: 30.0, Level.WARNING: 20.0}
-TURN_S = {Level.CAUTION: 20.0, Level.WARNING: 14.0}
-SHORT_S = {Level.CAUTION: 10.0, Level.WARNING: 4.0}
-"""Seconds ahead from which on something is that urgent; a robot that works at the end of its tether
-drives towards it all the time."""
-
-SLACK = {Level.CAUTION: 0.1, Level.WARNING: 0.03, Level.ALARM: 0.0}
-"""Shares of the tether that are left."""
-
-LIKELY, LOOPED, POSSIBLE = 0.8, 0.5, 0.05
-"""Shares of the classes in which a loop will close, or has closed: above the first, or second, it
-is spoken of as such, above the third as a possibility, and below not at all."""
-
-ALL = 0.95
-"""Share of the classes that is all of them, but for a rest."""
-
-
-@dataclass(frozen=True)
-class Course:
-    """How well it is known where the robot is heading.
-
-    Parameters
-    ----------
-    later : float
-        For each metre of a position's noise, the share by which a loop is seen to close later than
-        it does: a course with noise goes round in a wider circle.
-    likely : float
-        Share of the classes in which a loop will close for a warning.
-    clear : float
-        Share that the likeliest class must have for a warning: where it is anybody's guess how the
-        tether runs, so is what closes a loop; unless one closes in `ALL` of them.
-    """
-
-    later: float
-    likely: float
-    clear: float
-
-
-OF_PLACES, OF_VELOCITIES = Course(1.3, LIKELY, 0.6), Course(0.6, 0.75, 0.0)
-"""From where the robot has been alone, and where it tells its velocity, too
-(benchmarks/guard.py)."""
 
 FROZEN = "the position stands still to the last digit while the vehicle moves"
 """Reason not to believe a frozen position."""
 
-DOUBT = 0.05
-"""Share that a second class must have to be worth a word."""
 
-MOST_NAMES = 3
+@dataclass(frozen=True)
+class Situation:
+    """Place of the robot and knowledge of its course, for the reasons of alarms about loops.
+
+    Attributes
+    ----------
+    site
+        The site.
+    robot
+        Place of the robot in the likeliest class, shape (3,), m.
+    likeliest_share
+        Share of the likeliest class.
+    noise
+        Standard deviation of one position, m.
+    has_velocities
+        Whether the course is known from velocities, too.
+    is_on_plan
+        Whether the tether was as planned at the last visit of a tour. The robot will then more
+        likely follow the plan than go straight on, and a tour undoes the loops that it closes.
+    policy
+        Thresholds of alarms.
+    """
+
+    site: Site
+    robot: Floats
+    likeliest_share: float = 1.0
+    noise: float = 0.0
+    has_velocities: bool = False
+    is_on_plan: bool = False
+    policy: AlarmPolicy = AlarmPolicy()
 
 
-def names_of(site: Site, around: Sequence[int]) -> str:
-    """Obstacles in a phrase: the first few by name."""
-    names = [site.name_of(i) for i in around[:MOST_NAMES]]
-    if len(around) > MOST_NAMES:
-        names[-1:] = [names[-1], f"{len(around) - MOST_NAMES} more"]
+def names_of(site: Site, around: Sequence[int], max_names: int = AlarmPolicy.max_names) -> str:
+    """Return the names of obstacles as a phrase, and the number of those beyond `max_names`."""
+    names = [site.name_of(i) for i in around[:max_names]]
+    if len(around) > max_names:
+        names[-1:] = [names[-1], f"{len(around) - max_names} more"]
     if len(names) == 1:
         return names[0]
     return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def estimate_lost(seconds: float, why: str) -> Alarm:
-    """Nothing is claimed any more."""
-    return Alarm(
-        "estimate", Level.ALARM,
-        f"{why} for {seconds:.0f} s: nothing is claimed about the tether until a position comes",
-    )  # fmt: skip
+    """Return the alarm that nothing is claimed any more."""
+    text = f"{why} for {seconds:.0f} s: nothing is claimed about the tether until a position comes"
+    return Alarm("estimate", Level.ALARM, text)
 
 
 def never_claimed(why: str, seconds: float) -> Alarm:
@@ -98,7 +82,7 @@ def uncorrected(seconds: float, why: str, error: float, units: str) -> Alarm:
     return Alarm("position", Level.WARNING, text, is_immediate=True)
 
 
-def set_anew(far: float, units: str) -> Alarm:
+def position_reset(far: float, units: str) -> Alarm:
     """Return the alarm that the filter reset the position when it took fixes again."""
     text = (
         f"the position was set anew, {far:.1f} {units} from where it was: it was off, or the fixes "
@@ -107,26 +91,33 @@ def set_anew(far: float, units: str) -> Alarm:
     return Alarm("position", Level.WARNING, text, is_immediate=True)
 
 
-def in_doubt(classes: Sequence[ClassNow]) -> list[Alarm]:
-    """The class is one of several."""
-    if len(classes) < 2 or classes[1].likely < DOUBT:
+def in_doubt(classes: Sequence[ClassReport], policy: AlarmPolicy = AlarmPolicy()) -> list[Alarm]:
+    """Return the notice that there are several classes, if there are."""
+    if len(classes) < 2 or classes[1].likely < policy.doubt_share:
         return []
-    told = "; or ".join(f"{c.passes} ({100 * c.likely:.0f} %)" for c in classes[:3])
-    return [Alarm("class", Level.NOTICE, f"the tether runs {told}")]
+    paths = "; or ".join(f"{c.passes} ({100 * c.likely:.0f} %)" for c in classes[:3])
+    return [Alarm("class", Level.NOTICE, f"the tether runs {paths}")]
 
 
-def otherwise(as_planned: bool | None, now: ClassNow) -> list[Alarm]:
-    """The tether is in another class than the tour means it to be in here."""
-    if as_planned is not False or now.likely < LIKELY:
+def off_plan(
+    as_planned: bool | None, now: ClassReport, policy: AlarmPolicy = AlarmPolicy()
+) -> list[Alarm]:
+    """Return the caution that the tether is in another class than planned at this visit, if so."""
+    if as_planned is not False or now.likely < policy.likely_share:
         return []
     text = f"the tether is not as planned at this stop: it runs {now.passes}"
     return [Alarm("plan", Level.CAUTION, text)]
 
 
-def little_left(site: Site, now: ClassNow) -> list[Alarm]:
-    """The tether is nearly used up, or too short."""
+def little_slack(site: Site, now: ClassReport, policy: AlarmPolicy = AlarmPolicy()) -> list[Alarm]:
+    """Return the alarm that little or no tether is left, if so."""
     share = now.slack / site.tether_length
-    level = max((v for v, s in SLACK.items() if share < s), default=None)
+    limits = {
+        Level.CAUTION: policy.slack_caution,
+        Level.WARNING: policy.slack_warning,
+        Level.ALARM: 0.0,
+    }
+    level = max((v for v, s in limits.items() if share < s), default=None)
     if level is None:
         return []
     text = (
@@ -138,11 +129,14 @@ def little_left(site: Site, now: ClassNow) -> list[Alarm]:
     return [Alarm("slack", level, text)]
 
 
-def soon_short(site: Site, ahead: Ahead) -> list[Alarm]:
-    """Going on needs more tether than there is."""
+def soon_short(
+    site: Site, ahead: LookaheadResult, policy: AlarmPolicy = AlarmPolicy()
+) -> list[Alarm]:
+    """Return the alarm that the present motion soon needs more tether than there is, if so."""
     if ahead.short_s is None:
         return []
-    level = _level(SHORT_S, ahead.short_s)
+    limits = {Level.CAUTION: policy.short_caution_s, Level.WARNING: policy.short_warning_s}
+    level = _level(limits, ahead.short_s)
     if level is None:
         return []
     text = (
@@ -152,59 +146,71 @@ def soon_short(site: Site, ahead: Ahead) -> list[Alarm]:
     return [Alarm("short", level, text)]
 
 
-def soon_looped(
-    site: Site, ahead: Ahead, robot: Floats, share: float = 1.0, on_plan: bool = False,
-    clear: float = 1.0, noise: float = 0.0, course: Course = OF_PLACES,
-) -> list[Alarm]:  # fmt: skip
-    """Going on closes a loop, in that share of the classes, the likeliest of which is so clear.
-    Where the tether was as planned at the last stop of a tour, the way on is more likely that of
-    the plan than straight on."""
-    if ahead.loop_s is None or ahead.loop is None or share < POSSIBLE:
+def loop_ahead(ahead: LookaheadResult, situation: Situation, share: float = 1.0) -> list[Alarm]:
+    """Return the alarm that the present motion closes a loop in a share of the classes, if so."""
+    policy, site, robot = situation.policy, situation.site, situation.robot
+    if ahead.loop_s is None or ahead.loop is None or share < policy.possible_share:
         return []
-    limits = TURN_S if ahead.turning else LOOP_S
-    longer = 1.0 + course.later * noise
-    level = _level({v: most * longer for v, most in limits.items()}, ahead.loop_s)
+    level = _loop_ahead_level(ahead.loop_s, ahead.is_turning, situation, share)
     if level is None:
         return []
-    if share < course.likely or (clear < course.clear and share < ALL) or on_plan:
-        level = Level.CAUTION
     near = site.nearest(ahead.loop.around, robot)
     keep = site.side_of(near, robot)
-    names = names_of(site, ahead.loop.around)
+    names = names_of(site, ahead.loop.around, policy.max_names)
     text = (
         f"keep {beside(keep, site.name_of(near))}: going on closes a loop around {names} in "
-        f"{ahead.loop_s:.0f} s{_unsure(share)}; {_undo(site, ahead.loop, near)}"
+        f"{ahead.loop_s:.0f} s{_likelihood(share, policy)}; {_undo(site, ahead.loop, near)}"
     )
     return [Alarm("loop-ahead", level, text)]
 
 
-def looped(
-    site: Site, loops: Sequence[Loop], robot: Floats, share: float = 1.0, on_plan: bool = False
-) -> list[Alarm]:
-    """A loop is closed, in that share of the classes. Tours close some that they undo later."""
-    if not loops or share < POSSIBLE:
+def _loop_ahead_level(
+    loop_s: float, is_turning: bool, situation: Situation, share: float
+) -> Level | None:
+    """Return how urgent a loop is that closes in some seconds."""
+    policy = situation.policy
+    straight = {Level.CAUTION: policy.loop_caution_s, Level.WARNING: policy.loop_warning_s}
+    turning = {Level.CAUTION: policy.turn_caution_s, Level.WARNING: policy.turn_warning_s}
+    limits = turning if is_turning else straight
+    course = policy.course_of_velocities if situation.has_velocities else policy.course_of_positions
+    longer = 1.0 + course.delay_per_noise * situation.noise
+    level = _level({v: limit_s * longer for v, limit_s in limits.items()}, loop_s)
+    is_unclear = (
+        situation.likeliest_share < course.min_likeliest_share and share < policy.nearly_all_share
+    )
+    if level is not None and (share < course.min_share or is_unclear or situation.is_on_plan):
+        return Level.CAUTION
+    return level
+
+
+def loop_closed(loops: Sequence[Loop], situation: Situation, share: float = 1.0) -> list[Alarm]:
+    """Return the alarm that a loop is closed in a share of the classes, if so."""
+    policy, site = situation.policy, situation.site
+    if not loops or share < policy.possible_share:
         return []
     loop = loops[0]
-    near = site.nearest(loop.around, robot)
-    names, sure = names_of(site, loop.around), _unsure(share)
-    if on_plan:
-        text = f"a loop around {names} is closed{sure}; the tether was as planned at the last stop"
+    near = site.nearest(loop.around, situation.robot)
+    names, likelihood = names_of(site, loop.around, policy.max_names), _likelihood(share, policy)
+    text = f"a loop around {names} is closed{likelihood}"
+    if situation.is_on_plan:
+        text += "; the tether was as planned at the last stop"
         return [Alarm("loop", Level.NOTICE, text)]
-    text = f"a loop around {names} is closed{sure}; {_undo(site, loop, near)}"
-    return [Alarm("loop", Level.ALARM if share >= LOOPED else Level.CAUTION, text)]
+    level = Level.ALARM if share >= policy.loop_alarm_share else Level.CAUTION
+    return [Alarm("loop", level, f"{text}; {_undo(site, loop, near)}")]
 
 
-def _unsure(share: float) -> str:
-    return "" if share >= LIKELY else f" ({100.0 * share:.0f} % likely)"
+def _likelihood(share: float, policy: AlarmPolicy = AlarmPolicy()) -> str:
+    return "" if share >= policy.likely_share else f" ({100.0 * share:.0f} % likely)"
 
 
 def _undo(site: Site, loop: Loop, near: int) -> str:
-    """Back along the tether: past the middle of the loop."""
+    """Return how to undo a loop: back along the tether, past the middle of the loop."""
     length = polylines.length(loop.line)
     half = polylines.points_along(loop.line, 0.5 * length + 1e-9)[1] if length else loop.line[0]
-    back = site.side_of(near, half)
-    return f"to undo it go back {beside(back, site.name_of(near))}"
+    side = site.side_of(near, half)
+    return f"to undo it go back {beside(side, site.name_of(near))}"
 
 
 def _level(limits: dict[Level, float], seconds: float) -> Level | None:
+    """Return the highest level whose limit is not below the seconds left."""
     return max((v for v, s in limits.items() if seconds <= s), default=None)

@@ -1,4 +1,4 @@
-"""Read paths from files of any kind, including recorded flights."""
+"""Paths from files of any kind, including recorded flights."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def read_any_paths(
     system: int | None = None,
     noise: float = 0.0,
 ) -> list[FoundPath]:
-    """Read the paths of a file, or the flight of a recording.
+    """Read the paths of a file, or the flight of a recording, in the order of the file.
 
     Parameters
     ----------
@@ -46,11 +46,6 @@ def read_any_paths(
         Largest distance of a point that is left out from the simplified path (Douglas & Peucker
         1973), in the problem's units. Noise of the positions would lengthen the path.
 
-    Returns
-    -------
-    list of FoundPath
-        Paths in the order of the file.
-
     Raises
     ------
     InputError
@@ -62,7 +57,7 @@ def read_any_paths(
         found = [_flight(file, Frame(problem, frame), system)]
     else:
         found = read_paths(file, problem, frame)
-    return [_straightened(path, noise) for path in found] if noise else found
+    return [_simplified(path, noise) for path in found] if noise else found
 
 
 def _has_north_and_east(file: str | Path) -> bool:
@@ -84,32 +79,31 @@ def _flight(file: str | Path, frame: Frame, system: int | None) -> FoundPath:
     points = np.array([f.position for f in fixes], dtype=float)
     if len(np.unique(points, axis=0)) < 2:
         raise InputError(f"{file}: expected a recording with two positions or more that differ")
-    times, is_late = _lasting_times(fixes)
+    times, is_late = _continuous_times(fixes)
     if is_late.any():
         notes.append(f"{file}: {int(is_late.sum())} positions left out: their times go back")
     points, times = points[~is_late], times[~is_late]
     order = np.argsort(times, kind="stable")
-    told = tuple(note.removeprefix("--replay: ") for note in notes)
-    return FoundPath(Path(file).stem, points[order], times[order], told)
+    plain_notes = tuple(note.removeprefix("--replay: ") for note in notes)
+    return FoundPath(Path(file).stem, points[order], times[order], plain_notes)
 
 
-def _lasting_times(fixes: list[Fix]) -> tuple[Floats, Bools]:
-    """Return the times of fixes by a clock that is never set, also over restarts of the vehicle,
-    and which fixes came late."""
+def _continuous_times(fixes: list[Fix]) -> tuple[Floats, Bools]:
+    """Return the times of fixes by a clock that is never set or restarted, and which are late."""
     clock = VehicleClock()
-    times, late, begun, last = [], [], 0.0, 0.0
+    times, late, offset, last = [], [], 0.0, 0.0
     for fix in fixes:
-        reading = clock.take(fix.time)
+        reading = clock.read(fix.time)
         if reading.event == "restart":
-            begun = last - reading.time
-        times.append(reading.time + begun)
+            offset = last - reading.time
+        times.append(reading.time + offset)
         late.append(reading.event == "late")
         if not late[-1]:
             last = times[-1]
     return np.array(times), np.array(late)
 
 
-def _straightened(path: FoundPath, noise: float) -> FoundPath:
+def _simplified(path: FoundPath, noise: float) -> FoundPath:
     kept = polylines.telling(path.points, noise)
     times = None if path.times is None else path.times[kept]
     return FoundPath(path.name, path.points[kept], times, path.notes)

@@ -1,4 +1,4 @@
-"""What a guard asks of a site, be it a problem in the plane or a mission in space."""
+"""Protocol of a site, be it a problem in the plane or a mission in space."""
 
 from __future__ import annotations
 
@@ -8,26 +8,22 @@ from typing import Any, Protocol
 
 from netsp.base.arrays import ComparesArrays, Floats
 from netsp.hsignature import Word
+from netsp.online.guard.guard_policy import SitePolicy
 from netsp.world.scene.field import DistanceField
 from netsp.world.tether import GeodesicTether, Tether
-
-LONGER = 2.0
-"""Times the tether's length: longer ones of a class are not looked for."""
-
-ROUNDS = 300
-"""Of pulling a tether taut that was just found, or written down."""
 
 
 @dataclass(frozen=True, eq=False)
 class Loop(ComparesArrays):
-    """A loop of a tether.
+    """Loop of a tether.
 
-    Parameters
+    Attributes
     ----------
-    around : tuple of int
-        Indices of obstacles.
-    line : ndarray, shape (k, 2) or (k, 3)
-        From where it closes around to there again, metres.
+    around
+        Indices of the obstacles in the loop.
+    line
+        Closed polyline from where the loop closes around to there again, shape (k, 2) or (k,
+        3), m.
     """
 
     around: tuple[int, ...]
@@ -37,175 +33,143 @@ class Loop(ComparesArrays):
 class Letters(Protocol):
     """Words of the robot's steps."""
 
-    def written(self, starts: Floats, ends: Floats) -> list[Word | None]:
-        """The words of straight steps.
+    def words_of_steps(self, starts: Floats, ends: Floats) -> list[Word | None]:
+        """Return the words of straight steps; None for a step that no robot can make.
 
         Parameters
         ----------
-        starts : ndarray, shape (k, d)
-            Metres; d is 2 or 3 in the plane, and 3 in space.
-        ends : ndarray, shape (k, d)
-            Metres.
-
-        Returns
-        -------
-        list of Word or None
-            None for a step that nothing can have gone.
+        starts, ends : ndarray, shape (k, d)
+            Ends of the steps, m; d is 2 or 3 in the plane, and 3 in space.
         """
 
     def join(self, a: Word, b: Word) -> Word:
-        """The word of one path after another."""
+        """Return the word of one path after another."""
 
-    def back(self, word: Word) -> Word:
-        """The word of a path backwards."""
+    def inverse(self, word: Word) -> Word:
+        """Return the word of a path in the other direction."""
 
-    def near(self, points: Floats, reach: float) -> bool:
-        """Whether within reach of places something is that may be passed on two sides.
-
-        Parameters
-        ----------
-        points : ndarray, shape (k, d)
-            Metres.
-        reach : float
-            Metres.
-
-        Returns
-        -------
-        bool
-            Whether there is, or may be.
-        """
+    def is_near(self, points: Floats, reach: float) -> bool:
+        """Return whether there may be an obstacle within reach of points (k, d), m."""
 
     def depth(self, places: Floats) -> Floats:
-        """(k,) how deep places (k, d) are inside of obstacles, metres; 0 outside."""
+        """Return the depth of places (k, d) inside of obstacles, shape (k,), m; 0 outside."""
 
 
 class Site(Protocol):
-    """Where a tether is watched."""
+    """Site where a tether is watched: a problem in the plane, or a mission in space."""
 
+    policy: SitePolicy
     name: str
     units: str
     tether_length: float
     anchor: Floats
-    """(3,) where the tether is fixed, metres."""
+    """Place where the tether is fixed, shape (3,), m."""
     start: Floats
-    """(3,) where the robot begins, metres."""
+    """Place where the robot begins, shape (3,), m."""
     identity: str
-    """Tells it from others, in state files."""
+    """Hash that tells this site from others, in state files."""
     field: DistanceField
     model: GeodesicTether
-    ahead: GeodesicTether
-    """As the model, and as coarse as does for looks ahead."""
+    lookahead_model: GeodesicTether
+    """Model that is coarse enough for looks ahead."""
     letters: Letters
     sides: tuple[str, ...]
-    """Of obstacles, as operators may name them."""
+    """Sides of obstacles, as operators may name them."""
     centres: Floats
-    """(n, 2) of what robots circle, in the plan, metres."""
-    look_steps: int
-    """Of looks ahead, in one update, which is to take 50 ms at most: with fewer, a look in several
-    classes tells of what was ahead a second ago."""
+    """Centres of obstacles that robots circle, in the plan, shape (n, 2), m."""
+    steps_per_update: int
+    """Maximum number of steps of looks ahead in one update."""
 
     def start_word(self) -> Word:
-        """The word of the tether when it begins at the start."""
+        """Return the word of the tether at the start."""
 
-    def found(self, word: Word, place: Floats, hanging: Sequence[tuple[Word, Tether]]) -> (
-        Tether | None
-    ):  # fmt: skip
-        """A tether of a class that none of those at hand leads to by a straight step.
+    def recover_tether(
+        self, word: Word, place: Floats, known: Sequence[tuple[Word, Tether]]
+    ) -> Tether | None:
+        """Return a tether of a class that no straight step from a known tether leads to.
 
         Parameters
         ----------
         word : Word
-            The class, at the place.
+            Class of the tether to the place.
         place : ndarray, shape (3,)
-            Of the robot, metres.
-        hanging : sequence of (Word, Tether)
-            Those at hand, of this moment.
+            Place of the robot, m.
+        known : sequence of (Word, Tether)
+            Tethers of other classes at this moment.
 
         Returns
         -------
         Tether or None
-            None where there is none of twice the tether's length.
+            None if the tether would be longer than `SitePolicy.max_length_factor` allows.
         """
 
     def word_of(self, nodes: Floats) -> Word | None:
-        """The word of a tether; None where it has none."""
+        """Return the word of a tether; None if it has none."""
 
-    def ways(self, before: Floats, after: Floats, farthest: float) -> list[tuple[Word, float]]:
-        """The classes of ways from one place to another.
+    def paths_between(
+        self, before: Floats, after: Floats, max_length: float
+    ) -> list[tuple[Word, float]]:
+        """Return the words and lengths of paths from one place to another, shortest first.
 
         Parameters
         ----------
-        before : ndarray, shape (3,)
-            Metres.
-        after : ndarray, shape (3,)
-            Metres.
-        farthest : float
-            Metres that they are long at most; the shortest counts whatever it is.
-
-        Returns
-        -------
-        list of (Word, float)
-            Words and lengths, shortest first; at least one.
+        before, after : ndarray, shape (3,)
+            Places, m.
+        max_length : float
+            Largest length, m; the shortest path counts at any length, so there is at least one.
         """
 
     def loops_in(self, nodes: Floats) -> list[Loop]:
-        """The loops that a taut tether has, the last to be closed first."""
+        """Return the loops of a taut tether, the last to be closed first."""
 
-    def closed_by(self, nodes: Floats, there: Floats) -> Loop | None:
-        """The loop that a robot closes by going straight to a place; None where it closes none."""
+    def loop_closed_by(self, nodes: Floats, place: Floats) -> Loop | None:
+        """Return the loop that a robot closes by moving straight to a place; None if none."""
 
-    def leap(self, tether: Tether, places: Floats) -> int:
-        """Over how many places (k, 3) on its way, one after the other, the robot can go of which is
-        known without its tether there that it closes no loop and has tether enough."""
+    def safe_prefix(self, tether: Tether, places: Floats) -> int:
+        """Return over how many of the next places (k, 3) the robot can surely move without closing
+        a loop or running out of tether.
+        """
 
-    def corrected(
+    def classes_on_side(
         self, believed: Iterable[Word], robot: Floats, side: str, obstacle: int | str
     ) -> dict[Word, Tether]:
-        """The classes that agree with what an operator says
-        (`netsp.online.guard.correct.corrected`), and how the tether hangs in them."""
+        """Return the tethers to the robot that pass an obstacle on a side, by their class.
 
-    def agrees(self, nodes: Floats, side: str, obstacle: int | str) -> bool:
-        """Whether a tether passes an obstacle on that side, and not on the other one as well."""
+        Of these, only the classes that differ least from a believed one are returned. Raise
+        InputError if there is no such side, obstacle or class.
+        """
 
-    def passes(self, nodes: Floats, word: Word) -> str:
-        """How a taut tether runs, in words."""
+    def passes_on_side(self, nodes: Floats, side: str, obstacle: int | str) -> bool:
+        """Return whether a tether passes an obstacle on one side, and not on the opposite one."""
+
+    def describe_path(self, nodes: Floats, word: Word) -> str:
+        """Describe how a taut tether runs."""
 
     def turning(self, nodes: Floats) -> float:
-        """Radians that a tether turns by, all in all."""
+        """Return the sum of the angles by which a tether turns, rad."""
 
     def name_of(self, obstacle: int) -> str:
-        """The name of an obstacle."""
+        """Return the name of an obstacle, or its number."""
 
     def side_of(self, obstacle: int, place: Floats) -> str:
-        """On which side of an obstacle a place is."""
+        """Return the side of an obstacle that a place is on."""
 
     def nearest(self, around: Sequence[int], place: Floats) -> int:
-        """Which of some obstacles is nearest to a place."""
+        """Return which of the given obstacles is nearest to a place."""
 
     def as_planned(self, robot: Floats, word: Word, off: float) -> bool | None:
-        """Whether the tether is in the class that a tour means it to be in; None where the robot is
-        at none of its stops, or there is no tour. It may be off by so many metres."""
+        """Return whether the tether is in the class that the tour plans at this visit.
+
+        None if there is no tour, or the robot is at none of its visits, to within `off`, m.
+        """
 
     def check_word(self, word: Word) -> None:
-        """Raises InputError for what is no word of this site."""
+        """Raise InputError for a word that this site does not have."""
 
-    def shown(self) -> dict[str, Any]:
-        """What a map shows of it."""
+    def map_data(self) -> dict[str, Any]:
+        """Return base, obstacles and goals for a map, as JSON."""
 
 
 def beside(side: str, name: str) -> str:
-    """A side of an obstacle as a phrase.
-
-    Parameters
-    ----------
-    side : str
-        As of `Site.side_of`.
-    name : str
-        Of the obstacle.
-
-    Returns
-    -------
-    str
-        Such as "north of A2", or "above A2".
-    """
+    """Return a side of an obstacle as a phrase, such as "north of A2" or "above A2"."""
     return f"{side} {name}" if side in ("above", "below") else f"{side} of {name}"

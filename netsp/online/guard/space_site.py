@@ -1,4 +1,4 @@
-"""A mission in space, as a guard sees it: the words are those of its cells."""
+"""Site of a mission in space; its words are those of the cells of its water."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from netsp.base.field_types import is_index
 from netsp.base.geometry import polylines
 from netsp.hsignature import Word
 from netsp.online.guard.correct import least_changed
+from netsp.online.guard.guard_policy import SitePolicy
 from netsp.online.guard.silhouettes import silhouette
-from netsp.online.guard.site import LONGER, ROUNDS, Letters, Loop, beside
-from netsp.online.guard.winding import TOUCHING, closing, loops_of
+from netsp.online.guard.site import Letters, Loop, beside
+from netsp.online.guard.winding import space_loop_closed_by, space_loops_in
 from netsp.plan.space.planning_context import PlanningContext
 from netsp.plan.space.space_signature import SpaceSignature
 from netsp.world.mission.mission import Mission
@@ -27,27 +28,18 @@ from netsp.world.scene.scene import Scene
 from netsp.world.side_names import AXES
 from netsp.world.tether import Tether
 
-MOST_WAYS = 12
-"""Ways that are kept, the shortest."""
+DIRECTIONS = {
+    "north": ("+y", "−y"),
+    "east": ("+x", "−x"),
+    "south": ("−y", "+y"),
+    "west": ("−x", "+x"),
+    "above": ("above", "below"),
+    "below": ("below", "above"),
+}
+"""Direction that each side means, and its opposite."""
 
-ASIDE, MOST_ASIDE = 2.5, 6
-"""Metres more than straight that ways to another class of a place beside may be long, around a pile
-or so, and how many of them are looked at: more would take seconds."""
-
-AGAIN = 1.0
-"""Metres that the robot goes before a class whose tether was not found is looked for again."""
-
-UPRIGHT = 0.7
-"""Share of a direction that must be vertical for it to be above or below."""
-
-MEANT = {
-    "north": ("+y", "−y"), "east": ("+x", "−x"), "south": ("−y", "+y"), "west": ("−x", "+x"),
-    "above": ("above", "below"), "below": ("below", "above"),
-}  # fmt: skip
-"""The directions that an operator's words mean, and their opposites."""
-
-SURFACE = 1e-6
-"""Metres that places are put out of solids."""
+PUSH_OUT_DISTANCE = 1e-6
+"""Tolerance to which places are moved out of solids, m."""
 
 
 class CellLetters:
@@ -56,22 +48,22 @@ class CellLetters:
     Parameters
     ----------
     words : SpaceSignature
-        Of the mission's water.
+        Words of the mission's water.
     """
 
     def __init__(self, words: SpaceSignature) -> None:
         self.words, self.field = words, words.cells.field
         self._letters = lru_cache(maxsize=100_000)(words.letters)
 
-    def written(self, starts: Floats, ends: Floats) -> list[Word | None]:
-        """As of `netsp.online.guard.site.Letters`; places in solids are put out of them first."""
-        a, b = (pushed_out(self.field, points, SURFACE) for points in (starts, ends))
-        # a step through a solid has no word, which a walk along it finds out the hardest way
+    def words_of_steps(self, starts: Floats, ends: Floats) -> list[Word | None]:
+        """Return the words of straight steps, None through solids; ends in solids are moved out."""
+        a, b = (pushed_out(self.field, points, PUSH_OUT_DISTANCE) for points in (starts, ends))
+        # a step through a solid has no word, which is slow to find out from cells
         far = np.linalg.norm(b - a, axis=1)
-        doubt = self.field.distance(a) < far
+        is_unsure = self.field.distance(a) < far
         through = [
             near and not self.field.line_of_sight(p, q, self.words.tolerance)
-            for near, p, q in zip(doubt, a, b, strict=True)
+            for near, p, q in zip(is_unsure, a, b, strict=True)
         ]
         return [
             None if hits else self._word(np.stack(pair))
@@ -83,53 +75,57 @@ class CellLetters:
         return None if number is None else self._letters(number)
 
     def join(self, a: Word, b: Word) -> Word:
-        """The word of one path after another."""
+        """Return the word of one path after another."""
         return self.words.product(a, b) if b else a
 
-    def back(self, word: Word) -> Word:
-        """The word of a path backwards."""
+    def inverse(self, word: Word) -> Word:
+        """Return the word of a path in the other direction."""
         return self.words.inverse(word)
 
-    def near(self, points: Floats, reach: float) -> bool:
-        """Whether a solid is within reach; water is open around what is not."""
+    def is_near(self, points: Floats, reach: float) -> bool:
+        """Return whether a solid may be within reach."""
         return bool((self.field.distance(points) <= reach * 1.5).any())
 
     def depth(self, places: Floats) -> Floats:
-        """(k,) metres inside of solids."""
+        """Return the depth of places inside of solids, shape (k,), m."""
         return np.maximum(0.0, -np.asarray(self.field.distance(places)))
 
 
 class SpaceSite:
-    """A mission.
+    """Mission as the site of a guard; its state and its tour count, if it has them.
 
     Parameters
     ----------
     mission : Mission
-        Anchor, start, scene and tether count; its state and its tour, if it has them, too.
+        The mission.
     scene : Scene, optional
-        Its scene, when it is at hand.
+        Scene of the mission; loaded if it is not given.
+    policy : SitePolicy
+        Resolutions and limits.
 
     Raises
     ------
     InputError
-        A moving anchor, an anchor out of the water; as of
-        `netsp.plan.space.space_signature.SpaceSignature`.
+        The anchor moves or is out of the water, or the scene has no words
+        (`netsp.plan.space.space_signature.SpaceSignature`).
     """
 
-    sides: tuple[str, ...] = tuple(MEANT)
-    look_steps = 24
+    sides: tuple[str, ...] = tuple(DIRECTIONS)
 
-    def __init__(self, mission: Mission, scene: Scene | None = None) -> None:
+    def __init__(
+        self, mission: Mission, scene: Scene | None = None, policy: SitePolicy = SitePolicy()
+    ) -> None:
         if mission.track:
             raise InputError("track: a moving anchor cannot be watched; expected one that stays")
         scene = scene or mission.load_scene()
-        self.mission = mission
+        self.mission, self.policy = mission, policy
+        self.steps_per_update = policy.space_steps_per_update
         self.name, self.units = mission.name, scene.units
         self.tether_length = mission.tether_length
         self.field = scene.field()
         self.water = PlanningContext.for_mission(mission, scene, self.field)
         self.model = self.water.model
-        self.ahead = self.model
+        self.lookahead_model = self.model
         self.anchor = np.asarray(mission.anchor, dtype=float)
         self._first = self.water.present_tether
         self.start = self._first.robot
@@ -142,126 +138,128 @@ class SpaceSite:
         self._missed: dict[Word, Floats] = {}
 
     def start_word(self) -> Word:
-        """Of the tether that the mission begins with."""
+        """Return the word of the tether that the mission begins with."""
         return self.water.words.word(self._first.nodes)
 
-    def found(
-        self, word: Word, place: Floats, hanging: Sequence[tuple[Word, Tether]]
+    def recover_tether(
+        self, word: Word, place: Floats, known: Sequence[tuple[Word, Tether]]
     ) -> Tether | None:
-        """From one at hand by a way that is not straight; where none is at hand, from the anchor,
-        which takes seconds."""
-        words = self.water.words
+        """Return a tether of a class that no straight step from a known tether leads to.
+
+        It goes on from a known one by a detour. Without known ones it begins at the anchor, which
+        takes seconds.
+        """
+        words, policy = self.water.words, self.policy
         end = words.visible_cell(place)
         missed = self._missed.get(word)
-        if end is None or (missed is not None and math.dist(missed, place) < AGAIN):
+        if end is None or (missed is not None and math.dist(missed, place) < policy.retry_distance):
             return None
-        for other, tether in list(hanging) or [(self.start_word(), self._first)]:
+        for other, tether in list(known) or [(self.start_word(), self._first)]:
             begin = words.visible_cell(tether.robot)
             far = math.dist(tether.robot, place)
-            if begin is None or far > ASIDE:
+            if begin is None or far > policy.max_detour:
                 continue
-            for number, way in self._ways(begin, end, far + ASIDE, MOST_ASIDE):
+            max_length = far + policy.max_detour
+            for number, path in self._paths(begin, end, max_length, policy.max_nearby_paths):
                 if words.product(other, words.letters(number)) != word:
                     continue
-                moved = self._relaxed(np.vstack([tether.nodes, way, place]), word)
+                moved = self._relaxed(np.vstack([tether.nodes, path, place]), word)
                 if moved is not None:
                     return moved
-            break  # those of other classes hang at nearly the same place
+            break  # tethers of other classes end at nearly the same place
         self._missed[word] = place
-        if hanging:
+        if known:
             return None
-        root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
-        for number, way in self._ways(root, end, self.tether_length):
+        for number, path in self._paths(self._root_cell, end, self.tether_length, policy.max_paths):
             if words.letters(number) == word:
-                return self._relaxed(np.vstack([self.anchor, way, place]), word)
+                return self._relaxed(np.vstack([self.anchor, path, place]), word)
         return None
 
-    def _ways(
-        self, begin: int, end: int, farthest: float, most: int = MOST_WAYS
+    @property
+    def _root_cell(self) -> int:
+        """Return the index of the cell at the anchor."""
+        words = self.water.words
+        return int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
+
+    def _paths(
+        self, begin: int, end: int, max_length: float, max_count: int
     ) -> list[tuple[int, Floats]]:
+        """Return the numbers of words, and the paths, from one cell to another."""
         water = self.water
-        return water.paths_to(water.search_words(False, begin, most, {end: farthest}), end)
+        return water.paths_to(water.search_words(False, begin, max_count, {end: max_length}), end)
 
     def _relaxed(self, line: Floats, word: Word) -> Tether | None:
-        tether = self.model.relaxed(line, ROUNDS)
-        good = tether.length <= LONGER * self.tether_length and self.word_of(tether.nodes) == word
-        return tether if good else None
+        """Return a line pulled taut; None if it is too long, or of another class."""
+        tether = self.model.relaxed(line, self.policy.relax_rounds)
+        is_short = tether.length <= self.policy.max_length_factor * self.tether_length
+        return tether if is_short and self.word_of(tether.nodes) == word else None
 
     def word_of(self, nodes: Floats) -> Word | None:
-        """Of the cells that it passes."""
+        """Return the word of the cells that a tether passes; None if it passes none."""
         word, broken = self.water.words.try_word(nodes)
         return word if broken is None else None
 
-    def ways(self, before: Floats, after: Floats, farthest: float) -> list[tuple[Word, float]]:
-        """By a search over words; straight where it finds none."""
-        words = self.water.words
-        a, b = pushed_out(self.field, np.stack([before, after]), SURFACE)
+    def paths_between(
+        self, before: Floats, after: Floats, max_length: float
+    ) -> list[tuple[Word, float]]:
+        """Return the words and lengths of paths from one place to another, shortest first.
+
+        They come from a search over words; the straight path is taken if it finds none.
+        """
+        words, max_paths = self.water.words, self.policy.max_paths
+        a, b = pushed_out(self.field, np.stack([before, after]), PUSH_OUT_DISTANCE)
         begin, end = words.visible_cell(a), words.visible_cell(b)
         out: dict[Word, float] = {}
         straight = math.dist(a, b)
         if begin is not None and end is not None:
-            most = max(1.5 * straight, farthest) + 2.0 * words.cells.cell
-            for number, way in self._ways(begin, end, most):
+            searched = max(1.5 * straight, max_length) + 2.0 * words.cells.cell
+            for number, path in self._paths(begin, end, searched, max_paths):
                 # pulled taut it may pass another side of what cells show as one
-                path = self.water.pull_taut(np.vstack([a, way, b]))
+                taut = self.water.pull_taut(np.vstack([a, path, b]))
                 letters = words.letters(number)
-                out[letters] = min(out.get(letters, math.inf), polylines.length(path))
-        (direct,) = self.letters.written(a[None], b[None])
+                out[letters] = min(out.get(letters, math.inf), polylines.length(taut))
+        (direct,) = self.letters.words_of_steps(a[None], b[None])
         if direct is not None or not out:
             out[direct or ()] = min(out.get(direct or (), math.inf), straight)
         order = sorted(out.items(), key=lambda pair: pair[1])
-        return [p for p in order if p[1] <= max(farthest, order[0][1])][:MOST_WAYS]
+        return [p for p in order if p[1] <= max(max_length, order[0][1])][:max_paths]
 
     def loops_in(self, nodes: Floats) -> list[Loop]:
-        """As of `netsp.online.guard.winding.loops_of`."""
-        return loops_of(self.field, self.model, nodes)
+        """Return the loops of a taut tether, the last to be closed first."""
+        return space_loops_in(self.field, self.model, nodes, self.policy)
 
-    def closed_by(self, nodes: Floats, there: Floats) -> Loop | None:
-        """As of `netsp.online.guard.winding.closing`."""
-        return closing(self.field, self.model, nodes, there)
+    def loop_closed_by(self, nodes: Floats, place: Floats) -> Loop | None:
+        """Return the loop that a robot closes by moving straight to a place; None if none."""
+        return space_loop_closed_by(self.field, self.model, nodes, place, self.policy)
 
-    def leap(self, tether: Tether, places: Floats) -> int:
-        """None: in space a tether comes off its contacts in ways that its ends do not tell."""
+    def safe_prefix(self, tether: Tether, places: Floats) -> int:
+        """Return 0: the ends of a tether in space do not tell when it comes off its contacts."""
         return 0
 
-    def corrected(
+    def classes_on_side(
         self, believed: Iterable[Word], robot: Floats, side: str, obstacle: int | str
     ) -> dict[Word, Tether]:
-        """Of all classes that the tether reaches the robot in, those whose taut tether passes a
-        solid on that side (`agrees`), and of them those that differ least from one believed.
+        """Return the tethers to the robot that pass a solid on a side, by their class.
 
-        Parameters
-        ----------
-        believed : iterable of Word
-            Classes that were believed.
-        robot : ndarray, shape (3,)
-            Where the robot is, metres.
-        side : str
-            One of `sides`: north is the y axis.
-        obstacle : int or str
-            The solid's index or name.
-
-        Returns
-        -------
-        dict of Word to Tether
-            One or more, and how the tether hangs.
+        Of these, only the classes that differ least from a believed one are returned.
 
         Raises
         ------
         InputError
-            No such solid or side; no class agrees.
+            There is no such solid, side or class.
         """
-        index = self._index(obstacle)
+        index, policy = self._index(obstacle), self.policy
         end = self.water.words.visible_cell(robot)
         agree: dict[Word, Tether] = {}
         if end is not None:
-            shape = self.water.words.cells.flags.shape
-            root = int(np.ravel_multi_index(tuple(self.water.words.root), shape))
-            for _, way in self._ways(root, end, self.tether_length, MOST_ASIDE):
-                tether = self.model.relaxed(np.vstack([self.anchor, way, robot]), ROUNDS)
+            for _, path in self._paths(
+                self._root_cell, end, self.tether_length, policy.max_nearby_paths
+            ):
+                line = np.vstack([self.anchor, path, robot])
+                tether = self.model.relaxed(line, policy.relax_rounds)
                 word = self.word_of(tether.nodes)
-                short = tether.length <= self.tether_length
-                if word is not None and short and self.agrees(tether.nodes, side, index):
+                is_short = tether.length <= self.tether_length
+                if word is not None and is_short and self.passes_on_side(tether.nodes, side, index):
                     agree.setdefault(word, tether)
         if not agree:
             raise InputError(
@@ -270,16 +268,16 @@ class SpaceSite:
             )
         return {word: agree[word] for word in least_changed(agree, believed)}
 
-    def agrees(self, nodes: Floats, side: str, obstacle: int | str) -> bool:
-        """A tether passes a solid on the side where it comes nearest to it."""
+    def passes_on_side(self, nodes: Floats, side: str, obstacle: int | str) -> bool:
+        """Return whether a tether comes nearest to a solid on one side, not on the opposite one."""
         if side not in self.sides:
             raise InputError(f"side: expected {', '.join(self.sides)}, got {side!r}")
-        alone = self._of(self._index(obstacle))
+        alone = self._field_of(self._index(obstacle))
         places = polylines.dense(nodes, 0.5 * self.model.delta)
         distance = np.asarray(alone.distance(places))
-        near = distance <= max(float(distance.min()), 0.0) + TOUCHING * self.model.delta
-        sides = {s for away in alone.gradient(places[near]) for s in _direction(away).split()}
-        meant, opposite = MEANT[side]
+        near = distance <= max(float(distance.min()), 0.0) + self._contact_distance
+        sides = {s for away in alone.gradient(places[near]) for s in self._direction(away).split()}
+        meant, opposite = DIRECTIONS[side]
         return meant in sides and opposite not in sides
 
     def _index(self, obstacle: int | str) -> int:
@@ -290,102 +288,112 @@ class SpaceSite:
             return int(obstacle)
         raise InputError(f"obstacle: expected a name or an index of a solid, got {obstacle!r}")
 
-    def _of(self, solid: int) -> Any:
-        """The field of one solid."""
-        return _alone(self._solids[solid])
+    def _field_of(self, solid: int) -> Any:
+        """Return the distance field of one solid."""
+        return _field_of_solid(self._solids[solid])
 
-    def passes(self, nodes: Floats, word: Word) -> str:
-        """By the solids that it rests on."""
+    @property
+    def _contact_distance(self) -> float:
+        """Return the distance from a solid within which a tether rests on it, m."""
+        return self.policy.loops.contact_share * self.model.delta
+
+    def _direction(self, away: Floats) -> str:
+        """Return the name of a direction."""
+        x, y, z = (float(v) for v in away)
+        if abs(z) >= self.policy.min_vertical_share:
+            return "above" if z > 0.0 else "below"
+        angle = math.degrees(math.atan2(x, y))
+        return AXES[int((angle + 22.5) // 45.0) % 8]
+
+    def describe_path(self, nodes: Floats, word: Word) -> str:
+        """Describe a tether by the solids that it rests on."""
         inner = nodes[1:-1]
-        touching = inner[self.field.distance(inner) <= TOUCHING * self.model.delta]
+        touching = inner[self.field.distance(inner) <= self._contact_distance]
         out: list[str] = []
         before = None
         for place, solid in zip(touching, self.field.nearest(touching), strict=True):
             if solid != before:
-                side = _direction(self.field.gradient(place))
+                side = self._direction(self.field.gradient(place))
                 out.append(f"{beside(side, self.name_of(int(solid)))} (rests on it)")
             before = solid
         return ", ".join(out) or "straight from the anchor"
 
     def turning(self, nodes: Floats) -> float:
-        """In space."""
+        """Return the sum of the angles by which a tether turns, rad."""
         steps = np.diff(nodes, axis=0)
         lengths = np.linalg.norm(steps, axis=1)
         ahead = steps[lengths > 1e-9] / lengths[lengths > 1e-9][:, None]
         return float(np.arccos(np.clip((ahead[:-1] * ahead[1:]).sum(1), -1.0, 1.0)).sum())
 
     def name_of(self, obstacle: int) -> str:
-        """Its name, or its number; -1 is the mesh, cloud or sea floor."""
+        """Return the name of a solid, or its number; -1 is the mesh, cloud or sea floor."""
         if not 0 <= obstacle < len(self._solids):
             return "the structure"
         return self._solids[obstacle].name or f"solid {obstacle + 1}"
 
     def side_of(self, obstacle: int, place: Floats) -> str:
-        """An axis, above or below."""
-        known = 0 <= obstacle < len(self._solids)
-        return _direction((self._of(obstacle) if known else self.field).gradient(place))
+        """Return the side of a solid by an axis, or above or below."""
+        is_known = 0 <= obstacle < len(self._solids)
+        field = self._field_of(obstacle) if is_known else self.field
+        return self._direction(field.gradient(place))
 
     def nearest(self, around: Sequence[int], place: Floats) -> int:
-        """By the distance to its surface."""
+        """Return which of the given solids has the nearest surface."""
         known = [k for k in around if 0 <= k < len(self._solids)]
         if not known:
             return around[0]
-        return min(known, key=lambda k: float(self._of(k).distance(place)))
+        return min(known, key=lambda k: float(self._field_of(k).distance(place)))
 
     def as_planned(self, robot: Floats, word: Word, off: float) -> bool | None:
-        """By the word at the nearest stop that is within reach."""
+        """Return whether the word is that of a visit within reach; None if no visit is."""
         tour = self.mission.tour
         if tour is None:
             return None
-        ends = np.array([stop.path[-1] for stop in tour.stops]).reshape(-1, 3)
+        ends = np.array([visit.path[-1] for visit in tour.stops]).reshape(-1, 3)
         far = np.linalg.norm(ends - robot, axis=1)
         at = np.flatnonzero(far <= max(self.mission.reach, self.model.delta) + off)
         if not len(at):
             return None
-        # stops may be near one another
-        meant = []
+        # visits may be near one another
+        planned = []
         for k in at:
-            (letters,) = self.letters.written(ends[k][None], robot[None])
+            (letters,) = self.letters.words_of_steps(ends[k][None], robot[None])
             if letters is not None:
-                meant.append(self.letters.join(tuple(tour.stops[k].signature), letters))
-        return word in meant if meant else None
+                planned.append(self.letters.join(tuple(tour.stops[k].signature), letters))
+        return word in planned if planned else None
 
     def check_word(self, word: Word) -> None:
-        """Letters are those of the group."""
+        """Raise InputError if a letter is not of the group, or the word is not reduced."""
         group = self.water.words.group
         if any(x == 0 or abs(x) > group.rank for x in word):
             raise InputError(f"expected letters from 1 to {group.rank}")
         if group.normal(word) != word:
             raise InputError("expected reduced words")
 
-    def shown(self) -> dict[str, Any]:
-        """Solids from above."""
+    def map_data(self) -> dict[str, Any]:
+        """Return the anchor, the waypoints, and the solids from above."""
         obstacles = []
         for k, solid in enumerate(self._solids):
-            for rim in silhouette(solid.shape):
+            for rim in silhouette(solid.shape, self.policy.arc_segments):
                 middle = rim.mean(0)
-                obstacles.append({
-                    "name": self.name_of(k), "middle": middle.round(3).tolist(),
-                    "rim": rim.round(3).tolist(), "grown": rim.round(3).tolist(),
-                })  # fmt: skip
+                obstacles.append(
+                    {
+                        "name": self.name_of(k),
+                        "middle": middle.round(3).tolist(),
+                        "rim": rim.round(3).tolist(),
+                        "grown": rim.round(3).tolist(),
+                    }
+                )
         return {
-            "base": self.anchor[:2].tolist(), "obstacles": obstacles,
+            "base": self.anchor[:2].tolist(),
+            "obstacles": obstacles,
             "goals": [
                 {"name": f"waypoint {n}", "position": list(w.position)}
                 for n, w in enumerate(self.mission.waypoints, 1)
             ],
-        }  # fmt: skip
+        }
 
 
 @lru_cache(maxsize=4096)
-def _alone(solid: Any) -> Any:
+def _field_of_solid(solid: Any) -> Any:
     return Scene(solids=(solid,)).field()
-
-
-def _direction(away: Floats) -> str:
-    """The name of a direction."""
-    x, y, z = (float(v) for v in away)
-    if abs(z) >= UPRIGHT:
-        return "above" if z > 0.0 else "below"
-    angle = math.degrees(math.atan2(x, y))
-    return AXES[int((angle + 22.5) // 45.0) % 8]

@@ -1,4 +1,4 @@
-"""Recordings that are tables, with the quantities in columns of a name (`netsp.base.axes`)."""
+"""Recordings that are tables with named columns (`netsp.base.axes`)."""
 
 from __future__ import annotations
 
@@ -13,54 +13,49 @@ from netsp.base.errors import InputError
 from netsp.base.field_types import Point3
 from netsp.base.validated import shown
 from netsp.exchange.maps.time_stamps import NO_VALUES, TimeStamps
+from netsp.online.guard.guard_policy import RecordingPolicy
 from netsp.online.guard.message_tally import MessageTally
-from netsp.online.guard.recording_checks import RecordingPolicy, in_order_of_time
+from netsp.online.guard.recording_checks import in_order_of_time
 from netsp.online.guard.telemetry import Fix
 from netsp.online.link.geo_frame import Frame
 
 TRUTH = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
-
-MAX_METRES = 1e9
-"""Bound on places, lengths (m) and velocities (m/s) of a table; larger numbers are refused."""
+"""Values of a column of truths, in small letters."""
 
 POSITION_PAIRS: tuple[tuple[Quantity, Quantity], ...] = (
-    ("x", "y"), ("north", "east"), ("latitude", "longitude"),
-)  # fmt: skip
+    ("x", "y"),
+    ("north", "east"),
+    ("latitude", "longitude"),
+)
 """Pairs of quantities that give a position in the plan; the first pair in the table counts."""
 
 EXTRA_QUANTITIES: tuple[Quantity, ...] = (
-    "velocity_x", "velocity_y", "velocity_z", "heading", "armed", "mode", "estimate", "paid_out",
-)  # fmt: skip
+    "velocity_x",
+    "velocity_y",
+    "velocity_z",
+    "heading",
+    "armed",
+    "mode",
+    "estimate",
+    "paid_out",
+)
 """Quantities besides the position that a row may have."""
 
 
-def read_recording(
-    file: Path, frame: Frame, tally: MessageTally, on_note: Callable[[str], None]
+def read_table_fixes(
+    file: Path,
+    frame: Frame,
+    tally: MessageTally,
+    on_note: Callable[[str], None],
+    policy: RecordingPolicy = RecordingPolicy(),
 ) -> Iterator[Fix]:
-    """Read the rows of a table.
-
-    Parameters
-    ----------
-    file : Path
-        Table that `netsp.base.axes.read_table` reads, its columns named in the first line.
-    frame : Frame
-        Frame of the site.
-    tally : MessageTally
-        Told what becomes of each row.
-    on_note : callable
-        Called with what was assumed.
-
-    Yields
-    ------
-    Fix
-        One for each row; a row without a place is a gap.
+    """Yield the fixes of a table, one for each row; a row without a place is a gap.
 
     Raises
     ------
     InputError
         The table is missing, a value is invalid, or a column of depths holds heights.
     """
-    policy = RecordingPolicy()
     found: list[Fix] = []
     try:
         rows = _Rows(read_table(file), frame, on_note, policy)
@@ -87,13 +82,13 @@ class _Rows:
 
     def __init__(
         self, table: Table, frame: Frame, on_note: Callable[[str], None], policy: RecordingPolicy
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.table, self.frame, self.policy = table, frame, policy
         self.where = table.source
         self.on_note = on_note
         plan, up = table.pair(POSITION_PAIRS), table.height()
         self.clock: Quantity = "time" if "time" in table else "date"
-        if plan is None or self.clock not in table or (up is None and not frame.is_of_plane):
+        if plan is None or self.clock not in table or (up is None and not frame.is_planar):
             raise table.wanted(
                 "columns t, x, y, z (or t, north, east, down; or t, lat, lon, altitude or depth)"
             )
@@ -101,11 +96,10 @@ class _Rows:
         if up is None:
             self._note("no column z, altitude or depth: z is taken as 0")
         if plan == ("latitude", "longitude") and not frame.is_global:
-            raise InputError(
-                f"{self.where}: positions are in degrees, and "
-                + ("--frame local asks for metres; expected --frame global" if frame.has_origin
-                   else "the site has no origin; expected a problem with an origin")
-            )  # fmt: skip
+            why = "the site has no origin; expected a problem with an origin"
+            if frame.has_origin:
+                why = "--frame local asks for metres; expected --frame global"
+            raise InputError(f"{self.where}: positions are in degrees, and {why}")
         used = ("time", "date", *plan, *EXTRA_QUANTITIES, *((up,) if up else ()))
         for note in table.notes(used):
             self._note(note)
@@ -162,13 +156,18 @@ class _Rows:
         v, w, u = (self._number(k, q) for q in EXTRA_QUANTITIES[:3])
         velocity = None
         if v is not None and w is not None:
-            there = (v, w, u or 0.0)
-            velocity = there if self.plan == ("x", "y") else self.frame.velocity(*there)
+            given = (v, w, u or 0.0)
+            velocity = given if self.plan == ("x", "y") else self.frame.velocity(*given)
         return Fix(
-            time, place, self._number(k, "heading"), self._truth(k, "armed"),
-            self._cell(k, "mode") or None, self._truth(k, "estimate"),
-            self._number(k, "paid_out"), velocity,
-        )  # fmt: skip
+            time,
+            position=place,
+            heading=self._number(k, "heading"),
+            armed=self._truth(k, "armed"),
+            mode=self._cell(k, "mode") or None,
+            estimate=self._truth(k, "estimate"),
+            paid_out=self._number(k, "paid_out"),
+            velocity=velocity,
+        )
 
     def _cell(self, k: int, quantity: Quantity) -> str:
         text = self.table.plain(k, quantity) if quantity in self.table else ""
@@ -182,10 +181,10 @@ class _Rows:
             value = float(text) * self.table.columns[quantity][1].factor
         except ValueError:
             value = math.nan
-        if not abs(value) < MAX_METRES:
+        if not abs(value) < self.policy.max_value:
             raise InputError(
                 f"{self._at(k)}: {self.table.title(quantity)}: expected a number below "
-                f"{MAX_METRES:g}, got {shown(text)}"
+                f"{self.policy.max_value:g}, got {shown(text)}"
             )
         return value + 0.0
 

@@ -1,35 +1,35 @@
-"""What a vehicle says of itself."""
+"""Fixes: what a vehicle reports of itself."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 from netsp.base.field_types import Point3
 
 
 @dataclass(frozen=True)
 class Fix:
-    """One message, or one row of a recording; None for what it does not say.
+    """Fix from one message, or one row of a recording; None for what it does not report.
 
-    Parameters
+    Attributes
     ----------
-    time : float
-        Seconds, of the vehicle's clock.
-    position : (x, y, z), optional
-        As estimated, in the frame of the site, z up.
-    heading : float, optional
-        Degrees clockwise from the y axis.
-    armed : bool, optional
-        Whether its motors may turn.
-    mode : str, optional
-        Name of its mode.
-    estimate : bool, optional
-        Whether it vouches for the position.
-    paid_out : float, optional
+    time
+        Time by the vehicle's clock, s.
+    position
+        Estimated position in the frame of the site, z up.
+    heading
+        Heading, degrees clockwise from the y axis.
+    armed
+        Whether the motors may turn.
+    mode
+        Name of the mode.
+    estimate
+        Whether the vehicle vouches for its position.
+    paid_out
         Length of tether that the winch has let out.
-    velocity : (x, y, z), optional
-        As estimated with the position, m/s.
-    aiding_fault : str, optional
+    velocity
+        Velocity estimated with the position, m/s.
+    aiding_fault
         Reason why no fixes of GPS or another system correct the position; empty while they do.
     """
 
@@ -42,3 +42,8 @@ class Fix:
     paid_out: float | None = None
     velocity: Point3 | None = None
     aiding_fault: str | None = None
+
+    def completed_by(self, earlier: Fix) -> Fix:
+        """Return this fix with what only an earlier one reports."""
+        missing = (f.name for f in fields(Fix) if getattr(self, f.name) is None)
+        return replace(self, **{name: getattr(earlier, name) for name in missing})

@@ -12,25 +12,28 @@ from typing import Any
 
 from netsp.base.errors import InputError
 from netsp.base.files import read_bytes
+from netsp.online.guard.guard_policy import RecordingPolicy
 from netsp.online.guard.message_tally import MessageTally
 from netsp.online.guard.telemetry import Fix
 from netsp.online.link.dialect import dialect, parser
 from netsp.online.link.geo_frame import Frame
 from netsp.online.link.mavlink_messages import AUTOPILOT, POSITIONS, Listener
-from netsp.online.link.vehicle_kind import other_vehicle
+from netsp.online.link.vehicle_kind import other_vehicle_warning
 
 STAMP_BYTES = 8
-"""Length of the time stamp before each message, bytes."""
-
-MAX_STEP_US = 86_400_000_000
-"""Longest time between two messages in a row, microseconds: with it, messages of other dialects are
-told from chance."""
+"""Format of a log: length of the time stamp before each message, bytes."""
 
 CHECKSUM_BYTES = 2
-"""Length of the checksum after each message, bytes."""
+"""Format of MAVLink: length of the checksum after each message, bytes."""
 
-_VERSION_1, _VERSION_2, _SIGNED = 0xFE, 0xFD, 1
-"""First bytes of MAVLink's messages, and the flag of a message with a signature."""
+_VERSION_1 = 0xFE
+"""Format of MAVLink 1: first byte of a message."""
+
+_VERSION_2 = 0xFD
+"""Format of MAVLink 2: first byte of a message."""
+
+_SIGNED = 1
+"""Format of MAVLink 2: flag of a message with a signature."""
 
 _MARKER = re.compile(b"[\xfd\xfe]")
 
@@ -38,44 +41,31 @@ _BITS_REVERSED = bytes(int(f"{k:08b}"[::-1], 2) for k in range(256))
 
 
 def read_tlog(
-    file: Path, frame: Frame, system: int | None, tally: MessageTally,
+    file: Path,
+    frame: Frame,
+    system: int | None,
+    tally: MessageTally,
     on_note: Callable[[str], None],
-) -> list[Fix]:  # fmt: skip
-    """Read the messages of one vehicle.
+    policy: RecordingPolicy = RecordingPolicy(),
+) -> list[Fix]:
+    """Read the messages of one vehicle, one fix for each message that is used.
 
-    Parameters
-    ----------
-    file : Path
-        Log of a ground station.
-    frame : Frame
-        Frame of the site.
-    system : int, optional
-        System id of the vehicle; by default the only one that tells positions.
-    tally : MessageTally
-        Told what becomes of each message.
-    on_note : callable
-        Called with what was assumed.
-
-    Returns
-    -------
-    list of Fix
-        One for each message that says something that counts; none with a position where the
-        recording has none.
+    `system` is the vehicle's system id; by default the only one with positions.
 
     Raises
     ------
     InputError
-        The file is no telemetry log; several vehicles tell positions and `system` is None; no
+        The file is no telemetry log; several vehicles have positions and `system` is None; no
         message is of `system`.
     """
     where = f"--replay: {file}"
     data = read_bytes(file)
-    heard = _Recording.heard(data, frame)
-    if not heard.vehicles and not heard.others.total:
+    recording = _Recording.parse(data, frame, policy)
+    if not recording.vehicles and not recording.others.total:
         raise InputError(f"{where}: {_no_log(data)}")
-    vehicle = heard.vehicle(system, where)
-    if not vehicle.has_positions and frame.is_global and not frame.is_asked_for:
-        other = _Recording.heard(data, frame.local())
+    vehicle = recording.vehicle(system, where)
+    if not vehicle.has_positions and frame.is_global and not frame.is_given:
+        other = _Recording.parse(data, frame.local(), policy)
         fallback = other.vehicle(system, where)
         if fallback.has_positions:
             on_note(
@@ -83,39 +73,28 @@ def read_tlog(
                 "metres north, east and down of the base, as with --frame local; right only if "
                 "the vehicle's estimate began there"
             )
-            heard, vehicle = other, fallback
-    heard.count(vehicle, tally)
-    if heard.foreign_bytes > 0:
-        on_note(f"{where}: {heard.foreign_bytes:,} bytes left out: they belong to no message")
+            recording, vehicle = other, fallback
+    recording.count(vehicle, tally)
+    if recording.foreign_bytes > 0:
+        on_note(f"{where}: {recording.foreign_bytes:,} bytes left out: they belong to no message")
     kind = vehicle.listener.kind
     if kind is not None and not kind.is_ardusub:
-        on_note(f"{where}: {other_vehicle(kind)}")
+        on_note(f"{where}: {other_vehicle_warning(kind)}")
     if not vehicle.has_positions:
-        raise InputError(f"{where}: has no positions{_help(heard, vehicle, frame)}")
+        raise InputError(f"{where}: has no positions{_help(recording, vehicle, frame)}")
     return vehicle.fixes
 
 
-def messages_of(data: bytes) -> Iterator[Any]:
-    """Yield the messages of a log; bytes that belong to no message are skipped.
-
-    Parameters
-    ----------
-    data : bytes
-        The log.
-
-    Yields
-    ------
-    MAVLink_message
-        One after the other.
-    """
+def messages_of_log(data: bytes, policy: RecordingPolicy = RecordingPolicy()) -> Iterator[Any]:
+    """Yield the messages of a log in order; bytes that belong to no message are skipped."""
     reads, error = parser(), dialect().MAVError
     at = 0
     while (begin := _next_marker(data, at + STAMP_BYTES)) >= 0:
-        at = begin + 1 - STAMP_BYTES  # where to go on when this is no message
+        at = begin + 1 - STAMP_BYTES  # the next place to search if this is no message
         end = begin + _length(data, begin)
         if end > len(data) or (data[begin] == _VERSION_2 and data[begin + 2] & ~_SIGNED):
             continue
-        if not _is_message(data, begin, end):
+        if not _is_message(data, begin, end, policy):
             continue
         try:
             message = reads.decode(bytearray(data[begin:end]))
@@ -141,22 +120,24 @@ def _length(data: bytes, begin: int) -> int:
     return header + data[begin + 1] + CHECKSUM_BYTES + signature
 
 
-def _is_message(data: bytes, begin: int, end: int) -> bool:
-    """Return whether some bytes are a message, by their checksum; messages of other dialects, which
-    have no known checksum, are recognized by the times before and after them.
+def _is_message(data: bytes, begin: int, end: int, policy: RecordingPolicy) -> bool:
+    """Return whether some bytes are a message, by their checksum.
 
-    pymavlink does the same in Python, which takes seconds for each megabyte of a file that is no
-    log. `binascii.crc_hqx` has the polynomial of MAVLink's checksum, with the bits of each byte
-    reversed.
+    Messages of other dialects, which have no known checksum, are recognized by the times before
+    and
+    after them. pymavlink does the same in Python, which takes seconds for each megabyte of a
+    file
+    that is no log. `binascii.crc_hqx` has the polynomial of MAVLink's checksum, with the bits
+    of each
+    byte reversed.
     """
-    header = 6 if data[begin] == _VERSION_1 else 10
-    number = (
-        data[begin + 5] if data[begin] == _VERSION_1
-        else int.from_bytes(data[begin + 7 : begin + 10], "little")
-    )  # fmt: skip
+    if data[begin] == _VERSION_1:
+        header, number = 6, data[begin + 5]
+    else:
+        header, number = 10, int.from_bytes(data[begin + 7 : begin + 10], "little")
     known = dialect().mavlink_map.get(number)
     if known is None:
-        return _is_between_times(data, begin, end)
+        return _is_between_times(data, begin, end, policy)
     tail = begin + header + data[begin + 1]
     checked = data[begin + 1 : tail] + bytes([known.crc_extra])
     found = binascii.crc_hqx(checked.translate(_BITS_REVERSED), 0xFFFF)
@@ -164,13 +145,14 @@ def _is_message(data: bytes, begin: int, end: int) -> bool:
     return found == _BITS_REVERSED[low] << 8 | _BITS_REVERSED[high]
 
 
-def _is_between_times(data: bytes, begin: int, end: int) -> bool:
+def _is_between_times(data: bytes, begin: int, end: int, policy: RecordingPolicy) -> bool:
     """Return whether the times before and after some bytes are of one log, or the log ends here."""
     following = end + STAMP_BYTES
     if following >= len(data):
         return end == len(data)
     before, after = (int.from_bytes(data[k - STAMP_BYTES : k], "big") for k in (begin, following))
-    return data[following] in (_VERSION_1, _VERSION_2) and abs(after - before) < MAX_STEP_US
+    is_soon = abs(after - before) < 1e6 * policy.max_message_gap_s
+    return data[following] in (_VERSION_1, _VERSION_2) and is_soon
 
 
 def _no_log(data: bytes) -> str:
@@ -196,8 +178,9 @@ class _Vehicle:
     def has_positions(self) -> bool:
         return any(f.position is not None for f in self.fixes)
 
-    def take(self, message: Any) -> None:
-        fix = self.listener.understand(message)
+    def add(self, message: Any) -> None:
+        """Add a message to the fixes, or count why it has none."""
+        fix = self.listener.read(message)
         kind = message.get_type()
         if fix is None and self.listener.left_out:
             self.tally.leave_out(kind, self.listener.left_out)
@@ -208,7 +191,7 @@ class _Vehicle:
 
 
 class _Recording:
-    """Recording by vehicles."""
+    """Recording, sorted by vehicle."""
 
     def __init__(self) -> None:
         self.vehicles: dict[int, _Vehicle] = {}
@@ -216,10 +199,11 @@ class _Recording:
         self.foreign_bytes = 0
 
     @classmethod
-    def heard(cls, data: bytes, frame: Frame) -> _Recording:
+    def parse(cls, data: bytes, frame: Frame, policy: RecordingPolicy) -> _Recording:
+        """Parse a log, and sort its messages by vehicle."""
         self = cls()
         self.foreign_bytes = len(data)
-        for message in messages_of(data):
+        for message in messages_of_log(data, policy):
             self.foreign_bytes -= STAMP_BYTES + len(message.get_msgbuf())
             system = message.get_srcSystem()
             if message.get_srcComponent() != AUTOPILOT:
@@ -230,11 +214,11 @@ class _Recording:
             if vehicle is None:
                 vehicle = _Vehicle(system, Listener(frame, system))
                 self.vehicles[system] = vehicle
-            vehicle.take(message)
+            vehicle.add(message)
         return self
 
     def vehicle(self, system: int | None, where: str) -> _Vehicle:
-        """Return the vehicle that is asked for, or the only one that tells positions."""
+        """Return the given vehicle, or the only one with positions."""
         if system is not None:
             if system not in self.vehicles:
                 raise InputError(f"{where}: has no positions of system {system}{self._systems()}")
@@ -256,42 +240,40 @@ class _Recording:
         return placed[0] if placed else next(iter(self.vehicles.values()))
 
     def _systems(self) -> str:
-        heard = ", ".join(f"{v.system}" for v in self.vehicles.values())
-        return f"; it has messages of system {heard}" if heard else "; it has no messages"
+        systems = ", ".join(f"{v.system}" for v in self.vehicles.values())
+        return f"; it has messages of system {systems}" if systems else "; it has no messages"
 
     def count(self, vehicle: _Vehicle, tally: MessageTally) -> None:
-        """Tell what became of each message."""
+        """Count each message as used or left out for a vehicle."""
         for other in self.vehicles.values():
             if other is vehicle:
-                tally.used.update(other.tally.used)
-                for reason, kinds in other.tally.left_out.items():
-                    for kind, n in kinds.items():
-                        tally.leave_out(kind, reason, n)
+                tally.add(other.tally)
             else:
                 kind = f"of system {other.system}"
                 reason = f"not of the vehicle, system {vehicle.system}"
                 tally.leave_out(kind, reason, other.tally.total)
-        for reason, kinds in self.others.left_out.items():
-            for kind, n in kinds.items():
-                tally.leave_out(kind, reason, n)
+        tally.add(self.others)
 
 
-def _help(heard: _Recording, vehicle: _Vehicle, frame: Frame) -> str:
+def _help(recording: _Recording, vehicle: _Vehicle, frame: Frame) -> str:
     """Return what to do about a recording without positions."""
+    left_out = vehicle.tally.left_out.items()
     reasons = {
-        (kind, reason): n for reason, kinds in vehicle.tally.left_out.items()
-        for kind, n in kinds.items() if kind in POSITIONS
-    }  # fmt: skip
+        (kind, reason): n
+        for reason, kinds in left_out
+        for kind, n in kinds.items()
+        if kind in POSITIONS
+    }
     if not reasons:
-        placed = [v.system for v in heard.vehicles.values() if v.has_positions]
-        looked = f" of system {vehicle.system}: expected {' or '.join(POSITIONS)}"
-        return looked + (f"; or --system {placed[0]}" if placed else "")
-    said = "; ".join(f"{n} {kind}: {reason}" for (kind, reason), n in reasons.items())
+        placed = [v.system for v in recording.vehicles.values() if v.has_positions]
+        expected = f" of system {vehicle.system}: expected {' or '.join(POSITIONS)}"
+        return expected + (f"; or --system {placed[0]}" if placed else "")
+    text = "; ".join(f"{n} {kind}: {reason}" for (kind, reason), n in reasons.items())
     local, degrees = (any(k == kind for k, _ in reasons) for kind in POSITIONS)
     if local and frame.is_global:
-        said += "; expected --frame local to read the metres"
+        text += "; expected --frame local to read the metres"
     elif degrees and not frame.is_global and frame.has_origin:
-        said += "; expected --frame global to read the degrees"
+        text += "; expected --frame global to read the degrees"
     elif degrees and not frame.is_global:
-        said += "; expected a problem with an origin to read the degrees"
-    return f": {said}"
+        text += "; expected a problem with an origin to read the degrees"
+    return f": {text}"

@@ -1,4 +1,4 @@
-"""The taut tether of every class that is believed, from update to update."""
+"""Taut tethers of the classes that are believed, from update to update."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from netsp.world.tether import Tether
 
 @dataclass(frozen=True)
 class Strand:
-    """A class, and its tether.
+    """Class that is believed, and its tether.
 
-    Parameters
+    Attributes
     ----------
-    word : Word
-        Of the class.
-    likely : float
-        Its share among those believed.
-    tether : Tether
-        Taut, to where the robot is in that class.
-    believed : Word
-        Of the class, as the belief has it: to where the robot is if it may be in obstacles, too.
+    word
+        Word of the class.
+    likely
+        Share among the classes believed.
+    tether
+        Taut tether to the robot in that class.
+    believed
+        Word of the class in the belief: to the place of the robot if that may be in an
+        obstacle.
     """
 
     word: Word
@@ -37,48 +38,38 @@ class Strand:
 
 
 class Strands:
-    """Keeps the tethers of classes taut.
-
-    Parameters
-    ----------
-    site : Site
-        Where.
-    """
+    """Taut tethers of the classes that are believed."""
 
     def __init__(self, site: Site) -> None:
         self.site = site
         self.all: list[Strand] = []
 
-    def follow(self, hypotheses: list[Hypothesis], robot: Floats, most: int) -> list[Strand]:
-        """The tethers of what is believed now.
+    def follow(self, hypotheses: list[Hypothesis], robot: Floats, max_count: int) -> list[Strand]:
+        """Return the tethers of the classes that are believed now, the likeliest first.
+
+        Classes whose tether would be too long are left out; shares are among the others.
 
         Parameters
         ----------
         hypotheses : list of Hypothesis
-            The likeliest first.
+            Classes, the likeliest first.
         robot : ndarray, shape (3,)
-            Estimate of its place, metres.
-        most : int
-            Tethers at most.
-
-        Returns
-        -------
-        list of Strand
-            The likeliest first; classes without a tether of twice its length are left out, and
-            shares are among the others.
+            Estimate of the robot's place, m.
+        max_count : int
+            Maximum number of tethers.
         """
-        strands = self._of(hypotheses, robot, most)
+        strands = self._strands(hypotheses[:max_count], robot)
         total = sum(s.likely for s in strands)
         self.all = [replace(s, likely=s.likely / total) for s in strands]
         return self.all
 
-    def _of(self, hypotheses: list[Hypothesis], robot: Floats, most: int) -> list[Strand]:
+    def _strands(self, hypotheses: list[Hypothesis], robot: Floats) -> list[Strand]:
         site, out = self.site, []
-        for h in hypotheses[:most]:
-            there = robot.copy()
-            there[:2] += h.offset
-            place = pushed_out(site.field, there[None], 1e-6)[0]
-            (step,) = site.letters.written(there[None], place[None])
+        for h in hypotheses:
+            believed_place = robot.copy()
+            believed_place[:2] += h.offset
+            place = pushed_out(site.field, believed_place[None], 1e-6)[0]
+            (step,) = site.letters.words_of_steps(believed_place[None], place[None])
             if step is None:
                 continue
             word = site.letters.join(h.word, step)
@@ -88,17 +79,19 @@ class Strands:
         return out
 
     def _tether(self, word: Word, place: Floats) -> Tether | None:
-        """On from one that hangs already, or, if that is of another class, found anew."""
+        """Return a known tether moved to a place, or a recovered one if none is of the class."""
         site = self.site
         for strand in self.all:
             step = np.array([strand.tether.robot, place])
-            (letters,) = site.letters.written(step[:1], step[1:])
+            (letters,) = site.letters.words_of_steps(step[:1], step[1:])
             if letters is None or site.letters.join(strand.word, letters) != word:
                 continue
             if not site.field.line_of_sight(step[0], step[1], 0.2 * site.model.delta):
                 continue
             moved = site.model.update(strand.tether, place)
-            hangs = site.word_of(moved.nodes)
-            if hangs is None or hangs == word:  # it dips too deep for a word, where it bends most
+            moved_word = site.word_of(moved.nodes)
+            if (
+                moved_word is None or moved_word == word
+            ):  # None where it bends too deep into a solid
                 return moved
-        return site.found(word, place, [(s.word, s.tether) for s in self.all])
+        return site.recover_tether(word, place, [(s.word, s.tether) for s in self.all])

@@ -1,6 +1,6 @@
-"""The guardian of a tether: fixes in, reports out.
+"""Guard of a tether: fixes in, reports out.
 
-fix → track (noise, gaps, jumps) → belief (classes) → taut tethers → ahead → alarms → report
+fix → track (noise, dropouts, jumps) → belief (classes) → taut tethers → lookahead → alarms → report
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ from netsp.online.guard import reasons
 from netsp.online.guard.alarms import Alarm, Alarms
 from netsp.online.guard.belief import Belief
 from netsp.online.guard.dead_reckoning import DeadReckoning
-from netsp.online.guard.dropout import after_gap
-from netsp.online.guard.guard_report import ClassNow, Report
-from netsp.online.guard.lookahead import Ahead, Look
-from netsp.online.guard.position_track import GAP, JUMPED, Motion, Track
+from netsp.online.guard.dropout import classes_after_dropout
+from netsp.online.guard.guard_policy import GuardPolicy
+from netsp.online.guard.guard_report import ClassReport, Report
+from netsp.online.guard.lookahead import Lookahead, LookaheadResult
+from netsp.online.guard.position_track import JUMPED, Motion, Track
 from netsp.online.guard.site import Loop, Site
 from netsp.online.guard.site_files import site_of
 from netsp.online.guard.telemetry import Fix
@@ -30,32 +31,20 @@ from netsp.online.guard.tether_belief import Strand, Strands
 from netsp.world.mission.mission import Mission
 from netsp.world.tether import Tether
 
-LEFT_OF_NOISE = 0.4
-"""Share of an estimate's noise that is left when it is smoothed, about."""
-
-LOOK_S = 0.3
-"""Seconds between the beginnings of two looks ahead, at least."""
-
-MOST_TETHERS = 8
-"""Of the classes believed, the likeliest get a tether."""
-
-PAID_OUT = 1.05
-"""Times what the winch says it has let out; a class whose taut tether is longer is none."""
-
 
 @dataclass(frozen=True)
 class GuardOptions:
-    """What is known of the vehicle.
+    """Knowledge of the vehicle.
 
-    Parameters
+    Attributes
     ----------
-    noise : float
-        Standard deviation of one position estimate, metres.
-    drift : float
-        Standard deviation of how far estimates are off for minutes, metres.
-    speed : float
-        Fastest speed, m/s.
-    dead_reckoning : DeadReckoning
+    noise
+        Standard deviation of one position estimate, m.
+    drift
+        Standard deviation of the error of estimates that lasts for minutes, m.
+    speed
+        Full speed, m/s.
+    dead_reckoning
         Growth of the drift while no fixes correct the position.
     """
 
@@ -66,19 +55,21 @@ class GuardOptions:
 
 
 class Guard:
-    """Keeps the class, the taut tether, and what the present motion leads to.
+    """Guard of a tether: keeps its class, its taut line, and what the present motion leads to.
 
     Parameters
     ----------
     problem : Problem, Mission or Site
-        The site: where the tether is fixed, its length and what is in the way count.
+        Site: the base, the tether's length and the obstacles count.
     options : GuardOptions, optional
-        What is known of the vehicle.
+        Knowledge of the vehicle.
+    policy : GuardPolicy
+        Thresholds and limits. A `Site` brings its own `SitePolicy`.
 
     Raises
     ------
     InputError
-        Options out of range.
+        An option is out of range.
 
     Examples
     --------
@@ -88,44 +79,56 @@ class Guard:
     ...                obstacles=[Circle(center=(5, 0), radius=1)])
     >>> guard = Guard(site, GuardOptions(noise=0.0, drift=0.0))
     >>> for t in range(21):
-    ...     report = guard.take(Fix(float(t), (0.3 * t, 0.1 * t, 0.0), estimate=True))
+    ...     report = guard.update(Fix(float(t), (0.3 * t, 0.1 * t, 0.0), estimate=True))
     >>> report.classes[0].word, round(report.classes[0].slack, 2), report.loops
     ((1,), 2.68, ())
     """
 
     def __init__(
-        self, problem: Problem | Mission | Site, options: GuardOptions | None = None
+        self,
+        problem: Problem | Mission | Site,
+        options: GuardOptions | None = None,
+        policy: GuardPolicy = GuardPolicy(),
     ) -> None:
-        self.site, self.options = site_of(problem), options or GuardOptions()
+        self.site, self.options = site_of(problem, policy.site), options or GuardOptions()
+        self.policy = policy
         for name in ("noise", "drift"):
             checked_argument(name, getattr(self.options, name), 0.0)
         if not checked_argument("speed", self.options.speed, 0.0):
             raise InputError("speed: expected a positive number, got 0")
         o = self.options
-        self.track = Track(o.noise, o.speed)
-        self.belief = Belief(self.site.letters, o.drift, LEFT_OF_NOISE * o.noise)
+        self.track = Track(o.noise, o.speed, policy.track)
+        self._noise_left = policy.noise_left * o.noise
+        self.belief = Belief(self.site.letters, o.drift, self._noise_left, policy.belief)
         self.strands = Strands(self.site)
-        self.alarms = Alarms()
-        self._vouched: bool | None = None
+        self.alarms = Alarms(policy.alarms)
+        self._is_vouched_for: bool | None = None
         self._uncorrected_since: float | None = None
         self._corrected_at: float | None = None
         self._jumped_m: float | None = None
         self._last = Fix(0.0)
-        self._seen, self._looked = -np.inf, -np.inf
+        self._now, self._look_began = -np.inf, -np.inf
         self._heard_since: float | None = None
-        self._is_beyond = False
-        self._looks: list[tuple[float, Look]] = []
-        self._ahead, self._sure = Ahead(), 1.0
-        self._on_plan = False
+        self._is_out_of_reach = False
+        self._reset_lookahead()
+        self._is_on_plan = False
         self._motion: Motion | None = None
         self._restored: tuple[dict[Word, float], Floats, float] | None = None
         self._previous: Motion | None = None
         self.report: Report | None = None
 
-    def remember(
-        self, words: dict[Word, float], position: Floats, seconds: float,
+    def _reset_lookahead(self) -> None:
+        """Forget what is ahead."""
+        self._looks: list[tuple[float, Lookahead]] = []
+        self._ahead, self._ahead_share = LookaheadResult(), 1.0
+
+    def begin_with(
+        self,
+        words: dict[Word, float],
+        position: Floats,
+        age_s: float,
         tethers: dict[Word, Tether] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Begin with the classes of an earlier run.
 
         Parameters
@@ -133,84 +136,77 @@ class Guard:
         words : dict of Word to float
             Classes, and their costs.
         position : ndarray, shape (3,)
-            Where the robot was, metres.
-        seconds : float
-            Since then.
+            Position of the robot at that time, m.
+        age_s : float
+            Time since then, s.
         tethers : dict of Word to Tether, optional
-            How they hung.
+            Tethers of the classes.
         """
-        self._restored = words, position, seconds
+        self._restored = words, position, age_s
         self.strands.all = [Strand(w, 1.0, t) for w, t in (tethers or {}).items()]
 
     def correct(self, side: str, obstacle: int | str) -> Report | None:
-        """The operator says on which side of an obstacle the tether passes.
+        """Keep the classes whose tether passes an obstacle on a side, as the operator says.
 
-        Classes that are believed and pass on that side are kept; where there are none, those that
-        differ least from one that was believed take their place.
+        If no believed class does, those that differ least from a believed one take their
+        place.
 
         Parameters
         ----------
         side : str
-            One of the site's `sides`, or an axis where north is not known.
+            One of the site's `sides`, or an axis if north is unknown.
         obstacle : int or str
-            Its index or name.
+            Index or name of the obstacle.
 
         Returns
         -------
         Report or None
-            As it is now; None before the first fix.
+            Report of the guard; None before the first fix.
 
         Raises
         ------
         InputError
-            As of `netsp.online.guard.correct.corrected`; nothing is known of where the robot is.
+            The place of the robot is unknown, or there is no such side, obstacle or class.
         """
         if self.track.time is None or not self.strands.all:
             raise InputError("side: nothing is known yet of where the robot is")
         strands = self.strands.all
-        agree = [s for s in strands if self.site.agrees(s.tether.nodes, side, obstacle)]
+        agree = [s for s in strands if self.site.passes_on_side(s.tether.nodes, side, obstacle)]
         if agree:
             total = sum(s.likely for s in agree)
             self.strands.all = [replace(s, likely=s.likely / total) for s in agree]
             self.belief.drop(self.belief.words - {s.believed for s in agree})
         else:
             self._begin_with_others(side, obstacle)
-        # what was ahead, or closed, was so in classes that are none
-        self._looks, self._looked, self._ahead, self._sure = [], -np.inf, Ahead(), 1.0
-        self.alarms = Alarms()
-        return self._told(self._last)
+        # loops ahead and closed loops were those of excluded classes
+        self._reset_lookahead()
+        self._look_began = -np.inf
+        self.alarms = Alarms(self.policy.alarms)
+        return self._make_report(self._last)
 
     def _begin_with_others(self, side: str, obstacle: int | str) -> None:
-        """Of all classes that the tether reaches the robot in, where it most likely is."""
-        here = self.strands.all[0].tether.robot
+        """Begin with the classes that pass on a side, of all that reach the robot's likeliest
+        place."""
+        robot = self.strands.all[0].tether.robot
         known = {s.word for s in self.strands.all}
-        others = [
-            Strand(word, 1.0, tether, word)
-            for word, tether in self.site.corrected(known, here, side, obstacle).items()
-        ]
+        found = self.site.classes_on_side(known, robot, side, obstacle)
+        others = [Strand(word, 1.0, tether, word) for word, tether in found.items()]
         self.strands.all = [replace(s, likely=1.0 / len(others)) for s in others]
         assert self._motion is not None
         estimate = self._motion.after
-        (step,) = self.site.letters.written(here[None], estimate[None])
+        (step,) = self.site.letters.words_of_steps(robot[None], estimate[None])
         join = self.site.letters.join
         self.belief.begin({join(s.word, step or ()): 0.0 for s in others})
-        hanging = self.strands.all
-        if not self.strands.follow(self.belief.classes(), estimate, MOST_TETHERS):
-            self.strands.all = hanging
+        found_strands = self.strands.all
+        if not self._follow(estimate):
+            self.strands.all = found_strands
 
-    def take(self, fix: Fix) -> Report:
-        """Something that the vehicle says.
+    def _follow(self, estimate: Floats) -> list[Strand]:
+        """Return the tethers of the likeliest classes, moved to the estimate of the position."""
+        return self.strands.follow(self.belief.classes(), estimate, self.policy.max_tethers)
 
-        Parameters
-        ----------
-        fix : Fix
-            What it says; what it does not, is as before.
-
-        Returns
-        -------
-        Report
-            As it is now.
-        """
+    def update(self, fix: Fix) -> Report:
+        """Update the guard with what the vehicle reports, and return the report of the guard."""
         self._last = replace(
             fix,
             heading=self._last.heading if fix.heading is None else fix.heading,
@@ -221,29 +217,33 @@ class Guard:
                 self._last.aiding_fault if fix.aiding_fault is None else fix.aiding_fault
             ),
         )
-        self._seen = max(self._seen, fix.time)
+        self._now = max(self._now, fix.time)
         self._note_aiding()
         if self._heard_since is None:
             self._heard_since = fix.time
         if fix.estimate is not None:
-            self._vouched = fix.estimate
+            self._is_vouched_for = fix.estimate
             if not fix.estimate:
-                self.track.lose(fix.time)
+                self.track.invalidate(fix.time)
         if fix.position is not None:
-            self._is_beyond = self._beyond(fix.position)
-        if fix.position is not None and self._is_beyond:
-            self.track.lose(fix.time)  # no robot on this tether is there
-        elif fix.position is not None and self._vouched is not False:
-            motion = self.track.take(fix)
+            self._update_position(fix, fix.position)
+        return self._make_report(self._last)
+
+    def _update_position(self, fix: Fix, position: Point3) -> None:
+        """Follow the robot to the position of a fix, if the position can be believed."""
+        self._is_out_of_reach = self._is_beyond_reach(position)
+        if self._is_out_of_reach:
+            self.track.invalidate(fix.time)
+        elif self._is_vouched_for is not False:
+            motion = self.track.observe(fix)
             if motion is not None:
-                self._moved(motion)
-            elif self.track.frozen:
+                self._follow_motion(motion)
+            elif self.track.is_frozen:
                 self._widen()
-        return self._told(self._last)
 
     def _note_aiding(self) -> None:
-        """Note the time at which fixes were lost, or taken again."""
-        now = self._seen
+        """Note the time at which fixes were lost, or accepted again."""
+        now = self._now
         if self._last.aiding_fault:
             self._corrected_at = None
             if self._uncorrected_since is None:
@@ -256,232 +256,239 @@ class Guard:
 
     @property
     def drift(self) -> float:
-        """Standard deviation of the position's error now, metres."""
+        """Return the standard deviation of the position's error now, m."""
         o, since, error = self.options, self._uncorrected_since, 0.0
         if since is not None:
-            until = self._seen if self._corrected_at is None else self._corrected_at
+            until = self._now if self._corrected_at is None else self._corrected_at
             error = o.dead_reckoning.error(until - since)
-        if self.track.frozen:  # the robot may go on in any direction
-            gone = o.speed * max(0.0, self._seen - self.track.freeze.since)
-            error = min(max(error, gone), o.dead_reckoning.max_error)
+        if self.track.is_frozen:  # the robot may go on in any direction
+            travelled = o.speed * max(0.0, self._now - self.track.freeze.since)
+            error = min(max(error, travelled), o.dead_reckoning.max_error)
         return o.drift + error
 
     def _fit_drift(self, place: Floats) -> None:
         """Update the belief if the drift has changed enough."""
         drift, known = self.drift, self.belief.drift
-        is_growing = self._uncorrected_since is not None or self.track.frozen
-        least = self.options.dead_reckoning.growth if is_growing else 1.0
-        if drift > least * known or (not is_growing and drift < 0.999 * known):
+        is_growing = self._uncorrected_since is not None or self.track.is_frozen
+        min_growth = self.options.dead_reckoning.growth if is_growing else 1.0
+        if drift > min_growth * known or (not is_growing and drift < 0.999 * known):
             self.belief = self.belief.with_drift(drift, place)
 
     def _widen(self) -> None:
         """Widen the set of classes while the position is frozen and the guard still claims one."""
-        if self._motion is None or self.track.silence(self._seen) > GAP:
+        if self._motion is None or self._is_silent:
             return
         place = self._motion.after
         known = self.belief
         self._fit_drift(place)
         if self.belief is not known:
-            self.strands.follow(self.belief.classes(), place, MOST_TETHERS)
+            self._follow(place)
 
-    def _beyond(self, place: Point3) -> bool:
-        """Whether a place is farther from the base than twice the tether."""
+    @property
+    def _is_silent(self) -> bool:
+        """Return whether there was no believable position for too long."""
+        return self.track.silence_s(self._now) > self.policy.track.dropout_s
+
+    def _is_beyond_reach(self, place: Point3) -> bool:
+        """Return whether a place is farther from the base than twice the tether."""
         far = float(np.linalg.norm(np.array(place) - self.site.anchor))
         return not far <= 2.0 * self.site.tether_length + 4.0 * self.drift
 
-    def wait(self, now: float) -> Report:
-        """Nothing has come for a while.
+    def advance_to(self, now: float) -> Report:
+        """Advance the guard's time while nothing comes, and return the report of the guard."""
+        return self.update(Fix(max(now, self._now)))
 
-        Parameters
-        ----------
-        now : float
-            Seconds, of the vehicle's clock as far as that goes on.
+    def restart_vehicle(self, fix: Fix) -> Report:
+        """Go on after a restart of the vehicle, and return the report of the guard.
 
-        Returns
-        -------
-        Report
-            As it is now.
+        The vehicle's clock counts from 0 again, and its estimate begins where it is now; `fix` is
+        the first one since.
         """
-        return self.take(Fix(max(now, self._seen)))
-
-    def restarted(self, fix: Fix) -> Report:
-        """The vehicle has started anew: its clock counts from 0 again, and its estimate begins
-        where it is now.
-
-        Parameters
-        ----------
-        fix : Fix
-            The first since.
-
-        Returns
-        -------
-        Report
-            As it is now.
-        """
-        shift = self._seen - fix.time
+        shift = self._now - fix.time
         if self.track.time is not None:
-            self.track.shift(-shift)
+            self.track.shift_clock(-shift)
         if self._previous is not None:
             self._previous = replace(self._previous, time=self._previous.time - shift)
-        self.alarms = Alarms()
-        self._seen = self._looked = -np.inf
+        self.alarms = Alarms(self.policy.alarms)
+        self._now = self._look_began = -np.inf
         self._heard_since = fix.time
         self._uncorrected_since = self._corrected_at = self._jumped_m = None
-        self.track.lose(fix.time if self.track.time is None else self.track.time)
-        self._vouched = None
-        return self.take(fix)
+        self.track.invalidate(fix.time if self.track.time is None else self.track.time)
+        self._is_vouched_for = None
+        return self.update(fix)
 
-    def _moved(self, motion: Motion) -> None:
-        o = self.options
-        first = self._motion is None
-        if not first:
+    def _follow_motion(self, motion: Motion) -> None:
+        """Update belief and tethers by a motion of the robot."""
+        is_first = self._motion is None
+        if not is_first:
             self._fit_drift(motion.before if self._previous is None else self._previous.after)
-        reach = 2.0 * (max(self.drift, self.belief.drift) + LEFT_OF_NOISE * o.noise)
+        reach = 2.0 * (max(self.drift, self.belief.drift) + self._noise_left)
         self._motion = motion
-        if first:
-            self._begin(motion, reach)
+        if is_first:
+            self._begin_belief(motion, reach)
         elif motion.lost_s:
             lost_s = motion.lost_s
-            if self._uncorrected_since is not None:  # where it has been since then is a guess
+            if self._uncorrected_since is not None:  # its place since then is a guess
                 lost_s = max(lost_s, motion.time - self._uncorrected_since)
                 if motion.reason == JUMPED:
                     self._jumped_m = float(np.linalg.norm(motion.after - motion.before))
-            words = {h.word: -float(np.log(h.likely)) for h in self.belief.classes()}
-            self.belief.begin(
-                after_gap(self.site, words, motion.before, motion.after, lost_s, o.speed, reach)
-            )
+            self._begin_after_dropout(motion.before, motion.after, lost_s, reach)
         else:
             before = motion.before if self._previous is None else self._previous.after
             dt = motion.time - (self._previous.time if self._previous else motion.time)
             if not self.belief.move(before, motion.after, dt):
-                # no robot can have gone so: it went somehow
-                words = {h.word: -float(np.log(h.likely)) for h in self.belief.classes()}
-                self.belief.begin(
-                    after_gap(self.site, words, before, motion.after, dt, o.speed, reach)
-                )
+                # no robot can move straight there: its path is unknown
+                self._begin_after_dropout(before, motion.after, dt, reach)
         self._previous = motion
-        strands = self.strands.follow(self.belief.classes(), motion.after, MOST_TETHERS)
-        out = self._last.paid_out
-        there_is = self.site.tether_length
-        most = there_is if out is None else min(there_is, PAID_OUT * out)
-        self._not_longer_than(most + reach, strands)
+        strands = self._follow(motion.after)
+        paid_out, max_length = self._last.paid_out, self.site.tether_length
+        if paid_out is not None:
+            max_length = min(max_length, self.policy.max_paid_out_factor * paid_out)
+        self._drop_longer_than(max_length + reach, strands)
 
-    def _begin(self, motion: Motion, reach: float) -> None:
-        """With what is remembered, or a tether that is as short as can be."""
+    def _begin_belief(self, motion: Motion, reach: float) -> None:
+        """Begin with the restored classes, or with the tether at the start."""
         words = {self.site.start_word(): 0.0}
-        before, seconds = self.site.start, 0.0
+        before, age_s = self.site.start, 0.0
         if self._restored is not None:
-            words, before, seconds = self._restored
+            words, before, age_s = self._restored
+        max_travel = self.options.speed * age_s
         self.belief.begin(
-            after_gap(self.site, words, before, motion.after, seconds, self.options.speed, reach)
+            classes_after_dropout(self.site, words, before, motion.after, max_travel, reach)
         )
 
-    def _not_longer_than(self, most: float, strands: list[Strand]) -> None:
-        """There is less tether, or the winch has let out less, than some classes need."""
-        short = [s for s in strands if s.tether.length <= most]
+    def _begin_after_dropout(
+        self, before: Floats, after: Floats, lost_s: float, reach: float
+    ) -> None:
+        """Begin the belief anew with the classes of all paths that the robot may have taken."""
+        words = {h.word: -float(np.log(h.likely)) for h in self.belief.classes()}
+        max_travel = self.options.speed * lost_s
+        self.belief.begin(classes_after_dropout(self.site, words, before, after, max_travel, reach))
+
+    def _drop_longer_than(self, max_length: float, strands: list[Strand]) -> None:
+        """Drop the classes that need more tether than there is, or than the winch has let out."""
+        short = [s for s in strands if s.tether.length <= max_length]
         if short and len(short) < len(strands):
             total = sum(s.likely for s in short)
             self.strands.all = [replace(s, likely=s.likely / total) for s in short]
             self.belief.drop({s.believed for s in strands} - {s.believed for s in short})
 
-    def _told(self, fix: Fix) -> Report:
-        """The report as things are."""
-        silent = self.track.silence(self._seen)
-        claims = self._motion is not None and self._vouched is not False and silent <= GAP
+    def _make_report(self, fix: Fix) -> Report:
+        """Update what is ahead and the alarms, and return the report."""
+        is_vouched_for = self._is_vouched_for is not False
+        claims = self._motion is not None and is_vouched_for and not self._is_silent
         motion = self._motion
         strands = self.strands.all if claims else []
-        classes = tuple(self._class(s) for s in strands)
+        classes = tuple(self._class_report(s) for s in strands)
         closed = [self.site.loops_in(s.tether.nodes) for s in strands]
         if strands and motion is not None:
-            self._look(strands, closed, motion)
+            self._look_ahead(strands, closed, motion)
         else:
-            self._looks, self._ahead, self._sure = [], Ahead(), 1.0
-        wound = sum(s.likely for s, found in zip(strands, closed, strict=True) if found)
-        loops = next((found for found in closed if found), []) if wound >= reasons.LOOPED else []
-        raised = self.alarms.take(
-            self._seen, self._reasons(claims, silent, classes, (wound, closed), strands)
+            self._reset_lookahead()
+        share = sum(s.likely for s, found in zip(strands, closed, strict=True) if found)
+        loops = next((found for found in closed if found), [])
+        raised = self.alarms.update(
+            self._now, self._reasons(claims, classes, (share, loops), strands)
         )
         names = self.site.name_of
         ahead = self._ahead
-        place = None if not strands else strands[0].tether.robot
-        if place is None and motion is not None:
-            place = motion.after
+        is_looped = share >= self.policy.alarms.loop_alarm_share
         self.report = Report(
-            time=self._seen if np.isfinite(self._seen) else fix.time,
-            position=None if place is None else (float(place[0]), float(place[1]), float(place[2])),
+            time=self._now if np.isfinite(self._now) else fix.time,
+            position=self._reported_place(strands),
             heading=fix.heading,
             speed=0.0 if motion is None else float(np.linalg.norm(motion.velocity)),
-            armed=fix.armed, mode=fix.mode, claims=claims, classes=classes,
+            armed=fix.armed,
+            mode=fix.mode,
+            claims=claims,
+            classes=classes,
             home_s=classes[0].taut / self.options.speed if classes else None,
             loop_s=ahead.loop_s,
             loop_around=() if ahead.loop is None else tuple(map(names, ahead.loop.around)),
             short_s=ahead.short_s,
-            loops=tuple(tuple(map(names, loop.around)) for loop in loops),
-            alarms=tuple(sorted(self.alarms.on.values(), key=lambda a: -a.level)),
-            raised=tuple(raised), paid_out=fix.paid_out,
-            as_planned=self._as_planned(strands), drift=self.drift,
-        )  # fmt: skip
+            loops=tuple(tuple(map(names, loop.around)) for loop in loops if is_looped),
+            alarms=tuple(sorted(self.alarms.active.values(), key=lambda a: -a.level)),
+            raised=tuple(raised),
+            paid_out=fix.paid_out,
+            as_planned=self._as_planned(strands),
+            drift=self.drift,
+        )
         return self.report
 
+    def _reported_place(self, strands: Sequence[Strand]) -> Point3 | None:
+        """Return the place of the robot in the likeliest class, or else by the last motion."""
+        if strands:
+            place = strands[0].tether.robot
+        elif self._motion is not None:
+            place = self._motion.after
+        else:
+            return None
+        return float(place[0]), float(place[1]), float(place[2])
+
     def _reasons(
-        self, claims: bool, silent: float, classes: Sequence[ClassNow],
-        wound: tuple[float, Sequence[Sequence[Loop]]], strands: Sequence[Strand],
-    ) -> list[Alarm]:  # fmt: skip
+        self,
+        claims: bool,
+        classes: Sequence[ClassReport],
+        closed: tuple[float, Sequence[Loop]],
+        strands: Sequence[Strand],
+    ) -> list[Alarm]:
+        """Return the reasons for alarms; `closed` is the share of looped classes, and the loops."""
         if self._motion is None:
             return self._never_placed()
         if not claims:
-            why = (
-                "the vehicle does not vouch for its position" if self._vouched is False
-                else reasons.FROZEN if self.track.frozen
-                else "no position has come"
-            )  # fmt: skip
-            return [reasons.estimate_lost(silent, why)]
+            why = "no position has come"
+            if self._is_vouched_for is False:
+                why = "the vehicle does not vouch for its position"
+            elif self.track.is_frozen:
+                why = reasons.FROZEN
+            return [reasons.estimate_lost(self.track.silence_s(self._now), why)]
         if not classes:
             return self._uncorrected()
-        robot, site = strands[0].tether.robot, self.site
-        share, found = wound
-        loops = next((loops for loops in found if loops), [])
+        site, policy, (share, loops) = self.site, self.policy.alarms, closed
         as_planned = self._as_planned(strands)
         if as_planned is not None:
-            self._on_plan = as_planned
-        on_plan = self._on_plan
-        ahead = self._ahead
+            self._is_on_plan = as_planned
+        situation = reasons.Situation(
+            site,
+            strands[0].tether.robot,
+            classes[0].likely,
+            self.options.noise,
+            self.track.velocities.is_believed,
+            self._is_on_plan,
+            policy,
+        )
         return [
             *self._uncorrected(),
-            *reasons.in_doubt(classes),
-            *reasons.otherwise(as_planned, classes[0]),
-            *reasons.little_left(site, classes[0]),
-            *reasons.soon_short(site, ahead),
-            *reasons.soon_looped(
-                site, ahead, robot, self._sure, on_plan, classes[0].likely, self.options.noise,
-                reasons.OF_VELOCITIES if self.track.velocities.believed else reasons.OF_PLACES,
-            ),
-            *reasons.looped(site, loops, robot, share, on_plan),
-        ]  # fmt: skip
+            *reasons.in_doubt(classes, policy),
+            *reasons.off_plan(as_planned, classes[0], policy),
+            *reasons.little_slack(site, classes[0], policy),
+            *reasons.soon_short(site, self._ahead, policy),
+            *reasons.loop_ahead(self._ahead, situation, self._ahead_share),
+            *reasons.loop_closed(loops, situation, share),
+        ]
 
     def _uncorrected(self) -> list[Alarm]:
         """Return the alarm that the position is frozen, or that no fixes correct it, if so."""
         since, why = self._uncorrected_since, self._last.aiding_fault
-        if self.track.frozen:
+        if self.track.is_frozen:
             since, why = self.track.freeze.since, reasons.FROZEN
-            return [reasons.uncorrected(self._seen - since, why, self.drift, self.site.units)]
-        if self._jumped_m is not None:
-            return [reasons.set_anew(self._jumped_m, self.site.units)]
+        elif self._jumped_m is not None:
+            return [reasons.position_reset(self._jumped_m, self.site.units)]
         if since is None or not why:
             return []
-        return [reasons.uncorrected(self._seen - since, why, self.drift, self.site.units)]
+        return [reasons.uncorrected(self._now - since, why, self.drift, self.site.units)]
 
     def _never_placed(self) -> list[Alarm]:
-        """Return the alarm that nothing was ever claimed; silence counts after `GAP` seconds."""
+        """Return the alarm that nothing was ever claimed, if there was time for a position."""
         assert self._heard_since is not None
-        silent = self._seen - self._heard_since
-        if self._vouched is False:
+        silent = self._now - self._heard_since
+        if self._is_vouched_for is False:
             return [reasons.never_claimed("the vehicle has never vouched for its position", silent)]
-        if self._is_beyond:
+        if self._is_out_of_reach:
             far = 2.0 * self.site.tether_length
             why = f"all positions are more than {far:g} {self.site.units} from the base"
             return [reasons.never_claimed(why, silent)]
-        if silent > GAP:
+        if silent > self.policy.track.dropout_s:
             return [reasons.never_claimed("no position has come", silent)]
         return []
 
@@ -489,47 +496,56 @@ class Guard:
         if not strands:
             return None
         now = strands[0]
-        off = self.drift + LEFT_OF_NOISE * self.options.noise
-        return self.site.as_planned(now.tether.robot, now.word, off)
+        return self.site.as_planned(now.tether.robot, now.word, self.drift + self._noise_left)
 
-    def _look(
+    def _look_ahead(
         self, strands: Sequence[Strand], closed: Sequence[Sequence[Loop]], motion: Motion
     ) -> None:
-        """Ahead, in each class that is worth it: the first loop, of those that are not closed there
-        already, and in how likely classes one closes, or this one is closed."""
-        if not self._looks:
-            if 0.0 <= motion.time - self._looked < LOOK_S:
-                return
-            self._looked = motion.time
-            wound = [{loop.around for loop in loops} for loops in closed]
-            self._looks = [
-                (s.likely, Look(self.site, s.tether, motion, self.options.speed, around))
-                for k, (s, around) in enumerate(zip(strands, wound, strict=True))
-                if k == 0 or s.likely >= reasons.DOUBT
-            ]
-        steps = self.site.look_steps
-        for _, look in self._looks:
-            steps = look.go_on(steps)
-        if not all(look.done for _, look in self._looks):
-            return
-        looks, self._looks = self._looks, []
-        closing = [(likely, look.ahead) for likely, look in looks if look.ahead.loop is not None]
-        first = max(closing, key=lambda pair: pair[0], default=(0.0, looks[0][1].ahead))[1]
-        self._ahead = replace(first, short_s=looks[0][1].ahead.short_s)
-        # where it is closed already it is there as well
-        there = sum(
-            likely for likely, look in looks
-            if look.ahead.loop is not None
-            or (first.loop is not None and first.loop.around in look.closed)
-        )  # fmt: skip
-        self._sure = there / sum(likely for likely, _ in looks)
+        """Look some steps farther ahead in each likely class; at the end, note the result.
 
-    def _class(self, strand: Strand) -> ClassNow:
+        The result is the first loop of the likeliest class that has one ahead, and the share of the
+        classes in which a loop is ahead, or this one is closed already.
+        """
+        if not self._looks:
+            policy = self.policy.lookahead
+            if 0.0 <= motion.time - self._look_began < policy.min_interval_s:
+                return
+            self._look_began = motion.time
+            min_speed = self.policy.track.min_moving_share * self.options.speed
+            around = [{loop.around for loop in loops} for loops in closed]
+            self._looks = [
+                (s.likely, Lookahead(self.site, s.tether, motion, min_speed, known, policy))
+                for k, (s, known) in enumerate(zip(strands, around, strict=True))
+                if k == 0 or s.likely >= self.policy.alarms.doubt_share
+            ]
+        steps = self.site.steps_per_update
+        for _, look in self._looks:
+            steps = look.advance(steps)
+        if not all(look.is_done for _, look in self._looks):
+            return
+        results = [(likely, look.result, look.closed) for likely, look in self._looks]
+        self._looks = []
+        closing = [(likely, result) for likely, result, _ in results if result.loop is not None]
+        first = max(closing, key=lambda pair: pair[0], default=(0.0, results[0][1]))[1]
+        self._ahead = replace(first, short_s=results[0][1].short_s)
+        looped = sum(
+            likely
+            for likely, result, known in results
+            if result.loop is not None or (first.loop is not None and first.loop.around in known)
+        )
+        self._ahead_share = looped / sum(likely for likely, _, _ in results)
+
+    def _class_report(self, strand: Strand) -> ClassReport:
         site, nodes = self.site, strand.tether.nodes
-        return ClassNow(
-            strand.word, strand.likely, site.passes(nodes, strand.word), strand.tether.length,
-            site.tether_length - strand.tether.length, site.turning(nodes), nodes,
-        )  # fmt: skip
+        return ClassReport(
+            strand.word,
+            strand.likely,
+            site.describe_path(nodes, strand.word),
+            strand.tether.length,
+            site.tether_length - strand.tether.length,
+            site.turning(nodes),
+            nodes,
+        )
 
 
 __all__ = ["Guard", "GuardOptions"]

@@ -1,11 +1,10 @@
 """Loops of a taut tether in space.
 
 In the plane a tether that meets itself is wound around something (`netsp.online.guard.loops`). In
-space it passes itself at some distance, however often it is wound around a bar. So what counts as a
-loop is a piece of the tether that comes back near to where it began, in sight of it, after turning
-by more than half a circle (a closed curve turns by a whole one: Fenchel 1929), and that stays where
-it is when it is closed and pulled taut. That takes in bodies with free ends, too, of which words
-know nothing.
+space it passes itself at some distance, however often it is wound around a bar. So a piece of the
+tether counts as a loop if it turns by more than half a circle (a closed curve turns by a whole one:
+Fenchel 1929), comes back near to where it began, in sight of it, and stays there when it is closed
+and pulled taut. This includes loops around bodies with free ends, which have no words.
 """
 
 from __future__ import annotations
@@ -16,46 +15,24 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.geometry import polylines
-from netsp.online.guard.site import ROUNDS, Loop
+from netsp.online.guard.guard_policy import LoopPolicy, SitePolicy
+from netsp.online.guard.site import Loop
 from netsp.world.scene.field import DistanceField
 from netsp.world.tether import GeodesicTether
 
-NEAR, SHARE = 0.25, 0.15
-"""Metres between its ends at which a piece of tether counts as closed, or that share of its length:
-a robot that goes round a pile passes its own tether above or below."""
 
-TURN = 1.1 * math.pi
-"""Radians that a loop turns by, at least: more than a tether that comes back beside itself."""
+def space_loops_in(
+    field: DistanceField, model: GeodesicTether, nodes: Floats, policy: SitePolicy
+) -> list[Loop]:
+    """Return the loops of a taut tether, the last to be closed first.
 
-STEP = 0.2
-"""Metres between the places of a tether that are looked at."""
-
-TOUCHING = 0.1
-"""Of delta: nearer to a solid than that, a tether rests on it."""
-
-
-def loops_of(field: DistanceField, model: GeodesicTether, nodes: Floats) -> list[Loop]:
-    """The loops that a taut tether has.
-
-    Parameters
-    ----------
-    field : DistanceField
-        The scene.
-    model : GeodesicTether
-        The tether's.
-    nodes : ndarray, shape (n, 3)
-        Taut, from the anchor on, metres.
-
-    Returns
-    -------
-    list of Loop
-        The last to be closed first; each around other solids than those before.
+    Each is around other solids than those before. `nodes`, shape (n, 3), begin at the anchor.
     """
-    points, turned = _dense(nodes)
+    points, turned = _dense(nodes, policy.loops.sample_spacing)
     found: list[Loop] = []
     end = len(points)
     while end > 2:
-        loop, at = _last_loop(field, model, points[:end], turned[:end])
+        loop, at = _last_loop(field, model, points[:end], turned[:end], policy)
         if loop is None or at is None:
             break
         if all(loop.around != other.around for other in found):
@@ -64,38 +41,24 @@ def loops_of(field: DistanceField, model: GeodesicTether, nodes: Floats) -> list
     return found
 
 
-def closing(
-    field: DistanceField, model: GeodesicTether, nodes: Floats, there: Floats
+def space_loop_closed_by(
+    field: DistanceField, model: GeodesicTether, nodes: Floats, place: Floats, policy: SitePolicy
 ) -> Loop | None:
-    """The loop that a robot closes by going straight to a place.
+    """Return the loop that a robot closes by moving straight to a place; None if none.
 
-    Parameters
-    ----------
-    field : DistanceField
-        The scene.
-    model : GeodesicTether
-        The tether's.
-    nodes : ndarray, shape (n, 3)
-        Taut, to where the robot is, metres.
-    there : ndarray, shape (3,)
-        Where it goes, metres.
-
-    Returns
-    -------
-    Loop or None
-        None where it closes none that is not closed already.
+    `nodes`, shape (n, 3), are those of the taut tether to the robot, m.
     """
-    points, turned = _dense(np.vstack([nodes, there]))
-    begins = _near(points, turned, len(points) - 1)
+    points, turned = _dense(np.vstack([nodes, place]), policy.loops.sample_spacing)
+    begins = _returns(points, turned, len(points) - 1, policy.loops)
     for i in begins[::-1]:
-        loop = _wound(field, model, points[i:])
+        loop = _loop_of_piece(field, model, points[i:], policy)
         if loop is not None:
             return loop
     return None
 
 
-def _dense(nodes: Floats) -> tuple[Floats, Floats]:
-    """(k, 3) places along a tether, and (k,) radians that it has turned by up to each."""
+def _dense(nodes: Floats, spacing: float) -> tuple[Floats, Floats]:
+    """Return places along a tether, shape (k, 3), and the angle turned up to each, rad."""
     steps = np.diff(nodes, axis=0)
     lengths = np.linalg.norm(steps, axis=1)
     nodes = np.vstack([nodes[:1], nodes[1:][lengths > 1e-9]])
@@ -107,49 +70,56 @@ def _dense(nodes: Floats) -> tuple[Floats, Floats]:
     turned = np.concatenate([[0.0], np.cumsum(np.arccos(cosine))])
     points, at = [nodes[:1]], [np.zeros(1)]
     for a, b, turn, length in zip(nodes[:-1], nodes[1:], turned, lengths, strict=True):
-        share = np.linspace(0.0, 1.0, math.ceil(length / STEP) + 1)[1:, None]
+        share = np.linspace(0.0, 1.0, math.ceil(length / spacing) + 1)[1:, None]
         points.append(a + share * (b - a))
         at.append(np.full(len(share), turn))
     return np.vstack(points), np.concatenate(at)
 
 
-def _near(points: Floats, turned: Floats, end: int) -> np.ndarray:
-    """Places that a tether comes back to at one of its places, after half a circle or more."""
+def _returns(points: Floats, turned: Floats, end: int, policy: LoopPolicy) -> np.ndarray:
+    """Return the indices of places that a tether comes back to at place `end`, after a turn."""
     turn = turned[end] - turned[:end]
     far = np.linalg.norm(points[:end] - points[end], axis=1)
     steps = np.linalg.norm(np.diff(points[: end + 1], axis=0), axis=1)
     between = np.cumsum(steps[::-1])[::-1]
-    near = (turn >= TURN) & (far <= np.maximum(NEAR, SHARE * between))
+    is_closed = far <= np.maximum(policy.max_gap, policy.max_gap_share * between)
     # of places in a row, the nearest
     inner = np.r_[np.inf, far, np.inf]
-    least = (far <= inner[:-2]) & (far <= inner[2:])
-    return np.flatnonzero(near & least)
+    is_nearest = (far <= inner[:-2]) & (far <= inner[2:])
+    return np.flatnonzero((turn >= policy.min_turn) & is_closed & is_nearest)
 
 
 def _last_loop(
-    field: DistanceField, model: GeodesicTether, points: Floats, turned: Floats
+    field: DistanceField,
+    model: GeodesicTether,
+    points: Floats,
+    turned: Floats,
+    policy: SitePolicy,
 ) -> tuple[Loop | None, int | None]:
-    if turned[-1] < TURN:
+    """Return the last loop, and the index of the place where it begins."""
+    if turned[-1] < policy.loops.min_turn:
         return None, None
     for end in range(len(points) - 1, 1, -1):
-        for i in _near(points, turned, end)[::-1]:
-            loop = _wound(field, model, points[i : end + 1])
+        for i in _returns(points, turned, end, policy.loops)[::-1]:
+            loop = _loop_of_piece(field, model, points[i : end + 1], policy)
             if loop is not None:
                 return loop, int(i)
-        if turned[end] < TURN:
+        if turned[end] < policy.loops.min_turn:
             break
     return None, None
 
 
-def _wound(field: DistanceField, model: GeodesicTether, piece: Floats) -> Loop | None:
-    """A piece of tether as a loop; None where it could be pulled out."""
+def _loop_of_piece(
+    field: DistanceField, model: GeodesicTether, piece: Floats, policy: SitePolicy
+) -> Loop | None:
+    """Return a piece of tether as a loop; None if it could be pulled out."""
     if not field.line_of_sight(piece[0], piece[-1], 0.2 * model.delta):
         return None
     closed = np.vstack([piece, piece[:1]])
-    tether = model.relaxed(closed, ROUNDS)
-    if tether.length <= NEAR:
+    tether = model.relaxed(closed, policy.relax_rounds)
+    if tether.length <= policy.loops.max_gap:
         return None
     middle = polylines.dense(tether.nodes, 0.5 * model.delta)
-    touching = field.distance(middle) <= TOUCHING * model.delta
+    touching = field.distance(middle) <= policy.loops.contact_share * model.delta
     around = tuple(sorted({int(k) for k in field.nearest(middle[touching])}))
     return Loop(around, closed) if around else None

@@ -1,1 +1,1 @@
-"""How netsp talks to a vehicle: MAVLink over UDP (extra `mavlink`)."""
+"""Link to a vehicle: MAVLink over UDP (extra `mavlink`)."""

@@ -6,20 +6,20 @@ from dataclasses import dataclass
 
 from netsp.base.errors import InputError
 
-EXPECTED = "expected udpin:PORT, udpin:HOST:PORT or udpout:HOST:PORT"
+EXPECTED_ADDRESS = "expected udpin:PORT, udpin:HOST:PORT or udpout:HOST:PORT"
 
 
 @dataclass(frozen=True)
 class Address:
-    """Where a link is.
+    """Address of a link.
 
-    Parameters
+    Attributes
     ----------
-    listens : bool
+    listens
         Whether we wait for the vehicle to speak first (udpin), or speak first (udpout).
-    host : str
-        Name or number; for udpin what we bind to.
-    port : int
+    host
+        Host name or number; for udpin the one to bind to.
+    port
         UDP port.
     """
 
@@ -29,27 +29,17 @@ class Address:
 
     @classmethod
     def parse(cls, text: str) -> Address:
-        """An address as it is given on the command line; without a host, this machine only.
-
-        Parameters
-        ----------
-        text : str
-            The address.
-
-        Returns
-        -------
-        Address
-            The same.
+        """Parse an address as given on the command line; without a host, it is this machine.
 
         Raises
         ------
         InputError
-            No such kind of address.
+            The text is no such address.
         """
         kind, _, rest = text.partition(":")
         host, _, port = rest.rpartition(":")
         if kind not in ("udpin", "udpout") or (kind == "udpout" and not host):
-            raise InputError(f"--link: {EXPECTED}, got {text!r}")
+            raise InputError(f"--link: {EXPECTED_ADDRESS}, got {text!r}")
         if not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
             raise InputError(f"--link: expected a port from 1 to 65535, got {text!r}")
         return cls(kind == "udpin", host or "127.0.0.1", int(port))

@@ -1,4 +1,4 @@
-"""pymavlink, when it is asked for."""
+"""MAVLink's messages by pymavlink, loaded when they are needed."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ from typing import Any
 
 from netsp.base.errors import InputError
 
-GROUND_STATION, ONBOARD_COMPUTER = 255, 191
-"""Our system id where we steer, and the component id of a computer beside the vehicle."""
+GROUND_STATION = 255
+"""Code MAVLink system id of a ground station; ours in a flight."""
+
+ONBOARD_COMPUTER = 191
+"""Code MAV_COMP_ID_ONBOARD_COMPUTER of a computer beside the vehicle."""
 
 
 def dialect() -> Any:
-    """The generated module of ArduPilot's messages, version 2.
+    """Return the generated module of ArduPilot's messages, version 2.
 
     Raises
     ------
@@ -28,20 +31,10 @@ def dialect() -> Any:
 
 
 def parser(system: int = GROUND_STATION, component: int = ONBOARD_COMPUTER) -> Any:
-    """Packs and parses messages; what is malformed comes out as BAD_DATA.
+    """Return a packer and parser with our system and component id.
 
-    Parameters
-    ----------
-    system : int
-        Our system id.
-    component : int
-        Our component id.
-
-    Returns
-    -------
-    MAVLink
-        Of pymavlink, with no file behind it.
+    Malformed messages are parsed as BAD_DATA.
     """
-    made = dialect().MAVLink(None, srcSystem=system, srcComponent=component)
-    made.robust_parsing = True
-    return made
+    mavlink = dialect().MAVLink(None, srcSystem=system, srcComponent=component)
+    mavlink.robust_parsing = True
+    return mavlink

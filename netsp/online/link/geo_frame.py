@@ -1,8 +1,9 @@
-"""Between the frames of a vehicle and that of a site.
+"""Frames of vehicles and sites.
 
-A vehicle tells where it is in metres north, east and down of where its estimate began, or in
-degrees. Where a site says where on the earth it is, degrees count; where it does not, the estimate
-is taken to have begun at the base, with the site's y axis to the north.
+A vehicle reports its place in metres north, east and down of where its estimate began, or in
+degrees.
+If a site has an origin on the earth, degrees count; otherwise the estimate is assumed to have begun
+at the base, with the site's y axis to the north.
 """
 
 from __future__ import annotations
@@ -18,29 +19,34 @@ from netsp.model.problem import Problem
 from netsp.world.mission.mission import Mission
 
 DEGREE = 1e-7
-"""Of MAVLink's whole numbers for degrees."""
+"""Unit of MAVLink's whole numbers for degrees."""
 
 
 class Frame:
-    """Places of a vehicle in a site.
+    """Conversion between the places of a vehicle and those of a site.
 
     Parameters
     ----------
     site : Problem or Mission
-        The site; a mission does not say where on the earth it is.
+        Site; a mission has no origin on the earth.
     kind : str, optional
-        "local" or "global"; by default global where the site has an origin.
+        "local" or "global"; by default global if the site has an origin.
+
+    Attributes
+    ----------
+    is_given : bool
+        Whether the kind was given.
 
     Raises
     ------
     InputError
-        Global, and the site does not say where it is; no such kind.
+        The frame is global and the site has no origin, or there is no such kind.
     """
 
     def __init__(self, site: Problem | Mission, kind: str | None = None) -> None:
         if kind not in (None, "local", "global"):
             raise InputError(f"--frame: expected local or global, got {kind!r}")
-        self.site, self.is_asked_for = site, kind is not None
+        self.site, self.is_given = site, kind is not None
         projection = Projection.of(site) if isinstance(site, Problem) else None
         if kind == "global" and projection is None:
             raise InputError("--frame: global needs an origin, and the site has none")
@@ -53,7 +59,7 @@ class Frame:
 
     @property
     def is_global(self) -> bool:
-        """Whether places are told in degrees."""
+        """Return whether places are in degrees."""
         return self.projection is not None
 
     @property
@@ -62,8 +68,8 @@ class Frame:
         return isinstance(self.site, Problem) and self.site.origin is not None
 
     @property
-    def is_of_plane(self) -> bool:
-        """Return whether the site is a problem of the plane, where heights do not matter much."""
+    def is_planar(self) -> bool:
+        """Return whether the site is a problem in the plane, where heights matter little."""
         return isinstance(self.site, Problem)
 
     def local(self) -> Frame:
@@ -71,7 +77,7 @@ class Frame:
         return Frame(self.site, "local")
 
     def from_local(self, north: float, east: float, down: float) -> Point3:
-        """A place in the site of metres north, east and down of the base at the surface."""
+        """Return the place in the site of metres north, east and down of the base."""
         c, s = self._cos, self._sin
         return (
             float(self.base[0]) + c * east - s * north,
@@ -80,18 +86,18 @@ class Frame:
         )
 
     def velocity(self, north: float, east: float, down: float) -> Point3:
-        """A velocity in the site, of one to the north, east and down."""
+        """Return the velocity in the site of one to the north, east and down."""
         c, s = self._cos, self._sin
         return c * east - s * north, s * east + c * north, -down
 
     def to_local(self, place: Point3) -> tuple[float, float, float]:
-        """Metres north, east and down of a place in the site."""
+        """Return the metres north, east and down of a place in the site."""
         c, s = self._cos, self._sin
         x, y = place[0] - float(self.base[0]), place[1] - float(self.base[1])
         return -s * x + c * y, c * x + s * y, -place[2]
 
     def from_global(self, lat: int, lon: int, above_home: float) -> Point3:
-        """A place in the site, of degrees × 1e7 and metres above home."""
+        """Return the place in the site of degrees × 1e7 and metres above home."""
         return self.from_degrees(lat * DEGREE, lon * DEGREE, above_home)
 
     def from_degrees(self, lat: float, lon: float, above_home: float) -> Point3:
@@ -101,7 +107,7 @@ class Frame:
         return float(x), float(y), above_home
 
     def to_global(self, place: Point3) -> tuple[int, int, float]:
-        """Degrees × 1e7 and metres above home of a place in the site."""
+        """Return the degrees × 1e7 and metres above home of a place in the site."""
         assert self.projection is not None
         ((lat, lon),) = self.projection.to_earth([place[:2]])
         return round(lat / DEGREE), round(lon / DEGREE), place[2]

@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
-MODES = {
-    0: "STABILIZE", 1: "ACRO", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 7: "CIRCLE", 9: "SURFACE",
-    16: "POSHOLD", 19: "MANUAL", 20: "MOTOR_DETECT", 21: "SURFTRAK",
-}  # fmt: skip
-"""As ArduSub numbers them in the custom mode of its heartbeat."""
+from enum import IntEnum
 
-ALT_HOLD, GUIDED, SURFACE, POSHOLD = 2, 4, 9, 16
+
+class Mode(IntEnum):
+    """Mode of ArduSub by its number in the custom mode of heartbeats."""
+
+    STABILIZE = 0
+    ACRO = 1
+    ALT_HOLD = 2
+    AUTO = 3
+    GUIDED = 4
+    CIRCLE = 7
+    SURFACE = 9
+    POSHOLD = 16
+    MANUAL = 19
+    MOTOR_DETECT = 20
+    SURFTRAK = 21
 
 
 def mode_name(number: int) -> str:
-    """The name of a mode; its number, where it has none that we know."""
-    return MODES.get(number, f"mode {number}")
+    """Return the name of a mode, or its number if it is unknown."""
+    try:
+        return Mode(number).name
+    except ValueError:
+        return f"mode {number}"

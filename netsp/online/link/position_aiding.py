@@ -4,180 +4,207 @@ A filter without fixes continues by dead reckoning and reports that late: ArduSu
 its estimate for 7 s more, when the error is 1 m. The sensors tell sooner: the GPS has no fix or
 repeats itself, a sensor of position or velocity is unhealthy, or the filter rejects fixes because
 they are too far from its estimate.
+
+A guard warns at the first sign (`PositionAiding.fault`). A flight stops when a sign has lasted
+(`PositionAiding.confirmed_fault`).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections import deque
 from typing import Any
 
-from netsp.base.errors import InputError
+import numpy as np
 
-MIN_FIX_TYPE = 3
-"""Smallest fix type of GPS_RAW_INT that aids: a fix in three dimensions."""
+from netsp.online.link.link_policy import AidingPolicy
 
-GPS = 32
-"""Bit of SYS_STATUS for the GPS."""
+FIX_TYPE_3D = 3
+"""Code GPS_FIX_TYPE of GPS_RAW_INT for a fix in three dimensions, the smallest that aids."""
 
-SENSORS = {GPS: "GPS", 64: "optical flow or DVL", 128: "visual or DVL odometry"}
+GPS_SENSOR = 32
+"""Code MAV_SYS_STATUS_SENSOR of the GPS, a bit of SYS_STATUS."""
+
+SENSORS = {GPS_SENSOR: "GPS", 64: "optical flow or DVL", 128: "visual or DVL odometry"}
 """Sensors that aid the position, by their bit in SYS_STATUS."""
 
 GPS_FAULTS = 0x300
-"""Bits of XKF4.GPS that are set while there is no fix: the eighth or the ninth, by version."""
-
-
-@dataclass(frozen=True)
-class AidingPolicy:
-    """Policy that tells an aided position from one without aiding.
-
-    Attributes
-    ----------
-    max_age_s
-        Longest time for which GPS_RAW_INT may repeat the time of its fix, or stay away while other
-        messages come, s; with messages that are rare, three times their period. Positive.
-    max_innovation
-        Largest ratio of the distance between fixes and the estimate to what the filter accepts:
-        from 1 on, ArduPilot rejects them. Positive.
-    """
-
-    max_age_s: float = 1.5
-    max_innovation: float = 1.0
-
-    def __post_init__(self) -> None:
-        for name in ("max_age_s", "max_innovation"):
-            if not getattr(self, name) > 0.0:
-                raise InputError(f"{name}: expected more than 0, got {getattr(self, name)!r}")
+"""Code bits of XKF4.GPS that are set while there is no fix: the eighth or the ninth, by version."""
 
 
 class PositionAiding:
     """Monitor of the sensors that correct a vehicle's position.
 
     A sensor counts once it has worked, because vehicles without GPS report one without a fix. The
-    loss of a sensor does not matter while another one works.
+    loss of a sensor does not matter while another one works. Times are by the vehicle's clock, so
+    that the load of this computer does not matter.
 
     Parameters
     ----------
-    policy : AidingPolicy, optional
+    policy : AidingPolicy
         Limits of age and innovation.
 
     Examples
     --------
     >>> aiding = PositionAiding()
-    >>> aiding.take_innovation(0.1), aiding.fault(1.0)
+    >>> aiding.observe_innovations(1.0, 0.1), aiding.fault(1.0)
     (None, '')
-    >>> aiding.take_innovation(1.4), aiding.fault(1.2)
+    >>> aiding.observe_innovations(1.2, 1.4), aiding.fault(1.2)
     (None, 'the filter rejects the fixes')
     """
 
-    def __init__(self, policy: AidingPolicy | None = None) -> None:
-        self.policy = policy or AidingPolicy()
+    def __init__(self, policy: AidingPolicy = AidingPolicy()) -> None:
+        self.policy = policy
         self._has_fix: bool | None = None
+        self._no_fix_since: float | None = None
         self._fix_stamp: int | None = None
-        self._fix_since = self._gps_seen = 0.0
-        self._gps_period = 0.0
-        self._healthy: set[int] = set()
-        self._failed: set[int] = set()
-        self._rejected: bool | None = None
+        self._fix_since = 0.0
+        self._gps_at: float | None = None
+        self._intervals: deque[float] = deque(maxlen=policy.n_intervals)
+        self._worked: set[int] = set()
+        self._working: set[int] = set()
+        self._failed_since: dict[int, float] = {}
+        self._innovation: tuple[float, str] | None = None
+        self._rejected_since: float | None = None
 
-    def take(self, message: Any, time: float) -> None:
-        """Take a MAVLink message; messages of other kinds change nothing.
-
-        Parameters
-        ----------
-        message : MAVLink_message
-            Message of the vehicle.
-        time : float
-            Seconds, by the vehicle's clock.
-        """
+    def observe(self, message: Any, time: float) -> None:
+        """Observe a MAVLink message of the vehicle; messages of other kinds change nothing."""
         kind = message.get_type()
         if kind == "GPS_RAW_INT":
-            self._take_gps(int(message.fix_type) >= MIN_FIX_TYPE, int(message.time_usec), time)
+            stamp = int(getattr(message, "time_usec", 0))
+            self._observe_gps(int(message.fix_type) >= FIX_TYPE_3D, stamp, time)
         elif kind == "SYS_STATUS":
-            watched = int(message.onboard_control_sensors_enabled)
-            health = int(message.onboard_control_sensors_health)
-            for bit in SENSORS:
-                if watched & health & bit:
-                    self._healthy.add(bit)
-                    self._failed.discard(bit)
-                elif watched & bit and bit in self._healthy:
-                    self._failed.add(bit)
+            enabled = int(message.onboard_control_sensors_enabled)
+            self._observe_sensors(enabled & int(message.onboard_control_sensors_health), time)
         elif kind == "EKF_STATUS_REPORT":
-            self.take_innovation(
-                float(message.pos_horiz_variance), float(message.velocity_variance)
+            self.observe_innovations(
+                time, float(message.pos_horiz_variance), float(message.velocity_variance)
             )
 
-    def _take_gps(self, has_fix: bool, stamp: int, time: float) -> None:
+    def _observe_gps(self, has_fix: bool, stamp: int, time: float) -> None:
+        if self._gps_at is not None and time > self._gps_at:
+            self._intervals.append(time - self._gps_at)
+        self._gps_at = time
         if self._has_fix is None and not has_fix:
             return
-        if self._has_fix is not None and time >= self._gps_seen:
-            self._gps_period = max(0.9 * self._gps_period, time - self._gps_seen)
+        if has_fix:
+            self._no_fix_since = None
+        elif self._no_fix_since is None:
+            self._no_fix_since = time
         if stamp != self._fix_stamp or stamp == 0:
             self._fix_stamp, self._fix_since = stamp, time
-        self._has_fix, self._gps_seen = has_fix, time
+        self._has_fix = has_fix
 
-    def take_innovation(self, *ratios: float) -> None:
-        """Take the innovations of the filter.
+    def _observe_sensors(self, healthy: int, time: float) -> None:
+        self._working = {bit for bit in SENSORS if healthy & bit}
+        self._worked |= self._working
+        for bit in self._worked:
+            if bit in self._working:
+                self._failed_since.pop(bit, None)
+            else:
+                self._failed_since.setdefault(bit, time)
 
-        Parameters
-        ----------
-        *ratios : float
-            Innovations of position and velocity over the filter's bounds of acceptance; NaN is
-            ignored.
-        """
-        known = [ratio for ratio in ratios if math.isfinite(ratio)]
-        if known:
-            self._rejected = max(known) >= self.policy.max_innovation
-
-    def take_gps_checks(self, flags: int) -> None:
-        """Take the failed GPS checks of a vehicle's log (XKF4.GPS).
-
-        Parameters
-        ----------
-        flags : int
-            One bit per failed check.
-        """
-        bad = bool(flags & GPS_FAULTS)
-        if bad and self._has_fix is None:
+    def observe_innovations(self, time: float, position: float, velocity: float = math.nan) -> None:
+        """Observe the innovations of the filter, each over its bound of acceptance; NaN has no
+        effect."""
+        named = ((position, "position"), (velocity, "velocity"))
+        known = [pair for pair in named if math.isfinite(pair[0])]
+        if not known:
             return
-        self._has_fix = not bad
-        self._fix_since = self._gps_seen = math.inf  # the log has a row for each moment
+        self._innovation = max(known, key=lambda pair: pair[0])
+        if self._innovation[0] < self.policy.max_innovation:
+            self._rejected_since = None
+        elif self._rejected_since is None:
+            self._rejected_since = time
+
+    def observe_gps_checks(self, flags: int) -> None:
+        """Observe the failed GPS checks of a vehicle's log (XKF4.GPS), one bit each."""
+        is_bad = bool(flags & GPS_FAULTS)
+        if is_bad and self._has_fix is None:
+            return
+        self._has_fix = not is_bad
+        self._fix_since = self._gps_at = math.inf  # the log has a row for each moment
 
     def fault(self, time: float) -> str | None:
-        """Return the reason why no sensor corrects the position.
-
-        Parameters
-        ----------
-        time : float
-            Seconds, by the vehicle's clock.
+        """Return why no sensor corrects the position now.
 
         Returns
         -------
         str or None
             The reason; empty while fixes correct the position, None if the sensors are unknown.
         """
-        if self._rejected:
+        if self._rejected_since is not None:
             return "the filter rejects the fixes"
-        failed = [SENSORS[bit] for bit in sorted(self._failed)]
+        failed = [SENSORS[bit] for bit in sorted(self._failed_since)]
         gps = self._gps_fault(time)
-        has_gps = self._has_fix is not None and not gps and GPS not in self._failed
-        if has_gps or self._healthy - self._failed - {GPS}:
+        has_gps = self._has_fix is not None and not gps and GPS_SENSOR not in self._failed_since
+        if has_gps or self._working - {GPS_SENSOR}:
             return ""
         if gps:
             return gps
         if failed:
             return f"{' and '.join(failed)}: not healthy"
-        is_known = self._rejected is not None or bool(self._healthy)
+        is_known = self._innovation is not None or bool(self._worked)
         return "" if is_known else None
 
     def _gps_fault(self, time: float) -> str:
         """Return why the GPS gives no fixes; empty while it does, or never did."""
         if self._has_fix is False:
             return "the GPS has no fix"
-        oldest = max(self.policy.max_age_s, 3.0 * self._gps_period)
-        if self._has_fix and time - min(self._fix_since, self._gps_seen) > oldest:
-            return "the GPS is silent"
+        if self._has_fix:
+            assert self._gps_at is not None
+            if time - min(self._fix_since, self._gps_at) > self._max_age_s(self.policy.max_age_s):
+                return "the GPS is silent"
         return ""
 
+    def _max_age_s(self, max_age_s: float) -> float:
+        """Return the age from which on the GPS is silent; longer where its messages are rare."""
+        usual = float(np.median(self._intervals)) if self._intervals else 0.0
+        return max(max_age_s, self.policy.max_intervals * usual)
 
-__all__ = ["AidingPolicy", "PositionAiding"]
+    def confirmed_fault(self, time: float, min_fault_s: float, max_age_s: float) -> str | None:
+        """Return why no sensor has corrected the position for some time; None if one has.
+
+        The GPS counts by its fixes, not by its health in SYS_STATUS.
+
+        Parameters
+        ----------
+        time : float
+            Time now, s.
+        min_fault_s : float
+            Time for which a fault must have lasted, s.
+        max_age_s : float
+            Longest time without a message of the GPS, s; longer where its messages are rare.
+        """
+        if self._rejected_since is not None and time - self._rejected_since >= min_fault_s:
+            assert self._innovation is not None
+            ratio, name = self._innovation
+            return (
+                f"the filter rejects its {name} (innovation {ratio:.1f} of "
+                f"{self.policy.max_innovation:g} allowed)"
+            )
+        gps = self._confirmed_gps_fault(time, min_fault_s, max_age_s)
+        others = self._worked - {GPS_SENSOR}
+        if others & self._working or (self._has_fix is not None and gps is None):
+            return None
+        if gps is not None:
+            return gps
+        if not others:
+            return None
+        failed_since = max(self._failed_since[bit] for bit in others)
+        if time - failed_since < min_fault_s:
+            return None
+        return f"{SENSORS[max(others)]} is not healthy"
+
+    def _confirmed_gps_fault(self, time: float, min_fault_s: float, max_age_s: float) -> str | None:
+        if self._has_fix is None or self._gps_at is None:
+            return None
+        if self._no_fix_since is not None and time - self._no_fix_since >= min_fault_s:
+            return "the GPS has no fix"
+        age = time - self._gps_at
+        if age > self._max_age_s(max_age_s):
+            return f"the GPS is silent for {age:.1f} s"
+        return None
+
+
+__all__ = ["PositionAiding"]

@@ -1,7 +1,8 @@
-"""Words for whoever looks at a ground station, in MAVLink's STATUSTEXT.
+"""Texts for ground stations, in MAVLink's STATUSTEXT.
 
-Chunks of 50 bytes, numbered from 0, under an id that they share; one that is shorter is the last. A
-text of one chunk has the id 0 and is shown at once (MAVLink 2, common message 253).
+Chunks of 50 bytes are numbered from 0 under an id that they share; a shorter one is the last. A
+text
+of one chunk has the id 0 and is shown at once (MAVLink 2, common message 253).
 """
 
 from __future__ import annotations
@@ -10,52 +11,41 @@ import unicodedata
 from typing import Any
 
 from netsp.online.link.dialect import dialect
+from netsp.online.link.link_policy import LinkPolicy
 
-CHUNK = 50
-"""Bytes of a chunk."""
-
-MOST = 250
-"""Bytes of a text: longer ones are cut."""
+CHUNK_BYTES = 50
+"""Format of STATUSTEXT: length of a chunk, bytes."""
 
 
-def status_texts(severity: int, text: str, number: int) -> list[Any]:
-    """A text as messages.
+def status_texts(
+    severity: int, text: str, number: int, max_bytes: int = LinkPolicy.max_text_bytes
+) -> list[Any]:
+    """Return a text as messages, in order.
 
     Parameters
     ----------
     severity : int
         MAV_SEVERITY.
     text : str
-        What to say.
+        The text.
     number : int
-        Of the text among those sent: what two in a row share is not put together.
-
-    Returns
-    -------
-    list of messages
-        One or more, in their order.
+        Number of the text among those sent: stations join the chunks of texts with the same id.
+    max_bytes : int
+        Longest text, bytes; longer ones are cut.
     """
-    data = ascii_of(text)[:MOST]
-    parts = [data[k : k + CHUNK] for k in range(0, max(len(data), 1), CHUNK)]
-    if len(parts) > 1 and len(parts[-1]) == CHUNK:
-        parts.append(b"")  # or else the end is not known
-    together = 1 + number % 0xFFFF if len(parts) > 1 else 0
+    data = to_ascii(text)[:max_bytes]
+    parts = [data[k : k + CHUNK_BYTES] for k in range(0, max(len(data), 1), CHUNK_BYTES)]
+    if len(parts) > 1 and len(parts[-1]) == CHUNK_BYTES:
+        parts.append(b"")  # marks the end
+    shared_id = 1 + number % 0xFFFF if len(parts) > 1 else 0
     message = dialect().MAVLink_statustext_message
-    return [message(severity, part, id=together, chunk_seq=k) for k, part in enumerate(parts)]
+    return [message(severity, part, id=shared_id, chunk_seq=k) for k, part in enumerate(parts)]
 
 
-def ascii_of(text: str) -> bytes:
-    """A text in the characters that ground stations show: letters without their accents.
+def to_ascii(text: str) -> bytes:
+    """Return a text in ASCII, which ground stations show: letters without accents.
 
-    Parameters
-    ----------
-    text : str
-        Any.
-
-    Returns
-    -------
-    bytes
-        ASCII; a question mark for what has no such letter.
+    Other characters become question marks.
     """
     plain = unicodedata.normalize("NFKD", text.replace("−", "-"))
     letters = "".join(c for c in plain if not unicodedata.combining(c))

@@ -9,22 +9,18 @@ from netsp.base.field_types import Point3
 from netsp.online.link.geo_frame import DEGREE, Frame
 
 METRES_PER_UNIT = 0.011131884502145034
-"""Metres of 1e-7 degrees of latitude, as ArduPilot has them."""
+"""Unit of 1e-7 degrees of latitude in metres, as ArduPilot has it."""
 
 RELATIVE_FRAMES = (3, 6)
-"""MAV_FRAME_GLOBAL_RELATIVE_ALT, and the same of whole numbers: altitudes above home."""
+"""Code MAV_FRAME_GLOBAL_RELATIVE_ALT and ..._INT: altitudes above home."""
 
 
 class TargetEcho:
     """Decoder of the target that a vehicle reports.
 
-    ArduSub echoes in degrees and above the sea. The decoder converts them into the site with home
+    ArduSub echoes in degrees and above the sea. The decoder converts them into the site with
+    home
     and the origin of the estimate, which ArduSub reports as well.
-
-    Parameters
-    ----------
-    frame : Frame
-        Frame of the site.
     """
 
     def __init__(self, frame: Frame) -> None:
@@ -32,14 +28,10 @@ class TargetEcho:
         self._origin: tuple[int, int, float] | None = None
         self._home: float | None = None
 
-    def understand(self, message: Any) -> Point3 | None:
-        """Return the target in a message, in the site; None for other messages, and for echoes
-        whose place in the site is not known yet.
+    def read(self, message: Any) -> Point3 | None:
+        """Return the target in a message, in the site.
 
-        Parameters
-        ----------
-        message : MAVLink_message
-            Message of the vehicle, of any kind.
+        None for other messages, and for echoes whose place in the site is not known yet.
         """
         kind = message.get_type()
         if kind == "GPS_GLOBAL_ORIGIN":

@@ -1,4 +1,4 @@
-"""A UDP socket that speaks MAVLink."""
+"""UDP socket that speaks MAVLink."""
 
 from __future__ import annotations
 
@@ -12,49 +12,38 @@ from netsp.base.errors import InputError
 from netsp.online.link.address import Address
 from netsp.online.link.dialect import GROUND_STATION, ONBOARD_COMPUTER, dialect, parser
 
-MOST_BYTES = 65_536
-"""Of a datagram."""
+MAX_DATAGRAM_BYTES = 65_536
+"""Format limit of UDP: length of a datagram, bytes."""
 
 
 def messages_in(data: bytes) -> list[Any]:
-    """The whole messages in a datagram; what is malformed is none.
+    """Return the whole messages in a datagram, in order; malformed ones are left out.
 
-    Each gets a parser of its own, for what one leaves half done must not spoil the next.
-
-    Parameters
-    ----------
-    data : bytes
-        As it came.
-
-    Returns
-    -------
-    list of MAVLink_message
-        In their order.
+    Each datagram gets its own parser, so that an incomplete message does not spoil the next
+    one.
     """
     try:
         found = parser().parse_buffer(data) or []
     except (dialect().MAVError, struct.error, ValueError):
-        # pymavlink lets some malformed messages through to where they are unpacked
+        # pymavlink notices some malformed messages only when it unpacks them
         return []
     return [m for m in found if m.get_type() != "BAD_DATA"]
 
 
 class UdpLink:
-    """Sends to, and hears from, one vehicle.
+    """UDP link to one vehicle.
 
     Parameters
     ----------
     address : Address
-        Where.
-    system : int
-        Our system id.
-    component : int
-        Our component id.
+        Address of the link.
+    system, component : int
+        Our system id and component id.
 
     Raises
     ------
     InputError
-        The address cannot be had.
+        The address cannot be used.
     """
 
     def __init__(
@@ -76,57 +65,30 @@ class UdpLink:
                 f"--link: {address.host}:{address.port}: {error.strerror or error}"
             ) from None
 
-    def hear(self, seconds: float) -> list[tuple[Any, tuple[str, int]]]:
-        """The messages of the next datagram.
-
-        Parameters
-        ----------
-        seconds : float
-            To wait for one.
-
-        Returns
-        -------
-        list of (MAVLink_message, (str, int))
-            And where it came from; none where none came.
-        """
-        self._socket.settimeout(max(seconds, 1e-4))
+    def receive(self, timeout_s: float) -> list[tuple[Any, tuple[str, int]]]:
+        """Return the messages of the next datagram, each with its sender's host and port."""
+        self._socket.settimeout(max(timeout_s, 1e-4))
         try:
-            data, peer = self._socket.recvfrom(MOST_BYTES)
+            data, peer = self._socket.recvfrom(MAX_DATAGRAM_BYTES)
         except (TimeoutError, BlockingIOError, ConnectionError):
             return []
         except OSError:  # closed while it waited
             return []
         return [(m, peer) for m in messages_in(data)]
 
-    def answer(self, peer: tuple[str, int]) -> None:
-        """Send to that address from now on.
-
-        Parameters
-        ----------
-        peer : (str, int)
-            Host and port.
-        """
+    def set_peer(self, peer: tuple[str, int]) -> None:
+        """Send to a host and port from now on."""
         self.peer = peer
 
     def send(self, message: Any) -> bool:
-        """Send a message, from any thread.
-
-        Parameters
-        ----------
-        message : MAVLink_message
-            The message.
-
-        Returns
-        -------
-        bool
-            Whether it is on its way; not while nobody was heard.
-        """
+        """Send a message, from any thread; return False if it was not sent, or no vehicle was heard
+        yet."""
         with self._lock:
             if self.peer is None:
                 return False
             data = message.pack(self._pack)
             self._pack.seq = (self._pack.seq + 1) % 256
-            with contextlib.suppress(OSError):  # a network that is down is one where nothing comes
+            with contextlib.suppress(OSError):  # as if the message were lost
                 self._socket.sendto(data, self.peer)
                 return True
             return False

@@ -7,24 +7,19 @@ from typing import Any
 
 from netsp.online.link.dialect import dialect
 
-SUBMARINE, ARDUPILOT = 12, 3
-"""MAV_TYPE of an underwater vehicle, and MAV_AUTOPILOT of ArduPilot."""
+SUBMARINE = 12
+"""Code MAV_TYPE of an underwater vehicle."""
+
+ARDUPILOT = 3
+"""Code MAV_AUTOPILOT of ArduPilot."""
 
 GROUND_STATION_TYPE = 6
-"""MAV_TYPE of a ground station."""
+"""Code MAV_TYPE of a ground station."""
 
 
 @dataclass(frozen=True)
 class VehicleKind:
-    """Kind of a vehicle.
-
-    Attributes
-    ----------
-    vehicle
-        MAV_TYPE.
-    autopilot
-        MAV_AUTOPILOT.
-    """
+    """Kind of a vehicle (MAV_TYPE) and of its autopilot (MAV_AUTOPILOT)."""
 
     vehicle: int
     autopilot: int
@@ -41,19 +36,8 @@ class VehicleKind:
         return f"{vehicle} with autopilot {_name(names, 'MAV_AUTOPILOT', self.autopilot)}"
 
 
-def other_vehicle(kind: VehicleKind) -> str:
-    """Return the warning of a vehicle that a guard does not know.
-
-    Parameters
-    ----------
-    kind : VehicleKind
-        Kind of the vehicle.
-
-    Returns
-    -------
-    str
-        One line.
-    """
+def other_vehicle_warning(kind: VehicleKind) -> str:
+    """Return the warning, in one line, of a vehicle that a guard does not know."""
     return (
         f"warning: the vehicle is a {kind}, expected a submarine with ArduPilot: its modes, and "
         "when its position is lost, may be misread"
@@ -61,7 +45,7 @@ def other_vehicle(kind: VehicleKind) -> str:
 
 
 def _name(names: Any, kind: str, number: int) -> str:
-    """Return the name of a number of an enumeration in small letters; the number if it has none."""
+    """Return the name of an entry of an enumeration in small letters, or its number."""
     entry = names[kind].get(number)
     if entry is None:
         return f"{kind} {number}"
