@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp.mip.highs import HighsRelaxation
+from netsp.mip.mip_policy import LpPolicy, MipPolicy
 from netsp.mip.subtours import fractional_cuts
 from tests.cut_points import all_legs, some_cut
 from tests.travel_graphs import random_graph
@@ -30,11 +31,11 @@ def with_cuts(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_program_that_takes_too_many_steps_is_begun_anew(seed, monkeypatch):
+def test_a_program_that_takes_too_many_steps_is_begun_anew(seed):
     graph, lp, before = with_cuts(seed)
-    again = HighsRelaxation(graph.cluster, *all_legs(graph))
+    policy = MipPolicy(lp=LpPolicy(simplex_steps_per_row=0))
+    again = HighsRelaxation(graph.cluster, *all_legs(graph), policy)
     again.add_cuts(lp.cuts)
-    monkeypatch.setattr("netsp.mip.highs.STEPS", 0)
     point = again.solve(60.0)
     assert point.objective == pytest.approx(before.objective, rel=1e-9)
     assert steps(again) > 0

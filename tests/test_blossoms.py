@@ -32,7 +32,7 @@ def test_the_prism_of_halves_is_cut():
     for cut in cuts:
         assert cut.teeth == ((0, 3), (1, 4), (2, 5))
         left = cut_coefficients([cut], np.arange(6), PRISM) @ HALVES
-        assert left[0] == pytest.approx(-2.0 * cut.room - 1.0)
+        assert left[0] == pytest.approx(-2.0 * cut.rhs - 1.0)
 
 
 @settings(max_examples=30, deadline=None)
@@ -43,7 +43,7 @@ def test_no_tour_violates_a_two_matching_inequality(seed, chance):
     cuts = [some_cut(chance, graph) for _ in range(8)]
     rows = cut_coefficients(cuts, graph.cluster, legs)
     for _, y in tours_as_points(chance, graph, legs):
-        assert (rows @ y >= [-2.0 * c.room - 1e-9 for c in cuts]).all()
+        assert (rows @ y >= [-2.0 * c.rhs - 1e-9 for c in cuts]).all()
 
 
 @settings(max_examples=60, deadline=None)

@@ -35,7 +35,7 @@ def root_of(graph, *, tour=None, rows=None):
     """A root that has done nothing but hold all legs, with a poor tour or none."""
     run = MipRun(graph, Limits(on_progress=None if rows is None else rows.append))
     run.update_incumbent(tour)
-    return Root(run, CostMatrix(graph), HighsRelaxation, run.round)
+    return Root(run, CostMatrix(graph), HighsRelaxation, run.round_point)
 
 
 def test_the_first_legs_of_every_vertex_are_found_in_little_memory(monkeypatch):
@@ -65,7 +65,7 @@ def only_what_a_whole_point_needs(root, point):
 def test_branching_alone_finds_the_shortest_tour_and_proves_it(seed, start, cuts, monkeypatch):
     if not cuts:
         monkeypatch.setattr(Root, "separate", only_what_a_whole_point_needs)
-    monkeypatch.setattr(MipRun, "tour_at", _as_it_is)
+    monkeypatch.setattr(MipRun, "offer_rounded", _as_it_is)
     graph, rows = random_graph(seed, 6, most=3), []
     some = [0, *(graph.members(g)[0] for g in range(1, 7))]
     root = root_of(graph, tour=some if start else None, rows=rows)
@@ -76,12 +76,12 @@ def test_branching_alone_finds_the_shortest_tour_and_proves_it(seed, start, cuts
     assert all(r.bound.length <= best * (1 + 1e-9) for r in rows)
 
 
-def _as_it_is(run, costs, point, *, whole):
+def _as_it_is(run, costs, point, *, is_whole):
     """Take a point that is a tour for one, without a search that would find better."""
     from netsp.mip.subtours import cycles_of
 
     cycles = cycles_of(point.x, point.legs, point.y)
-    if whole and len(cycles) == 1:
+    if is_whole and len(cycles) == 1:
         run.update_incumbent(costs.vertices[cycles[0]].tolist())
 
 
@@ -140,8 +140,8 @@ def test_prices_of_a_list_of_legs_are_those_of_a_matrix(seed, chance, scale):
     of_list = LegPrices(legs, costs, graph.cluster, cuts, duals)
     assert of_list.bound == pytest.approx(of_matrix.bound, abs=1e-9)
     if np.isfinite(of_list.bound):
-        of_matrix.rule_out(of_matrix.bound + 0.3)
-        gone = of_list.above(of_matrix.bound + 0.3 - of_list.bound)
+        of_matrix.fix_out(of_matrix.bound + 0.3)
+        gone = of_list.exceeds(of_matrix.bound + 0.3 - of_list.bound)
         by_matrix = dead[legs[:, 0], legs[:, 1]]
         # a matrix also forgets vertices, whose legs a list keeps
         assert not (gone & ~by_matrix).any()
@@ -185,11 +185,11 @@ def test_no_tour_violates_a_comb(seed, chance):
     combs = [some_comb(chance, graph) for _ in range(8)]
     rows = cut_coefficients(combs, graph.cluster, legs)
     for tour, y in tours_as_points(chance, graph, legs):
-        assert (rows @ y >= [-2.0 * c.room - 1e-9 for c in combs]).all()
+        assert (rows @ y >= [-2.0 * c.rhs - 1e-9 for c in combs]).all()
         for comb in combs:
-            within, times = comb.within(graph.cluster, legs)
+            within, times = comb.left_side(graph.cluster, legs)
             visited = sum(comb.inside[v] for v in tour)
-            assert times @ y[within] <= visited + comb.room + 1e-9
+            assert times @ y[within] <= visited + comb.rhs + 1e-9
 
 
 def test_a_comb_is_found_where_no_pair_of_clusters_is_a_tooth():
@@ -217,7 +217,7 @@ def test_a_comb_is_found_where_no_pair_of_clusters_is_a_tooth():
     y = between[legs[:, 0], legs[:, 1]]
     for cut in cuts:
         assert max(len(t) for t in cut.teeth) == 3
-        assert (cut_coefficients([cut], cluster, legs) @ y)[0] < -2.0 * cut.room - 0.5
+        assert (cut_coefficients([cut], cluster, legs) @ y)[0] < -2.0 * cut.rhs - 0.5
     assert not comb_cuts(between, [], cluster)
 
 

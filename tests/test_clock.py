@@ -18,7 +18,7 @@ from netsp.base.clock import (
 from netsp.base.compiled.compile_policy import everything_compiled
 from netsp.base.errors import InputError, LimitReachedError, MemoryLimitError
 from netsp.base.ram import available_memory, check_available
-from netsp.mip.cutpool import IDLE, CutPool
+from netsp.mip.cutpool import CutPool
 from netsp.mip.cuts import Cut
 from netsp.plan.random_worlds import random_world, reachable_world
 from netsp.plan.space.mission_policy import MissionPolicy
@@ -103,7 +103,7 @@ def test_a_cut_pool_never_gives_one_cut_the_count_of_another():
         active = pool.active()
         if active is not None:
             pool.keep(active)
-            assert (pool.idle[~pool.for_good] < IDLE).all()
+            assert (pool.idle[~pool.for_good] < pool.policy.max_idle_rounds).all()
         assert pool.for_good.tolist() == [c.cluster % 5 == 0 for c in pool.cuts]
         assert pool.for_good.sum() == len(range(0, made, 5))
 

@@ -224,6 +224,6 @@ def test_a_tour_through_a_vertex_pays_what_it_costs_above_the_cheapest_of_its_cl
         dead = DeadLegs(~np.isfinite(costs))
         prices = Prices(costs, dead, cluster, [], duals)
         assert prices.bound == pytest.approx(0.0, abs=1e-9)
-        prices.rule_out(cutoff)
+        prices.fix_out(cutoff)
         assert bool(dead.matrix()[2].all()) is gone
         assert not dead.matrix()[1, 0]

@@ -1,6 +1,7 @@
 """Inequalities of even crossing: valid for tours, over goals and over classes, certified, and worth
 something."""
 
+import functools
 import itertools
 import math
 import random
@@ -25,11 +26,12 @@ from netsp.mip.cover_costs import ClassCovers, PathCovers
 from netsp.mip.covers import refine_covers
 from netsp.mip.cuts import Cut, cut_coefficients
 from netsp.mip.deadlegs import DeadLegs
-from netsp.mip.goal_relaxation import bound_over_goals
+from netsp.mip.goal_relaxation import CoverCosts, bound_over_goals
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.lagrangian_bound import exact_bound
 from netsp.mip.legprices import LegPrices
-from netsp.mip.mip_solver import solve
+from netsp.mip.mip_policy import CoverPolicy, MipPolicy, TimePolicy
+from netsp.mip.mip_solver import MipRun, Params, solve
 from netsp.mip.parity_cuts import odd_letters, parity_cuts
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
@@ -56,7 +58,7 @@ def test_no_tour_violates_an_inequality_of_any_set_of_vertices(seed, chance):
     cuts = [some_cut(chance, graph) for _ in range(8)]
     rows = cut_coefficients(cuts, graph.cluster, legs)
     for _, y in tours_as_points(chance, graph, legs):
-        assert (rows @ y >= [-2.0 * c.room - 1e-9 for c in cuts]).all()
+        assert (rows @ y >= [-2.0 * c.rhs - 1e-9 for c in cuts]).all()
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -67,7 +69,7 @@ def test_bounds_with_split_clusters_are_below_their_certificate_and_the_optimum(
     lp.add_cuts([some_cut(random.Random(seed + k), graph) for k in range(25)])
     point = lp.solve(60.0)
     assert (point.slack > -1e-6).all()
-    assert any(c.splits(graph.cluster) for c in lp.cuts)
+    assert any(c.splits_clusters(graph.cluster) for c in lp.cuts)
     rng = np.random.default_rng(seed)
     for scale in (0.0, 1e-3, 1.0):
         duals = duals_of_relaxation(
@@ -113,7 +115,7 @@ def test_a_ring_that_lies_on_two_sheets_by_halves_is_cut():
     y = np.full(6, 0.5)
     (cut, *_) = parity_cuts(legs, y, cluster, odd)
     assert cut.teeth == ((1, 3),)
-    assert (cut_coefficients([cut], cluster, legs) @ y)[0] == pytest.approx(-2.0 * cut.room - 1.0)
+    assert (cut_coefficients([cut], cluster, legs) @ y)[0] == pytest.approx(-2.0 * cut.rhs - 1.0)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -149,7 +151,7 @@ def test_a_leg_between_cells_costs_no_more_than_any_between_their_classes(seed, 
     graph, odd, *both = towers(seed)
     for tower in both:
         cells = tower.cells(obstacles)
-        own, costs = cells.of(graph.cluster, odd), tower.costs(cells)
+        own, costs = cells.cells_of(graph.cluster, odd), tower.costs(cells)
         assert (own >= 0).all()
         assert own[0] == 0
         assert (cells.cluster[own] == graph.cluster).all()
@@ -167,18 +169,17 @@ def test_bounds_of_covers_hold_and_what_they_rule_out_is_in_no_best_tour(seed):
     least = bound_over_goals(graph, proven_goals, Limits()).bound
     stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour]
     for tower in both:
-        found = refine_covers(tower, stops, best.length * 1.02, Clock(), Limits())
+        found = refine_covers(tower, stops, best.length * 1.02, Limits())
         assert least * (1.0 - 1e-6) <= found.bound <= best.length * 1.02
-        own = found.cells.of(graph.cluster, odd)[list(best.tour)]
+        own = found.cells.cells_of(graph.cluster, odd)[list(best.tour)]
         assert found.alive[own].all()
         assert not found.dead[own, np.roll(own, -1)].any()
         if found.bound < best.length:
             # as bounds over classes, from the dual values of the cells
-            own = found.cells.of(graph.cluster, odd)
-            prices = Prices(
-                costs_of(graph), DeadLegs.of(graph.costs), graph.cluster, found.lifted_cuts(own),
-                found.lifted_duals(own),
-            )  # fmt: skip
+            own = found.cells.cells_of(graph.cluster, odd)
+            dead, cuts = DeadLegs.missing(graph.costs), found.lifted_cuts(own)
+            duals = found.lifted_duals(own)
+            prices = Prices(costs_of(graph), dead, graph.cluster, cuts, duals)
             assert prices.bound <= best.length * (1.0 + 1e-9)
 
 
@@ -208,7 +209,7 @@ def test_two_sheets_know_that_a_ring_around_an_obstacle_is_no_tour(kind):
         else PathCovers(graph.ways_by_parity(), np.inf)
     )  # fmt: skip
     stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour]
-    found = refine_covers(tower, stops, best.length, Clock(), Limits())
+    found = refine_covers(tower, stops, best.length, Limits())
     assert found.cells.obstacles == (0,)
     assert found.bound == pytest.approx(best.length, rel=1e-5)
 
@@ -224,13 +225,10 @@ def test_covers_in_between_prove_the_same(seed, most, monkeypatch):
         seen.append(refine_covers(*args, **more))
         return seen[-1]
 
-    monkeypatch.setattr("netsp.mip.goal_relaxation.climb", on_cover_bound)
-    monkeypatch.setattr("netsp.mip.covers.MOST_CELLS", most)
-    monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "MANY_GOALS", 5)
+    monkeypatch.setattr("netsp.mip.goal_relaxation.refine_covers", on_cover_bound)
+    policy = MipPolicy(many_goals=5, covers=CoverPolicy(min_classes=50, max_cells=most))
     monkeypatch.setattr("netsp.gtsp.searching.MEASURE_AT_ONCE", 50)
-    for module in ("netsp.mip.mip_solver", "netsp.mip.goal_relaxation"):
-        monkeypatch.setattr(sys.modules[module], "MANY_CLASSES", 50)
-    fewer = solve(travel_graph(problem))
+    fewer = solve(travel_graph(problem), Params(policy=policy))
     assert len(seen) == 1
     assert whole.status is fewer.status is Status.OPTIMAL
     assert fewer.length == pytest.approx(whole.length, rel=2e-6)
@@ -242,15 +240,15 @@ def test_beyond_reach_of_the_program_over_all_classes_the_time_left_is_for_the_s
 ):
     problem = random_world(0, goals=14, tether_length=320.0)
     whole = solve(travel_graph(problem))
-    monkeypatch.setattr("netsp.mip.covers.MOST_CELLS", 16)
     monkeypatch.setattr("netsp.gtsp.searching.MEASURE_AT_ONCE", 50)
-    monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "MANY_GOALS", 5)
-    monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "OUT_OF_REACH", 0.0)
-    monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "LARGE", 5)
-    for module in ("netsp.mip.mip_solver", "netsp.mip.goal_relaxation"):
-        monkeypatch.setattr(sys.modules[module], "MANY_CLASSES", 50)
+    policy = MipPolicy(
+        many_goals=5,
+        large_goal_count=5,
+        max_gap_after_covers=0.0,
+        covers=CoverPolicy(min_classes=50, max_cells=16),
+    )
     graph = travel_graph(problem)
-    found = solve_graph(graph, "mip", **limits)
+    found = solve_graph(graph, "mip", params={"policy": policy}, **limits)
     assert graph.is_tour(found.tour)
     assert found.lower_bound <= whole.length * (1.0 + 1e-6)
     assert found.length >= whole.length * (1.0 - 1e-6)
@@ -277,11 +275,11 @@ def test_however_long_covers_take_the_core_has_its_share_of_what_is_left(monkeyp
 
     monkeypatch.setattr(module.MipRun, "bound_by_goals", slowly)
     monkeypatch.setattr(module.MipRun, "program", program)
-    monkeypatch.setattr(module, "CORE_FIRST", 50)
     monkeypatch.setattr("netsp.gtsp.searching.MEASURE_AT_ONCE", 50)
     monkeypatch.setattr("netsp.gtsp.searching.LARGER", 1)
     graph = travel_graph(random_world(0, goals=14, tether_length=320.0))
-    found = solve_graph(graph, "mip", time_limit=10.0)
+    params = {"policy": MipPolicy(core_classes=50)}
+    found = solve_graph(graph, "mip", params=params, time_limit=10.0)
     assert began
     assert proven[0]
     assert graph.is_tour(found.tour)
@@ -291,21 +289,21 @@ def share_of_covers(goals, classes):
     cluster = np.sort(np.append(np.arange(goals + 1), np.ones(classes - goals - 1, dtype=int)))
     costs = CostTable(np.broadcast_to(1.0, (classes, classes)), cluster)
     graph = TravelGraph(cluster, [()] * classes, np.ones(classes), costs)
-    return sys.modules["netsp.mip.mip_solver"].MipRun(graph)._cover_time_share
+    return MipRun(graph)._cover_time_share
 
 
 def test_covers_have_more_of_the_time_the_more_classes_there_are():
     shares = [share_of_covers(100, n) for n in (500, 3000, 9000, 13_000, 20_000)]
-    module = sys.modules["netsp.mip.mip_solver"]
-    assert shares[0] == module.GOALS_SHARE
-    assert shares[-1] == module.CELLS_SHARE
+    policy = TimePolicy()
+    assert shares[0] == policy.goal_share
+    assert shares[-1] == policy.cover_share
     assert shares == sorted(shares)
     assert len(set(shares)) > 3
 
 
 def test_with_hundreds_of_goals_covers_have_all_the_time_that_they_may():
-    module = sys.modules["netsp.mip.mip_solver"]
-    assert share_of_covers(module.LARGE + 1, 500) == module.CELLS_SHARE
+    policy = MipPolicy()
+    assert share_of_covers(policy.large_goal_count + 1, 500) == policy.time.cover_share
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -314,7 +312,9 @@ def test_with_too_many_classes_for_a_matrix_covers_bound_the_tour(seed, monkeypa
     best = solve_graph(travel_graph(problem), "auto")
     goals = bound_over_goals(travel_graph(problem), proven_goals, Limits()).bound
     monkeypatch.setattr("netsp.plan.auto.PROVABLE", 30)
-    monkeypatch.setattr("netsp.mip.goal_relaxation.MANY_CLASSES", 30)
+    policy = MipPolicy(covers=CoverPolicy(min_classes=30))
+    bound = functools.partial(bound_over_goals, policy=policy)
+    monkeypatch.setattr("netsp.plan.auto.bound_over_goals", bound)
     found = solve_graph(travel_graph(problem), "auto", time_limit=3.0)
     assert found.lower_bound <= best.length * (1.0 + 1e-6)
     assert found.length >= best.length * (1.0 - 1e-6)
@@ -349,16 +349,17 @@ def test_auto_has_a_tour_and_a_bound_whatever_the_time(seed):
     assert found.status is Status.FEASIBLE
 
 
-def test_the_legs_of_a_matrix_that_takes_too_long_leave_the_bound_over_goals(monkeypatch):
+def test_the_legs_of_a_matrix_that_takes_too_long_leave_the_bound_over_goals():
     graph = travel_graph(small(1))
     best = solve_graph(graph, "auto").length
 
     def too_long():
         raise LimitReachedError("the time is up")
 
-    monkeypatch.setattr("netsp.mip.goal_relaxation.MANY_CLASSES", 10)
+    policy = MipPolicy(covers=CoverPolicy(min_classes=10))
+    costs = CoverCosts(too_long)
     with pytest.raises(LimitReachedError):
-        bound_over_goals(graph, proven_goals, Limits(), [0], too_long)
+        bound_over_goals(graph, proven_goals, Limits(), [0], costs, policy=policy)
     assert 0.5 * best < graph.bound_in_any_class <= best
 
 
@@ -376,7 +377,7 @@ def test_covers_that_are_stopped_keep_what_they_have_proven(press, monkeypatch):
 
     monkeypatch.setattr(root.Root, "_solve_lp", stopping)
     found = refine_covers(
-        tower, stops, 1.5 * best.length, clock, Limits(), lambda *b: heard.append(b)
+        tower, stops, 1.5 * best.length, Limits(clock), lambda *b: heard.append(b)
     )
     assert len(heard) >= 1
     assert found.bound == heard[-1][0] > 0.0

@@ -24,7 +24,7 @@ from netsp.base.clock import Clock
 from netsp.base.errors import MemoryLimitError
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.search import Instance, Search
-from netsp.mip.flows import min_cuts
+from netsp.mip.flows import Edges, min_cuts
 from netsp.mip.mip_solver import MipRun
 from netsp.mip.subtours import cover_branches
 from netsp.roadmap.slits import _taut_string, build_slits, slit_lengths
@@ -125,9 +125,8 @@ def test_minimum_cuts_are_those_of_networkx(seed):
     capacity = rng.uniform(0.1, 1.0, len(pairs))
     cluster = np.concatenate([[0], rng.integers(1, 3, n - 1)])
     for c in np.unique(cluster[1:]):
-        sets, _, values = min_cuts(
-            n, tail, head, capacity, cluster, 0, np.array([c]), 1e9
-        )  # fmt: skip
+        edges = Edges(tail, head, capacity)
+        sets, _, values = min_cuts(n, edges, cluster, 0, np.array([c]), 1e9)
         g = nx.Graph()
         g.add_nodes_from([*range(n), "s"])
         for (u, v), w in zip(pairs, capacity, strict=True):
@@ -163,7 +162,7 @@ def test_the_clusters_with_a_cut_below_enough_are_those_of_networkx(seed):
             g.add_edge("s", int(v))
         flows[c] = nx.maximum_flow_value(g, "s", 0)
     enough = float(np.median(list(flows.values()))) + 1e-6
-    sets, which, values = min_cuts(n, tail, head, capacity, cluster, 0, wanted, enough)
+    sets, which, values = min_cuts(n, Edges(tail, head, capacity), cluster, 0, wanted, enough)
     below = {c for c, flow in flows.items() if flow < enough}
     assert set(which.tolist()) <= below
     for c in below:

@@ -1,6 +1,5 @@
 """Tests of the handover of a proof from walks to cutting planes."""
 
-import importlib
 from dataclasses import fields
 
 import pytest
@@ -10,9 +9,10 @@ from hypothesis import strategies as st
 from netsp import solve_graph, travel_graph
 from netsp.base.errors import InputError
 from netsp.gtsp.dp.handover import Handover
+from netsp.gtsp.limits import Limits
+from netsp.mip.mip_policy import MipPolicy
+from netsp.mip.mip_solver import MipRun
 from tests.worlds import random_world
-
-MIP = importlib.import_module("netsp.mip.mip_solver")
 
 
 @given(st.integers(1, 200), st.integers(0, 10**6))
@@ -25,12 +25,13 @@ def test_cuts_take_over_at_few_legs_or_many_labels(vertices, labels):
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_walks_and_cuts_that_take_over_at_once_prove_the_same_tour(seed, monkeypatch):
+def test_walks_and_cuts_that_take_over_at_once_prove_the_same_tour(seed):
     graph = travel_graph(random_world(seed, circles=10, goals=13, tether=300.0))
     by_walks = solve_graph(graph, "auto")
-    monkeypatch.setattr(MIP, "HANDOVER", Handover(max_legs_of_slow_walks=10**6))
+    policy = MipPolicy(handover=Handover(max_legs_of_slow_walks=10**6))
     stages = []
-    by_cuts = solve_graph(graph, "auto", on_progress=lambda p: stages.append(p.stage))
+    limits = Limits(on_progress=lambda p: stages.append(p.stage))
+    by_cuts = MipRun(graph, limits, policy=policy).solve("highs", None, walks=True)
     assert stages.count("walks") == 1
     assert "root" in stages
     assert by_cuts.status == by_walks.status == "optimal"

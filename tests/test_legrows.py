@@ -8,18 +8,17 @@ import pytest
 
 from netsp import Problem, Status, solve_graph, travel_graph
 from netsp import solve as solve_problem
-from netsp.base.clock import Clock
 from netsp.gtsp import cost_matrix
 from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.nearest_index import NearestIndex
 from netsp.gtsp.sparse_costs import SparseCosts
-from netsp.mip import goal_relaxation
 from netsp.mip.cost_fixing import max_leg_costs, surviving_legs
 from netsp.mip.cover_costs import ClassCovers, PathCovers
 from netsp.mip.covers import refine_covers
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs
+from netsp.mip.mip_policy import CoverPolicy, MipPolicy
 from netsp.mip.parity_cuts import odd_letters
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
@@ -137,7 +136,7 @@ def test_prices_over_rows_are_those_over_a_matrix_and_rule_out_the_same(seed):
     costs = graph.costs.astype(np.float32)
     cuts = [Cut(rng.random(len(graph)) < 0.5, 1 + k % 6) for k in range(12)]
     duals = duals_of_relaxation(rng.normal(size=7), rng.random(12), cuts, graph.cluster)
-    marks, rows = DeadLegs.of(costs), rows_of(costs, rng)
+    marks, rows = DeadLegs.missing(costs), rows_of(costs, rng)
     with_marks = Prices(costs, marks, graph.cluster, cuts, duals)
     in_rows = Prices(cost_matrix.NO_VALUES, rows, graph.cluster, cuts, duals)
     assert in_rows.bound == with_marks.bound
@@ -145,11 +144,11 @@ def test_prices_over_rows_are_those_over_a_matrix_and_rule_out_the_same(seed):
     legs = marks.legs_left()
     assert (in_rows.costs_of(legs) == with_marks.costs_of(legs)).all()
     before = rows.left
-    in_rows.rule_out(cutoff)
-    with_marks.rule_out(cutoff)
+    in_rows.fix_out(cutoff)
+    with_marks.fix_out(cutoff)
     assert (matrix_of(rows) == np.where(marks.matrix(), np.inf, costs)).all()
     assert 0 < rows.left < before
-    for a, b in zip(in_rows.cheapest(1e-9), with_marks.cheapest(1e-9), strict=True):
+    for a, b in zip(in_rows.most_negative(1e-9), with_marks.most_negative(1e-9), strict=True):
         assert (a == b).all()
     gone = np.argwhere(np.isinf(matrix_of(rows)) & np.isfinite(costs))
     assert np.isinf(in_rows.costs_of(gone)).all()
@@ -186,7 +185,7 @@ def test_what_lies_nearest_is_so_along_legs_that_were_let_go_too(monkeypatch):
     assert asked == [30, 10]
 
 
-def over_ways(seed):
+def over_ways(seed, coarse_covers=3):
     """A small world, its best tour, and what covers of ways prove with a tour 2 % longer."""
     graph = travel_graph(small(seed, tether_length=150.0))
     best = solve_graph(graph, "auto")
@@ -195,30 +194,32 @@ def over_ways(seed):
     stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour]
     seen = []
 
-    def finer(over, length):
+    def refine_costs(over, length):
         seen.append((over, length))
         rows = surviving_legs(graph, over, length, best.tour, odd)
         return ClassCovers(rows, graph.cluster, odd)
 
     length = 1.02 * best.length
-    found = refine_covers(PathCovers(ways, np.inf), stops, length, Clock(), Limits(), finer=finer)
+    policy = MipPolicy(covers=CoverPolicy(coarse_covers=coarse_covers))
+    found = refine_covers(
+        PathCovers(ways, np.inf), stops, length, Limits(), refine_costs=refine_costs, policy=policy
+    )
     return graph, best, odd, seen, found
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_covers_go_on_where_a_cell_has_no_class_left(seed, monkeypatch):
-    monkeypatch.setattr("netsp.mip.covers.COARSE", 2)
     emptied, find = [], surviving_legs
 
     def fewer(graph, over, length, tour, odd):
         rows = find(graph, over, length, tour, odd)
         others = (graph.cluster == 1) & ~np.isin(np.arange(len(graph)), tour)
         rows.add_vertices(others)
-        emptied.append(set(over.cells.of(graph.cluster, odd)[others].tolist()))
+        emptied.append(set(over.cells.cells_of(graph.cluster, odd)[others].tolist()))
         return rows
 
-    monkeypatch.setattr("tests.test_legrows.survivors", fewer)
-    _, best, _, seen, found = over_ways(seed)
+    monkeypatch.setattr("tests.test_legrows.surviving_legs", fewer)
+    _, best, _, seen, found = over_ways(seed, coarse_covers=2)
     assert found.bound <= 1.02 * best.length
     assert len(emptied) == len(seen)
 
@@ -248,16 +249,15 @@ def shortest_along(graph):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_no_leg_of_a_better_tour_is_let_go(seed, monkeypatch):
-    monkeypatch.setattr("netsp.mip.covers.COARSE", 1)
-    graph, best, odd, seen, found = over_ways(seed)
+def test_no_leg_of_a_better_tour_is_let_go(seed):
+    graph, best, odd, seen, found = over_ways(seed, coarse_covers=1)
     ((over, length),) = seen
     assert over.bound < length
     rows = surviving_legs(graph, over, length, NO_TOUR, odd)
     left = matrix_of(rows)
     assert np.isfinite(left).sum() < np.isfinite(graph.costs).sum()
     gone = np.argwhere(np.triu(np.isinf(left) & np.isfinite(graph.costs)))
-    own = over.cells.of(graph.cluster, odd)
+    own = over.cells.cells_of(graph.cluster, odd)
     u, v = gone.T
     excess = graph.costs[u, v] - max_leg_costs(over, length)[own[u], own[v]]
     assert (excess > 0.0).all()
@@ -274,7 +274,7 @@ def test_what_a_leg_may_cost_is_no_less_than_it_costs_in_tours_as_short(seed):
     graph, best, odd, seen, _ = over_ways(seed)
     for over, length in seen:
         longest = max_leg_costs(over, length)
-        own = over.cells.of(graph.cluster, odd)
+        own = over.cells.cells_of(graph.cluster, odd)
         tour = np.array(best.tour)
         cost = graph.costs[tour, np.roll(tour, 1)]
         assert (cost <= longest[own[tour], own[np.roll(tour, 1)]] + 1e-9).all()
@@ -285,16 +285,11 @@ def rows_from_the_start(monkeypatch):
     """Legs of small graphs are held in rows, until few classes are left."""
     monkeypatch.setattr(SOLVE, "ROUNDED_FROM", 20)
     monkeypatch.setattr(cost_matrix, "ROUNDED_FROM", 20)
-    monkeypatch.setattr(SOLVE, "MANY_CLASSES", 20)
-    monkeypatch.setattr(goal_relaxation, "MANY_CLASSES", 20)
-    monkeypatch.setattr(SOLVE, "MANY_GOALS", 5)
-    monkeypatch.setattr("netsp.mip.covers.COARSE", 1)
     monkeypatch.setattr("netsp.gtsp.searching.CORE", 30)
     monkeypatch.setattr("netsp.gtsp.searching.MEASURE_AT_ONCE", 10)
     monkeypatch.setattr(cost_matrix, "MEASURE_AT_ONCE", 10)
     # covers prove little, so that the program over the classes has something to do
-    monkeypatch.setattr("netsp.mip.covers.MOST_CELLS", 25)
-    monkeypatch.setattr("netsp.mip.covers.PATIENCE", 0)
+    covers = CoverPolicy(min_classes=20, coarse_covers=1, max_cells=25, patience=0)
     made, restricted = [], []
     make, restrict = CostMatrix.__init__, SparseCosts.restrict
 
@@ -308,14 +303,14 @@ def rows_from_the_start(monkeypatch):
 
     monkeypatch.setattr(CostMatrix, "__init__", noted)
     monkeypatch.setattr(SparseCosts, "restrict", heard)
-    return made, restricted
+    return made, restricted, MipPolicy(many_goals=5, covers=covers)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_proof_over_rows_finds_the_optimum_of_one_over_a_matrix(
     seed, rows_from_the_start, monkeypatch
 ):
-    made, _ = rows_from_the_start
+    made, _, policy = rows_from_the_start
     asked, find = [], NearestIndex.nearest
 
     def heard(self, vertices, some):
@@ -328,7 +323,7 @@ def test_a_proof_over_rows_finds_the_optimum_of_one_over_a_matrix(
     )
     graph = travel_graph(problem)
     expected = solve_graph(travel_graph(problem), "auto")
-    found = solve_graph(graph, "mip", seed=seed)
+    found = solve_graph(graph, "mip", params={"policy": policy}, seed=seed)
     assert any(made)
     assert asked
     assert found.status is Status.OPTIMAL
@@ -387,7 +382,7 @@ def test_legs_in_blocks_are_those_rounded_and_ways_no_longer(kind):
     odd = odd_letters(graph.signatures, ways.obstacles)
     tower = PathCovers(ways, np.inf)
     cells = tower.cells(tuple(range(ways.obstacles)))
-    own = cells.of(graph.cluster, odd)
+    own = cells.cells_of(graph.cluster, odd)
     assert (own >= 0).all()
     least = tower.costs(cells)[own][:, own]
     finite = np.isfinite(expected)

@@ -3,6 +3,7 @@
 import itertools
 import random
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from netsp.base.clock import Clock
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.searching import SearchingRun
 from netsp.mip.merging import merge, merged_tour, visited_classes
+from netsp.mip.mip_policy import CoverPolicy, MergingPolicy, MipPolicy
 from netsp.mip.mip_solver import solve_merged
 from netsp.plan.random_worlds import random_world
 from tests.brute import brute_tour
@@ -57,12 +59,12 @@ def test_searches_from_the_start_give_different_tours_and_the_merged_is_no_longe
     assert run.search_afresh(1, Clock(0.0)) == [run.tour]
 
 
-def test_tours_of_very_many_classes_are_merged_by_a_program_that_merges_nothing(monkeypatch):
+def test_tours_of_very_many_classes_are_merged_by_a_program_that_merges_nothing():
     graph = random_graph(0, 5, most=3)
-    monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "MANY_CLASSES", 2)
-    monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "MANY_GOALS", 2)
+    policy = MipPolicy(many_goals=2, covers=CoverPolicy(min_classes=2))
     tours = some_tours(graph, random.Random(0), 4)
-    found = merged_tour(graph, tours, solve_merged, Limits(Clock(60.0)))
+    prove = partial(solve_merged, policy=policy)
+    found = merged_tour(graph, tours, prove, Limits(Clock(60.0)))
     assert graph.is_tour(found)
 
 
@@ -77,9 +79,9 @@ def ends_of(monkeypatch, least, limits):
         known(run, tours, prove, clock)
 
     monkeypatch.setattr(module, "merge", merge)
-    monkeypatch.setattr(module, "MERGED_FROM", least)
     graph = travel_graph(random_world(3, goals=30, tether_length=250.0))
-    run = module.MipRun(graph, limits, search_rounds=2)
+    policy = MipPolicy(merging=MergingPolicy(min_goals=least))
+    run = module.MipRun(graph, limits, search_rounds=2, policy=policy)
     run.solve("highs", None)
     assert run.is_done
     return given

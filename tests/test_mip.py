@@ -15,28 +15,34 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csc_array, csr_array
 
-from netsp import solve_graph, travel_graph
+from netsp import travel_graph
 from netsp.gtsp import cost_matrix, searching
 from netsp.gtsp.cost_matrix import MEASURE_AT_ONCE, CostMatrix
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.travel.costs import rounded_down
 from netsp.gtsp.travel.graph import TravelGraph
-from netsp.mip import highs, root
+from netsp.mip import root
 from netsp.mip import solve as mip
 from netsp.mip.cbc_program import CbcRelaxation
 from netsp.mip.cuts import Cut
-from netsp.mip.deadlegs import DeadLegs, not_dead
-from netsp.mip.flows import contracted
+from netsp.mip.deadlegs import DeadLegs, write_alive
+from netsp.mip.flows import Edges, contracted
 from netsp.mip.goal_relaxation import one_tree_bound
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.lagrangian_bound import exact_bound
-from netsp.mip.mip_solver import Params
+from netsp.mip.mip_policy import (
+    CutPolicy,
+    LpPolicy,
+    MipPolicy,
+    PricingPolicy,
+    SchedulePolicy,
+)
+from netsp.mip.mip_solver import MipRun, Params
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
 from netsp.mip.reducedcosts import reduced_costs_at
 from netsp.mip.subtours import (
-    VIOLATION,
     components,
     fractional_cuts,
     goal_cuts,
@@ -56,6 +62,7 @@ def solve(graph, params=None, **limits):
 
 
 BACKENDS = ["highs", "cbc"]
+MIN_VIOLATION = CutPolicy().min_subtour_violation
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
@@ -115,15 +122,14 @@ def test_any_dual_values_give_a_valid_bound(backend):
     assert priced(graph, program.cuts, duals).bound >= program.solve(60.0).objective - 1e-5
 
 
-def test_a_program_that_is_built_in_pieces_is_the_same(monkeypatch):
+def test_a_program_that_is_built_in_pieces_is_the_same():
     graph = random_graph(7, goals=5)
     legs = np.argwhere(np.triu(np.isfinite(graph.costs), 1))
     costs, half = graph.costs[legs[:, 0], legs[:, 1]], len(legs) // 2
     cuts = [Cut(np.isin(graph.cluster, [k, k + 1]), k) for k in range(1, 5)]
     programs = []
-    for block in (highs.BLOCK, 7):
-        monkeypatch.setattr(highs, "BLOCK", block)
-        program = HighsRelaxation(graph.cluster, legs[:half], costs[:half])
+    for policy in (MipPolicy(), MipPolicy(lp=LpPolicy(max_block_entries=7))):
+        program = HighsRelaxation(graph.cluster, legs[:half], costs[:half], policy)
         program.add_cuts(cuts[:3])
         program.add_legs(legs[half:], costs[half:])
         program.add_cuts(cuts[3:])
@@ -143,7 +149,7 @@ def test_a_program_that_is_built_in_pieces_is_the_same(monkeypatch):
 
 def priced(graph, cuts, duals):
     """All legs of a graph at dual values, none of them dead."""
-    return Prices(costs_of(graph), DeadLegs.of(graph.costs), graph.cluster, cuts, duals)
+    return Prices(costs_of(graph), DeadLegs.missing(graph.costs), graph.cluster, cuts, duals)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -167,10 +173,10 @@ def test_what_prices_rule_out_is_in_no_shorter_tour(seed):
                 point.duals.cut + scale * rng.normal(size=point.duals.cut.shape), 0.0
             ),
         )  # fmt: skip
-        marks = DeadLegs.of(graph.costs)
+        marks = DeadLegs.missing(graph.costs)
         prices = Prices(costs_of(graph), marks, graph.cluster, program.cuts, shaken)
         before = marks.left
-        prices.rule_out(1.0001 * best)
+        prices.fix_out(1.0001 * best)
         dead = marks.matrix()
         left = np.where(dead, np.inf, graph.costs)
         assert brute(TravelGraph.from_costs(left, graph.cluster)) == pytest.approx(best)
@@ -184,7 +190,7 @@ def test_marks_of_dead_legs_are_those_of_a_matrix(size, share):
     rng = np.random.default_rng(size)
     dead = rng.random((size, size)) < share
     dead |= dead.T
-    marks = DeadLegs.of(np.where(dead, np.inf, 1.0))
+    marks = DeadLegs.missing(np.where(dead, np.inf, 1.0))
     gone = rng.random(size) < 0.1
     marks.add_vertices(gone)
     dead[gone] = dead[:, gone] = True
@@ -203,7 +209,9 @@ def test_marks_of_dead_legs_are_those_of_a_matrix(size, share):
         assert (marks[u, v] == dead.ravel()).all()
         other = np.empty(len(dead), dtype=np.int64)
         for row in range(len(dead)):
-            assert (other[: not_dead(row, marks.bits, other)] == np.flatnonzero(~dead[row])).all()
+            assert (
+                other[: write_alive(row, marks.bits, other)] == np.flatnonzero(~dead[row])
+            ).all()
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -269,12 +277,12 @@ def test_where_no_cut_of_whole_clusters_is_found_none_is_violated(seed):
         point = program.solve(60.0)
         cuts = goal_cuts(point.legs, point.y, graph.cluster)
         least = min(crossing(s) for s in subsets)
-        assert bool(cuts) == (least < 2.0 - VIOLATION)
+        assert bool(cuts) == (least < 2.0 - MIN_VIOLATION)
         for cut in cuts:
             goals = np.unique(graph.cluster[cut.inside])
             assert (cut.inside == np.isin(graph.cluster, goals)).all()
             assert cut.cluster in goals
-            assert crossing(goals) < 2.0 - VIOLATION
+            assert crossing(goals) < 2.0 - MIN_VIOLATION
         if not cuts:
             return
         program.add_cuts(cuts)
@@ -307,15 +315,16 @@ def test_goals_joined_by_whole_edges_hide_no_violated_set(seed, goals, mixed):
     sets = np.array(list(itertools.product([False, True], repeat=goals)), dtype=bool)[1:]
     sets = np.hstack([np.zeros((len(sets), 1), dtype=bool), sets])
     least = ((sets[:, legs[:, 0]] ^ sets[:, legs[:, 1]]) @ y).min()
-    assert bool(cuts) == (least < 2.0 - VIOLATION)
+    assert bool(cuts) == (least < 2.0 - MIN_VIOLATION)
 
 
 def test_strings_of_whole_edges_are_joined_and_the_base_to_nothing():
     tail, head = np.array([0, 1, 2, 3, 4, 5]), np.array([1, 2, 3, 4, 5, 0])
     capacity = np.array([1.0, 1.0, 1.0, 0.5, 1.0, 1.0])
-    assert contracted(6, tail, head, capacity, 0).tolist() == [0, 1, 1, 1, 2, 2]
+    assert contracted(6, Edges(tail, head, capacity), 0).tolist() == [0, 1, 1, 1, 2, 2]
     # 0.5 is all that others of either carry, but not of both
-    pair = contracted(4, np.array([0, 1, 2, 1]), np.array([1, 2, 3, 3]), np.full(4, 0.5), 0)
+    ring = Edges(np.array([0, 1, 2, 1]), np.array([1, 2, 3, 3]), np.full(4, 0.5))
+    pair = contracted(4, ring, 0)
     assert pair.tolist() == [0, 1, 2, 2]
 
 
@@ -353,17 +362,17 @@ def row_prices(prices):
     return out
 
 
-def test_legs_that_got_longer_since_are_looked_for_again_where_there_may_be_more(monkeypatch):
+def test_legs_that_got_longer_since_are_looked_for_again_where_there_may_be_more():
     """All legs of negative price are given in the end, whatever few are given at a time."""
-    monkeypatch.setattr("netsp.mip.prices.CHEAPEST", 2)
     graph = random_graph(3, goals=6, most=4)
     costs = graph.costs.copy()
     duals = duals_of_relaxation(np.full(7, 0.4), np.zeros(0), [], graph.cluster)
-    prices = Prices(costs, DeadLegs.of(costs), graph.cluster, [], duals)
+    policy = PricingPolicy(candidates_per_vertex=2)
+    prices = Prices(costs, DeadLegs.missing(costs), graph.cluster, [], duals, policy=policy)
     legs, cost = first_legs(graph)
     negative = {tuple(leg) for leg in legs[cost < 0.8 - 1e-9].tolist()}
     seen = set()
-    while len(found := prices.cheapest(1e-9)[0]):
+    while len(found := prices.most_negative(1e-9)[0]):
         assert not seen & {tuple(leg) for leg in found.tolist()}
         seen |= {tuple(leg) for leg in found.tolist()}
         u, v = found.T
@@ -592,21 +601,20 @@ def test_with_many_classes_of_few_goals_a_bound_comes_before_all_legs_are_bounde
 
     module = sys.modules["netsp.mip.mip_solver"]  # the function of that name hides it
     monkeypatch.setattr(module, "CostMatrix", OfSome)
-    monkeypatch.setattr(module, "CORE_FIRST", 10)
     monkeypatch.setattr(searching, "LARGER", 2)
     assert len(graph) > MEASURE_AT_ONCE
-    found = solve_graph(graph, "auto")
+    run = MipRun(graph, Limits(), policy=MipPolicy(core_classes=10))
+    found = run.solve("highs", None, walks=True)
     assert held
     assert found.status is Status.FEASIBLE
     assert found.lower_bound > 0.5 * found.length
 
 
-def test_with_many_goals_their_bound_comes_first_and_the_proof_is_the_same(monkeypatch):
+def test_with_many_goals_their_bound_comes_first_and_the_proof_is_the_same():
     graph = travel_graph(far_world(1, goals=12, tether_length=200.0))
     plain = solve(graph)
     assert "goals" not in {row.stage for row in plain.trace}
-    monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "MANY_GOALS", 12)
-    first = solve(graph)
+    first = solve(graph, {"policy": MipPolicy(many_goals=12)})
     begun = [row for row in first.trace if row.stage == "goals"]
     assert 0.0 < begun[0].bound.length <= plain.length * (1 + 1e-9)
     assert first.status is plain.status is Status.OPTIMAL
@@ -712,10 +720,11 @@ def test_what_comes_of_something_else_than_ctrl_c_is_no_interrupt(monkeypatch):
 def test_what_is_done_with_thousands_of_classes_only_proves_the_same_with_hundreds(monkeypatch):
     problem = far_world(1, goals=25, tether_length=300.0)
     plain = solve(travel_graph(problem))
-    monkeypatch.setattr(root, "MANY", 0)
-    monkeypatch.setattr(root, "MOST_PRICED", 40)
-    monkeypatch.setattr(root, "LEAN_EVERY", 1)
-    monkeypatch.setattr(root, "SETTLE", 0.05)
+    policy = MipPolicy(
+        lp=LpPolicy(many_vertices=0, drop_interval=1),
+        pricing=PricingPolicy(max_new_legs=40),
+        schedule=SchedulePolicy(settle_share=0.05),
+    )
     left = []
     drop = root.Root._drop_expensive_legs
     monkeypatch.setattr(
@@ -723,15 +732,14 @@ def test_what_is_done_with_thousands_of_classes_only_proves_the_same_with_hundre
         "_drop_expensive_legs",
         lambda self, *more: (drop(self, *more), left.append(self)),
     )
-    lean = solve(travel_graph(problem))
+    lean = solve(travel_graph(problem), {"policy": policy})
     assert left
     assert plain.status is lean.status is Status.OPTIMAL
     assert lean.length == pytest.approx(plain.length, rel=2e-6)
 
 
 def test_cuts_of_the_proof_over_goals_stay_in_the_program(monkeypatch):
-    monkeypatch.setattr(sys.modules["netsp.mip.mip_solver"], "MANY_GOALS", 5)
-    monkeypatch.setattr("netsp.mip.cutpool.IDLE", 1)
+    policy = MipPolicy(many_goals=5, cuts=CutPolicy(max_idle_rounds=1))
     ends = []
     proven = root.Root.solve
 
@@ -741,7 +749,7 @@ def test_cuts_of_the_proof_over_goals_stay_in_the_program(monkeypatch):
         ends.append((began, self.lp.pool.for_good.sum(), len(self.lp.pool)))
 
     monkeypatch.setattr(root.Root, "solve", prove)
-    solve(travel_graph(far_world(1, goals=25, tether_length=300.0)))
+    solve(travel_graph(far_world(1, goals=25, tether_length=300.0)), {"policy": policy})
     began, left, cuts = ends[-1]
     assert 0 < began == left < cuts
 
@@ -751,17 +759,16 @@ def test_looking_at_prices_can_be_stopped_half_way():
     vertices = len(graph)
     assert vertices > 10
     duals = HighsRelaxation(graph.cluster, *first_legs(graph)).solve(None).duals
-    dead, seen = DeadLegs.of(graph.costs), []
+    dead, seen = DeadLegs.missing(graph.costs), []
 
     def stop():
         seen.append(1)
         if len(seen) > 2:
             raise RunStopped
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("netsp.mip.prices.ROWS", max(1, vertices // 6))
-        with pytest.raises(RunStopped):
-            Prices(costs_of(graph), dead, graph.cluster, [], duals, stop)
+    policy = PricingPolicy(rows_per_task=max(1, vertices // 6))
+    with pytest.raises(RunStopped):
+        Prices(costs_of(graph), dead, graph.cluster, [], duals, stop, policy)
 
 
 def first_legs(graph):

@@ -14,6 +14,7 @@ from netsp.gtsp.solver_run import RunStopped
 from netsp.mip import covers
 from netsp.mip.cover_bounds import Cells
 from netsp.mip.cover_refinement import CoverRefinement, frustration
+from netsp.mip.mip_policy import CoverPolicy
 from netsp.mip.root import Root
 from tests.cut_points import towers
 
@@ -42,7 +43,7 @@ def signed_graphs(draw):
 @settings(max_examples=200, deadline=None)
 @given(signed_graphs())
 def test_frustration_is_no_less_than_the_least_of_all_choices_of_sides(graph):
-    found = frustration(*graph)
+    found = frustration(*graph, 20)
     assert least_frustration(*graph) - 1e-9 <= found <= graph[1].max(axis=1).sum() + 1e-9
 
 
@@ -52,22 +53,22 @@ def test_what_goes_around_nothing_is_not_frustrated(graph, chance):
     ends, excess, sides = graph
     side = np.array([chance.choice(np.flatnonzero(s)) for s in sides])
     excess[np.arange(len(ends)), side[ends[:, 0]] ^ side[ends[:, 1]]] = 0.0
-    assert frustration(ends, excess, sides) == 0.0
+    assert frustration(ends, excess, sides, 20) == 0.0
     one_sided = np.arange(2) == side[:, None]
-    assert frustration(ends, excess, one_sided) == 0.0
+    assert frustration(ends, excess, one_sided, 20) == 0.0
     # where legs tell which side their ends are on, a tree of them does
     excess[np.arange(len(ends)), 1 - (side[ends[:, 0]] ^ side[ends[:, 1]])] = 1.0
-    assert frustration(ends, excess, np.ones_like(sides)) == 0.0
+    assert frustration(ends, excess, np.ones_like(sides), 20) == 0.0
 
 
 def test_once_around_costs_the_cheapest_leg_of_the_ring():
     ring = np.array([(0, 1), (1, 2), (2, 3), (0, 3)])
     excess = np.array([(0.0, 5.0), (0.0, 3.0), (0.0, 7.0), (6.0, 0.0)])
     both = np.ones((4, 2), dtype=bool)
-    assert frustration(ring, excess, both) == 3.0
+    assert frustration(ring, excess, both, 20) == 3.0
     # the ends of the leg that would give way have only one side
     both[1:3, 1] = False
-    assert frustration(ring, excess, both) == 5.0
+    assert frustration(ring, excess, both, 20) == 5.0
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -88,7 +89,7 @@ def test_legs_by_parity_are_those_between_sides_of_the_cover_above(seed):
         )  # fmt: skip
         for i in range(1, tower.obstacles):
             split = tower.cells((0, i))
-            costs, own = tower.costs(split), split.above(cells)
+            costs, own = tower.costs(split), split.cells_below(cells)
             least = np.full((m, m, 2), np.inf)
             side = split.code >> 1 & 1
             where = own[:, None], own[None, :], side[:, None] ^ side[None, :]
@@ -120,14 +121,13 @@ class TwoObstacles:
 def test_the_obstacle_that_a_point_goes_around_is_told_apart_first():
     tower = TwoObstacles()
     ring = np.array([(1, 2), (2, 3), (1, 3)])
-    splits = CoverRefinement(tower, growth=1.3, most=100)
-    assert splits.after(tower.cells(()), ring, np.ones(3), gap=10.0) == [1]
+    splits = CoverRefinement(tower, CoverPolicy(max_cells=100))
+    assert splits.next_obstacles(tower.cells(()), ring, np.ones(3), gap=10.0) == [1]
     # with no more cells than there may be
-    assert (
-        CoverRefinement(tower, 1.3, most=6).after(tower.cells(()), ring, np.ones(3), gap=10.0) == []
-    )
+    few_cells = CoverRefinement(tower, CoverPolicy(max_cells=6))
+    assert few_cells.next_obstacles(tower.cells(()), ring, np.ones(3), gap=10.0) == []
     # what promised once is believed after a point that goes around nothing
-    assert splits.after(tower.cells((0,)), ring[:2], np.ones(2), gap=10.0) == [1]
+    assert splits.next_obstacles(tower.cells((0,)), ring[:2], np.ones(2), gap=10.0) == [1]
 
 
 @pytest.mark.parametrize("much", [True, False])
@@ -155,13 +155,13 @@ def test_a_better_tour_that_is_told_is_gone_on_with(seed, much, monkeypatch):
         return stops(best), told_length
 
     monkeypatch.setattr(covers, "_Level", Noted)
-    found = covers.refine_covers(tower, stops(other), given, Clock(), Limits(), told)
+    found = covers.refine_covers(tower, stops(other), given, Limits(), told)
     assert levels[0].run.length == given
     assert len(levels) > 1
     for level in levels[1:]:
         tour, length = (best, told_length) if much else (other, given)
         assert level.run.length == length
-        own = level.cells.of(graph.cluster, odd)[tour]
+        own = level.cells.cells_of(graph.cluster, odd)[tour]
         assert level.cell_tour.tolist() == own.tolist()
     assert found.bound <= length * (1.0 + 1e-9)
 
@@ -178,7 +178,5 @@ def test_a_cover_that_has_proven_nothing_tells_nothing(monkeypatch):
         return price(self, *args, **more)
 
     monkeypatch.setattr(Root, "_price", priced)
-    covers.refine_covers(
-        tower, stops, 1.5 * best.length, clock, Limits(), lambda *a: heard.append(a)
-    )
+    covers.refine_covers(tower, stops, 1.5 * best.length, Limits(clock), lambda *a: heard.append(a))
     assert len(heard) == 1

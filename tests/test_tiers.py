@@ -598,8 +598,8 @@ def test_loops_and_vectorised_form_choose_the_same_sides_of_parity_cuts(pairs, f
     across = np.array(flow).reshape(-1, 2)[: len(ends)]
     row = np.searchsorted(np.sort(ends.ravel()), np.arange(13))
     by_loops, at_once = np.array(sides), np.array(sides)
-    cost, teeth = _loops(parity_cuts._cheapest)(ends, across, row, row, by_loops)
-    other, same = interpreted(parity_cuts._cheapest)(ends, across, row, row, at_once)
+    cost, teeth = _loops(parity_cuts._cheapest)(ends, across, row, by_loops, 4)
+    other, same = interpreted(parity_cuts._cheapest)(ends, across, row, at_once, 4)
     assert (cost, teeth.tolist(), by_loops.tolist()) == (other, same.tolist(), at_once.tolist())
 
 

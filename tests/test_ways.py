@@ -17,8 +17,9 @@ from netsp.mip import root
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.lp_warm_start import WarmStart
+from netsp.mip.mip_policy import MipPolicy, PricingPolicy
 from netsp.mip.mip_solver import MipRun
-from netsp.mip.parity_paths import beyond, paths_from_base
+from netsp.mip.parity_paths import leg_excess, paths_from_base
 from netsp.mip.prices import Prices
 from netsp.mip.program import Duals, duals_of_relaxation
 from netsp.mip.reducedcosts import reduced_costs
@@ -46,7 +47,7 @@ def test_no_tour_pays_less_than_the_ways_to_its_vertices_and_along_its_legs(seed
     duals = duals_of_relaxation(
         0.5 + scale * rng.normal(size=5), scale * np.abs(rng.normal(size=3)), cuts, graph.cluster
     )
-    prices = Prices(costs_of(graph), DeadLegs.of(graph.costs), graph.cluster, cuts, duals)
+    prices = Prices(costs_of(graph), DeadLegs.missing(graph.costs), graph.cluster, cuts, duals)
     terms, excess = prices._terms, prices._cost - prices._cheapest[graph.cluster]
     way, other, before = paths_from_base(terms, excess, np.inf)
     lengths, least = [], []
@@ -56,7 +57,7 @@ def test_no_tour_pays_less_than_the_ways_to_its_vertices_and_along_its_legs(seed
         for (u, v), price in zip(legs.tolist(), reduced_costs(legs, terms), strict=True):
             there = other[u] if before[u] == v else way[u]
             home = other[v] if before[v] == u else way[v]
-            pays.append(there + beyond(u, v, price, terms) + home)
+            pays.append(there + leg_excess(u, v, price, terms) + home)
         pays += [way[v] + other[v] - excess[v] for v in tour[1:]]
         lengths.append(graph.tour_length(tour))
         least.append(prices.bound + max(pays))
@@ -81,38 +82,37 @@ def test_a_sheet_far_away_is_ruled_out_though_its_legs_cost_nothing(apart, gone)
     costs, cluster = two_sheets(apart)
     half = np.where(cluster == 0, np.sqrt(2) - 0.5, 0.5)  # every vertex pays for half of its legs
     duals = Duals(2.0 * half[:5], half, np.zeros(0))
-    marks = DeadLegs.of(costs)
+    marks = DeadLegs.missing(costs)
     prices = Prices(costs, marks, cluster, [], duals)
     local = prices._cost - prices._cheapest[cluster]
     assert (local[5:] < 1e-9).all()
-    prices.rule_out(prices.bound + 2.0)
+    prices.fix_out(prices.bound + 2.0)
     dead = marks.matrix()
     assert dead[5:].all() == gone
     assert not dead[0, 1]
     assert not dead[1, 2]
 
 
-def test_the_search_for_ways_can_be_stopped(monkeypatch):
+def test_the_search_for_ways_can_be_stopped():
     costs, cluster = two_sheets(0.4)
     duals = Duals(np.zeros(5), np.zeros(9), np.zeros(0))
-    asked = []
+    asked, policy = [], PricingPolicy(vertices_per_check=1)
 
     def stop():
         asked.append(1)
         if len(asked) == 3:
             raise RunStopped
 
-    prices = Prices(costs, DeadLegs.of(costs), cluster, [], duals, stop)
-    monkeypatch.setattr("netsp.mip.parity_paths.AT_ONCE", 1)
+    prices = Prices(costs, DeadLegs.missing(costs), cluster, [], duals, stop, policy)
     with pytest.raises(RunStopped):
-        prices.rule_out(prices.bound + 100.0)
+        prices.fix_out(prices.bound + 100.0)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_once_few_legs_are_left_all_of_them_are_measured(seed, monkeypatch):
     problem = random_world(seed, goals=9, tether_length=400.0)
     known = MipRun(travel_graph(problem), Limits()).solve("highs", None)
-    monkeypatch.setattr(root, "MEASURED_AT", 10**9)
+    policy = MipPolicy(pricing=PricingPolicy(max_measured_legs=10**9))
     after = []
     measure = root.Root._measure_left
 
@@ -131,7 +131,7 @@ def test_once_few_legs_are_left_all_of_them_are_measured(seed, monkeypatch):
     monkeypatch.setattr(root.Root, "_measure_left", note)
     monkeypatch.setattr("netsp.gtsp.cost_matrix.MEASURE_AT_ONCE", 20)
     monkeypatch.setattr(TravelGraph, "legs_at_once", False)
-    found = MipRun(travel_graph(problem), Limits()).solve("highs", None)
+    found = MipRun(travel_graph(problem), Limits(), policy=policy).solve("highs", None)
     assert after
     assert all(after)
     assert found.status is known.status is Status.OPTIMAL

@@ -377,22 +377,21 @@ def covers() -> tuple[str, bool]:
     """What covers of 450 cells leave of the gap, of 100 goals at tether 500."""
     import frontier
 
-    import netsp.mip.covers as module
     from netsp import travel_graph
     from netsp.gtsp.limits import Limits
-    from netsp.mip.goal_relaxation import bound_over_goals
+    from netsp.mip.goal_relaxation import CoverCosts, bound_over_goals
+    from netsp.mip.mip_policy import CoverPolicy, MipPolicy
     from netsp.mip.mip_solver import MipRun
 
     graph = travel_graph(frontier.world(4, 100, 500.0, many=False))
     run = MipRun(graph, Limits(rng=np.random.default_rng(0)), search_rounds=1000)
     run.find_first_tour()
     run.search_near_incumbent()
-    costs, most = graph.costs_rounded(np.arange(len(graph))), module.MOST_CELLS
-    module.MOST_CELLS = 450
-    try:
-        found = bound_over_goals(graph, lambda *_: None, Limits(), run.tour, lambda: costs)
-    finally:
-        module.MOST_CELLS = most
+    costs = graph.costs_rounded(np.arange(len(graph)))
+    policy = MipPolicy(covers=CoverPolicy(max_cells=450))
+    found = bound_over_goals(
+        graph, lambda *_: None, Limits(), run.tour, CoverCosts(lambda: costs), policy=policy
+    )
     gap = 100.0 * (1.0 - found.bound / run.length)
     return f"{gap:.1f} %", gap <= 4.3
 

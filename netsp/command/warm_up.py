@@ -150,7 +150,6 @@ def steps() -> Iterator[Step]:
     """Yield named steps that together compile all kernels."""
     import numpy as np
 
-    from netsp.base.clock import Clock
     from netsp.base.errors import InputError, LimitReachedError
     from netsp.gtsp.limits import Limits
     from netsp.gtsp.sparse_costs import SparseCosts
@@ -208,11 +207,11 @@ def steps() -> Iterator[Step]:
         cells = tower.cells(())
         tower.costs(cells)
         tower.costs_by_parity(cells, np.array([[0, 1]]))
-        for held in DeadLegs.of(costs), rows:
+        for held in DeadLegs.missing(costs), rows:
             prices = Prices(costs, held, graph.cluster, [], duals)
-            prices.room(1.0)
-            prices.rule_out(1.0)
-            prices.of(prices.cheapest(-1.0)[0])
+            prices.max_increases(1.0)
+            prices.fix_out(1.0)
+            prices.reduced_costs(prices.most_negative(-1.0)[0])
         rows.restrict(rows.with_legs())
         legs = rows.legs_left()
         rows.costs_of(legs[:, 0], legs[:, 1])
@@ -227,7 +226,7 @@ def steps() -> Iterator[Step]:
         assert ways is not None
         stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour or ()]
         for tower in ClassCovers(graph.costs, graph.cluster, odd), PathCovers(ways, np.inf):
-            refine_covers(tower, stops, 1.02 * best.length, Clock(), Limits())
+            refine_covers(tower, stops, 1.02 * best.length, Limits())
 
     yield "covers", covered
 

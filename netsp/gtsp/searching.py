@@ -90,6 +90,10 @@ class SearchingRun(SolverRun):
         self.bound = 0.0
         self._core: tuple[int, Instance] | None = None
 
+    def run_over(self, graph: TravelGraph, limits: Limits) -> Self:
+        """Return a run over another graph with the same settings."""
+        return type(self)(graph, limits, search_rounds=self.search_rounds)
+
     def find_first_tour(self) -> None:
         """A first tour, among few classes, before all legs are bounded: with very many classes that
         takes long, and whoever stops the run meanwhile wants a tour."""
@@ -175,10 +179,7 @@ class SearchingRun(SolverRun):
         if self.core_classes_per_goal >= ENOUGH_BESIDE:
             core = beside
         core = np.union1d(core, np.array(self.tour or (0,), dtype=np.int64))
-        inner = type(self)(
-            graph.subgraph(core), Limits(self.clock, rng=self.rng),
-            search_rounds=self.search_rounds,
-        )  # fmt: skip
+        inner = self.run_over(graph.subgraph(core), Limits(self.clock, rng=self.rng))
         inner.iteration_limit = self.iteration_limit - self.iterations
         inner.outer = self, core
         if self.tour is not None:

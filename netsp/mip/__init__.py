@@ -1,4 +1,4 @@
-"""The paper's mixed-integer program, solved by cutting planes, branching and lazy rounds."""
+"""Solver of the paper's mixed-integer program: cutting planes, branch and cut, lazy rounds."""
 
 from netsp.mip.mip_solver import solve
 

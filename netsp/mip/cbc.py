@@ -1,8 +1,8 @@
-"""One run of the CBC solver on a PuLP model, under a watchdog.
+"""Run of the CBC solver on a PuLP model, in a process with a watchdog.
 
-PuLP writes the model and ships the solver; the process is ours, in its own group, because CBC can
-overrun its time limit in preprocessing and the root LP, and must never outlive us. CBC's word for
-the status is not trusted beyond what its numbers show.
+PuLP writes the model and ships the solver. The process is started here, in a process group of its
+own, because CBC can overrun its time limit in preprocessing and the root LP, and must not outlive
+this process. The status that CBC reports is checked against its numbers.
 """
 
 from __future__ import annotations
@@ -23,28 +23,23 @@ import pulp
 
 from netsp.base.clock import Clock, TimeLimit, deferred_interrupts
 from netsp.base.errors import NetspError
-
-GRACE = 1.0
-"""Seconds past its own limit after which CBC is killed."""
-
-WAIT = 0.02
-"""Seconds between two looks at the clock."""
+from netsp.mip.mip_policy import LpPolicy
 
 
 @dataclass(frozen=True)
 class CbcOutcome:
-    """What CBC said.
+    """Outcome of a run of CBC.
 
     Attributes
     ----------
     status
         'optimal', 'infeasible' or 'stopped'.
     objective
-        Of the solution, or None.
+        Objective of the solution, or None.
     bound
-        CBC's best bound of a stopped integer run, or None.
+        Best bound of a stopped integer run, or None.
     values, duals
-        By variable and constraint name; duals of an LP only.
+        Values by variable and dual values by constraint; duals of an LP only.
     """
 
     status: str
@@ -55,9 +50,14 @@ class CbcOutcome:
 
 
 def run_cbc(
-    model: pulp.LpProblem, *, integer: bool, limit: TimeLimit, threads: int = 1
+    model: pulp.LpProblem,
+    *,
+    integer: bool,
+    limit: TimeLimit,
+    threads: int = 1,
+    policy: LpPolicy = LpPolicy(),
 ) -> CbcOutcome:
-    """Solve a minimisation model as it stands (`integer=False`: its LP relaxation)."""
+    """Solve a minimisation model, or its LP relaxation if `integer` is false."""
     with tempfile.TemporaryDirectory(prefix="netsp-cbc-") as folder:
         mps, out, log = (Path(folder) / n for n in ("model.mps", "solution.txt", "log.txt"))
         renamed = model.writeMPS(str(mps), rename=True, mip=1 if integer else 0)
@@ -73,7 +73,7 @@ def run_cbc(
         else:
             command += ["-initialSolve"]
         command += ["-printingOptions", "all", "-solution", str(out)]
-        _run(command, log, clock)
+        _run(command, log, clock, policy)
         text = log.read_text(errors="replace") if log.exists() else ""
         return _read(out, text, variable_names, constraint_names, integer)
 
@@ -86,7 +86,7 @@ def _binary() -> str:
 
 
 def _die_with_parent() -> Callable[[], None] | None:
-    """A hook that makes the child receive SIGKILL when we die, where the kernel can (Linux)."""
+    """Return a hook by which Linux kills the child process when this process ends; else None."""
     if not sys.platform.startswith("linux"):
         return None
     import ctypes
@@ -98,9 +98,11 @@ def _die_with_parent() -> Callable[[], None] | None:
     return lambda: prctl(1, signal.SIGKILL)
 
 
-def _run(command: list[str], log: Path, clock: Clock) -> None:
-    """Run to the end, or until the clock is up: at a deadline CBC has a while to end by itself. The
-    process group is gone when this returns."""
+def _run(command: list[str], log: Path, clock: Clock, policy: LpPolicy) -> None:
+    """Run a command until it ends, its limit and a grace time are over, or the clock is stopped.
+
+    The process group has ended when this returns.
+    """
     process = None
     with log.open("wb") as stream:
         try:
@@ -114,10 +116,10 @@ def _run(command: list[str], log: Path, clock: Clock) -> None:
                     start_new_session=True,
                     preexec_fn=_die_with_parent(),
                 )
-            end = time.monotonic() + clock.left + GRACE
+            end = time.monotonic() + clock.left + policy.cbc_grace_s
             while time.monotonic() < end and not clock.is_stopped:
                 with contextlib.suppress(subprocess.TimeoutExpired):
-                    process.wait(WAIT)
+                    process.wait(policy.cbc_check_interval_s)
                     break
         finally:
             if process is not None:
@@ -133,13 +135,8 @@ def _read(
     constraint_names: dict[str, str],
     integer: bool,
 ) -> CbcOutcome:
-    bound = None
-    found = re.findall(r"^Lower bound:\s+(\S+)", log, re.M) or re.findall(
-        r"best possible (\S+)", log
-    )
-    if found:
-        with contextlib.suppress(ValueError):
-            bound = float(found[-1].rstrip(","))
+    """Read the outcome from the solution file and the log."""
+    bound = _bound_in(log)
     if "infeasible" in log.lower() and not out.exists():
         return CbcOutcome("infeasible", None, bound)
     if not out.exists():
@@ -151,9 +148,33 @@ def _read(
     status = "optimal" if head.startswith("optimal") else "stopped"
     variables = {new: old for old, new in variable_names.items()}
     constraints = {new: old for old, new in constraint_names.items()}
+    values, duals = _values_and_duals(lines[1:], variables, constraints, integer)
+    # a run that stops without a solution writes the LP it stopped at
+    if status == "stopped" and (integer and "no feasible" in (head + log.lower())):
+        values = {}
+    match = re.search(r"objective value\s+(\S+)", lines[0] if lines else "")
+    objective = float(match.group(1)) if match and values else None
+    return CbcOutcome(status, objective, bound, values, duals)
+
+
+def _bound_in(log: str) -> float | None:
+    """Return the last lower bound that a log states, or None."""
+    found = re.findall(r"^Lower bound:\s+(\S+)", log, re.M) or re.findall(
+        r"best possible (\S+)", log
+    )
+    if found:
+        with contextlib.suppress(ValueError):
+            return float(found[-1].rstrip(","))
+    return None
+
+
+def _values_and_duals(
+    lines: list[str], variables: dict[str, str], constraints: dict[str, str], integer: bool
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return values and dual values by the names of the model, from lines of a solution file."""
     values: dict[str, float] = {}
     duals: dict[str, float] = {}
-    for line in lines[1:]:
+    for line in lines:
         parts = line.replace("**", " ").split()
         if len(parts) < 4:
             continue
@@ -162,9 +183,4 @@ def _read(
             values[variables[name]] = float(value)
         elif name in constraints and not integer:
             duals[constraints[name]] = float(extra)
-    # a run that stops without a solution writes the LP it stopped at
-    if status == "stopped" and (integer and "no feasible" in (head + log.lower())):
-        values = {}
-    match = re.search(r"objective value\s+(\S+)", lines[0] if lines else "")
-    objective = float(match.group(1)) if match and values else None
-    return CbcOutcome(status, objective, bound, values, duals)
+    return values, duals

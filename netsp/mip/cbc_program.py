@@ -1,4 +1,4 @@
-"""The programs as PuLP models solved by CBC: the paper's shape, complete on its own."""
+"""Relaxation and integer program as PuLP models that CBC solves, as in the paper."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from netsp.base.clock import TimeLimit
 from netsp.mip.cbc import run_cbc
 from netsp.mip.cutpool import CutPool
 from netsp.mip.cuts import Cut, cut_coefficients
+from netsp.mip.mip_policy import LpPolicy, MipPolicy
 from netsp.mip.program import IntegerOutcome, Point, duals_of_relaxation, restricted, scale_of
 
 
@@ -28,34 +29,39 @@ def _row(
 
 
 class CbcRelaxation:
-    """`netsp.mip.program.Relaxation`, one process a solve. The model is written afresh from legs
-    and cuts every time, which costs little beside starting the process."""
+    """`netsp.mip.program.Relaxation` by CBC, with one process for each solve.
 
-    def __init__(self, cluster: Ints, legs: Ints, costs: Floats) -> None:
+    The model is written from scratch each time, which takes little beside starting the process.
+    """
+
+    def __init__(
+        self, cluster: Ints, legs: Ints, costs: Floats, policy: MipPolicy = MipPolicy()
+    ) -> None:
+        self.policy = policy.lp
         self.cluster = cluster
         self.clusters = int(cluster.max()) + 1
         self.legs: Ints = np.zeros((0, 2), dtype=np.int64)
         self.costs: Floats = np.zeros(0)
-        self.pool = CutPool()
+        self.pool = CutPool(policy.cuts)
         self.infeasible = False
         self.add_legs(legs, costs)
 
     @property
     def cuts(self) -> list[Cut]:
-        """Cuts in the program, in the order of their rows."""
+        """Cuts in the order of their rows."""
         return self.pool.cuts
 
     def add_legs(self, legs: Ints, costs: Floats) -> None:
-        """Bring legs (k, 2) into the program."""
+        """Add legs (k, 2) to the program."""
         self.legs = np.vstack([self.legs, legs])
         self.costs = np.concatenate([self.costs, costs])
 
     def keep_legs(self, keep: Bools) -> None:
-        """Take all legs out of the program but those marked."""
+        """Remove all legs but those marked."""
         self.legs, self.costs = self.legs[keep], self.costs[keep]
 
     def restrict(self, keep: Bools) -> None:
-        """Renumber legs and cuts for the vertices marked; no other has a leg in the program."""
+        """Renumber legs and cuts for the vertices of a mask, which hold the ends of all legs."""
         self.cluster, self.legs, cuts = restricted(self.cluster, self.legs, self.cuts, keep)
         self.pool.replace(cuts)
 
@@ -64,15 +70,15 @@ class CbcRelaxation:
         self.costs = np.array(costs)
 
     def add_cuts(self, cuts: list[Cut], *, for_good: bool = False) -> None:
-        """Bring cuts into the program."""
+        """Add cuts to the program."""
         self.pool.add(cuts, for_good=for_good)
 
     def keep_cuts(self, keep: Bools) -> None:
-        """Take all cuts out of the program but those marked."""
+        """Remove all cuts but those marked."""
         self.pool.keep(keep)
 
     def solve(self, limit: TimeLimit) -> Point | None:
-        """The optimum with duals; None if there is none or the time ran out."""
+        """Return the optimum with duals; None if there is none or the time is up."""
         problem = pulp.LpProblem("netsp", pulp.LpMinimize)
         y = [pulp.LpVariable(f"y_{u}_{v}", 0, 1) for u, v in self.legs.tolist()]
         scale = scale_of(self.costs)
@@ -87,8 +93,8 @@ class CbcRelaxation:
         block = cut_coefficients(self.cuts, self.cluster, self.legs)
         for k, values in enumerate(block):
             terms = [(y[e], float(values[e])) for e in np.flatnonzero(values)]
-            _row(problem, terms, pulp.LpConstraintGE, -2.0 * self.cuts[k].room, f"cut_{k}")
-        outcome = run_cbc(problem, integer=False, limit=limit)
+            _row(problem, terms, pulp.LpConstraintGE, -2.0 * self.cuts[k].rhs, f"cut_{k}")
+        outcome = run_cbc(problem, integer=False, limit=limit, policy=self.policy)
         self.infeasible = outcome.status == "infeasible"
         if outcome.status != "optimal":
             return None
@@ -102,7 +108,7 @@ class CbcRelaxation:
             self.cuts,
             self.cluster,
         )
-        slack = block @ value + np.array([2.0 * c.room for c in self.cuts])
+        slack = block @ value + np.array([2.0 * c.rhs for c in self.cuts])
         return Point(x, self.legs, value, (outcome.objective or 0.0) / scale, duals, slack)
 
 
@@ -110,8 +116,15 @@ class CbcInteger:
     """`netsp.mip.program.IntegerProgram` by PuLP and CBC."""
 
     def __init__(
-        self, cluster: Ints, vertices: Ints, legs: Ints, costs: Floats, cuts: Sequence[Cut]
+        self,
+        cluster: Ints,
+        vertices: Ints,
+        legs: Ints,
+        costs: Floats,
+        cuts: Sequence[Cut],
+        policy: LpPolicy = LpPolicy(),
     ) -> None:
+        self.policy = policy
         self.cluster, self.legs = cluster, legs
         self.cuts: list[Cut] = []
         self._forbidden = 0
@@ -135,18 +148,18 @@ class CbcInteger:
         self.add_cuts(list(cuts))
 
     def add_cuts(self, cuts: list[Cut]) -> None:
-        """Bring cuts into the program."""
+        """Add cuts to the program."""
         for cut in cuts:
             terms = [
                 (x, -1.0)
                 for v, x in self._x.items()
                 if cut.inside[v] and self.cluster[v] != cut.cluster
             ]
-            rows, times = cut.within(self.cluster, self.legs)
-            terms += [(self._y[k], float(t)) for k, t in zip(rows, times, strict=True)]
+            columns, coefficients = cut.left_side(self.cluster, self.legs)
+            terms += [(self._y[k], float(c)) for k, c in zip(columns, coefficients, strict=True)]
             if terms:
                 name = f"cut_{len(self.cuts)}"
-                _row(self.problem, terms, pulp.LpConstraintLE, cut.room, name)
+                _row(self.problem, terms, pulp.LpConstraintLE, cut.rhs, name)
             self.cuts.append(cut)
 
     def forbid_subtour(self, members: Ints, visits: int) -> None:
@@ -160,8 +173,8 @@ class CbcInteger:
         self._forbidden += 1
 
     def solve(self, limit: TimeLimit) -> IntegerOutcome:
-        """The best integer solution, as far as the time goes."""
-        outcome = run_cbc(self.problem, integer=True, limit=limit)
+        """Return the best integer solution found in time."""
+        outcome = run_cbc(self.problem, integer=True, limit=limit, policy=self.policy)
         point = None
         if outcome.values:
             x = np.zeros(len(self.cluster))

@@ -6,9 +6,9 @@ in H and partly not,
     y(δ(H)) + Σ y(δ(T)) >= 3 k + 1
 
 (Chvátal 1973, Grötschel & Padberg 1979; over clusters: Fischetti, Salazar & Toth 1997). A set that
-the point enters and leaves once is as good as one cluster: with disjoint such sets shrunk, teeth
-are sought between two of them as those of 2-matching inequalities are between two clusters (Padberg
-& Rinaldi 1990). Which sets are shrunk together is tried by their size.
+the point enters and leaves once behaves like one cluster. So disjoint such sets are shrunk, and
+teeth are sought between two of them as those of 2-matching inequalities between two clusters
+(Padberg & Rinaldi 1990). Several limits on the size of shrunk sets are tried.
 """
 
 from __future__ import annotations
@@ -18,69 +18,64 @@ from collections.abc import Sequence
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
-from netsp.mip.blossoms import VIOLATION, fractional_components
+from netsp.mip.blossoms import fractional_components
 from netsp.mip.cuts import Cut
+from netsp.mip.mip_policy import CutPolicy
 from netsp.mip.program import Point
 
-TIGHT = 1e-6
-"""The most by which a set may be entered and left more than once."""
-
-SIZES = (2, 3, 4, 6, 9, 14, 25)
-"""Most clusters of a set that is shrunk, in turn."""
-
-MOST_CUTS = 40
-"""Most combs from one point."""
-
-WEAK = 0.3
-"""Sets joined by less are no tooth."""
+CROSSING_TOLERANCE = 1e-6
+"""Tolerance by which the crossing of a set that is entered and left once may exceed two."""
 
 
-def tight_sets(cuts: Sequence[Cut], point: Point, between: Floats, cluster: Ints) -> list[Bools]:
-    """(m + 1,) flags of sets of clusters that a point enters and leaves once: of its cuts those
-    whose sets hold, of what it visits, clusters as a whole."""
+def tight_sets(cuts: Sequence[Cut], point: Point, flow: Floats, cluster: Ints) -> list[Bools]:
+    """Return masks (m + 1,) of the sets of clusters that a point enters and leaves once.
+
+    They are the sets of cuts of which the point visits whole clusters only.
+    """
     out: dict[bytes, Bools] = {}
-    visited = np.flatnonzero(point.x > TIGHT)
+    visited = np.flatnonzero(point.x > CROSSING_TOLERANCE)
     for cut in cuts:
         if cut.teeth:
             continue
         inside = visited[cut.inside[visited]]
-        weight = np.bincount(cluster[inside], point.x[inside], minlength=len(between))
-        whole = weight > 0.5
-        if not 2 <= whole.sum() < len(whole) - 1 or np.abs(weight - whole).max() > TIGHT:
+        weight = np.bincount(cluster[inside], point.x[inside], minlength=len(flow))
+        held = weight > 0.5
+        is_whole = np.abs(weight - held).max() <= CROSSING_TOLERANCE
+        if not 2 <= held.sum() < len(held) - 1 or not is_whole:
             continue
-        if between[np.ix_(whole, ~whole)].sum() <= 2.0 + TIGHT:
-            out[whole.tobytes()] = whole
+        if flow[np.ix_(held, ~held)].sum() <= 2.0 + CROSSING_TOLERANCE:
+            out[held.tobytes()] = held
     return list(out.values())
 
 
-def comb_cuts(between: Floats, tight: Sequence[Bools], cluster: Ints) -> list[Cut]:
-    """Violated combs, the most violated first.
+def comb_cuts(
+    cluster_flow: Floats, tight: Sequence[Bools], cluster: Ints, policy: CutPolicy = CutPolicy()
+) -> list[Cut]:
+    """Return violated combs, the most violated first.
 
     Parameters
     ----------
-    between
-        (m + 1, m + 1) sums of y between clusters, those of no other cut violated.
+    cluster_flow
+        (m + 1, m + 1) sums of y between clusters, at a point that violates no other cut.
     tight
-        Sets of clusters, as of `tight_sets`.
-    cluster
-        (V,) of the vertices.
+        Result of `tight_sets`.
     """
     found: dict[tuple[bytes, tuple[tuple[int, ...], ...]], tuple[float, Cut]] = {}
     seen = set()
     by_size = sorted(tight, key=lambda s: -int(s.sum()))
-    for most in SIZES:
-        label = _shrunk_to([s for s in by_size if s.sum() <= most], len(between))
+    for max_size in policy.shrunk_sizes:
+        label = _set_numbers([s for s in by_size if s.sum() <= max_size], len(cluster_flow))
         if label.tobytes() in seen:
             continue
         seen.add(label.tobytes())
         count = int(label.max()) + 1
-        to = np.zeros((count, len(between)))
-        to[label, np.arange(len(between))] = 1.0
-        flow = to @ between @ to.T
+        to = np.zeros((count, len(cluster_flow)))
+        to[label, np.arange(len(cluster_flow))] = 1.0
+        flow = to @ cluster_flow @ to.T
         np.fill_diagonal(flow, 0.0)
-        for handle in fractional_components(flow, 2):
-            violation, pairs = _teeth(flow, handle)
-            if violation <= VIOLATION:
+        for handle in fractional_components(flow, 2, policy):
+            violation, pairs = _teeth(flow, handle, policy.min_tooth_flow)
+            if violation <= policy.min_comb_violation:
                 continue
             teeth = tuple(
                 tuple(np.flatnonzero((label == a) | (label == b)).tolist()) for a, b in pairs
@@ -88,12 +83,12 @@ def comb_cuts(between: Floats, tight: Sequence[Bools], cluster: Ints) -> list[Cu
             inside = handle[label]
             cut = Cut(inside[cluster], -1, teeth)
             found[inside.tobytes(), teeth] = (violation, cut)
-    best = sorted(found.values(), key=lambda f: -f[0])[:MOST_CUTS]
+    best = sorted(found.values(), key=lambda f: -f[0])[: policy.max_combs]
     return [cut for _, cut in best]
 
 
-def _shrunk_to(sets: Sequence[Bools], size: int) -> Ints:
-    """(m + 1,) numbers of disjoint sets, the first of these, or of clusters alone."""
+def _set_numbers(sets: Sequence[Bools], size: int) -> Ints:
+    """Return for each cluster the number of its set; of sets that overlap, the first one counts."""
     label = np.arange(size)
     taken = np.zeros(size, dtype=bool)
     for s in sets:
@@ -103,16 +98,17 @@ def _shrunk_to(sets: Sequence[Bools], size: int) -> Ints:
     return np.unique(label, return_inverse=True)[1]
 
 
-def _teeth(flow: Floats, handle: Bools) -> tuple[float, list[tuple[int, int]]]:
-    """How much the comb of a handle is violated, and its teeth: disjoint pairs across the handle,
-    those of the greatest flow first."""
+def _teeth(
+    flow: Floats, handle: Bools, min_tooth_flow: float
+) -> tuple[float, list[tuple[int, int]]]:
+    """Return the violation of a handle's comb, and its teeth: disjoint pairs of largest flow."""
     inside, outside = np.flatnonzero(handle), np.flatnonzero(~handle)
     across = flow[np.ix_(inside, outside)]
     around = flow.sum(axis=1)
     pairs: list[tuple[int, int]] = []
     short: list[float] = []
     used: set[int] = set()
-    rows, cols = np.nonzero(across > WEAK)
+    rows, cols = np.nonzero(across > min_tooth_flow)
     for k in np.argsort(-across[rows, cols], kind="stable"):
         a, b = int(inside[rows[k]]), int(outside[cols[k]])
         if a in used or b in used:

@@ -1,10 +1,9 @@
-"""From covers to classes without the matrix of all legs.
+"""Reduced-cost fixing of legs between classes by a bound over a cover.
 
-A tour that takes a leg between two classes is over a cover one along the leg between their cells,
-which costs no more. Where that leg, at what the program over the cover has proven, would lead to a
-tour as long as the best one if it were so much longer, every leg above it that is so much longer is
-in no better tour. After a few covers of the ways between goals fewer than one leg in ten is left,
-so that the legs of some classes at a time are measured, and most are let go at once.
+A leg between two classes lies above the leg between their cells, which costs no more. If it costs
+more than the leg of the cells by more than the slack of that leg in the cover's bound, it is in no
+better tour. After a few covers over paths between goals fewer than one leg in ten is left. So legs
+are measured in blocks, of which most is discarded at once, and no matrix of all legs is made.
 """
 
 from __future__ import annotations
@@ -18,45 +17,48 @@ from netsp.gtsp.sparse_costs import SparseCosts
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip.cover_bounds import CellBound
 from netsp.mip.deadlegs import DeadLegs
+from netsp.mip.mip_policy import PricingPolicy
 from netsp.mip.prices import Prices
 
-ROUNDING = 1e-9
-"""Ways are shortest up to this, relative."""
+PATH_ROUNDING = 1e-9
+"""Tolerance, relative, within which paths between goals are shortest."""
 
 
-def max_leg_costs(over: CellBound, cutoff: float) -> Floats:
-    """(m, m) what a leg above one between two cells may cost, at most, to be in a tour shorter
-    than the cutoff; -inf for nothing.
+def max_leg_costs(
+    bound: CellBound, cutoff: float, policy: PricingPolicy = PricingPolicy()
+) -> Floats:
+    """Return the largest cost (m, m) of a leg between two cells in a tour below the cutoff.
 
-    Parameters
-    ----------
-    over
-        What is proven over the cells.
+    It is -inf where no such tour has a leg.
     """
-    costs, dead = over.costs, DeadLegs(over.dead | np.isinf(over.costs))
-    prices = Prices(costs, dead, over.cells.cluster, over.cuts, over.duals)
-    return np.where(np.isinf(costs), 0.0, costs) + prices.room(cutoff) + ROUNDING * cutoff
+    costs, dead = bound.costs, DeadLegs(bound.dead | np.isinf(bound.costs), policy)
+    prices = Prices(costs, dead, bound.cells.cluster, bound.cuts, bound.duals, policy=policy)
+    increases = prices.max_increases(cutoff)
+    return np.where(np.isinf(costs), 0.0, costs) + increases + PATH_ROUNDING * cutoff
 
 
 def surviving_legs(
-    graph: TravelGraph, over: CellBound, length: float, tour: Sequence[int], odd: Bools
-) -> SparseCosts:  # fmt: skip
-    """The legs among all vertices that may be in a tour as short as one of that length.
+    graph: TravelGraph,
+    bound: CellBound,
+    length: float,
+    tour: Sequence[int],
+    odd: Bools,
+    policy: PricingPolicy = PricingPolicy(),
+) -> SparseCosts:
+    """Return the costs of the legs that may be in a tour of at most a given length.
 
     Parameters
     ----------
-    over
-        As of `max_leg_costs`.
     tour
-        One as short as that, whose legs are kept in any case.
+        Tour of that length, whose legs are kept in any case.
     odd
-        (V, n) as of `netsp.mip.parity_cuts.odd_letters`.
+        Result of `netsp.mip.parity_cuts.odd_letters`.
 
     Raises
     ------
     LimitReachedError
-        The graph's clock was up before they were measured.
+        The graph's clock was up before all legs were measured.
     """
-    own = over.cells.of(graph.cluster, odd)
-    longest = max_leg_costs(over, length)
-    return SparseCosts(len(graph), graph.costs_in_blocks(), own, longest, np.asarray(tour))
+    cell = bound.cells.cells_of(graph.cluster, odd)
+    longest = max_leg_costs(bound, length, policy)
+    return SparseCosts(len(graph), graph.costs_in_blocks(), cell, longest, np.asarray(tour))

@@ -1,4 +1,4 @@
-"""What is proven over goals, or over cells of a cover, for the program over classes."""
+"""Bounds over goals, or over cells of a cover, and their data for the program over classes."""
 
 from __future__ import annotations
 
@@ -14,57 +14,65 @@ from netsp.mip.program import Duals
 
 @dataclass(frozen=True)
 class Cells:
-    """The vertices of a cover.
+    """Vertices of a cover; the first is the base.
 
     Attributes
     ----------
     obstacles
-        Whose letters count.
-    cluster, code
-        (m,) goal, and bits that tell of which obstacles a word has an odd number of letters; the
-        first is the base.
+        Obstacles whose letters count.
+    cluster
+        (m,) goal of each cell.
+    code
+        (m,) bits, one for each of the obstacles: whether words have an odd number of its letters.
     """
 
     obstacles: tuple[int, ...]
     cluster: Ints
     code: Ints
 
-    def of(self, cluster: Ints, odd: Bools) -> Ints:
-        """(V,) the cells that vertices lie in, -1 for none; `odd` tells as
-        `netsp.mip.parity_cuts.odd_letters` does."""
+    def cells_of(self, cluster: Ints, odd: Bools) -> Ints:
+        """Return the cell (V,) of each vertex, -1 for none.
+
+        Parameters
+        ----------
+        odd
+            Result of `netsp.mip.parity_cuts.odd_letters`.
+        """
         return self._places(cluster, packed(odd, self.obstacles))
 
-    def above(self, below: Cells) -> Ints:
-        """(m,) the cell of a cover below that each lies above; the first of the obstacles are those
-        that count there."""
+    def cells_below(self, below: Cells) -> Ints:
+        """Return the cell (m,) of a lower cover that each cell lies above.
+
+        The obstacles of the lower cover are the first of this one's.
+        """
         return below._places(self.cluster, self.code & ((1 << len(below.obstacles)) - 1))
 
     def _places(self, cluster: Ints, code: Ints) -> Ints:
-        """Numbers of cells, -1 where there is none."""
-        own = zip(self.cluster.tolist(), self.code.tolist(), strict=True)
-        place = {k: j for j, k in enumerate(own)}
+        """Return the number of each cell, -1 for none."""
+        cells = zip(self.cluster.tolist(), self.code.tolist(), strict=True)
+        place = {k: j for j, k in enumerate(cells)}
         keys = zip(cluster.tolist(), code.tolist(), strict=True)
         return np.array([place.get(k, -1) for k in keys], dtype=np.int64)
 
 
 @dataclass(frozen=True)
 class CellBound:
-    """What a program over cells has proven.
+    """Lower bound from the program over a cover.
 
     Attributes
     ----------
     bound
-        No tour is shorter.
+        Lower bound on all tours.
     cells
-        Its vertices.
+        Vertices of the cover.
     costs
-        (m, m) of legs between them, inf where there is none.
+        (m, m) costs of legs between cells, inf for missing ones.
     alive
-        (m,) which of them may be in a better tour.
+        (m,) mask of cells that may be in a better tour.
     dead
-        (m, m) legs that are in none.
+        (m, m) mask of legs that are in no better tour.
     cuts, duals
-        That the bound rests on, over the cells.
+        Cuts and dual values over the cells, from which the bound follows.
     """
 
     bound: float
@@ -75,27 +83,27 @@ class CellBound:
     cuts: tuple[Cut, ...]
     duals: Duals
 
-    def lifted_cuts(self, own: Ints) -> list[Cut]:
-        """Over vertices that lie in these cells."""
-        return [replace(c, inside=c.inside[own]) for c in self.cuts]
+    def lifted_cuts(self, cell: Ints) -> list[Cut]:
+        """Return the cuts over vertices that lie in given cells (V,)."""
+        return [replace(c, inside=c.inside[cell]) for c in self.cuts]
 
-    def lifted_duals(self, own: Ints) -> Duals:
-        """For vertices that lie in these cells, with the cuts of `lifted_cuts`."""
-        return replace(self.duals, degree=self.duals.degree[own])
+    def lifted_duals(self, cell: Ints) -> Duals:
+        """Return the dual values for vertices that lie in given cells (V,)."""
+        return replace(self.duals, degree=self.duals.degree[cell])
 
 
 @dataclass(frozen=True)
 class GoalBound:
-    """A bound over goals or cells, and what it rests on.
+    """Lower bound over goals or over a cover.
 
     Attributes
     ----------
     bound
-        No tour is shorter.
+        Lower bound on all tours.
     cuts
-        Over goals.
+        Cuts over goals.
     cells
-        What has been proven over cells instead, which is worth more; None for nothing.
+        Bound over a cover, which is stronger; None if there is none.
     """
 
     bound: float
@@ -104,7 +112,7 @@ class GoalBound:
 
 
 def packed(odd: Bools, obstacles: Sequence[int]) -> Ints:
-    """(V,) the columns of some obstacles as bits."""
+    """Return the columns of obstacles in a mask (V, n) as bits (V,)."""
     out = np.zeros(len(odd), dtype=np.int64)
     for j, i in enumerate(obstacles):
         if i < odd.shape[1]:

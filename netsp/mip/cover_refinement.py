@@ -1,13 +1,13 @@
-"""Which obstacles a cover tells apart next: those that promise most for the cells that they add.
+"""Refinement of covers: the choice of the obstacles whose letters count next.
 
-A leg of a program's point is the shortest between two cells, however many letters of an obstacle it
-writes. Once these count, the cells that are reached on both sides of the obstacle fall in two, and
-so does the leg: one that writes an even number of them stays on its side, and one that writes an
-odd number changes it. What the point costs then, with the same legs and each cell on the better
-side, is more by what it saved going around that obstacle: the frustration of a signed graph
-(Harary 1959), with lengths for weights. To find the least is NP-hard; a spanning tree of the legs
-that say most, and changing sides of one cell after another, is near it. The program may choose
-other legs and so gains less; but where the promise is large, the gain is too.
+A leg of a program's point is the shortest between two cells, whichever letters of an obstacle it
+writes. Once these letters count, each cell that is reached on both sides of the obstacle splits in
+two: a leg that writes an even number of them stays on its side, and a leg that writes an odd number
+changes it. With the same legs, and each cell on its better side, the point then costs more by what
+it saved going around that obstacle: the frustration of a signed graph (Harary 1959) with lengths
+for weights. That is the promise of the obstacle. The program may choose other legs and gain less,
+but large promises mean large gains. Minimum frustration is NP-hard; a spanning tree of the legs
+whose sides differ most, and then changing the sides of single cells, comes near it.
 """
 
 from __future__ import annotations
@@ -22,120 +22,124 @@ from netsp.base.compiled.dynamic_array import order_of
 from netsp.base.compiled.kernel import kernel
 from netsp.mip.cover_bounds import Cells
 from netsp.mip.cover_costs import Covers
+from netsp.mip.mip_policy import CoverPolicy
 
-FADES = 0.5
-"""Of what an obstacle promised at the cover below, so much is believed: a point goes around it one
-way here and another there."""
+MAX_OBSTACLES = 60
+"""Format limit: number of obstacles whose parities fit into the bits of an integer."""
 
-DEAR = 2.5
-"""A promise is divided by this power of the cells that it adds: an LP over twice the cells takes
-far more than twice as long."""
-
-MOST_OBSTACLES = 60
-"""That fit into a number."""
-
-HARDLY = 1e-4
-"""A smaller share of the gap is no promise."""
-
-PASSES = 20
-"""Over all cells, changing sides."""
-
-TINY = 1e-12
-"""A side that saves less is not changed."""
+SIDE_TOLERANCE = 1e-12
+"""Tolerance below which the gain of changing a side counts as rounding."""
 
 
 @dataclass
 class CoverRefinement:
-    """The choice of obstacles, cover by cover.
+    """Choice of obstacles, cover by cover.
 
     Attributes
     ----------
-    tower
-        The covers.
-    growth, most
-        So many times as many cells at most, unless one obstacle alone adds more; and at most so
-        many cells.
+    covers
+        Covers of the problem.
+    policy
+        Limits on the number of cells, and how promises are weighed.
     """
 
-    tower: Covers
-    growth: float
-    most: int
+    covers: Covers
+    policy: CoverPolicy = CoverPolicy()
     _promised: dict[int, float] = field(default_factory=dict)
 
-    def after(
-        self, cells: Cells, ends: Ints, y: Floats, gap: float,
+    def next_obstacles(
+        self,
+        cells: Cells,
+        ends: Ints,
+        y: Floats,
+        gap: float,
         check: Callable[[], None] = lambda: None,
-    ) -> list[int]:  # fmt: skip
-        """The obstacles whose letters are to count from now on, too; none if there are no more.
+    ) -> list[int]:
+        """Return the obstacles that the next cover adds, those of largest promise per new cell.
 
         Parameters
         ----------
         cells
-            Of the cover so far.
+            Cells of the cover so far.
         ends, y
-            (k, 2) legs that its point uses, and (k,) how much.
+            (k, 2) legs that its point uses, and (k,) their values.
         gap
-            A leg that is longer by that much is in no better tour.
+            Gap of the bound; a leg that is longer by that much is in no better tour.
         check
             Called for each obstacle; may raise to stop.
         """
-        own = cells.obstacles
-        left = [i for i in range(self.tower.obstacles) if i not in own]
-        if not left or len(own) >= MOST_OBSTACLES:
+        policy, known = self.policy, cells.obstacles
+        left = [i for i in range(self.covers.obstacles) if i not in known]
+        if not left or len(known) >= MAX_OBSTACLES:
             return []
-        lengths = self.tower.costs_by_parity(cells, ends)
+        lengths = self.covers.costs_by_parity(cells, ends)
         least = lengths.min(axis=2, keepdims=True)
-        least[np.isinf(least)] = 0.0  # a leg that has none above it says nothing
+        least[np.isinf(least)] = 0.0  # no leg lies above such a leg
         excess = y[:, None, None] * np.minimum(lengths - least, gap)
         excess = np.ascontiguousarray(excess.swapaxes(0, 1))
-        adds = {}
+        new_cells = {}
         for i in left:
             check()
-            split = self.tower.cells((*own, i))
-            adds[i] = len(split.cluster) - len(cells.cluster)
-            new = frustration(ends, excess[i], _sides(cells, split))
-            self._promised[i] = max(new, FADES * self._promised.get(i, 0.0))
-        left = [i for i in left if len(cells.cluster) + adds[i] <= self.most]
-        promising = [i for i in left if self._promised[i] > HARDLY * gap]
-        promising.sort(key=lambda i: -self._promised[i] / max(adds[i], 1) ** DEAR)
-        # else where few goals are reached on both sides, most say on which side they are
-        return self._first(cells, promising or sorted(left, key=lambda i: adds[i]))
+            split = self.covers.cells((*known, i))
+            new_cells[i] = len(split.cluster) - len(cells.cluster)
+            promise = frustration(ends, excess[i], _sides(cells, split), policy.max_side_passes)
+            self._promised[i] = max(promise, policy.promise_decay * self._promised.get(i, 0.0))
+        left = [i for i in left if len(cells.cluster) + new_cells[i] <= policy.max_cells]
+        promising = [i for i in left if self._promised[i] > policy.min_promise * gap]
+        promising.sort(
+            key=lambda i: -self._promised[i] / max(new_cells[i], 1) ** policy.size_exponent
+        )
+        # without a promise, prefer obstacles that split few cells
+        return self._first(cells, promising or sorted(left, key=lambda i: new_cells[i]))
 
     def _first(self, cells: Cells, order: list[int]) -> list[int]:
-        """Of some obstacles the first, as many as there is room for."""
+        """Return the first obstacles of a list, as many as the limits on cells allow."""
+        policy = self.policy
         out: list[int] = []
         for i in order:
-            count = len(self.tower.cells((*cells.obstacles, *out, i)).cluster)
-            full = len(cells.obstacles) + len(out) == MOST_OBSTACLES or count > self.most
-            if full or (out and count > self.growth * len(cells.cluster)):
+            count = len(self.covers.cells((*cells.obstacles, *out, i)).cluster)
+            is_full = len(cells.obstacles) + len(out) == MAX_OBSTACLES or count > policy.max_cells
+            if is_full or (out and count > policy.max_growth * len(cells.cluster)):
                 break
             out.append(i)
         return out
 
 
 def _sides(cells: Cells, split: Cells) -> Bools:
-    """(m, 2) whether a cell has an even, and an odd, side of the obstacle that is last in the cover
-    above."""
+    """Return the mask (m, 2) of cells with an even, and an odd, side of the last obstacle above."""
     out = np.zeros((len(cells.cluster), 2), dtype=bool)
-    out[split.above(cells), split.code >> len(cells.obstacles) & 1] = True
+    out[split.cells_below(cells), split.code >> len(cells.obstacles) & 1] = True
     return out
 
 
 @kernel
-def frustration(ends: Ints, excess: Floats, sides: Bools) -> float:
-    """What legs cost more with each cell on one side; nearly the least.
+def frustration(ends: Ints, excess: Floats, sides: Bools, max_passes: int) -> float:
+    """Return what legs cost more if each cell is on one side, near the minimum.
 
     Parameters
     ----------
     ends
-        (k, 2) cells.
+        (k, 2) cells of legs.
     excess
-        (k, 2) of a leg that stays on a side, and of one that changes.
+        (k, 2) excess cost of a leg that stays on a side, and of one that changes it.
     sides
-        (m, 2) that a cell has.
+        (m, 2) mask of the sides of a cell.
+    max_passes
+        Maximum number of passes over all cells.
     """
+    side = _sides_along_tree(ends, excess, sides)
+    _improve_sides(ends, excess, sides, side, max_passes)
+    total = 0.0
+    for e in range(len(ends)):
+        total += excess[e, side[ends[e, 0]] ^ side[ends[e, 1]]]
+    return total
+
+
+@kernel
+def _sides_along_tree(ends: Ints, excess: Floats, sides: Bools) -> Ints:
+    """Return the side of each cell by a spanning tree of the legs whose sides differ most."""
     m = len(sides)
-    # trees with sides told from the root; what has one side hangs on a root of its own
+    # forests with sides relative to the root; cells with one side hang on a root of their own
     parent, turned = np.arange(m + 1), np.zeros(m + 1, dtype=np.int64)
     for v in range(m):
         if sides[v, 0] != sides[v, 1]:
@@ -160,30 +164,32 @@ def frustration(ends: Ints, excess: Floats, sides: Bools) -> float:
         while parent[u] != u:
             side[v] ^= turned[u]
             u = parent[u]
-    row, legs = _at(ends, m)
-    for _ in range(PASSES):
+    return side
+
+
+@kernel
+def _improve_sides(ends: Ints, excess: Floats, sides: Bools, side: Ints, max_passes: int) -> None:
+    """Change the sides of single cells while that makes legs cheaper."""
+    row, legs = _legs_by_cell(ends, len(sides))
+    for _ in range(max_passes):
         changed = False
-        for v in range(m):
+        for v in range(len(sides)):
             if not (sides[v, 0] and sides[v, 1]):
                 continue
             gain = 0.0
             for e in legs[row[v] : row[v + 1]]:
                 change = side[ends[e, 0]] ^ side[ends[e, 1]]
                 gain += excess[e, change] - excess[e, 1 - change]
-            if gain > TINY:
+            if gain > SIDE_TOLERANCE:
                 side[v] ^= 1
                 changed = True
         if not changed:
             break
-    total = 0.0
-    for e in range(len(ends)):
-        total += excess[e, side[ends[e, 0]] ^ side[ends[e, 1]]]
-    return total
 
 
 @kernel
-def _at(ends: Ints, cells: int) -> tuple[Ints, Ints]:
-    """The legs at each cell: `legs[row[c] : row[c + 1]]`."""
+def _legs_by_cell(ends: Ints, cells: int) -> tuple[Ints, Ints]:
+    """Return `row` and `legs`: the legs at cell c are `legs[row[c] : row[c + 1]]`."""
     row = np.zeros(cells + 2, dtype=np.int64)
     for e in range(len(ends)):
         row[ends[e, 0] + 2] += 1

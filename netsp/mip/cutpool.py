@@ -1,7 +1,6 @@
-"""The cuts of a relaxation, and how long each has done nothing.
+"""Cuts of a relaxation, and for how long each has been idle.
 
-The pool owns its cuts and their counters together, so that a counter can never be another cut's:
-what restricts or drops cuts does it to both.
+The pool holds the cuts and their counters together, so that no counter can belong to another cut.
 """
 
 from __future__ import annotations
@@ -12,14 +11,13 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.mip.cuts import Cut
+from netsp.mip.mip_policy import CutPolicy
 
-IDLE, SLACK = 8, 2
-"""A cut leaves the LP after so many rounds in a row without a price, rounds in which it was slack
-counting twice (a cut between vertices that the LP leaves alone is tight and means nothing).
-Separation finds it again if need be."""
+SLACK_TOLERANCE = 1e-6
+"""Tolerance below which a cut counts as tight."""
 
-MOST_KEPT = 0.9
-"""Idle cuts are taken out when no more than this share would be left."""
+PRICE_TOLERANCE = 1e-9
+"""Tolerance below which a dual value counts as zero."""
 
 
 class CutPool:
@@ -28,12 +26,13 @@ class CutPool:
     Attributes
     ----------
     idle
-        (k,) rounds that each has done nothing.
+        (k,) rounds that each cut has been idle.
     for_good
-        (k,) which of them are never idle.
+        (k,) mask of the cuts that never count as idle.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, policy: CutPolicy = CutPolicy()) -> None:
+        self.policy = policy
         self.cuts: list[Cut] = []
         self.idle: Ints = np.zeros(0, dtype=np.int64)
         self.for_good: Bools = np.zeros(0, dtype=bool)
@@ -42,13 +41,13 @@ class CutPool:
         return len(self.cuts)
 
     def add(self, cuts: Sequence[Cut], *, for_good: bool = False) -> None:
-        """Take new cuts, which have not been idle yet."""
+        """Add new cuts."""
         self.cuts += cuts
         self.for_good = np.concatenate([self.for_good, np.full(len(cuts), for_good)])
         self.idle = np.concatenate([self.idle, np.zeros(len(cuts), dtype=np.int64)])
 
     def replace(self, cuts: Sequence[Cut]) -> None:
-        """The same cuts in the same order, over other vertices."""
+        """Set the same cuts, in the same order, over other vertices."""
         if len(cuts) != len(self.cuts):
             raise ValueError(f"expected {len(self.cuts)} cuts, got {len(cuts)}")
         self.cuts = list(cuts)
@@ -59,11 +58,11 @@ class CutPool:
         self.idle, self.for_good = self.idle[kept], self.for_good[kept]
 
     def count(self, prices: Floats, slack: Floats) -> None:
-        """Count a round: prices and slacks of all cuts at its optimum."""
-        rounds = np.where(slack > 1e-6, SLACK, 1)
-        self.idle = np.where(prices < -1e-9, 0, self.idle + rounds)
+        """Count a round, from the dual values and slacks of all cuts at its optimum."""
+        rounds = np.where(slack > SLACK_TOLERANCE, self.policy.slack_rounds, 1)
+        self.idle = np.where(prices < -PRICE_TOLERANCE, 0, self.idle + rounds)
 
     def active(self) -> Bools | None:
-        """(k,) which cuts are not idle; None if too few are for it to be worth the while."""
-        kept = (self.idle < IDLE) | self.for_good
-        return None if kept.sum() >= MOST_KEPT * len(kept) else kept
+        """Return the mask of cuts that are not idle; None if too few are idle to remove them."""
+        kept = (self.idle < self.policy.max_idle_rounds) | self.for_good
+        return None if kept.sum() >= self.policy.max_kept_share * len(kept) else kept

@@ -1,4 +1,4 @@
-"""Cuts: which sets, what they bound, their coefficients."""
+"""Cuts of the program: their sets, and their coefficients."""
 
 from __future__ import annotations
 
@@ -12,13 +12,21 @@ from netsp.base.arrays import Bools, Floats, Ints
 
 @dataclass(frozen=True)
 class Cut:
-    """The cut y(E(S)) + Σ y(E(T)) <= x(S \\ C) + `room`: `inside` marks S, `cluster` is C, `teeth`
-    are the sets of clusters T.
+    """The cut y(E(S)) + Σ y(E(T)) <= x(S \\ C) + `rhs`.
 
-    A subtour cut has no teeth. A comb (`netsp.mip.blossoms`, `netsp.mip.combs`) has an odd number
-    of them, each partly in S, a union of clusters, and no C (-1). Teeth of more than two clusters
-    share none. Where S is no union of clusters (`netsp.mip.parity_cuts`), all teeth are pairs. Of a
-    pair only legs with one end in S count.
+    A subtour cut has no teeth. A comb (`netsp.mip.blossoms`, `netsp.mip.combs`) has no C and an odd
+    number of teeth, each partly in S, which is a union of clusters; teeth of more than two clusters
+    are disjoint. If S is no union of clusters (`netsp.mip.parity_cuts`), all teeth are pairs. Of a
+    tooth that is a pair, only legs with one end in S count.
+
+    Attributes
+    ----------
+    inside
+        (V,) mask of S.
+    cluster
+        Cluster C, -1 for none.
+    teeth
+        Sets of clusters T.
     """
 
     inside: Bools
@@ -26,20 +34,20 @@ class Cut:
     teeth: tuple[tuple[int, ...], ...] = ()
 
     @property
-    def room(self) -> float:
-        """Σ (|T| - 1) - (k + 1) / 2 with k teeth, else 0; (k - 1) / 2 if each is a pair."""
+    def rhs(self) -> float:
+        """Right-hand side: Σ (|T| - 1) - (k + 1) / 2 for k teeth, 0 for none."""
         k = len(self.teeth)
         return sum(len(t) - 1 for t in self.teeth) - 0.5 * (k + 1) if k else 0.0
 
     def tooth_pairs(self, clusters: int) -> Bools:
-        """(m + 1, m + 1) pairs of different clusters within a tooth."""
+        """Return the mask (m + 1, m + 1) of pairs of clusters within a tooth."""
         out = np.zeros((clusters, clusters), dtype=bool)
         for tooth in self.teeth:
             out[np.ix_(tooth, tooth)] = True
         return out
 
     def in_tooth(self, cluster: Ints, legs: Ints) -> Bools:
-        """(k,) legs (k, 2) that are in a tooth."""
+        """Return the mask (k,) of legs (k, 2) that count in a tooth."""
         if not self.teeth:
             return np.zeros(len(legs), dtype=bool)
         ends = cluster[legs]
@@ -48,38 +56,42 @@ class Cut:
             out &= self.inside[legs[:, 0]] ^ self.inside[legs[:, 1]]
         return np.asarray(out)
 
-    def is_union(self, cluster: Ints) -> bool:
-        """Whether S holds all vertices of a cluster or none."""
+    def is_union_of_clusters(self, cluster: Ints) -> bool:
+        """Return whether S holds all vertices of each cluster or none."""
         size = np.bincount(cluster)
         held = np.bincount(cluster[self.inside], minlength=len(size))
         return bool(((held == 0) | (held == size)).all())
 
-    def splits(self, cluster: Ints) -> bool:
-        """Whether all teeth are pairs, and S is no union of clusters, or holds both or neither of
-        a pair (where vertices were forgotten): then not all legs between the clusters of a tooth
-        are in it."""
+    def splits_clusters(self, cluster: Ints) -> bool:
+        """Return whether only some of the legs between the clusters of a tooth count in it.
+
+        So it is if all teeth are pairs, and S is no union of clusters, or holds both or neither of
+        a pair because vertices were removed.
+        """
         if not self.teeth or any(len(t) > 2 for t in self.teeth):
             return False
         holds = set(cluster[self.inside].tolist())
-        return any((a in holds) == (b in holds) for a, b in self.teeth) or not self.is_union(
-            cluster
-        )
+        is_crossed = all((a in holds) != (b in holds) for a, b in self.teeth)
+        return not (is_crossed and self.is_union_of_clusters(cluster))
 
     def tooth_sets(self, cluster: Ints) -> list[Bools]:
-        """For teeth that are pairs of clusters the sets of vertices, two for each, whose legs to
-        one another are in the tooth."""
+        """Return masks of vertex sets, up to two for each tooth, a pair of clusters.
+
+        A leg between the clusters counts in the tooth if both ends are in one of the sets.
+        """
         out = []
         for a, b in self.teeth:
-            there = np.where(cluster == a, self.inside, ~self.inside) & (
-                (cluster == a) | (cluster == b)
-            )
-            other = ((cluster == a) | (cluster == b)) & ~there
-            out += [part for part in (there, other) if part.any()]
+            is_of_pair = (cluster == a) | (cluster == b)
+            first = np.where(cluster == a, self.inside, ~self.inside) & is_of_pair
+            second = is_of_pair & ~first
+            out += [part for part in (first, second) if part.any()]
         return out
 
-    def within(self, cluster: Ints, legs: Ints) -> tuple[Ints, Floats]:
-        """Rows of the legs on the left side, and how often they stand there: a leg may be within
-        the handle and within a tooth."""
+    def left_side(self, cluster: Ints, legs: Ints) -> tuple[Ints, Floats]:
+        """Return the indices of legs on the left side and their coefficients.
+
+        The coefficient is 2 for a leg within both the handle and a tooth.
+        """
         both = self.inside[legs[:, 0]] & self.inside[legs[:, 1]]
         times = both.astype(np.float64) + self.in_tooth(cluster, legs)
         rows = np.flatnonzero(times)
@@ -87,13 +99,16 @@ class Cut:
 
 
 def cut_coefficients(cuts: Sequence[Cut], cluster: Ints, legs: Ints) -> Floats:
-    """(cuts, legs) coefficients of y(δ(S)) - y at S ∩ C - 2 Σ y(E(T)) >= -2 room: 1 for a leg
-    out of S \\ C, -1 for one between S ∩ C and S \\ C, else 0, and 2 less in a tooth."""
+    """Return the coefficients (cuts, legs) of cuts in the relaxation without x.
+
+    They are those of y(δ(S)) - y at S ∩ C - 2 Σ y(E(T)) >= -2 rhs: 1 for a leg that leaves S \\ C,
+    -1 for a leg between S ∩ C and S \\ C, else 0; and 2 less in a tooth.
+    """
     out = np.zeros((len(cuts), len(legs)))
     for k, cut in enumerate(cuts):
         u, v = cut.inside[legs[:, 0]], cut.inside[legs[:, 1]]
-        of_c = cluster == cut.cluster
-        at_c = (u & of_c[legs[:, 0]]).astype(np.int8) + (v & of_c[legs[:, 1]])
+        is_in_c = cluster == cut.cluster
+        at_c = (u & is_in_c[legs[:, 0]]).astype(np.int8) + (v & is_in_c[legs[:, 1]])
         out[k] = (u ^ v).astype(np.int8) - at_c
         if cut.teeth:
             out[k] -= 2.0 * cut.in_tooth(cluster, legs)

@@ -17,13 +17,36 @@ CAPACITY_TOLERANCE = 1e-11
 """Tolerance, relative, within which two capacities count as equal."""
 
 
+class Edges(NamedTuple):
+    """Undirected edges of a flow network."""
+
+    tail: Ints
+    head: Ints
+    capacity: Floats
+
+
+class _Network(NamedTuple):
+    """Arcs of a flow network whose last node is the source.
+
+    Arcs 2 e and 2 e + 1 are the two directions of edge e; then come, for each node, the arc from
+    the source and its reverse. `first` is the first arc of each node, `following` the next arc of
+    the same node.
+    """
+
+    first: Ints
+    following: Ints
+    to: Ints
+    residual: Floats
+
+
 @kernel
-def contracted(n: int, tail: Ints, head: Ints, capacity: Floats, sink: int) -> Ints:
+def contracted(n: int, edges: Edges, sink: int) -> Ints:
     """Return the contracted node of each vertex.
 
     An edge is contracted if it has at least the capacity of all other edges of either end: a set
     that holds one end is then cut no more with both. The sink is not contracted.
     """
+    tail, head, capacity = edges.tail, edges.head, edges.capacity
     degree = np.zeros(n)
     for e in range(len(tail)):
         degree[tail[e]] += capacity[e]
@@ -31,9 +54,8 @@ def contracted(n: int, tail: Ints, head: Ints, capacity: Floats, sink: int) -> I
     parent = np.arange(n)
     for e in range(len(tail)):
         u, v = tail[e], head[e]
-        if sink in (u, v) or 2.0 * capacity[e] < (1.0 - CAPACITY_TOLERANCE) * max(
-            degree[u], degree[v]
-        ):
+        largest = max(degree[u], degree[v])
+        if sink in (u, v) or 2.0 * capacity[e] < (1.0 - CAPACITY_TOLERANCE) * largest:
             continue
         while parent[u] != u:
             parent[u] = parent[parent[u]]
@@ -57,14 +79,7 @@ def contracted(n: int, tail: Ints, head: Ints, capacity: Floats, sink: int) -> I
 
 @kernel
 def min_cuts(
-    n: int,
-    tail: Ints,
-    head: Ints,
-    capacity: Floats,
-    cluster: Ints,
-    sink: int,
-    wanted: Ints,
-    enough: float,
+    n: int, edges: Edges, cluster: Ints, sink: int, wanted: Ints, enough: float
 ) -> tuple[Bools, Ints, Floats]:
     """Return the minimum cuts between the sink and each wanted cluster that are below `enough`.
 
@@ -78,8 +93,6 @@ def min_cuts(
     ----------
     n
         Number of vertices.
-    tail, head, capacity
-        Undirected edges.
 
     Returns
     -------
@@ -90,11 +103,11 @@ def min_cuts(
     value : ndarray, shape (k,)
         Capacity of each cut.
     """
-    node = contracted(n, tail, head, capacity, sink)
+    node = contracted(n, edges, sink)
     nodes, sink = node.max() + 1, node[sink]
-    crossing = node[tail] != node[head]
-    tail, head, capacity = node[tail[crossing]], node[head[crossing]], capacity[crossing]
-    edges = len(tail)
+    crossing = node[edges.tail] != node[edges.head]
+    tail, head = node[edges.tail[crossing]], node[edges.head[crossing]]
+    capacity = edges.capacity[crossing]
     network = _network(nodes, tail, head)
     inside = np.zeros((len(wanted), n), dtype=np.bool_)
     which = np.empty(len(wanted), dtype=np.int64)
@@ -108,46 +121,41 @@ def min_cuts(
         distance[cluster[v]] = min(distance[cluster[v]], level[node[v]])
     is_done = np.zeros(nodes, dtype=np.bool_)
     for c in wanted[order_of(distance[wanted])]:
-        network.residual[2 * edges :] = 0.0
-        last, in_one = -1, True
-        for v in range(n):
-            if cluster[v] == c:
-                network.residual[2 * edges + 2 * node[v]] = np.inf
-                in_one = in_one and last in (-1, node[v])
-                last = node[v]
+        last, in_one = _join_source(network, node, cluster == c)
         if last < 0 or (in_one and is_done[last]):
             continue
         is_done[last] = is_done[last] or in_one
-        for e in range(edges):
+        for e in range(len(tail)):
             network.residual[2 * e] = network.residual[2 * e + 1] = capacity[e]
         flow = _max_flow(network, is_sink, level, enough)
         if flow >= enough:
-            if in_one:
-                is_sink[last] = True
+            is_sink[last] = is_sink[last] or in_one
             continue
         # level marks what the source still reaches
-        is_empty = True
         for v in range(n):
             inside[found, v] = level[node[v]] >= 0
-            is_empty = is_empty and not inside[found, v]
-        if not is_empty:
+        if inside[found].any():
             which[found], value[found] = c, flow
             found += 1
     return inside[:found], which[:found], value[:found]
 
 
-class _Network(NamedTuple):
-    """Arcs of a flow network whose last node is the source.
+@kernel
+def _join_source(network: _Network, node: Ints, members: Bools) -> tuple[int, bool]:
+    """Join the source to the nodes of some vertices, and to no other, without limit.
 
-    Arcs 2 e and 2 e + 1 are the two directions of edge e; then come, for each node, the arc from
-    the source and its reverse. `first` is the first arc of each node, `following` the next arc of
-    the same node.
+    Return the last node, -1 for none, and whether it is the only one.
     """
-
-    first: Ints
-    following: Ints
-    to: Ints
-    residual: Floats
+    nodes = len(network.first) - 1
+    start = len(network.to) - 2 * nodes
+    network.residual[start:] = 0.0
+    last, in_one = -1, True
+    for v in range(len(members)):
+        if members[v]:
+            network.residual[start + 2 * node[v]] = np.inf
+            in_one = in_one and last in (-1, node[v])
+            last = node[v]
+    return last, in_one
 
 
 @kernel

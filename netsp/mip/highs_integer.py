@@ -1,4 +1,4 @@
-"""The integer program in HiGHS."""
+"""Integer program in HiGHS."""
 
 from __future__ import annotations
 
@@ -11,13 +11,16 @@ import numpy as np
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock, TimeLimit
 from netsp.mip.cuts import Cut
-from netsp.mip.highs_runner import NONE, Interruption, run, silent_solver
+from netsp.mip.highs_runner import NO_ENTRIES, Interruption, run, silent_solver
 from netsp.mip.program import IntegerOutcome, Point, scale_of
 
 
 class HighsInteger:
-    """`netsp.mip.program.IntegerProgram`. Columns: x by position in `vertices`, then y in the order
-    of `legs`. Rows: clusters, then vertices, then cuts."""
+    """`netsp.mip.program.IntegerProgram` by HiGHS.
+
+    Columns are x by position in `vertices`, then y in the order of `legs`. Rows are clusters, then
+    vertices, then cuts.
+    """
 
     def __init__(
         self, cluster: Ints, vertices: Ints, legs: Ints, costs: Floats, cuts: Sequence[Cut]
@@ -31,19 +34,29 @@ class HighsInteger:
         h = self._highs = silent_solver()
         k, n = len(vertices), len(legs)
         ones = np.ones(self.clusters)
-        h.addRows(self.clusters, ones, ones, *NONE)
-        h.addRows(k, np.zeros(k), np.zeros(k), *NONE)
+        h.addRows(self.clusters, ones, ones, *NO_ENTRIES)
+        h.addRows(k, np.zeros(k), np.zeros(k), *NO_ENTRIES)
         index = np.column_stack([cluster[vertices], self.clusters + np.arange(k)])
         h.addCols(
-            k, np.zeros(k), np.zeros(k), np.ones(k), 2 * k,
-            (2 * np.arange(k)).astype(np.int32), index.ravel().astype(np.int32),
+            k,
+            np.zeros(k),
+            np.zeros(k),
+            np.ones(k),
+            2 * k,
+            (2 * np.arange(k)).astype(np.int32),
+            index.ravel().astype(np.int32),
             np.tile([1.0, -2.0], k),
-        )  # fmt: skip
+        )
         h.addCols(
-            n, costs * self._scale, np.zeros(n), np.ones(n), 2 * n,
+            n,
+            costs * self._scale,
+            np.zeros(n),
+            np.ones(n),
+            2 * n,
             (2 * np.arange(n)).astype(np.int32),
-            (self.clusters + self._position[legs]).ravel().astype(np.int32), np.ones(2 * n),
-        )  # fmt: skip
+            (self.clusters + self._position[legs]).ravel().astype(np.int32),
+            np.ones(2 * n),
+        )
         self.add_cuts(list(cuts))
         h.changeColsIntegrality(
             k + n, np.arange(k + n, dtype=np.int32), np.full(k + n, highspy.HighsVarType.kInteger)
@@ -53,7 +66,7 @@ class HighsInteger:
         self._interruption = Interruption(h.cbMipInterrupt, h.cbSimplexInterrupt)
 
     def add_cuts(self, cuts: list[Cut]) -> None:
-        """Bring cuts into the program."""
+        """Add cuts to the program."""
         if not cuts:
             return
         starts, index, value = [], [], []
@@ -61,25 +74,29 @@ class HighsInteger:
         for cut in cuts:
             at = self.vertices
             outside_c = at[cut.inside[at] & (self.cluster[at] != cut.cluster)]
-            within, times = cut.within(self.cluster, self.legs)
+            columns, coefficients = cut.left_side(self.cluster, self.legs)
             starts.append(count)
-            index += [self._position[outside_c], len(self.vertices) + within]
-            value += [np.full(len(outside_c), -1.0), times]
-            count += len(outside_c) + len(within)
+            index += [self._position[outside_c], len(self.vertices) + columns]
+            value += [np.full(len(outside_c), -1.0), coefficients]
+            count += len(outside_c) + len(columns)
         n = len(cuts)
         self._highs.addRows(
-            n, np.full(n, -highspy.kHighsInf), np.array([c.room for c in cuts]), count,
-            np.array(starts, dtype=np.int32), np.concatenate(index).astype(np.int32),
+            n,
+            np.full(n, -highspy.kHighsInf),
+            np.array([c.rhs for c in cuts]),
+            count,
+            np.array(starts, dtype=np.int32),
+            np.concatenate(index).astype(np.int32),
             np.concatenate(value),
-        )  # fmt: skip
+        )
         self.cuts = [*self.cuts, *cuts]
 
     def solve(self, limit: TimeLimit) -> IntegerOutcome:
-        """The best integer solution, as far as the time goes."""
+        """Return the best integer solution found in time."""
         h = self._highs
         clock = Clock.from_limit(limit)
         # HiGHS can overrun its own limit in presolve and at the root of its tree
-        self._interruption.hear(clock, always=True)
+        self._interruption.follow(clock, always=True)
         run(h, clock.left)
         status = h.getModelStatus()
         if status == highspy.HighsModelStatus.kInfeasible:

@@ -1,4 +1,4 @@
-"""HiGHS in this process: without output, with one thread, to be stopped at any time."""
+"""HiGHS in this process: silent, with one thread, and interruptible."""
 
 from __future__ import annotations
 
@@ -9,23 +9,26 @@ import numpy as np
 
 from netsp.base.clock import Clock
 
-NONE = (0, np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0))
-"""No entries of rows."""
+NO_ENTRIES = (0, np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0))
+"""Arguments of rows without entries."""
 
 
-class Quiet(highspy.Highs):  # type: ignore[misc]
-    """HiGHS that prints nothing: 1.16 prints its banner to standard output, where solutions go, as
-    soon as callbacks are enabled, which its constructor does."""
+class SilentHighs(highspy.Highs):  # type: ignore[misc]
+    """HiGHS that prints nothing.
+
+    HiGHS 1.16 prints its banner to standard output, where solutions go, when its constructor
+    enables callbacks.
+    """
 
     def enableCallbacks(self) -> None:
-        """With nothing printed."""
+        """Turn output off, then enable callbacks."""
         self.setOptionValue("output_flag", False)
         super().enableCallbacks()
 
 
 def silent_solver() -> highspy.Highs:
-    """An empty program, and tolerances as small as HiGHS takes them."""
-    h = Quiet()
+    """Return an empty program with the smallest tolerances that HiGHS accepts."""
+    h = SilentHighs()
     h.setOptionValue("output_flag", False)
     h.setOptionValue("threads", 1)
     h.setOptionValue("primal_feasibility_tolerance", 1e-9)
@@ -34,7 +37,7 @@ def silent_solver() -> highspy.Highs:
 
 
 def run(h: highspy.Highs, time_left: float) -> None:
-    """Solve, for so many seconds."""
+    """Solve for at most `time_left` seconds."""
     # HiGHS counts its limit from the first run of the object
     limit = h.getRunTime() + max(time_left, 0.05) if time_left < 1e9 else 1e30
     h.setOptionValue("time_limit", limit)
@@ -42,18 +45,21 @@ def run(h: highspy.Highs, time_left: float) -> None:
 
 
 class Interruption:
-    """Ends a run of HiGHS when a clock is up, also before its deadline."""
+    """Callback that ends a run of HiGHS when a clock is up, also before its deadline."""
 
     def __init__(self, *events: Any) -> None:
         self.clock = Clock()
-        self._events, self._on = events, False
+        self._events, self._is_subscribed = events, False
 
-    def hear(self, clock: Clock, *, always: bool) -> None:
-        """Of this clock from now on. Being asked at every step of the simplex method costs time, so
-        that it is done only where it is needed."""
+    def follow(self, clock: Clock, *, always: bool) -> None:
+        """Interrupt by another clock from now on.
+
+        A callback at every simplex step takes time, so it is subscribed only for a clock that may
+        be stopped, or `always`.
+        """
         self.clock = clock
-        if (always or clock.can_stop) and not self._on:
-            self._on = True
+        if (always or clock.can_stop) and not self._is_subscribed:
+            self._is_subscribed = True
             for event in self._events:
                 event.subscribe(self._interrupt)
 

@@ -10,12 +10,12 @@ two legs (m >= 2), each of which has two ends; so
 
     length >= Σ_k μ_k room_k + Σ_C (λ_C + min over v in C of (r_v + half of its two least r_uv)).
 
-It holds whatever the solver's tolerances were. At an LP optimum no r_uv is negative and it is no
-less than that; before, when many legs of negative r_uv are not in the LP yet, it is far above what
-one gets by taking all of them.
+It holds whatever the solver's tolerances were. At an LP optimum no r_uv is negative, and the bound
+is at least the optimum. Before, while many legs of negative r_uv are not in the LP yet, it is far
+better than the bound that counts all of them.
 
-It is summed in floating point (`netsp.mip.prices`), so `ROUNDING` times the size of what is summed
-is taken off; the test suite compares with the same formula in exact rationals (`exact_bound`).
+It is summed in floating point (`netsp.mip.prices`), so `BOUND_ROUNDING` times the size of the terms
+is subtracted. The test suite compares it with the formula in exact rationals (`exact_bound`).
 """
 
 from __future__ import annotations
@@ -28,28 +28,37 @@ from netsp.base.arrays import Floats, Ints
 from netsp.mip.cuts import Cut
 from netsp.mip.program import Duals
 
-ROUNDING = 1e-12
-"""Relative rounding allowed for: some thousand additions at 1.1e-16 each, with room to spare."""
+BOUND_ROUNDING = 1e-12
+"""Tolerance, relative, of summing a bound: several thousand additions at 1.1e-16 each."""
 
 
 def rounding(duals: Duals, longest: float) -> float:
-    """What the sums of a bound can be off by: `ROUNDING` of all duals, and of the reduced cost of
-    largest size for every leg of a tour."""
+    """Return the largest rounding error of a bound.
+
+    It is `BOUND_ROUNDING` times all duals and, for each leg of a tour, the largest reduced cost.
+
+    Parameters
+    ----------
+    longest
+        Largest absolute reduced cost of a leg.
+    """
     size = float(np.abs(duals.cluster).sum() + np.abs(duals.cut).sum() - duals.constant)
-    most = longest + float(np.abs(duals.degree).max(initial=0.0))
-    return ROUNDING * (size + len(duals.cluster) * most)
+    largest = longest + float(np.abs(duals.degree).max(initial=0.0))
+    return BOUND_ROUNDING * (size + len(duals.cluster) * largest)
 
 
 def least_of_clusters(values: Floats, cluster: Ints) -> Floats:
-    """(m + 1,) the least value of any vertex, by cluster."""
+    """Return the least value of the vertices of each cluster, shape (m + 1,)."""
     least = np.full(int(cluster.max()) + 1, np.inf)
     np.minimum.at(least, cluster, values)
     return least
 
 
 def exact_bound(costs: Floats, cluster: Ints, cuts: list[Cut], duals: Duals) -> Fraction:
-    """The module's formula in exact rationals, of the very same floating-point numbers; for small
-    instances, in which every vertex has two legs."""
+    """Return the module's bound in exact rationals of the same floating-point numbers.
+
+    For small instances in which every vertex has two legs.
+    """
     n = len(cluster)
     cluster_dual = [Fraction(x) for x in duals.cluster.tolist()]
     degree = [Fraction(x) for x in duals.degree.tolist()]
@@ -61,17 +70,18 @@ def exact_bound(costs: Floats, cluster: Ints, cuts: list[Cut], duals: Duals) -> 
                 r = Fraction(float(costs[u, v])) - degree[u] - degree[v]
                 pair = {int(cluster[u]), int(cluster[v])}
                 r -= sum(mu for c, mu in active if c.inside[u] and c.inside[v])
-                tooth_pairs = sum(
-                    mu for c, mu in active
+                teeth = sum(
+                    mu
+                    for c, mu in active
                     if any(pair <= set(t) for t in c.teeth)
                     and (c.inside[u] != c.inside[v] or any(len(t) > 2 for t in c.teeth))
-                )  # fmt: skip
-                legs[u].append(r - tooth_pairs)
+                )
+                legs[u].append(r - teeth)
     vertex = []
     for v in range(n):
         r = 2 * degree[v] - cluster_dual[cluster[v]]
         r += sum(mu for c, mu in active if c.inside[v] and c.cluster != cluster[v])
         vertex.append(r + sum(sorted(legs[v])[:2]) / 2)
     least = [min(vertex[v] for v in range(n) if cluster[v] == c) for c in range(max(cluster) + 1)]
-    rooms = sum((mu * Fraction(c.room) for c, mu in active), Fraction(0))
+    rooms = sum((mu * Fraction(c.rhs) for c, mu in active), Fraction(0))
     return Fraction(sum(cluster_dual) + sum(least) + rooms)

@@ -1,5 +1,4 @@
-"""The bound of `netsp.mip.lagrangian_bound` over a list of legs, all others being out of the
-question."""
+"""Lagrangian bound (`netsp.mip.lagrangian_bound`) and reduced costs over a list of legs."""
 
 from __future__ import annotations
 
@@ -14,25 +13,25 @@ from netsp.mip.program import Duals
 
 
 class LegPrices:
-    """Reduced costs of legs.
+    """Reduced costs of a list of legs, all others being excluded.
 
     Parameters
     ----------
     legs : ndarray of int, shape (k, 2)
-        All that there are.
+        The legs.
     costs : ndarray, shape (k,)
-        Of these.
+        Cost of each leg.
     cluster : ndarray of int, shape (V,)
-        Of the vertices.
+        Cluster of each vertex.
     cuts : sequence of Cut
-        Of the program.
+        Cuts of the program.
     duals : Duals
-        Any; the better they are, the better the bound.
+        Any dual values; better ones give a better bound.
 
     Attributes
     ----------
     bound : float
-        No tour of these legs is shorter; inf where some cluster cannot be reached by two of them.
+        Lower bound on the tours of these legs; inf if a cluster has fewer than two of them.
     """
 
     def __init__(
@@ -58,23 +57,22 @@ class LegPrices:
         fixed = float((duals.cluster + cheapest).sum()) + duals.constant
         self.bound = fixed - rounding(duals, float(np.abs(reduced).max(initial=0.0)))
 
-    def above(self, missing: float) -> Bools:
-        """(k,) legs that no tour less than so much longer than the bound uses (see
-        `netsp.mip.prices`)."""
+    def exceeds(self, gap: float) -> Bools:
+        """Return the mask (k,) of legs whose tours all exceed the bound by more than a gap."""
         r = total = self._reduced
         for end in self._legs.T:
             other = np.where(r <= self._least[end], self._second[end], self._least[end])
             total = total + self._above[end] + 0.5 * other
-        return np.asarray(total > missing)
+        return np.asarray(total > gap)
 
 
 def _two_least(legs: Ints, values: Floats, size: int) -> tuple[Floats, Floats]:
-    """(V,) the two least values of the legs at each vertex; inf where there are not so many."""
-    ends, of_both = legs.ravel(), np.repeat(values, 2)
-    order = np.lexsort((of_both, ends))
-    ends, of_both = ends[order], np.append(of_both[order], [np.inf, np.inf])
+    """Return the two least values (V,) of the legs at each vertex, inf where legs are missing."""
+    ends, leg_values = legs.ravel(), np.repeat(values, 2)
+    order = np.lexsort((leg_values, ends))
+    ends, leg_values = ends[order], np.append(leg_values[order], [np.inf, np.inf])
     first = np.searchsorted(ends, np.arange(size))
     count = np.bincount(ends, minlength=size)
-    least = np.where(count > 0, of_both[first], np.inf)
-    second = np.where(count > 1, of_both[np.minimum(first + 1, len(of_both) - 1)], np.inf)
+    least = np.where(count > 0, leg_values[first], np.inf)
+    second = np.where(count > 1, leg_values[np.minimum(first + 1, len(leg_values) - 1)], np.inf)
     return least, second

@@ -1,12 +1,11 @@
-"""The shortest tour through the classes of many tours.
+"""Tour merging: the shortest tour through the classes of several tours.
 
-From one start or another, ruin and recreate ends in tours that are some tenths of a percent apart,
-and most of their classes are the same. A program over these has hardly more to choose from than a
+From different starts, ruin and recreate ends in tours whose lengths differ by tenths of a percent
+and which share most of their classes. A program over these classes has hardly more choices than a
 travelling salesperson's, and is solved in seconds where one over all classes is out of reach; its
-tour is no longer than any of theirs. The idea is that of Cook & Seymour 2003, "Tour merging via
-branch-decomposition", who take the legs of the tours alone. All legs among their classes are worth
-more: in the fourth world of 200 goals at tether 300, no search comes below 4793.18 m, and the
-legs of many such tours hold none that is shorter; their classes do, 4789.09 m, which is optimal.
+tour is no longer than any of the given ones. The idea is that of Cook & Seymour 2003, "Tour merging
+via branch-decomposition", who use the legs of the tours alone. All legs among their classes are
+worth more: they hold shorter tours than the legs of many searches do.
 """
 
 from __future__ import annotations
@@ -24,29 +23,30 @@ from netsp.gtsp.limits import Limits
 from netsp.gtsp.searching import SearchingRun
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
-
-MERGED = 8
-"""Searches from the start whose tours are merged. With 500 goals, 8 or 32 of them, of 25,000 rounds
-or 200,000 each, end in the same tour or within 0.02 %."""
-
-SEARCHED = 0.75
-"""Part of the time that is left which these may take, before their tours are merged."""
+from netsp.mip.mip_policy import MergingPolicy
 
 Prove = Callable[[TravelGraph, Limits], Result]
+"""Solver that proves."""
 
 
-def search_and_merge(run: SearchingRun, prove: Prove) -> None:
-    """Search from the start and merge the tours, again beside the best one, until the time is up;
-    not at all if it is not limited, or iterations are."""
+def search_and_merge(
+    run: SearchingRun, prove: Prove, policy: MergingPolicy = MergingPolicy()
+) -> None:
+    """Search from scratch and merge the tours found, repeatedly, until the time is up.
+
+    Without a time limit, or with a limit of iterations, do nothing.
+    """
     while run.clock.limit and run.iteration_limit == np.inf and not run.is_done:
         run.check()
-        tours = run.search_afresh(MERGED, run.clock.part(SEARCHED))
+        tours = run.search_afresh(policy.searches, run.clock.part(policy.search_time_share))
         merge(run, tours, prove, Clock.from_limit(run.clock))
 
 
 def merge(run: SearchingRun, tours: Sequence[Sequence[int]], prove: Prove, clock: Clock) -> None:
-    """Take the shortest tour through the classes of some tours, if it is below the cutoff: one at
-    it or above may use what a bound has ruled out."""
+    """Offer a run the shortest tour through the classes of some tours, if it is below the cutoff.
+
+    A tour at the cutoff or above may use legs that a bound has fixed out.
+    """
     with run.graph.on_clock(clock), suppress(LimitReachedError):
         found = merged_tour(run.graph, tours, prove, Limits(clock, rng=run.rng))
         if found is not None and (length := run.graph.tour_length(found)) < run.cutoff:
@@ -55,15 +55,14 @@ def merge(run: SearchingRun, tours: Sequence[Sequence[int]], prove: Prove, clock
 
 
 def visited_classes(tours: Iterable[Sequence[int]]) -> Ints:
-    """All that some tours visit, in order."""
+    """Return all vertices that some tours visit, in order."""
     return np.unique(np.concatenate([np.asarray(t, dtype=np.int64) for t in tours]))
 
 
 def merged_tour(
     graph: TravelGraph, tours: Sequence[Sequence[int]], prove: Prove, limits: Limits
 ) -> list[int] | None:
-    """The shortest tour through the classes of some tours, or as good a one as the limits leave;
-    None if there is none."""
+    """Return the shortest tour through the classes of some tours that the limits allow to find."""
     if not tours:
         return None
     vertices = visited_classes(tours)

@@ -11,7 +11,7 @@ from netsp.gtsp.gtsp_policy import GtspPolicy
 
 @dataclass(frozen=True)
 class CutPolicy:
-    """Which violated inequalities come into the LP, and when they leave it.
+    """Policy of cuts: which violated inequalities come into the LP, and when they leave it.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class CutPolicy:
 
 @dataclass(frozen=True)
 class PricingPolicy:
-    """Which legs come into the LP, and which are measured.
+    """Policy of pricing: which legs come into the LP, and which are measured.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ class PricingPolicy:
 
 @dataclass(frozen=True)
 class SchedulePolicy:
-    """When the root prices all legs, and when it ends.
+    """Schedule of the root: when it prices all legs, and when it ends.
 
     Attributes
     ----------
@@ -219,7 +219,7 @@ class LpPolicy:
 
 @dataclass(frozen=True)
 class BranchingPolicy:
-    """How branch and cut chooses and processes nodes.
+    """Policy of branch and cut: how nodes are chosen and processed.
 
     Attributes
     ----------
@@ -346,7 +346,7 @@ class GoalBoundPolicy:
 
 @dataclass(frozen=True)
 class MergingPolicy:
-    """When tours are merged.
+    """Policy of tour merging.
 
     Attributes
     ----------

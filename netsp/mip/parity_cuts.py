@@ -1,25 +1,23 @@
-"""Inequalities of even crossing: a tour that is not entangled crosses every ray an even number of
-times.
+"""Parity cuts: a free tour crosses the ray of every obstacle an even number of times.
 
-Its word is empty, so each letter stands in it as often as its inverse, and the legs that write an
-odd number of letters of an obstacle are even in number. On the cover that is nothing new: they are
-the legs between vertices whose words have an even and an odd number of that letter, a set H of
-vertices that the tour enters and leaves. But the relaxation takes halves of vertices, and what goes
-once around an obstacle costs it nothing: it returns on another sheet. As in generalised 2-matching
+The word of a tour that is not entangled is empty, so an even number of its legs write an odd number
+of letters of an obstacle. On the cover these are the legs that leave the set H of vertices whose
+words hold an odd number of that letter. An LP that visits halves of vertices can go around an
+obstacle once at no cost, because it returns on another sheet. As in generalised 2-matching
 inequalities (`netsp.mip.blossoms`), for an odd number k of teeth, pairs of clusters,
 
     y(δ(H)) - 2 Σ y(legs of a tooth in δ(H)) >= 1 - k,
 
-for a tour has at most one leg between two clusters, and one that had all k of these and no other in
-δ(H) would cross it an odd number of times. Those inequalities are the case that H is a union of
-clusters, and together they are the {0, 1/2}-cuts (Caprara & Fischetti 1996) of the equations of
-degree and parity. Within a set of obstacles and one of clusters, H is where the letters of the
-former, and membership of the latter, add up to an odd number.
+because a tour has at most one leg between two clusters, and a tour with all k of these and no other
+leg in δ(H) would cross it an odd number of times. If H is a union of clusters, these are 2-matching
+inequalities; together they are the {0, 1/2}-cuts (Caprara & Fischetti 1996) of the equations of
+degree and parity. For a set of obstacles and a set of clusters, H holds the vertices whose letters
+of those obstacles, plus one in those clusters, add up to an odd number.
 
-Which clusters: with q the flow of a pair across H, it costs min(q, 1 - q), and is a tooth where q
-is more than a half; where the number of teeth is even, one pair is changed. A violated cut is one
-of cost below 1. To find the cheapest is NP-hard (it is the frustration index of a signed graph); it
-is sought by changing sides of one cluster after another.
+Separation chooses the clusters. A pair of clusters with the flow q across H costs min(q, 1 - q),
+and is a tooth if q is more than a half; if the number of teeth is even, one pair is changed. A cut
+is violated if its cost is below 1. To find the cheapest cut is NP-hard (it is the frustration index
+of a signed graph), so clusters change sides one after another while the cost falls.
 """
 
 from __future__ import annotations
@@ -35,26 +33,20 @@ from netsp.base.compiled.interpretation import interprets
 from netsp.base.compiled.kernel import kernel
 from netsp.hsignature import Word
 from netsp.mip.cuts import Cut
+from netsp.mip.mip_policy import CutPolicy
 
-VIOLATION = 0.02
-"""Least violation worth a cut."""
-
-MOST_CUTS = 40
-"""Most cuts from one point."""
-
-ENOUGH = 4
-"""With so many cuts of single obstacles, two at a time are not looked at."""
-
-MOST_SETS = 500
-"""Of obstacles that are looked at."""
-
-PASSES = 4
-"""Times that the sides of all clusters are gone through."""
+FLOW_TOLERANCE = 1e-9
+"""Tolerance below which a flow counts as zero, and two costs as equal."""
 
 
 def odd_letters(signatures: Sequence[Word], obstacles: int | None = None) -> Bools:
-    """(V, n) of which obstacles each word has an odd number of letters; of the first so many,
-    where that is given, or up to the last that is in any word."""
+    """Return the mask (V, n) of obstacles of which each word has an odd number of letters.
+
+    Parameters
+    ----------
+    obstacles
+        Number of obstacles n; by default the last one in any word.
+    """
     last = max((abs(a) for word in signatures for a in word), default=0)
     out = np.zeros((len(signatures), last if obstacles is None else obstacles), dtype=bool)
     for v, word in enumerate(signatures):
@@ -64,54 +56,59 @@ def odd_letters(signatures: Sequence[Word], obstacles: int | None = None) -> Boo
 
 
 def parity_cuts(
-    legs: Ints, y: Floats, cluster: Ints, odd: Bools, check: Callable[[], None] = lambda: None
+    legs: Ints,
+    y: Floats,
+    cluster: Ints,
+    odd: Bools,
+    check: Callable[[], None] = lambda: None,
+    policy: CutPolicy = CutPolicy(),
 ) -> list[Cut]:
-    """Violated inequalities of even crossing, the most violated first.
+    """Return violated parity cuts, the most violated first.
 
     Parameters
     ----------
     odd
-        (V, n) as of `odd_letters`.
+        Result of `odd_letters`.
     check
         Called for each set of obstacles; may raise to stop.
     """
-    on = y > 1e-9
+    on = y > FLOW_TOLERANCE
     u, v = legs[on].T
     clusters = int(cluster.max()) + 1
     pairs, pair = _pairs_of(np.column_stack([cluster[u], cluster[v]]), clusters)
-    row, beside = _beside(pairs, clusters)
+    row = np.searchsorted(np.sort(pairs.ravel()), np.arange(clusters + 1)).astype(np.int64)
     found: dict[tuple[object, ...], tuple[float, Cut]] = {}
     for size in (1, 2):
-        if len(found) >= ENOUGH:
+        if len(found) >= policy.max_cuts_before_pairs:
             break
-        if math.comb(odd.shape[1], size) > MOST_SETS:
+        if math.comb(odd.shape[1], size) > policy.max_obstacle_sets:
             break
-        for some in combinations(range(odd.shape[1]), size):
+        for obstacles in combinations(range(odd.shape[1]), size):
             check()
-            side_of = _sides(odd, some)
+            side_of = _sides(odd, obstacles)
             flow = _flow(pair, side_of[u] ^ side_of[v], y[on], len(pairs))
             if not flow[:, 1].any():
                 continue
             for sides in (np.zeros(clusters, dtype=np.bool_), _along_tree(pairs, flow, clusters)):
-                cost, teeth = _cheapest(pairs, flow, row, beside, sides)
-                if cost > 1.0 - VIOLATION or not teeth.any():
+                cost, teeth = _cheapest(pairs, flow, row, sides, policy.max_parity_passes)
+                if cost > 1.0 - policy.min_parity_violation or not teeth.any():
                     continue
                 inside = side_of ^ sides[cluster]
                 cut = Cut(inside, -1, tuple((int(a), int(b)) for a, b in pairs[teeth]))
                 found.setdefault((inside.tobytes(), cut.teeth), (1.0 - cost, cut))
-    best = sorted(found.values(), key=lambda f: -f[0])[:MOST_CUTS]
+    best = sorted(found.values(), key=lambda f: -f[0])[: policy.max_parity_cuts]
     return [cut for _, cut in best]
 
 
 def _pairs_of(ends: Ints, size: int) -> tuple[Ints, Ints]:
-    """(p, 2) pairs that legs are between, and (k,) which is each leg's."""
+    """Return the pairs (p, 2) of numbers that occur as ends, and the pair (k,) of each leg."""
     g, h = np.sort(ends, axis=1).T
     keys, pair = np.unique(g * size + h, return_inverse=True)
     return np.column_stack([keys // size, keys % size]), pair
 
 
 def _flow(pair: Ints, odd: Bools, y: Floats, pairs: int) -> Floats:
-    """(p, 2) y of the legs of each pair that write an even, and an odd, number of letters."""
+    """Return y of each pair's legs (p, 2) that write an even, and an odd, number of letters."""
     out = np.zeros((pairs, 2))
     np.add.at(out, (pair, odd.astype(np.int64)), y)
     return out
@@ -121,57 +118,52 @@ def _sides(odd: Bools, obstacles: tuple[int, ...]) -> Bools:
     return np.asarray(np.logical_xor.reduce(odd[:, list(obstacles)], axis=1))
 
 
-def _beside(ends: Ints, clusters: int) -> tuple[Ints, Ints]:
-    """Numbers of the pairs at each cluster: `beside[row[c] : row[c + 1]]`."""
-    at = ends.ravel()
-    order = np.argsort(at, kind="stable")
-    return np.searchsorted(at[order], np.arange(clusters + 1)).astype(np.int64), order // 2
-
-
 def _along_tree(ends: Ints, flow: Floats, clusters: int) -> Bools:
-    """(m + 1,) sides such that what is most fractional does not cross, along a spanning tree."""
+    """Return sides (m + 1,) that a spanning tree of the most fractional pairs does not cross."""
     cost = np.minimum(flow, 1.0 - flow)
     order = np.argsort(-cost.ravel(), kind="stable")
     root, turned = np.arange(clusters), np.zeros(clusters, dtype=bool)
     at, costs = ends.tolist(), cost.ravel().tolist()
     for k in order.tolist():
         p, label = divmod(k, 2)
-        if costs[k] <= 1e-9:
+        if costs[k] <= FLOW_TOLERANCE:
             break
         a, b = at[p]
         if root[a] != root[b]:
-            # that this pair does not cross: its sides differ as it writes letters or not
-            wrong = bool(turned[a] ^ turned[b]) != bool(label)
-            mine = root == root[b]
-            turned[mine] ^= wrong
-            root[mine] = root[a]
+            # the pair does not cross if its sides differ exactly where its legs write letters
+            is_crossing = bool(turned[a] ^ turned[b]) != bool(label)
+            moved = root == root[b]
+            turned[moved] ^= is_crossing
+            root[moved] = root[a]
     return turned
 
 
 @kernel
 def _cheapest(
-    ends: Ints, flow: Floats, row: Ints, beside: Ints, sides: Bools
+    ends: Ints, flow: Floats, row: Ints, sides: Bools, max_passes: int
 ) -> tuple[float, Bools]:
-    """Change sides until that makes nothing cheaper; the cost, and which pairs are teeth.
+    """Change sides while the cost falls, and return it and the mask of pairs that are teeth.
 
     Parameters
     ----------
     flow
         (pairs, 2) y of the legs between two clusters that stay on one side, and that change.
+    row
+        Cluster c is in no pair if row[c] equals row[c + 1].
     """
     cost, change = _cost(ends, flow, sides)
-    for _ in range(PASSES):
+    for _ in range(max_passes):
         best = cost
         for c in range(len(sides)):
             if row[c] == row[c + 1]:
                 continue
             sides[c] ^= True
             now, at = _cost(ends, flow, sides)
-            if now < cost - 1e-9:
+            if now < cost - FLOW_TOLERANCE:
                 cost, change = now, at
             else:
                 sides[c] ^= True
-        if cost > best - 1e-9:
+        if cost > best - FLOW_TOLERANCE:
             break
     teeth = np.zeros(len(ends), dtype=np.bool_)
     for p in range(len(ends)):
@@ -183,13 +175,13 @@ def _cheapest(
 
 @kernel
 def _across(p: int, ends: Ints, flow: Floats, sides: Bools) -> float:
-    """What a pair of clusters has across the handle."""
+    """Return the flow of a pair of clusters across the handle."""
     return float(flow[p, 1] if sides[ends[p, 0]] == sides[ends[p, 1]] else flow[p, 0])
 
 
 @kernel
 def _cost(ends: Ints, flow: Floats, sides: Bools) -> tuple[float, int]:
-    """Cost of some sides, and the pair that is changed for it, -1 for none."""
+    """Return the cost of sides, and the pair that is changed for it, -1 if none is."""
     total, odd, least, at = 0.0, False, np.inf, -1
     for p in range(len(ends)):
         q = _across(p, ends, flow, sides)
@@ -207,25 +199,25 @@ def _cost(ends: Ints, flow: Floats, sides: Bools) -> tuple[float, int]:
 
 @interprets(_cheapest)
 def _cheapest_in_numpy(
-    ends: Ints, flow: Floats, row: Ints, beside: Ints, sides: Bools
+    ends: Ints, flow: Floats, row: Ints, sides: Bools, max_passes: int
 ) -> tuple[float, Bools]:
     """Vectorise `_cheapest`: cost the moves of all clusters together, and again after each move."""
     cost, change = _cost_in_numpy(ends, flow, sides)
     movable = np.flatnonzero(row[:-1] != row[1:])
     is_end = ((ends[:, :1] == movable) ^ (ends[:, 1:] == movable)).T
-    for _ in range(PASSES):
+    for _ in range(max_passes):
         best, first = cost, 0
         while first < len(movable):
             is_whole = (sides[ends[:, 0]] == sides[ends[:, 1]]) ^ is_end[first:]
             costs, changes = _costs_of(np.where(is_whole, flow[:, 1], flow[:, 0]))
-            cheaper = np.flatnonzero(costs < cost - 1e-9)
+            cheaper = np.flatnonzero(costs < cost - FLOW_TOLERANCE)
             if not len(cheaper):
                 break
             k = int(cheaper[0])
             sides[movable[first + k]] ^= True
             cost, change = float(costs[k]), int(changes[k])
             first += k + 1
-        if cost > best - 1e-9:
+        if cost > best - FLOW_TOLERANCE:
             break
     is_whole = sides[ends[:, 0]] == sides[ends[:, 1]]
     teeth = np.where(is_whole, flow[:, 1], flow[:, 0]) > 0.5

@@ -1,7 +1,7 @@
-"""The prices of all legs at dual values: one pass for the bound, one for what it rules out.
+"""Reduced costs of all legs: one pass for the Lagrangian bound, one for reduced-cost fixing.
 
 The bound is that of `netsp.mip.lagrangian_bound`. A tour through a given vertex, or along a given
-leg, pays what these cost above the cheapest of their clusters.
+leg, costs at least the bound and what these cost above the cheapest choice of their clusters.
 """
 
 from __future__ import annotations
@@ -18,73 +18,54 @@ from netsp.gtsp.sparse_costs import EMPTY_ROWS, Rows, SparseCosts
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import NO_BITS, Bits, DeadLegs, mark_dead
 from netsp.mip.lagrangian_bound import least_of_clusters, rounding
-from netsp.mip.parity_paths import beyond, paths_from_base
+from netsp.mip.mip_policy import PricingPolicy
+from netsp.mip.parity_paths import BasePaths, leg_excess, paths_from_base
 from netsp.mip.program import Duals
-from netsp.mip.reducedcosts import Terms, reduced_costs, reduced_costs_at, rooms
-
-ROWS = 256
-"""Rows of a matrix that a thread works on at a time."""
-
-CHEAPEST = 8
-"""Legs of negative reduced cost that are kept for each vertex."""
+from netsp.mip.reducedcosts import Terms, reduced_costs, reduced_costs_at, work_arrays
 
 
 class Prices:
-    """The reduced costs of `netsp.mip.lagrangian_bound` over a matrix of costs.
+    """Reduced costs of all legs at given dual values.
 
     Parameters
     ----------
     costs : ndarray, shape (V, V)
-        Of legs; inf where there is none.
+        Costs of legs, inf for missing ones. Ignored if costs are sparse.
     dead : DeadLegs or SparseCosts
-        Legs that are of no interest, and those that there are none of; or the others, with costs,
-        and then the matrix is not looked at.
+        Mask of the legs that are fixed out or missing; or the costs of all other legs.
     cluster : ndarray of int, shape (V,)
-        Of the vertices.
+        Cluster of each vertex.
     cuts : sequence of Cut
-        Of the program.
+        Cuts of the program.
     duals : Duals
-        Any; the better they are, the better the bound.
+        Any dual values; better ones give a better bound.
     check : callable
         Called every few million legs, from several threads; may raise to stop.
+    policy : PricingPolicy
+        Sizes of blocks, and candidates of each vertex.
 
     Attributes
     ----------
     bound : float
-        No tour without a dead leg is shorter.
+        Lower bound on all tours without a dead leg.
     """
 
     def __init__(
-        self, costs: Floats, dead: DeadLegs | SparseCosts, cluster: Ints, cuts: Sequence[Cut],
-        duals: Duals, check: Callable[[], None] = lambda: None,
-    ) -> None:  # fmt: skip
+        self,
+        costs: Floats,
+        dead: DeadLegs | SparseCosts,
+        cluster: Ints,
+        cuts: Sequence[Cut],
+        duals: Duals,
+        check: Callable[[], None] = lambda: None,
+        policy: PricingPolicy = PricingPolicy(),
+    ) -> None:
+        self.policy = policy
         self._check, self._dead = check, dead
         self._size = len(cluster)
-        active = np.flatnonzero(duals.cut < 0.0).tolist()
-        sets, weight = [cuts[k].inside for k in active], [-duals.cut[k] for k in active]
-        split = {k for k in active if cuts[k].splits(cluster)}
-        for k in sorted(split):
-            of_teeth = cuts[k].tooth_sets(cluster)
-            sets += of_teeth
-            weight += [-duals.cut[k]] * len(of_teeth)
-        inside = np.array(sets, dtype=bool).reshape(-1, self._size)
-        of_cut, member = map(np.ascontiguousarray, np.nonzero(inside))
-        first_member = np.searchsorted(of_cut, np.arange(len(sets) + 1))
-        by_vertex = np.argsort(member, kind="stable")
-        first_at = np.searchsorted(member[by_vertex], np.arange(self._size + 1))
-        m = int(cluster.max(initial=0)) + 1
-        tooth_pairs = np.zeros((m, m))
-        for k in active:
-            if cuts[k].teeth and k not in split:
-                tooth_pairs[cuts[k].tooth_pairs(m)] += duals.cut[k]
-        vertex = 2.0 * duals.degree - duals.cluster[cluster]
-        for k in active:
-            vertex[cuts[k].inside & (cluster != cuts[k].cluster)] += duals.cut[k]
-        least, second, longest = np.empty((3, self._size))
-        terms = self._terms = Terms(
-            costs, *_held(dead), cluster, duals.degree, first_at, of_cut[by_vertex], first_member,
-            member, np.array(weight, dtype=float), tooth_pairs, vertex, least, second,
-        )  # fmt: skip
+        terms = self._terms = _terms(costs, dead, cluster, cuts, duals)
+        least, second, vertex = terms.least, terms.second, terms.vertex
+        longest = np.empty(self._size)
         self._by_rows(lambda a, b: _scan(a, b, terms, longest), self._size)
         self._more = least < 0.0
         self._cost = vertex + 0.5 * (least + second)
@@ -92,52 +73,57 @@ class Prices:
         fixed = float((duals.cluster + self._cheapest).sum()) + duals.constant
         self.bound = fixed - rounding(duals, float(longest.max(initial=0.0)))
 
-    def rule_out(self, cutoff: float) -> None:
+    def fix_out(self, cutoff: float) -> None:
         """Mark as dead the legs and vertices that are in no tour shorter than the cutoff."""
-        missing = cutoff - self.bound
-        if not np.isfinite(missing):
+        gap = cutoff - self.bound
+        if not np.isfinite(gap):
             return
         terms = self._terms
         above = terms.vertex - self._cheapest[terms.cluster]
         excess = self._cost - self._cheapest[terms.cluster]
-        way, other_way, before = paths_from_base(terms, excess, missing, self._check)
-        self._by_rows(
-            lambda a, b: _rule_out(a, b, terms, above, way, other_way, before, missing), self._size
-        )
-        gone = (excess > missing) | (way + other_way > missing + excess)
+        paths = paths_from_base(terms, excess, gap, self._check, self.policy.vertices_per_check)
+        self._by_rows(lambda a, b: _fix_out(a, b, terms, above, paths, gap), self._size)
+        gone = (excess > gap) | (paths.cost + paths.second_cost > gap + excess)
         gone[0] = False
         self._dead.add_vertices(gone)
 
-    def room(self, cutoff: float) -> Floats:
-        """(V, V) by how much more a leg may cost than it does and be in a tour shorter than the
-        cutoff; -inf where it is dead."""
+    def max_increases(self, cutoff: float) -> Floats:
+        """Return by how much each leg (V, V) may cost more and be in a tour below the cutoff.
+
+        The increase of a dead leg is -inf.
+        """
         terms, out = self._terms, np.full((self._size, self._size), -np.inf)
         above = terms.vertex - self._cheapest[terms.cluster]
-        missing = cutoff - self.bound
-        self._by_rows(lambda a, b: _room(a, b, terms, above, missing, out), self._size)
+        gap = cutoff - self.bound
+        self._by_rows(lambda a, b: _max_increases(a, b, terms, above, gap, out), self._size)
         return out
 
-    def cheapest(self, tolerance: float) -> tuple[Ints, Floats]:
-        """(k, 2) legs u < v of reduced costs below minus the tolerance, and these: of each vertex
-        the `CHEAPEST` at most. Costs may have risen since it was last called: then those of
-        vertices of which all such legs had been given are not looked for again."""
-        rows = np.flatnonzero(self._more)
-        other = np.full((self._size, CHEAPEST), -1, dtype=np.int64)
-        price = np.zeros((self._size, CHEAPEST))
+    def most_negative(self, tolerance: float) -> tuple[Ints, Floats]:
+        """Return legs (k, 2), u < v, of reduced cost below minus the tolerance, and the costs (k,).
+
+        They are the `candidates_per_vertex` most negative legs of each vertex. In a later call,
+        after costs have risen, vertices that had fewer such legs are skipped.
+        """
+        rows, count = np.flatnonzero(self._more), self.policy.candidates_per_vertex
+        other = np.full((self._size, count), -1, dtype=np.int64)
+        price = np.zeros((self._size, count))
         terms = self._terms
-        self._by_rows(lambda a, b: _cheapest(rows[a:b], terms, tolerance, other, price), len(rows))
+        self._by_rows(
+            lambda a, b: _most_negative(rows[a:b], terms, tolerance, other, price), len(rows)
+        )
         self._more = other[:, -1] >= 0
         u, k = np.nonzero(other >= 0)
         pairs = np.sort(np.column_stack([u, other[u, k]]), axis=1)
         legs, where = np.unique(pairs.reshape(-1, 2), axis=0, return_index=True)
         return legs, price[u, k][where]
 
-    def of(self, legs: Ints) -> Floats:
-        """(k,) the reduced costs of legs (k, 2)."""
+    def reduced_costs(self, legs: Ints) -> Floats:
+        """Return the reduced costs (k,) of legs (k, 2)."""
         return reduced_costs(legs, self._terms)
 
     def _by_rows(self, work: Callable[[int, int], None], count: int) -> None:
-        blocks = [(k, min(k + ROWS, count)) for k in range(0, count, ROWS)]
+        step = self.policy.rows_per_task
+        blocks = [(k, min(k + step, count)) for k in range(0, count, step)]
         if len(blocks) < 4:
             work(0, count)
             return
@@ -150,19 +136,57 @@ class Prices:
             list(pool.map(checked, blocks))
 
 
-def _held(dead: DeadLegs | SparseCosts) -> tuple[Bits, Rows]:
-    """For the kernels."""
+def _terms(
+    costs: Floats, dead: DeadLegs | SparseCosts, cluster: Ints, cuts: Sequence[Cut], duals: Duals
+) -> Terms:
+    """Return the terms of reduced costs; `least` and `second` are to be filled in."""
+    size, m = len(cluster), int(cluster.max(initial=0)) + 1
+    active = np.flatnonzero(duals.cut < 0.0).tolist()
+    sets, weight = [cuts[k].inside for k in active], [-duals.cut[k] for k in active]
+    split = {k for k in active if cuts[k].splits_clusters(cluster)}
+    for k in sorted(split):
+        tooth_sets = cuts[k].tooth_sets(cluster)
+        sets += tooth_sets
+        weight += [-duals.cut[k]] * len(tooth_sets)
+    inside = np.array(sets, dtype=bool).reshape(-1, size)
+    holder, member = map(np.ascontiguousarray, np.nonzero(inside))
+    by_vertex = np.argsort(member, kind="stable")
+    tooth_pairs = np.zeros((m, m))
+    vertex = 2.0 * duals.degree - duals.cluster[cluster]
+    for k in active:
+        if cuts[k].teeth and k not in split:
+            tooth_pairs[cuts[k].tooth_pairs(m)] += duals.cut[k]
+        vertex[cuts[k].inside & (cluster != cuts[k].cluster)] += duals.cut[k]
+    return Terms(
+        costs,
+        *_alive_legs(dead),
+        cluster=cluster,
+        degree=duals.degree,
+        first_at=np.searchsorted(member[by_vertex], np.arange(size + 1)),
+        cut_at=holder[by_vertex],
+        first_member=np.searchsorted(holder, np.arange(len(sets) + 1)),
+        member=member,
+        weight=np.array(weight, dtype=float),
+        tooth_pairs=tooth_pairs,
+        vertex=vertex,
+        least=np.empty(size),
+        second=np.empty(size),
+    )
+
+
+def _alive_legs(dead: DeadLegs | SparseCosts) -> tuple[Bits, Rows]:
+    """Return the mask and the sparse costs for kernels, one of them empty."""
     return (dead.bits, EMPTY_ROWS) if isinstance(dead, DeadLegs) else (NO_BITS, dead.held)
 
 
 @kernel
 def _scan(first: int, last: int, terms: Terms, longest: Floats) -> None:
-    """Per row the two least reduced costs, and the largest size of any."""
-    other, price, room = rooms(terms)
+    """Find the two least reduced costs of each row, and the largest absolute one."""
+    other, price, shared = work_arrays(terms)
     for u in range(first, last):
         least = second = np.inf
         size = 0.0
-        for i in range(reduced_costs_at(u, terms, other, price, room)):
+        for i in range(reduced_costs_at(u, terms, other, price, shared)):
             r = price[i]
             size = max(size, abs(r))
             if r < least:
@@ -173,73 +197,79 @@ def _scan(first: int, last: int, terms: Terms, longest: Floats) -> None:
 
 
 @kernel
-def _rule_out(
-    first: int, last: int, terms: Terms, above: Floats, way: Floats, other_way: Floats,
-    before: Ints, missing: float,
-) -> None:  # fmt: skip
-    """Mark the legs whose ends cost more than what is missing if they are used, or to which and
-    from which the ways cost as much; rows let go of them."""
-    other, price, room = rooms(terms)
+def _fix_out(
+    first: int, last: int, terms: Terms, above: Floats, paths: BasePaths, gap: float
+) -> None:
+    """Mark as dead, or remove from sparse costs, the legs of rows that exceed the gap.
+
+    A leg exceeds the gap by what its ends cost if it is used, or by the paths from the base to its
+    ends.
+    """
+    other, price, shared = work_arrays(terms)
     rows = terms.rows
-    held = len(rows.first) > 0
+    is_sparse = len(rows.first) > 0
     for u in range(first, last):
         kept = 0
-        for i in range(reduced_costs_at(u, terms, other, price, room)):
+        for i in range(reduced_costs_at(u, terms, other, price, shared)):
             v, r = other[i], price[i]
-            there = other_way[u] if before[u] == v else way[u]
-            home = other_way[v] if before[v] == u else way[v]
+            to_u = paths.second_cost[u] if paths.before[u] == v else paths.cost[u]
+            to_v = paths.second_cost[v] if paths.before[v] == u else paths.cost[v]
             if (
-                there + home + beyond(u, v, r, terms) > missing
-                or with_ends(u, v, r, above, terms) > missing
+                to_u + to_v + leg_excess(u, v, r, terms) > gap
+                or excess_with_ends(u, v, r, above, terms) > gap
             ):
-                if not held:
+                if not is_sparse:
                     mark_dead(u, v, terms.dead)
-            elif held:
+            elif is_sparse:
                 at = rows.first[u]
                 rows.other[at + kept], rows.cost[at + kept] = v, rows.cost[at + i]
                 kept += 1
-        if held:
+        if is_sparse:
             rows.size[u] = kept
 
 
 @kernel
-def with_ends(u: int, v: int, price: float, above: Floats, terms: Terms) -> float:
-    """What a tour along a leg costs above the bound, by what its ends do: an end pays for half of
-    the leg, and half of its cheapest other one."""
-    on = terms.second[u] if price <= terms.least[u] else terms.least[u]
-    back = terms.second[v] if price <= terms.least[v] else terms.least[v]
-    return float(above[u] + above[v] + price + 0.5 * (on + back))
+def excess_with_ends(u: int, v: int, price: float, above: Floats, terms: Terms) -> float:
+    """Return what a tour along a leg costs above the bound by the choices at its ends.
+
+    Each end pays for half of the leg and half of its cheapest other leg.
+    """
+    at_u = terms.second[u] if price <= terms.least[u] else terms.least[u]
+    at_v = terms.second[v] if price <= terms.least[v] else terms.least[v]
+    return float(above[u] + above[v] + price + 0.5 * (at_u + at_v))
 
 
 @kernel
-def _room(first: int, last: int, terms: Terms, above: Floats, missing: float, out: Floats) -> None:
-    other, price, room = rooms(terms)
+def _max_increases(
+    first: int, last: int, terms: Terms, above: Floats, gap: float, out: Floats
+) -> None:
+    other, price, shared = work_arrays(terms)
     for u in range(first, last):
-        for i in range(reduced_costs_at(u, terms, other, price, room)):
+        for i in range(reduced_costs_at(u, terms, other, price, shared)):
             v = other[i]
-            out[u, v] = missing - with_ends(u, v, price[i], above, terms)
+            out[u, v] = gap - excess_with_ends(u, v, price[i], above, terms)
 
 
 @kernel
-def _cheapest(
+def _most_negative(
     rows: Ints, terms: Terms, tolerance: float, held_at: Ints, held_price: Floats
-) -> None:  # fmt: skip
-    """Per row the legs of least reduced cost, if it is negative, in no order."""
-    most = held_at.shape[1]
-    other, price, room = rooms(terms)
+) -> None:
+    """Find the legs of most negative reduced cost of each row, in no order."""
+    capacity = held_at.shape[1]
+    other, price, shared = work_arrays(terms)
     for u in rows:
         held, worst = 0, 0
-        for i in range(reduced_costs_at(u, terms, other, price, room)):
+        for i in range(reduced_costs_at(u, terms, other, price, shared)):
             r = price[i]
-            if r >= -tolerance or (held == most and r >= held_price[u, worst]):
+            if r >= -tolerance or (held == capacity and r >= held_price[u, worst]):
                 continue
             at = worst
-            if held < most:
+            if held < capacity:
                 at = held
                 held += 1
             held_at[u, at], held_price[u, at] = other[i], r
-            if held == most:
+            if held == capacity:
                 worst = 0
-                for k in range(most):
+                for k in range(capacity):
                     if held_price[u, k] > held_price[u, worst]:
                         worst = k

@@ -1,53 +1,55 @@
-"""When the root looks at the prices of all legs, and when it gives up."""
+"""Schedule of the root: when all legs are priced, and when the root ends."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-PRICE_EVERY, PRICE_SELDOM = 2, 32
-"""Rounds of cuts between two looks at the prices of all legs, unless no cut is found; every look
-that brings hardly a leg and raises the bound by little doubles the first, up to the second."""
-
-WORTH = 0.02
-"""Less than this share of the gap closed is hardly anything."""
+from netsp.mip.mip_policy import SchedulePolicy
 
 
 @dataclass
 class PricingSchedule:
-    """When to look at the prices of all legs, and when to give up.
+    """Count of rounds and pricing passes.
 
     Attributes
     ----------
+    policy
+        Intervals and thresholds.
     rounds
-        Of the LP since the last look.
-    every
-        So many make the next one due.
-    looks
-        So far.
+        LP rounds since the last pass.
+    interval
+        Rounds after which the next pass is due.
+    passes
+        Number of passes so far.
     gaps
-        After every look.
+        Gap after every pass.
     """
 
+    policy: SchedulePolicy = field(default_factory=SchedulePolicy)
     rounds: int = 0
-    every: int = PRICE_EVERY
-    looks: int = 0
+    interval: int = field(init=False)
+    passes: int = 0
     gaps: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.interval = self.policy.min_interval
 
     @property
     def is_due(self) -> bool:
-        """At first, and whenever enough rounds have passed."""
-        return self.rounds % self.every == 0
+        """True if the next round begins with a pricing pass, as the first does."""
+        return self.rounds % self.interval == 0
 
     def note_pass(self, *, idle: bool) -> None:
-        """Looks that bring nothing become seldom."""
+        """Count a pass, and double the interval if it was idle."""
         self.rounds = 1
-        self.looks += 1
-        self.every = min(2 * self.every, PRICE_SELDOM) if idle else PRICE_EVERY
+        self.passes += 1
+        shortest, longest = self.policy.min_interval, self.policy.max_interval
+        self.interval = min(2 * self.interval, longest) if idle else shortest
 
-    def stalled(self, gap: float, patience: int) -> bool:
-        """Whether the last so many looks closed hardly anything of the gap."""
+    def has_stalled(self, gap: float, patience: int) -> bool:
+        """Note a gap, and return whether the last passes closed hardly anything of it."""
         self.gaps.append(gap)
         if len(self.gaps) <= patience:
             return False
         before = self.gaps[-1 - patience]
-        return before - gap < WORTH * before
+        return before - gap < self.policy.min_gap_closed * before

@@ -1,4 +1,4 @@
-"""The mixed-integer program of the paper, as its backends share it.
+"""Mixed-integer program of the paper, in the form that all backends share.
 
 For a travel graph with clusters C_0 = {base}, C_1 … C_m, binaries x_v (vertex v is visited) and
 y_uv (leg u-v is travelled; legs are undirected, so one variable serves both directions):
@@ -35,16 +35,29 @@ from netsp.mip.cuts import Cut
 
 
 def scale_of(costs: Floats) -> float:
-    """A power of two that brings costs to some hundreds, where solvers' absolute tolerances mean
-    what they should; multiplying by it is exact."""
+    """Return a power of two that scales the largest cost to between 512 and 1024.
+
+    The absolute tolerances of solvers suit such costs, and scaling by it is exact.
+    """
     largest = float(np.max(np.abs(costs), initial=0.0))
     return 2.0 ** (10 - math.frexp(largest)[1]) if largest > 0.0 else 1.0
 
 
 @dataclass(frozen=True)
 class Duals:
-    """Dual values: λ of (2) by cluster, π of (3) by vertex, μ <= 0 of (4) by cut; constant : what
-    the rooms of cuts with teeth come to, Σ μ_k room_k."""
+    """Dual values.
+
+    Attributes
+    ----------
+    cluster
+        (m + 1,) λ of (2).
+    degree
+        (V,) π of (3).
+    cut
+        (cuts,) μ <= 0 of (4).
+    constant
+        Σ μ_k rhs_k.
+    """
 
     cluster: Floats
     degree: Floats
@@ -55,7 +68,7 @@ class Duals:
 def restricted(
     cluster: Ints, legs: Ints, cuts: Sequence[Cut], keep: Bools
 ) -> tuple[Ints, Ints, list[Cut]]:
-    """Cluster, legs and cuts renumbered for the vertices marked."""
+    """Return clusters, legs and cuts renumbered for the vertices of a mask."""
     number = np.cumsum(keep) - 1
     return cluster[keep], number[legs], [replace(c, inside=c.inside[keep]) for c in cuts]
 
@@ -63,22 +76,34 @@ def restricted(
 def duals_of_relaxation(
     by_cluster: Floats, by_cut: Floats, cuts: Sequence[Cut], cluster: Ints
 ) -> Duals:
-    """Duals of (2)-(4) from those of the relaxation without x, so that no vertex has a reduced
-    cost of its own: λ = 2 by_cluster, μ = -2 by_cut, π_v = by_cluster + by_cut where v is in
-    S \\ C."""
+    """Return duals of (2)-(4) from those of the relaxation without x.
+
+    They are λ = 2 by_cluster, μ = -2 by_cut, and π_v = by_cluster + by_cut for v in S \\ C, so that
+    the reduced cost of every vertex is 0.
+    """
     prices = np.maximum(by_cut, 0.0)
     degree = by_cluster[cluster].copy()
     for cut, price in zip(cuts, prices, strict=True):
         if price > 0.0:
             degree[cut.inside & (cluster != cut.cluster)] += price
     mu = -2.0 * prices
-    rooms = sum(m * c.room for m, c in zip(mu.tolist(), cuts, strict=True) if c.teeth)
-    return Duals(2.0 * by_cluster, degree, mu, rooms)
+    constant = sum(m * c.rhs for m, c in zip(mu.tolist(), cuts, strict=True) if c.teeth)
+    return Duals(2.0 * by_cluster, degree, mu, constant)
 
 
 @dataclass(frozen=True)
 class Point:
-    """An LP or integer solution: x by vertex, y by leg (k, 2); duals and slacks by cut of an LP."""
+    """Solution of an LP or an integer program.
+
+    Attributes
+    ----------
+    x
+        (V,) value of each vertex.
+    legs, y
+        (k, 2) legs of the program, and (k,) their values.
+    duals, slack
+        Dual values, and the slack of each cut, of an LP; None of an integer program.
+    """
 
     x: Floats
     legs: Ints
@@ -90,18 +115,18 @@ class Point:
 
 @dataclass(frozen=True)
 class IntegerOutcome:
-    """What an integer run gave.
+    """Outcome of a run of an integer program.
 
     Attributes
     ----------
     point
-        The best integer solution of the program, or None (it may hold subtours).
+        Best integer solution, which may have subtours; None if none was found.
     bound
-        A bound on every solution of the program, or None.
+        Lower bound on all solutions of the program, or None.
     finished
         Whether the program was solved to the end.
     infeasible
-        It has no solution.
+        Whether it has no solution.
     """
 
     point: Point | None
@@ -111,14 +136,14 @@ class IntegerOutcome:
 
 
 class Relaxation(Protocol):
-    """The linear relaxation over a changing set of legs and cuts.
+    """Linear relaxation over a changing set of legs and cuts.
 
     Attributes
     ----------
     legs
         (k, 2) legs u < v in the program.
     pool
-        Its cuts.
+        Cuts in the program.
     infeasible
         Whether the last solve found that there is no solution.
     """
@@ -132,48 +157,48 @@ class Relaxation(Protocol):
         """Cuts in the program."""
 
     def add_legs(self, legs: Ints, costs: Floats) -> None:
-        """Bring legs (k, 2) into the program."""
+        """Add legs (k, 2) to the program."""
 
     def keep_legs(self, keep: Bools) -> None:
-        """Take all legs out of the program but those marked."""
+        """Remove all legs but those marked."""
 
     def restrict(self, keep: Bools) -> None:
-        """Renumber legs and cuts for the vertices marked; no other has a leg in the program."""
+        """Renumber legs and cuts for the vertices of a mask, which hold the ends of all legs."""
 
     def set_costs(self, costs: Floats) -> None:
         """Set the costs of all legs in the program."""
 
     def add_cuts(self, cuts: list[Cut], *, for_good: bool = False) -> None:
-        """Bring cuts into the program; those that are there for good are never idle."""
+        """Add cuts to the program; cuts added for good never count as idle."""
 
     def keep_cuts(self, keep: Bools) -> None:
-        """Take the cuts out of the program but those marked, and those that its basis rests on."""
+        """Remove the cuts that are neither marked nor needed by the basis."""
 
     def solve(self, limit: TimeLimit) -> Point | None:
-        """The optimum with duals; None if there is none or the time ran out."""
+        """Return the optimum with duals; None if there is none or the time is up."""
 
 
 class WarmRelaxation(Relaxation, Protocol):
-    """A relaxation that starts from its last basis, so that a tree can be searched with it."""
+    """Relaxation that re-solves from its last basis, as branch and cut needs it."""
 
     def set_alive(self, alive: Bools) -> None:
-        """Let only the legs marked be used."""
+        """Fix all legs at 0 but those marked."""
 
     def rays(self) -> list[Duals]:
-        """Dual values that say why the last solve found no solution; all that there may be."""
+        """Return dual rays that may prove that the last solve had no solution."""
 
     def probe(self, costs: Floats, alive: Bools, steps: int) -> float:
-        """The objective after so many simplex steps with other costs and legs."""
+        """Return the objective after some simplex steps with other costs and legs."""
 
 
 class IntegerProgram(Protocol):
-    """The integer program over fixed legs and a growing set of cuts."""
+    """Integer program over fixed legs and a growing set of cuts."""
 
     legs: Ints
     cuts: list[Cut]
 
     def add_cuts(self, cuts: list[Cut]) -> None:
-        """Bring cuts into the program."""
+        """Add cuts to the program."""
 
     def solve(self, limit: TimeLimit) -> IntegerOutcome:
-        """The best integer solution, as far as the time goes."""
+        """Return the best integer solution found in time."""

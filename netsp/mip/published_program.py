@@ -1,4 +1,4 @@
-"""`mip-2017`: the program of McCammon & Hollinger 2017, section IV-B, as published: a baseline.
+"""`mip-2017`: the program of McCammon & Hollinger 2017, section IV-B, as published, for comparison.
 
 The solver states equations (2) to (4) over all vertices and all legs as an integer program. CBC
 solves it; the paper used Gurobi. There is no warm start, no cut at fractional points and no
@@ -39,10 +39,7 @@ from netsp.mip.cbc_program import CbcInteger
 from netsp.mip.subtours import cycles_of
 
 CUTS = ("goals", "vertices")
-
-BYTES_PER_LEG = 4000
-"""Estimated memory of a leg in the program, bytes: PuLP's variable, its terms in the objective and
-in two degree rows, and its share of the file for CBC."""
+"""Kinds of constraints that forbid a subtour."""
 
 
 @dataclass(frozen=True)
@@ -56,16 +53,24 @@ class Params:
         ``vertices``, over the vertices of the subtour.
     max_legs
         Largest number of legs in the program, at least 1.
+    bytes_per_leg
+        Estimated memory of a leg in the program, bytes, at least 1: PuLP's variable, its terms in
+        the objective and in two degree rows, and its share of the file for CBC.
     """
 
     cuts: str = "goals"
     max_legs: int = 50_000
+    bytes_per_leg: int = 4000
 
     def __post_init__(self) -> None:
         if self.cuts not in CUTS:
             raise ValueError(f"option 'cuts': expected {' or '.join(CUTS)}, got {self.cuts!r}")
         if self.max_legs < 1:
             raise ValueError(f"option 'max_legs': expected 1 or more, got {self.max_legs}")
+        if self.bytes_per_leg < 1:
+            raise ValueError(
+                f"option 'bytes_per_leg': expected 1 or more, got {self.bytes_per_leg}"
+            )
 
 
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
@@ -73,15 +78,6 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
 
     A warm start is ignored, so that the baseline shows what the method does alone. An iteration is
     one solved integer program. Source: McCammon & Hollinger 2017, section IV-B.
-
-    Parameters
-    ----------
-    graph : TravelGraph
-        Travel graph of the problem.
-    params : Params, optional
-        Options of the solver.
-    limits : Limits, optional
-        Limits of time and iterations, and the listener.
 
     Returns
     -------
@@ -98,22 +94,23 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     # blind: do not substitute a heuristic tour if the run stops before its first tour
     with run.until_stopped(blind=True):
         if not run.solve_if_trivial():
-            legs, costs = _all_legs(graph, chosen.max_legs)
+            legs, costs = _all_legs(graph, chosen)
             run.check()
             _lazy_rounds(run, legs, costs, chosen)
     return run.finish("proven" if run.is_done else "open")
 
 
-def _all_legs(graph: TravelGraph, max_legs: int) -> tuple[Ints, Floats]:
+def _all_legs(graph: TravelGraph, params: Params) -> tuple[Ints, Floats]:
     """Return all legs (k, 2) between vertices of different goals, and their costs."""
     sizes = np.bincount(graph.cluster).astype(float)
     count = (sizes.sum() ** 2 - (sizes**2).sum()) / 2.0
-    if count > max_legs:
+    if count > params.max_legs:
         raise InputError(
-            f"solver 'mip-2017': the program has {count:.0f} legs; expected at most {max_legs} "
-            "(option max_legs): choose fewer goals, a shorter tether or solver mip"
+            f"solver 'mip-2017': the program has {count:.0f} legs; expected at most "
+            f"{params.max_legs} (option max_legs): choose fewer goals, a shorter tether or solver "
+            "mip"
         )
-    check_available(BYTES_PER_LEG * count, f"a program of {count:.0f} legs", "choose solver mip")
+    check_available(params.bytes_per_leg * count, f"a program of {count:.0f} legs", "choose solver mip")
     finite = np.triu(np.isfinite(graph.costs), 1)
     legs = np.argwhere(finite & (graph.cluster[:, None] != graph.cluster[None, :]))
     return legs.astype(np.int64), graph.costs[legs[:, 0], legs[:, 1]]

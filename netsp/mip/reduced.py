@@ -1,17 +1,17 @@
-"""The reduced MIP heuristic: one class per goal, then an ordinary TSP.
+"""`reduced-mip`: one class for each goal, then an ordinary TSP.
 
-McCammon & Hollinger 2017, section IV-C: every goal is taken in the class of its shortest tether;
+McCammon & Hollinger 2017, section IV-C: every goal is visited in the class of its shortest tether;
 two goals are joined by the direct leg if it shares the homotopy class of the path through the base,
 else by the shortest leg that does. On the covering space both cases are one: the leg from (i, h_i)
 to (j, h_j) is the shortest path of the class ``h_i^-1 h_j``, which is that of the path through the
-base. So the reduced graph is the travel graph on the vertices of least tether, and the TSP on it
-goes to the same machinery, with equation (2) trivially satisfied.
+base. So the reduced graph is the travel graph on the vertices of shortest tether, and its TSP is
+solved by `mip`, with equation (2) trivially satisfied.
 
-The paper reports tours within 5 % of the optimum. Its recipe by itself misses it by 17 % on our
-worlds (20 goals, tether 350: docs/solvers.md): the classes of least tether are too few to leave on
-one side of an obstacle and come back on the other. So by default the three classes of least tether
-are kept for every goal (2 %), and the classes of the order found are chosen once more, exactly and
-from all, by a shortest path through layers. ``classes=1 polish=0`` is the paper's.
+The paper reports tours within 5 % of the optimum. Its recipe alone does not reach that (figures in
+docs/solvers.md): the classes of shortest tether are too few to pass an obstacle on one side and
+come back on the other. So by default three classes are kept for every goal, and the classes along
+the order found are chosen once more, exactly and from all, by a shortest path through layers.
+``classes=1 polish=0`` is the paper's.
 """
 
 from __future__ import annotations
@@ -28,9 +28,6 @@ from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.gtsp.travel.result import Progress, Result
 from netsp.mip.mip_solver import MipRun, Params
 
-MOST_POLISHED = 4000
-"""Most classes, those of least tether, among which the last choice is made."""
-
 
 @dataclass(frozen=True)
 class ReducedParams(Params):
@@ -39,13 +36,16 @@ class ReducedParams(Params):
     Attributes
     ----------
     classes
-        How many classes per goal, those of least tether.
+        Number of classes of each goal, those of shortest tether.
     polish
-        1 to choose the classes of the order found exactly, 0 to leave it, as in the paper.
+        1 to choose the classes along the order found exactly, 0 to keep them, as in the paper.
+    max_polished
+        Maximum number of classes, those of shortest tether, for that choice; at least 1.
     """
 
     classes: int = 3
     polish: int = 1
+    max_polished: int = 4000
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -53,21 +53,25 @@ class ReducedParams(Params):
             raise ValueError(f"option 'classes': expected 1 or more, got {self.classes}")
         if self.polish not in (0, 1):
             raise ValueError(f"option 'polish': expected 0 or 1, got {self.polish}")
+        if self.max_polished < 1:
+            raise ValueError(f"option 'max_polished': expected 1 or more, got {self.max_polished}")
 
 
 def solve(
     graph: TravelGraph, params: ReducedParams | None = None, limits: Limits | None = None
 ) -> Result:
-    """Solve the TSP over the classes of least tether.
+    """Solve the TSP over the classes of shortest tether.
 
     The tour is optimal for those classes only, so no bound is claimed for the problem unless they
-    are all there are. Iterations as of `netsp.mip.mip_solver`; params : see `ReducedParams`.
+    are all that there are. An iteration is one of `netsp.mip.mip_solver`.
     """
     chosen, limits = params or ReducedParams(), limits or Limits()
     kept = least_tethers(graph.costs_to_base, graph.cluster, chosen.classes)
     whole = len(kept) == len(graph)
     inner = replace(limits, warm_start=None, on_progress=None)
-    part = MipRun(graph.subgraph(kept), inner, search_rounds=chosen.search_rounds)
+    part = MipRun(
+        graph.subgraph(kept), inner, search_rounds=chosen.search_rounds, policy=chosen.policy
+    )
     outer = SolverRun(graph, limits)
 
     def pass_on(row: Progress) -> None:
@@ -91,7 +95,7 @@ def solve(
             outer.update_incumbent(kept[np.array(result.tour)].tolist())
             if chosen.polish and not whole:
                 outer.check()
-                instance = Instance.among(graph, search_core(outer, vertices=MOST_POLISHED))
+                instance = Instance.among(graph, search_core(outer, vertices=chosen.max_polished))
                 order = graph.cluster[kept[np.array(result.tour[1:])]]
                 _, tour = best_classes(order, instance.start, instance.costs)
                 outer.update_incumbent(instance.original(tour))

@@ -1,9 +1,9 @@
-"""One leg's reduced cost, and those of all legs at a vertex: kernels over a matrix of costs.
+"""Kernels for the reduced costs of one leg, and of all legs at a vertex.
 
-Reduced costs are never held. With thousands of classes a matrix of them, and those that are in
-between, would take more memory than the costs themselves, and more time to write than to compute.
-What cuts add to the legs of one vertex is summed up cut by cut, over the sets that it lies in: most
-sets hold few of all vertices, so that takes far less than a product of matrices.
+Reduced costs are computed when they are needed. With thousands of classes a matrix of them would
+take more memory than the costs themselves, and more time to write than to compute. The terms of
+cuts are summed cut by cut over the sets that hold a vertex: most sets hold few of all vertices, so
+this is far quicker than a product of matrices.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ import numpy as np
 from netsp.base.arrays import Floats, Ints
 from netsp.base.compiled.kernel import kernel
 from netsp.gtsp.sparse_costs import Rows, place_of
-from netsp.mip.deadlegs import Bits, not_dead
+from netsp.mip.deadlegs import Bits, write_alive
 
 
 class Terms(NamedTuple):
-    """What a reduced cost is made of, c - π_u - π_v + shared - bitten, for the kernels.
+    """Terms of reduced costs c - π_u - π_v + shared - teeth, for kernels.
 
-    `shared` is what the cuts that hold both ends cost: those of vertex v are
-    `cut_at[first_at[v] : first_at[v + 1]]`, cut k holds
-    `member[first_member[k] : first_member[k + 1]]`, both ascending, and costs `weight[k]`.
-    `tooth_pairs` (m + 1, m + 1) is what teeth that hold both clusters do; `vertex` r_v; `least` and
-    `second` are r_uv of the two cheapest legs of each vertex. Legs are those of the matrix `costs`
-    but for `dead`, the bits of `DeadLegs`, or those of `rows`, where these are not empty.
+    The term `shared` is the sum over the cuts that hold both ends. Vertex v is in the cuts
+    `cut_at[first_at[v] : first_at[v + 1]]`, cut k holds the vertices
+    `member[first_member[k] : first_member[k + 1]]`, both ascending, and has the term `weight[k]`.
+    `tooth_pairs` (m + 1, m + 1) is the sum over the teeth that hold both clusters, `vertex` r_v,
+    `least` and `second` are r_uv of the two cheapest legs of each vertex. The legs are those of the
+    matrix `costs` without `dead`, the bits of `DeadLegs`; or those of `rows`, if it is not empty.
     """
 
     costs: Floats
@@ -46,77 +46,83 @@ class Terms(NamedTuple):
 
 
 @kernel
-def reduced(u: int, v: int, cost: float, shared: float, terms: Terms) -> float:
-    """r_uv, the same as r_vu."""
-    tooth_pairs = terms.tooth_pairs[terms.cluster[u], terms.cluster[v]]
-    return float(cost - (terms.degree[u] + terms.degree[v]) + shared - tooth_pairs)
+def reduced_cost(u: int, v: int, cost: float, shared: float, terms: Terms) -> float:
+    """Return r_uv, which equals r_vu to the bit."""
+    teeth = terms.tooth_pairs[terms.cluster[u], terms.cluster[v]]
+    return float(cost - (terms.degree[u] + terms.degree[v]) + shared - teeth)
 
 
 @kernel
 def legs_at(u: int, terms: Terms, other: Ints, cost: Floats) -> int:
-    """How many legs at u are left, and the first so many of `other` and `cost`: their other ends,
-    ascending, and costs."""
+    """Write the ends, ascending, and costs of the legs left at u, and return their number."""
     if len(terms.rows.first) > 0:
         first, count = terms.rows.first[u], terms.rows.size[u]
         for i in range(count):
             other[i], cost[i] = terms.rows.other[first + i], terms.rows.cost[first + i]
         return int(count)
-    count = not_dead(u, terms.dead, other)
+    count = write_alive(u, terms.dead, other)
     for i in range(count):
         cost[i] = terms.costs[u, other[i]]
     return int(count)
 
 
 @kernel
-def reduced_costs_at(u: int, terms: Terms, other: Ints, price: Floats, room: Floats) -> int:
-    """As `legs_at`, with reduced costs. `room` has one place for each vertex or cut and is zero
-    before and after.
+def reduced_costs_at(u: int, terms: Terms, other: Ints, price: Floats, work: Floats) -> int:
+    """Write the ends, ascending, and reduced costs of the legs left at u, and return their number.
 
-    What cuts add is summed over the sets of u, or, where few legs are left, over those of their
-    other ends; the order of the sums is the same, and makes r_uv the same as r_vu.
+    The terms of cuts are summed over the sets of u or, if few legs are left, over those of their
+    other ends. The order of the sums is the same, so that r_uv equals r_vu to the bit.
+
+    Parameters
+    ----------
+    work
+        Work array of zeros, one for each vertex or cut; zero again afterwards.
     """
-    count, work = legs_at(u, terms, other, price), 0
+    count, extra_terms = legs_at(u, terms, other, price), 0
     for v in other[:count]:
-        work += terms.first_at[v + 1] - terms.first_at[v]
+        extra_terms += terms.first_at[v + 1] - terms.first_at[v]
     cuts = terms.cut_at[terms.first_at[u] : terms.first_at[u + 1]]
     for k in cuts:
-        work -= terms.first_member[k + 1] - terms.first_member[k]
-    if work > 0:
+        extra_terms -= terms.first_member[k + 1] - terms.first_member[k]
+    if extra_terms > 0:
         for k in cuts:
             for v in terms.member[terms.first_member[k] : terms.first_member[k + 1]]:
-                room[v] += terms.weight[k]
+                work[v] += terms.weight[k]
     else:
         for k in cuts:
-            room[k] = terms.weight[k]
+            work[k] = terms.weight[k]
     for i in range(count):
         v = other[i]
         shared = 0.0
-        if work > 0:
-            shared = room[v]
+        if extra_terms > 0:
+            shared = work[v]
         else:
             for k in terms.cut_at[terms.first_at[v] : terms.first_at[v + 1]]:
-                shared += room[k]
-        price[i] = reduced(u, v, price[i], shared, terms)
-    if work > 0:
+                shared += work[k]
+        price[i] = reduced_cost(u, v, price[i], shared, terms)
+    if extra_terms > 0:
         for k in cuts:
             for v in terms.member[terms.first_member[k] : terms.first_member[k + 1]]:
-                room[v] = 0.0
+                work[v] = 0.0
     else:
         for k in cuts:
-            room[k] = 0.0
+            work[k] = 0.0
     return count
 
 
 @kernel
-def rooms(terms: Terms) -> tuple[Ints, Floats, Floats]:
-    """`other`, `price` and `room` of `reduced_costs_at`."""
+def work_arrays(terms: Terms) -> tuple[Ints, Floats, Floats]:
+    """Return `other`, `price` and `work` for `reduced_costs_at`."""
     n = len(terms.cluster)
     return np.empty(n, np.int64), np.empty(n), np.zeros(max(n, len(terms.weight)))
 
 
 @kernel
 def reduced_costs(legs: Ints, terms: Terms) -> Floats:
-    """The reduced cost of each leg, as `reduced_costs_at` has it; inf where rows have none."""
+    """Return the reduced cost of each leg (k, 2), inf for legs that sparse costs lack.
+
+    Sums are in the order of `reduced_costs_at`.
+    """
     out = np.empty(len(legs))
     for k in range(len(legs)):
         u, v = legs[k]
@@ -133,5 +139,5 @@ def reduced_costs(legs: Ints, terms: Terms) -> Floats:
             cost = terms.rows.cost[at] if at >= 0 else np.inf
         else:
             cost = terms.costs[u, v]
-        out[k] = reduced(u, v, cost, shared, terms)
+        out[k] = reduced_cost(u, v, cost, shared, terms)
     return out

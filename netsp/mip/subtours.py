@@ -1,9 +1,9 @@
-"""Finding violated subtour cuts.
+"""Separation of subtour cuts.
 
-At integer points by sight: the components of the support. At fractional points by components, too,
-by minimum cuts among the clusters, by the branches of the cover (for every prefix of a word, the
-vertices whose word begins with it: sets that belong together in space and need no search) and by
-minimum cuts among the vertices, which find a violated cut for a cluster if there is one.
+At integer points they are the components of the support. At fractional points they are found by
+components, too, by minimum cuts among clusters, by branches of the cover (for every prefix of a
+word, the vertices whose word begins with it, which lie together in space), and by minimum cuts
+among vertices, which find a violated cut of a cluster if there is one.
 """
 
 from __future__ import annotations
@@ -16,49 +16,47 @@ from netsp.base.arrays import Bools, Floats, Ints
 from netsp.hsignature import Word
 from netsp.mip.blossoms import cluster_flows
 from netsp.mip.cuts import Cut
-from netsp.mip.flows import min_cuts
+from netsp.mip.flows import Edges, min_cuts
+from netsp.mip.mip_policy import CutPolicy
 
-VIOLATION = 1e-4
-"""Least violation worth a cut."""
-
-MOST_CUTS = 60
-"""Most cuts from one point beside those of components."""
+SUPPORT_TOLERANCE = 1e-9
+"""Tolerance below which a value of an LP's point counts as zero."""
 
 
 def components(x: Floats, legs: Ints, y: Floats) -> tuple[int, Ints]:
-    """Connected components of the support (vertices with x > 0); label -1 elsewhere."""
+    """Return the number of components of the support, and each vertex's, -1 where x is 0."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    on = y > 1e-9
+    on = y > SUPPORT_TOLERANCE
     n = len(x)
     u, v = legs[on].T
     graph = coo_array((np.ones(len(u)), (u, v)), shape=(n, n))
     _, label = connected_components(graph, directed=False)
-    label = np.where(x > 1e-9, label, -1)
+    label = np.where(x > SUPPORT_TOLERANCE, label, -1)
     used = np.unique(label[label >= 0])
     renumber = {int(old): new for new, old in enumerate(used)}
     return len(used), np.array([renumber.get(int(k), -1) for k in label], dtype=np.int64)
 
 
 def complete_clusters(inside: Bools, x: Floats, cluster: Ints) -> Bools:
-    """S with each cluster completed whose support lies inside: no weaker, and often stronger."""
+    """Return S with each cluster completed whose support lies inside, which strengthens a cut."""
     m = int(cluster.max()) + 1
     weight = np.bincount(cluster[inside], weights=x[inside], minlength=m)
-    return np.asarray(inside | (weight[cluster] > 1.0 - 1e-9))
+    return np.asarray(inside | (weight[cluster] > 1.0 - SUPPORT_TOLERANCE))
 
 
 def component_cuts(
     x: Floats, legs: Ints, y: Floats, cluster: Ints, near: Ints | None = None
 ) -> list[Cut]:
-    """One cut for each component of the support that the base is not in.
+    """Return a cut for each component of the support without the base.
 
     Parameters
     ----------
     near
-        (V,) the visited vertex nearest to each, itself if it is visited. Vertices that are not
-        visited then go with it: they carry no flow, so the cut is as violated, and the same subtour
-        in a neighbouring class, which the next LP would pay for instead, is cut with it.
+        (V,) the visited vertex nearest to each, itself if it is visited. An unvisited vertex joins
+        the set of its nearest: it carries no flow, so the cut is as violated, and also cuts off the
+        same subtour in neighbouring classes, which the next LP would choose instead.
     """
     count, label = components(x, legs, y)
     cuts = []
@@ -76,9 +74,11 @@ def component_cuts(
 def strongest_cut(
     inside: Bools, x: Floats, legs: Ints, y: Floats, cluster: Ints
 ) -> tuple[float, Cut]:
-    """How much a point violates y(δ(S ∪ C)) >= 2 with the cluster C for which that is most, and the
-    cut. All of C in S is stronger than the part of it that is in S already: by (3) the cut is
-    y(E(S)) <= x(S \\ C), and more of C adds to the left side alone."""
+    """Return the largest violation of y(δ(S ∪ C)) >= 2 over all clusters C, and its cut.
+
+    All of C in S is stronger than a part of it: by (3) the cut is y(E(S)) <= x(S \\ C), and more of
+    C adds to the left side alone.
+    """
     ends = cluster[legs]
     u, v = inside[legs].T
     # by cluster, half of what the violation gains when all of it is in S
@@ -92,23 +92,23 @@ def strongest_cut(
     return violation, Cut(inside | (cluster == c), c)
 
 
-def goal_cuts(legs: Ints, y: Floats, cluster: Ints) -> list[Cut]:
-    """Violated cuts of sets of whole clusters: those of least crossing, one for each cluster, or
-    for some that no set is crossed more for having together. They say nothing of classes, so that
-    no other class of a goal gets round them."""
-    between = cluster_flows(legs, y, cluster)
-    tail, head = map(np.ascontiguousarray, np.nonzero(np.triu(between)))
-    goals = np.arange(1, len(between))
-    sets, which, _ = min_cuts(
-        len(between), tail, head, between[tail, head], np.arange(len(between)), 0, goals,
-        2.0 - VIOLATION,
-    )  # fmt: skip
+def goal_cuts(legs: Ints, y: Floats, cluster: Ints, policy: CutPolicy = CutPolicy()) -> list[Cut]:
+    """Return violated cuts of sets of whole clusters: a minimum cut for each contracted cluster.
+
+    They hold whichever classes are visited, so no other class of a goal evades them.
+    """
+    flow = cluster_flows(legs, y, cluster)
+    tail, head = map(np.ascontiguousarray, np.nonzero(np.triu(flow)))
+    goals, numbers = np.arange(1, len(flow)), np.arange(len(flow))
+    enough = 2.0 - policy.min_subtour_violation
+    edges = Edges(tail, head, flow[tail, head])
+    sets, which, _ = min_cuts(len(flow), edges, numbers, 0, goals, enough)
     distinct = {s.tobytes(): (s, int(c)) for s, c in zip(sets, which, strict=True)}
     return [Cut(s[cluster], c) for s, c in distinct.values()]
 
 
 def cover_branches(signatures: Sequence[Word]) -> Bools:
-    """(k, V) vertices of every branch of the cover with more than one vertex and not all."""
+    """Return masks (k, V) of the branches of the cover with more than one vertex."""
     rows: dict[Word, list[int]] = {}
     for v, word in enumerate(signatures):
         for k in range(1, len(word) + 1):
@@ -127,70 +127,89 @@ def fractional_cuts(
     cluster: Ints,
     branch: Bools | None = None,
     near: Ints | None = None,
+    policy: CutPolicy = CutPolicy(),
 ) -> list[Cut]:
-    """Cuts violated by a fractional point: of components, and the most violated of others; `near`
-    as of `component_cuts`. An LP costs far more than looking for cuts, so that all are taken at
-    once: with thousands of classes it takes a quarter of the rounds."""
-    cuts = component_cuts(x, legs, y, cluster, near) + goal_cuts(legs, y, cluster)
+    """Return cuts violated by a fractional point.
+
+    All separation procedures add their cuts at once, because an LP costs far more than separation:
+    with thousands of classes this takes a quarter of the rounds.
+
+    Parameters
+    ----------
+    branch
+        Result of `cover_branches`.
+    near
+        Nearest visited vertices, for `component_cuts`.
+    """
+    cuts = component_cuts(x, legs, y, cluster, near) + goal_cuts(legs, y, cluster, policy)
     known = {np.packbits(c.inside).tobytes() for c in cuts}
-    support = np.flatnonzero(x > 1e-9)
-    on = y > 1e-9
-    legs, y = legs[on], y[on]
-    found: dict[bytes, tuple[float, Bools, int]] = {}
+    support = np.flatnonzero(x > SUPPORT_TOLERANCE)
+    on = y > SUPPORT_TOLERANCE
+    sets = _SetCuts(x, legs[on], y[on], cluster, policy)
     if branch is not None and len(branch):
-        crossing = (branch[:, legs[:, 0]] ^ branch[:, legs[:, 1]]) @ y
+        sets.add_branches(branch, support)
+    if len(sets.found) < policy.max_subtour_cuts // 2:
+        sets.add_minimum_cuts(support, near)
+    new = [f for key, f in sets.found.items() if key not in known]
+    best = sorted(new, key=lambda f: -f[0])[: policy.max_subtour_cuts]
+    return cuts + [cut for _, cut in best]
+
+
+class _SetCuts:
+    """Violated cuts of vertex sets, with their violation, by set.
+
+    The legs of the point are those with y above 0.
+    """
+
+    def __init__(self, x: Floats, legs: Ints, y: Floats, cluster: Ints, policy: CutPolicy) -> None:
+        self.x, self.legs, self.y, self.cluster, self.policy = x, legs, y, cluster, policy
+        self.found: dict[bytes, tuple[float, Cut]] = {}
+
+    def add_branches(self, branch: Bools, support: Ints) -> None:
+        """Add the most violated cuts of branches of the cover."""
+        cluster, policy = self.cluster, self.policy
+        crossing = (branch[:, self.legs[:, 0]] ^ branch[:, self.legs[:, 1]]) @ self.y
         served = np.zeros((len(branch), int(cluster.max()) + 1))
         for v in support:
-            served[:, cluster[v]] += branch[:, v] * x[v]
-        worst = 2.0 * served.max(axis=1) - crossing
-        for k in np.argsort(-worst, kind="stable"):
-            if worst[k] <= VIOLATION or len(found) >= MOST_CUTS:
+            served[:, cluster[v]] += branch[:, v] * self.x[v]
+        violation = 2.0 * served.max(axis=1) - crossing
+        for k in np.argsort(-violation, kind="stable"):
+            is_weak = violation[k] <= policy.min_subtour_violation
+            if is_weak or len(self.found) >= policy.max_subtour_cuts:
                 break
-            _add(found, branch[k], x, legs, y, cluster)
-    if len(found) < MOST_CUTS // 2:
-        local = np.full(len(x), -1, dtype=np.int64)
+            self.add(branch[k])
+
+    def add_minimum_cuts(self, support: Ints, near: Ints | None) -> None:
+        """Add the minimum cuts of all clusters among the visited vertices."""
+        local = np.full(len(self.x), -1, dtype=np.int64)
         local[support] = np.arange(len(support))
+        edges = Edges(local[self.legs[:, 0]], local[self.legs[:, 1]], self.y)
+        goals = np.arange(1, int(self.cluster.max()) + 1)
+        enough = 2.0 - self.policy.min_subtour_violation
         sets, _, _ = min_cuts(
-            len(support),
-            local[legs[:, 0]],
-            local[legs[:, 1]],
-            y,
-            cluster[support],
-            int(local[0]),
-            np.arange(1, int(cluster.max()) + 1),
-            2.0 - VIOLATION,
+            len(support), edges, self.cluster[support], int(local[0]), goals, enough
         )
         for row in sets:
-            inside = np.zeros(len(x), dtype=bool)
+            inside = np.zeros(len(self.x), dtype=bool)
             inside[support[row]] = True
             if near is not None:
                 inside = inside[near]
-            _add(found, inside, x, legs, y, cluster)
-    new = [f for key, f in found.items() if key not in known]
-    best = sorted(new, key=lambda f: -f[0])[:MOST_CUTS]
-    return cuts + [Cut(inside, c) for _, inside, c in best]
+            self.add(inside)
 
-
-def _add(
-    found: dict[bytes, tuple[float, Bools, int]],
-    inside: Bools,
-    x: Floats,
-    legs: Ints,
-    y: Floats,
-    cluster: Ints,
-) -> None:
-    """Keep the cut of a set, completed by whole clusters, for the cluster it serves best."""
-    if inside[0]:
-        return
-    full = complete_clusters(inside, x, cluster)
-    violation, cut = strongest_cut(full, x, legs, y, cluster)
-    key = np.packbits(cut.inside).tobytes()
-    if violation > VIOLATION / 2.0 and (key not in found or violation > found[key][0]):
-        found[key] = (violation, cut.inside, cut.cluster)
+    def add(self, inside: Bools) -> None:
+        """Add the strongest cut of a set that is completed by whole clusters, if it is violated."""
+        if inside[0]:
+            return
+        full = complete_clusters(inside, self.x, self.cluster)
+        violation, cut = strongest_cut(full, self.x, self.legs, self.y, self.cluster)
+        key = np.packbits(cut.inside).tobytes()
+        is_violated = violation > self.policy.min_subtour_violation / 2.0
+        if is_violated and (key not in self.found or violation > self.found[key][0]):
+            self.found[key] = (violation, cut)
 
 
 def cycles_of(x: Floats, legs: Ints, y: Floats) -> list[list[int]]:
-    """The cycles of an integer point, each a list of vertices; the base's cycle first."""
+    """Return the cycles of an integer point as lists of vertices, the base's cycle first."""
     on = legs[y > 0.5]
     neighbours: dict[int, list[int]] = {}
     for u, v in on.tolist():
@@ -200,29 +219,30 @@ def cycles_of(x: Floats, legs: Ints, y: Floats) -> list[list[int]]:
     left = dict.fromkeys([0, *np.flatnonzero(x > 0.5).tolist()])
     while left:
         first = next(iter(left))
-        cycle, before, here = [], -1, first
-        while here in left:
-            del left[here]
-            cycle.append(here)
-            onward = [w for w in neighbours.get(here, []) if w != before and w in left]
+        cycle, before, current = [], -1, first
+        while current in left:
+            del left[current]
+            cycle.append(current)
+            onward = [w for w in neighbours.get(current, []) if w != before and w in left]
             if not onward:
                 break
-            before, here = here, onward[0]
+            before, current = current, onward[0]
         cycles.append(cycle)
     return cycles
 
 
 def heaviest_walk(legs: Ints, y: Floats, cluster: Ints) -> list[int]:
-    """Clusters by walking from the base along the heaviest leg to one not yet visited."""
+    """Return the clusters in the order of a walk along the heaviest legs, from the base."""
     m = int(cluster.max())
     weight = np.zeros((m + 1, m + 1))
     np.add.at(weight, (cluster[legs[:, 0]], cluster[legs[:, 1]]), y)
     weight += weight.T
     left = np.ones(m + 1, dtype=bool)
     left[0] = False
-    order, here = [0], 0
+    order, current = [0], 0
     while left.any():
-        here = int(np.argmax(np.where(left, weight[here] + 1e-9, -1.0)))
-        left[here] = False
-        order.append(here)
+        # also where no leg leads on, another cluster is next
+        current = int(np.argmax(np.where(left, weight[current] + 1e-9, -1.0)))
+        left[current] = False
+        order.append(current)
     return order

@@ -184,7 +184,7 @@ def _bound_by_goals(
     """A bound on the tours in any class; the one that is known if there is one, and no tour."""
     if tour is not None or not graph.bound_in_any_class:
         bound_over_goals(
-            graph, lambda g, limits: (prove(g, limits=limits), ()), limits, tour, told=told
+            graph, lambda g, limits: (prove(g, limits=limits), ()), limits, tour, on_bound=told
         )
     return graph.bound_in_any_class
 

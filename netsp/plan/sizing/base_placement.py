@@ -27,7 +27,7 @@ from netsp.base.errors import InfeasibleError, InputError, LimitReachedError
 from netsp.base.files import cell, write_text
 from netsp.base.reprs import Drawn
 from netsp.gtsp.travel.graph import TravelGraph
-from netsp.mip.goal_relaxation import ROUNDING
+from netsp.mip.cost_fixing import PATH_ROUNDING
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE, LowerBound, Scope, strongest
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution, Status
@@ -471,7 +471,7 @@ def _tour_bound(problem: Problem, to: Floats, between: Floats, clock: Clock, see
     if clock.is_up:
         return least
     bound = solve_graph(over, time_limit=clock, seed=seed).lower_bound or 0.0
-    return max(least, bound) * (1.0 - ROUNDING)
+    return max(least, bound) * (1.0 - PATH_ROUNDING)
 
 
 def _finite(value: float) -> float | None:
