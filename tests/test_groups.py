@@ -11,14 +11,14 @@ from netsp.hsignature.wordtable import empty_table, number_of, packed, times, ti
 
 COMMUTING = (1, 2, -1, -2)
 TREFOIL = (1, 2, 1, -2, -1, -2)
-PLANE = Group.of(2, [COMMUTING])
-CHAIN = Group.of(3, [COMMUTING, (2, 3, -2, -3)])
+PLANE = Group.presented(2, [COMMUTING])
+CHAIN = Group.presented(3, [COMMUTING, (2, 3, -2, -3)])
 
 
 @functools.cache
 def trefoil():
     """Return the group of a knot, whose completion does not end and takes a while."""
-    return Group.of(2, [TREFOIL])
+    return Group.presented(2, [TREFOIL])
 
 
 two = st.lists(st.sampled_from([1, -1, 2, -2]), max_size=12).map(tuple)
@@ -32,7 +32,7 @@ def exponents(word, rank):
 def test_linked_rings_and_chains_are_completed():
     assert PLANE.exact
     assert CHAIN.exact
-    assert Group.of(4, []).exact
+    assert Group.presented(4, []).exact
 
 
 @given(two, two)
@@ -43,7 +43,7 @@ def test_two_words_of_commuting_letters_are_equal_exactly_when_their_exponents_a
 @given(three, three)
 def test_in_a_chain_the_middle_ring_commutes_and_the_others_are_free(a, b):
     def apart(word):
-        free = Group.of(2, []).normal(1 if x == 1 else -1 if x == -1 else 2 if x == 3 else -2
+        free = Group.presented(2, []).normal(1 if x == 1 else -1 if x == -1 else 2 if x == 3 else -2
                                       for x in word if abs(x) != 2)  # fmt: skip
         return free, exponents(word, 3)[1]
 
@@ -100,7 +100,7 @@ def test_elimination_leaves_the_group_what_it_is(relators):
         return tuple(y for x in word
                      for y in (meaning[x - 1] if x > 0 else invert(meaning[-x - 1])))  # fmt: skip
 
-    group = Group.of(rank, left)
+    group = Group.presented(rank, left)
     assert all(group.normal(translated(r)) == () for r in relators if group.exact)
     assert len(group.functionals) == len(Group(3, tuple(relators)).functionals)
 
@@ -108,7 +108,7 @@ def test_elimination_leaves_the_group_what_it_is(relators):
 @given(three, three)
 @settings(deadline=None)
 def test_words_as_numbers_are_the_same_words(a, b):
-    for group in (CHAIN, Group.of(3, [])):
+    for group in (CHAIN, Group.presented(3, [])):
         rules, table = packed(group.rules), empty_table()
         m, table = number_of(table, rules, a)
         n, table = number_of(table, rules, b)

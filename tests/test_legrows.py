@@ -142,7 +142,7 @@ def test_prices_over_rows_are_those_over_a_matrix_and_rule_out_the_same(seed):
     assert in_rows.bound == with_marks.bound
     cutoff = with_marks.bound + 3.0
     legs = marks.legs_left()
-    assert (in_rows.costs_of(legs) == with_marks.costs_of(legs)).all()
+    assert (in_rows.reduced_costs(legs) == with_marks.reduced_costs(legs)).all()
     before = rows.left
     in_rows.fix_out(cutoff)
     with_marks.fix_out(cutoff)
@@ -151,7 +151,7 @@ def test_prices_over_rows_are_those_over_a_matrix_and_rule_out_the_same(seed):
     for a, b in zip(in_rows.most_negative(1e-9), with_marks.most_negative(1e-9), strict=True):
         assert (a == b).all()
     gone = np.argwhere(np.isinf(matrix_of(rows)) & np.isfinite(costs))
-    assert np.isinf(in_rows.costs_of(gone)).all()
+    assert np.isinf(in_rows.reduced_costs(gone)).all()
 
 
 def test_what_lies_nearest_is_so_along_legs_that_were_let_go_too(monkeypatch):

@@ -1,17 +1,17 @@
-"""Groups that are given by generators and relations, and the one word of each of their elements.
+"""Groups by generators and relations, with a normal form of their words.
 
-The classes of loops in a scene make a group, which `netsp.plan.space.triangle_labels` finds as
+The classes of loops in a scene form a group, which `netsp.plan.space.triangle_labels` finds as
 generators and relations. Generators that a relation expresses by others are eliminated (Tietze
-1908). What is left is mostly a free group, where a reduced word is an element. If relations are
-left, rules that turn the later of two equal words (in order of length, then letters) into the
-earlier are completed (Knuth & Bendix 1970): where that ends, every element has exactly one word
-that no rule applies to. It need not end. Capped, the rules still only join words that are equal: an
-empty word means contractible then, and a word that is not empty means nothing certain;
-`Group.exact` says which.
+1908). The result is usually a free group, whose elements are the reduced words. If relations are
+left, rules that replace the later of two equal words (by length, then letters) by the earlier are
+completed (Knuth & Bendix 1970). If the completion ends, every element has exactly one word to which
+no rule applies. It need not end; then it is cut off, and the rules still only join words that are
+equal: an empty word means contractible, and any other word means nothing certain (`Group.exact`).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -19,16 +19,8 @@ from functools import cached_property
 from itertools import product
 
 from netsp.base.clock import end_if_abandoned
+from netsp.hsignature.signature_policy import CompletionPolicy
 from netsp.hsignature.words import Word, cyclically_reduced, invert, reduce
-
-MOST_RULES = 100
-"""Of a completion; beyond them it is given up."""
-
-LONGEST_SIDE = 16
-"""Letters of a rule's longer side; longer ones are left out, and the group is no longer exact."""
-
-MOST_PAIRS = 5_000
-"""Overlaps that a completion looks at."""
 
 Endings = dict[int, list[tuple[int, Word, Word]]]
 """Rules by the last letter of their left side: its length, the left side, the right side."""
@@ -36,7 +28,7 @@ Endings = dict[int, list[tuple[int, Word, Word]]]
 
 @dataclass(frozen=True)
 class Group:
-    """A finitely presented group with a normal form of its words.
+    """Finitely presented group with a normal form of its words.
 
     Parameters
     ----------
@@ -45,7 +37,7 @@ class Group:
     relators : tuple of Word
         Words that are equal to the empty word.
     rules : tuple of (Word, Word)
-        Left sides are replaced by right sides; the cancellation of inverses is not among them.
+        Left sides and what replaces them. The cancellation of inverses is not among the rules.
     exact : bool
         Whether every element has exactly one normal form.
     """
@@ -56,50 +48,29 @@ class Group:
     exact: bool = True
 
     @classmethod
-    def of(cls, rank: int, relators: Iterable[Word]) -> Group:
-        """The group of a presentation, completed.
-
-        Parameters
-        ----------
-        rank : int
-            Number of generators.
-        relators : iterable of Word
-            Words that are equal to the empty word.
-
-        Returns
-        -------
-        Group
-            The group, on the same generators.
+    def presented(
+        cls, rank: int, relators: Iterable[Word], policy: CompletionPolicy = CompletionPolicy()
+    ) -> Group:
+        """Return the group of a presentation, with completed rules.
 
         Examples
         --------
-        >>> Group.of(2, [(1, 2, -1, -2)]).normal((2, 1, -2))
+        >>> Group.presented(2, [(1, 2, -1, -2)]).normal((2, 1, -2))
         (1,)
         """
         kept = _distinct(relators)
         if not kept:
             return cls(rank)
-        rules, exact = _completed(rank, kept)
+        rules, exact = _completed(rank, kept, policy)
         return cls(rank, kept, rules, exact)
 
     @property
     def free(self) -> bool:
-        """Whether there are no relations."""
+        """True if there are no relations."""
         return not self.relators
 
     def normal(self, letters: Iterable[int]) -> Word:
-        """The word of an element to which no rule applies.
-
-        Parameters
-        ----------
-        letters : iterable of int
-            A word.
-
-        Returns
-        -------
-        Word
-            Equal to it.
-        """
+        """Return the equal word to which no rule applies."""
         return _rewritten(letters, self._endings)
 
     @cached_property
@@ -108,37 +79,25 @@ class Group:
 
     @cached_property
     def functionals(self) -> tuple[tuple[int, ...], ...]:
-        """Rows of whole numbers, one for each generator: sums of a word's letters weighted with a
-        row depend on the element alone, and all together are its class in the abelianisation (but
-        for torsion, of which the complement of solids in space has none: Alexander duality)."""
+        """Rows of integer weights, one for each generator.
+
+        The sum of a word's letters, weighted with a row, depends on the element alone. All sums
+        together are its class in the abelianisation, except for torsion, of which the complement of
+        solids in space has none (Alexander duality).
+        """
         return _annihilators([_exponents(r, self.rank) for r in self.relators], self.rank)
 
     def windings(self, word: Iterable[int]) -> tuple[int, ...]:
-        """The element in the abelianisation: how often a path winds, counted with signs.
+        """Return how often a path winds, with signs: its class in the abelianisation.
 
-        Parameters
-        ----------
-        word : iterable of int
-            A word of it.
-
-        Returns
-        -------
-        tuple of int
-            One number for each of `functionals`.
+        There is one number for each of `functionals`.
         """
         e = _exponents(word, self.rank)
         return tuple(sum(f * x for f, x in zip(row, e, strict=True)) for row in self.functionals)
 
 
 def eliminated(rank: int, relators: Iterable[Word]) -> tuple[list[Word], int, tuple[Word, ...]]:
-    """A presentation without generators that a relation expresses by others.
-
-    Parameters
-    ----------
-    rank : int
-        Number of generators.
-    relators : iterable of Word
-        Words that are equal to the empty word.
+    """Return a presentation without generators that a relation expresses by others.
 
     Returns
     -------
@@ -147,7 +106,7 @@ def eliminated(rank: int, relators: Iterable[Word]) -> tuple[list[Word], int, tu
     rank : int
         Number of new generators.
     relators : tuple of Word
-        What is left of the relations, in the new generators.
+        Remaining relations, in the new generators.
     """
     left = list(_distinct(relators))
     meaning: dict[int, Word] = {g: (g,) for g in range(1, rank + 1)}
@@ -185,7 +144,7 @@ def eliminated(rank: int, relators: Iterable[Word]) -> tuple[list[Word], int, tu
 
 
 def _lone_letter(relators: Sequence[Word]) -> tuple[int, int] | None:
-    """(relator, place) of a generator that occurs once in it, in the shortest such relator."""
+    """Return the shortest relator in which a generator occurs once, and its place there."""
     for r in sorted(range(len(relators)), key=lambda r: (len(relators[r]), relators[r])):
         seen: dict[int, int] = {}
         for x in relators[r]:
@@ -197,8 +156,10 @@ def _lone_letter(relators: Sequence[Word]) -> tuple[int, int] | None:
 
 
 def _shortened(relators: Sequence[Word]) -> tuple[int, Word, list[Word]] | None:
-    """A generator, a product of it with another to put in its place (Nielsen's moves), and the
-    relators that get shorter by that, taken together; None where there is no such."""
+    """Return a Nielsen move that makes the relators shorter in all, or None.
+
+    It is a generator, the product with another that replaces it, and the new relators.
+    """
     used = sorted({abs(x) for w in relators for x in w})
     now = sum(map(len, relators))
     for g, h in product(used, used):
@@ -213,26 +174,23 @@ def _shortened(relators: Sequence[Word]) -> tuple[int, Word, list[Word]] | None:
 
 
 def _substituted(word: Word, generator: int, means: Word) -> Word:
-    back = invert(means)
-    return reduce(
-        y for x in word for y in (means if x == generator else back if x == -generator else (x,))
-    )
+    parts = {generator: means, -generator: invert(means)}
+    return reduce(y for x in word for y in parts.get(x, (x,)))
 
 
 def _distinct(relators: Iterable[Word]) -> tuple[Word, ...]:
-    """Relators that say different things: each cyclically reduced, in the first of its rotations
-    and those of its inverse."""
+    """Return distinct relators, each as the first rotation of itself or of its inverse."""
     out: dict[Word, None] = {}
     for word in relators:
         w = cyclically_reduced(word)
         if w:
-            turns = [v[k:] + v[:k] for v in (w, invert(w)) for k in range(len(w))]
-            out[min(turns, key=_order)] = None
+            rotations = [v[k:] + v[:k] for v in (w, invert(w)) for k in range(len(w))]
+            out[min(rotations, key=_order)] = None
     return tuple(sorted(out, key=_order))
 
 
 def _order(word: Word) -> tuple[int, list[tuple[int, bool]]]:
-    """By length, then letter by letter: 1, -1, 2, -2, …"""
+    """Return the key that orders words by length, then by letters 1, -1, 2, -2, …"""
     return len(word), [(abs(x), x < 0) for x in word]
 
 
@@ -245,7 +203,10 @@ def _by_last_letter(rules: Iterable[tuple[Word, Word]]) -> Endings:
 
 
 def _rewritten(letters: Iterable[int], endings: Endings) -> Word:
-    """No rule applies to what is kept, so only its end need be looked at after a letter."""
+    """Return the normal form of letters.
+
+    No rule applies to the letters kept so far, so rules are tried at their end only.
+    """
     todo, kept = list(letters)[::-1], list[int]()
     while todo:
         x = todo.pop()
@@ -261,8 +222,10 @@ def _rewritten(letters: Iterable[int], endings: Endings) -> Word:
     return tuple(kept)
 
 
-def _completed(rank: int, relators: Sequence[Word]) -> tuple[tuple[tuple[Word, Word], ...], bool]:
-    """Rules of a group, and whether they are complete."""
+def _completed(
+    rank: int, relators: Sequence[Word], policy: CompletionPolicy
+) -> tuple[tuple[tuple[Word, Word], ...], bool]:
+    """Return the rules of a group, and whether they are complete."""
     inverses: list[tuple[Word, Word]] = [((x, -x), ()) for g in range(1, rank + 1) for x in (g, -g)]
     place = _places(rank, relators)
 
@@ -280,10 +243,10 @@ def _completed(rank: int, relators: Sequence[Word]) -> tuple[tuple[tuple[Word, W
             if a == b:
                 continue
             big, small = (a, b) if order(a) > order(b) else (b, a)
-            if len(big) > LONGEST_SIDE or len(rules) >= MOST_RULES:
+            if len(big) > policy.max_side or len(rules) >= policy.max_rules:
                 exact = False
                 continue
-            # what the new rule applies to is said again
+            # rules that the new one rewrites become equations again
             again = [r for r in rules if _within(big, r[0])]
             done -= sum(rules.index(r) < done for r in again)
             every = _by_last_letter([*rules, (big, small)])
@@ -291,7 +254,7 @@ def _completed(rank: int, relators: Sequence[Word]) -> tuple[tuple[tuple[Word, W
             equations.extend(again)
             rules.append((big, small))
             endings = _by_last_letter(rules)
-        if done >= len(rules) or pairs > MOST_PAIRS:
+        if done >= len(rules) or pairs > policy.max_overlaps:
             break
         new = rules[done]
         done += 1
@@ -299,15 +262,18 @@ def _completed(rank: int, relators: Sequence[Word]) -> tuple[tuple[tuple[Word, W
             for first, second in {(one, other), (other, one)}:
                 pairs += 1
                 equations.extend(_overlaps(first, second))
-    exact = exact and pairs <= MOST_PAIRS
+    exact = exact and pairs <= policy.max_overlaps
     return tuple(sorted(rules, key=lambda r: _order(r[0]))), exact
 
 
 def _places(rank: int, relators: Sequence[Word]) -> dict[int, int]:
-    """Which generator comes first in the order of words: what is in most relations. What commutes
-    with others is then collected in front, and the completion of Z x F_n ends."""
-    many = {g: sum(g in map(abs, r) for r in relators) for g in range(1, rank + 1)}
-    return {g: k for k, g in enumerate(sorted(many, key=lambda g: (-many[g], g)))}
+    """Return the place of each generator in the order of words, those in most relations first.
+
+    Generators that commute with others are then collected in front, and the completion of Z x F_n
+    ends.
+    """
+    count = {g: sum(g in map(abs, r) for r in relators) for g in range(1, rank + 1)}
+    return {g: k for k, g in enumerate(sorted(count, key=lambda g: (-count[g], g)))}
 
 
 def _within(part: Word, word: Word) -> bool:
@@ -315,8 +281,7 @@ def _within(part: Word, word: Word) -> bool:
 
 
 def _overlaps(first: tuple[Word, Word], second: tuple[Word, Word]) -> Iterable[tuple[Word, Word]]:
-    """What a word becomes by either of two rules, where the end of one's left side is the beginning
-    of the other's."""
+    """Yield the two words that a word becomes by either rule, for each overlap of left sides."""
     (a, b), (c, d) = first, second
     for k in range(1, min(len(a), len(c))):
         if a[-k:] == c[:k]:
@@ -331,7 +296,7 @@ def _exponents(word: Iterable[int], rank: int) -> list[int]:
 
 
 def _annihilators(rows: Sequence[Sequence[int]], n: int) -> tuple[tuple[int, ...], ...]:
-    """Whole-numbered basis of what is orthogonal to some rows: by Gauss's elimination."""
+    """Return an integer basis of the vectors orthogonal to some rows, by Gauss's elimination."""
     table = [[Fraction(x) for x in row] for row in rows]
     pivots: list[int] = []
     for column in range(n):
@@ -356,12 +321,6 @@ def _annihilators(rows: Sequence[Sequence[int]], n: int) -> tuple[tuple[int, ...
             vector[column] = -table[r][free]
         scale = 1
         for x in vector:
-            scale = scale * x.denominator // _gcd(scale, x.denominator)
+            scale = math.lcm(scale, x.denominator)
         out.append(tuple(int(x * scale) for x in vector))
     return tuple(out)
-
-
-def _gcd(a: int, b: int) -> int:
-    while b:
-        a, b = b, a % b
-    return a

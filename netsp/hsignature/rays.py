@@ -9,7 +9,7 @@ never changes when a path is split, reversed or concatenated:
 - a segment is monotone in x, so it crosses its rays in the order of their x, whatever their
   heights; rays with equal x are taken in the order of their numbers, as if each ray stood an
   infinitesimal step to the right of its predecessor;
-- a ray goes on through whatever lies above it, other obstacles included.
+- a ray passes through everything above it, other obstacles included.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from netsp.hsignature.words import Word, reduce
 def crossings(
     path: npt.ArrayLike, points: npt.ArrayLike, *, closed: bool = False
 ) -> tuple[int, ...]:
-    """Letters of all ray crossings along a polyline, in order, not reduced.
+    """Return the letters of all ray crossings along a polyline, in order, not reduced.
 
     Parameters
     ----------
@@ -77,10 +77,10 @@ def _segment_crossings(
 
 
 def signature(path: npt.ArrayLike, points: npt.ArrayLike, *, closed: bool = False) -> Word:
-    """The h-signature of a polyline: its ray crossings, reduced.
+    """Return the h-signature of a polyline: its ray crossings, reduced.
 
     The path must not meet a representative point; netsp's paths keep clear of the obstacles that
-    contain them.
+    contain these points.
 
     Parameters
     ----------
@@ -90,11 +90,6 @@ def signature(path: npt.ArrayLike, points: npt.ArrayLike, *, closed: bool = Fals
         Representative points of the obstacles.
     closed : bool
         Whether the last vertex is joined to the first.
-
-    Returns
-    -------
-    Word
-        The reduced word.
 
     Examples
     --------

@@ -1,18 +1,17 @@
-"""How entangled is a path? The definitions in use, each for any path among the obstacles.
+"""Measures of the entanglement of a path, by the definitions in use.
 
-Of the path as a loop (closed by its ends being the base):
+As a loop (closed, because both ends are the base):
 
 - *empty signature*: its reduced word is empty, so it can be pulled back to the base (McCammon &
   Hollinger 2017, section III).
 - *entangled obstacles*: those of the cyclically reduced word (`netsp.hsignature.entangled`).
-- *winding numbers*: how often it runs around each obstacle, counter-clockwise positive. Weaker than
-  the word: a path may wind nowhere and still be entangled.
-- *self-crossings*: how often it crosses itself in plan.
+- *winding numbers*: turns around each obstacle, counter-clockwise positive. They are weaker than
+  the word: a path may wind around nothing and still be entangled.
+- *self-crossings*: number of times that it crosses itself in plan.
 
-Of the path as a tether from its first point, the anchor, to its last, the robot; Battocletti,
-Boskos, Tolić, Palunko & De Schutter 2024, "Entanglement definitions for tethered robots:
-exploration and analysis", IEEE Access. A tether that merely touches an obstacle is not entangled by
-it.
+As a tether from its first point, the anchor, to its last, the robot (Battocletti, Boskos, Tolić,
+Palunko & De Schutter 2024, "Entanglement definitions for tethered robots: exploration and
+analysis", IEEE Access; a tether that merely touches an obstacle is not entangled by it):
 
 - *obstacle-free convex hull*: the convex hull of the tether meets the interior of no obstacle.
 - *obstacle-free linear homotopy*: drawn straight to the anchor, H(s, t) = (1 - t) γ(s) + t γ(0),
@@ -20,7 +19,7 @@ it.
 - *local visibility homotopy*: whenever two points of the tether see each other, the tether between
   them is homotopic to the straight line between them.
 
-Each holds or fails; what fails names the obstacles in the way. The first implies the other two.
+Each definition holds, or names the obstacles that break it. The first implies the other two.
 """
 
 from __future__ import annotations
@@ -35,32 +34,23 @@ import shapely
 
 from netsp.base.arrays import Bools, Floats
 from netsp.hsignature.rays import crossings
+from netsp.hsignature.signature_policy import MeasurePolicy
 from netsp.hsignature.words import Word, entangled, reduce
 from netsp.model.problem import Problem
-
-TOUCHING = 1e-6
-"""How deep, relative to the size of the problem, a tether may reach into an obstacle it touches."""
-
-SAGITTA = 1e-3
-"""How far, as a share of the largest obstacle, two drawings of one arc may lie apart: drawn with
-chords, a path that retraces an arc would seem to cross itself."""
-
-VISIBILITY_POINTS = 120
-"""Points of a tether between which lines of sight are tried, besides its vertices."""
 
 
 @dataclass(frozen=True)
 class Measures:
-    """Of one path; obstacles by their 0-based index.
+    """Measures of one path; obstacles are numbered from 0.
 
     Attributes
     ----------
     signature
         Reduced word.
     closed
-        Whether the path ends where it starts; entangled and winding are None if not.
+        Whether the path ends where it starts; if not, `entangled` and `winding` are None.
     convex_hull, linear_homotopy, local_visibility
-        Obstacles that break the definition of that name; none if it holds.
+        Obstacles that break the definition of that name.
     """
 
     signature: Word
@@ -73,11 +63,13 @@ class Measures:
     local_visibility: tuple[int, ...]
 
 
-def measure(problem: Problem, path: npt.ArrayLike) -> Measures:
-    """All measures of a (k, 2) or (k, 3) polyline among a problem's obstacles; z does not count."""
+def measure(
+    problem: Problem, path: npt.ArrayLike, policy: MeasurePolicy = MeasurePolicy()
+) -> Measures:
+    """Return all measures of a polyline (k, 2) or (k, 3) among a problem's obstacles, in plan."""
     xy = np.asarray(path, dtype=float)[:, :2]
     rays = problem.representative_points
-    slack = TOUCHING * problem.scale
+    slack = policy.contact_depth * problem.scale
     shapes = [o.shape(problem.clearance).buffer(-slack, quad_segs=32) for o in problem.obstacles]
     widths = [max(s.bounds[2] - s.bounds[0], s.bounds[3] - s.bounds[1]) for s in shapes if s]
     largest = max(widths, default=0.0)
@@ -89,16 +81,18 @@ def measure(problem: Problem, path: npt.ArrayLike) -> Measures:
         closed=closed,
         entangled=tuple(k - 1 for k in entangled(word)) if closed else None,
         winding=tuple(round(t) for t in turns.tolist()) if closed else None,
-        self_crossings=self_crossings(xy, tolerance=max(slack, SAGITTA * largest)),
+        self_crossings=self_crossings(xy, tolerance=max(slack, policy.sagitta * largest)),
         convex_hull=in_convex_hull(xy, shapes),
         linear_homotopy=in_linear_homotopy(xy, shapes),
-        local_visibility=against_local_visibility(xy, shapes, rays),
+        local_visibility=against_local_visibility(xy, shapes, rays, policy),
     )
 
 
 def winding_numbers(path: Floats, points: Floats) -> Floats:
-    """(n,) turns of a polyline around each point, counter-clockwise positive; whole numbers if the
-    path is closed."""
+    """Return the turns (n,) of a polyline around each point, counter-clockwise positive.
+
+    They are whole numbers if the path is closed.
+    """
     if len(points) == 0:
         return np.zeros(0)
     arm = path[:, None, :] - points[None, :, :]
@@ -109,11 +103,11 @@ def winding_numbers(path: Floats, points: Floats) -> Floats:
 
 
 def self_crossings(path: Floats, *, tolerance: float = 0.0) -> int:
-    """How often a polyline crosses itself in plan.
+    """Return the number of times that a polyline crosses itself in plan.
 
-    A later vertex within `tolerance` of a segment's line is on neither side of it: the path crosses
-    where it comes from one side and leaves on the other, so a path through a vertex of its own is
-    counted once, and one that touches itself or retraces its steps is not.
+    A later vertex within `tolerance` of a segment's line counts as on neither side. The path
+    crosses the segment where it comes from one side and leaves on the other. So a crossing at a
+    vertex counts once, and a path that touches or retraces itself does not cross.
     """
     step = np.hypot(*np.diff(path, axis=0).T)
     p = path[np.concatenate([[True], step > max(tolerance, 1e-150)])]
@@ -145,35 +139,40 @@ def self_crossings(path: Floats, *, tolerance: float = 0.0) -> int:
 
 
 def in_convex_hull(path: Floats, shapes: Sequence[shapely.Geometry]) -> tuple[int, ...]:
-    """Obstacles whose interior the convex hull of a path meets."""
+    """Return the obstacles whose interior meets the convex hull of a path."""
     return _met([shapely.MultiPoint(path).convex_hull], shapes)
 
 
 def in_linear_homotopy(path: Floats, shapes: Sequence[shapely.Geometry]) -> tuple[int, ...]:
-    """Obstacles whose interior a path sweeps when it is drawn straight to its first point: those
-    that meet a triangle of the first point and a segment."""
+    """Return the obstacles whose interior a path sweeps when drawn straight to its first point.
+
+    They are those that meet a triangle of the first point and a segment.
+    """
     triangles = [shapely.MultiPoint([path[0], a, b]).convex_hull for a, b in pairwise(path[1:])]
     return _met([shapely.LineString(path), *triangles], shapes)
 
 
 def against_local_visibility(
-    path: Floats, shapes: Sequence[shapely.Geometry], rays: Floats
+    path: Floats,
+    shapes: Sequence[shapely.Geometry],
+    rays: Floats,
+    policy: MeasurePolicy = MeasurePolicy(),
 ) -> tuple[int, ...]:
-    """Obstacles between a tether and a free line of sight of its own.
+    """Return the obstacles between a tether and a free line of sight between two of its points.
 
-    Lines of sight are tried between all vertices and `VISIBILITY_POINTS` points spread evenly.
+    Lines of sight are tried between all vertices and points that are spread evenly.
     """
     if len(shapes) == 0 or len(path) < 3:
         return ()
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-    spots = np.union1d(along, np.linspace(0.0, along[-1], VISIBILITY_POINTS))
+    spots = np.union1d(along, np.linspace(0.0, along[-1], policy.visibility_points))
     line = np.column_stack([np.interp(spots, along, path[:, k]) for k in range(2)])
     first, second = np.triu_indices(len(line), 2)
     sight = shapely.linestrings(np.stack([line[first], line[second]], axis=1))
     solid = shapely.union_all(list(shapes))
     shapely.prepare(solid)
     free = ~shapely.intersects(solid, sight)
-    # the letters of the tether up to every spot; a sub-path's word needs no second look at it
+    # letters of the tether up to every point, from which all its parts have theirs
     steps = [crossings(line[k : k + 2], rays) for k in range(len(line) - 1)]
     begin = np.concatenate([[0], np.cumsum([len(s) for s in steps])])
     letters = [x for s in steps for x in s]
@@ -189,7 +188,7 @@ def against_local_visibility(
 
 
 def _cross_rays(p: Floats, q: Floats, rays: Floats) -> Bools:
-    """Return for segments from p to q, both (k, 2), whether they have letters (`crossings`)."""
+    """Return the mask (k,) of segments from p to q (k, 2) that cross a ray."""
     sides = (p[:, :1] >= rays[:, 0]) != (q[:, :1] >= rays[:, 0])
     (x, y), d = rays.T, q - p
     with np.errstate(divide="ignore", invalid="ignore"):

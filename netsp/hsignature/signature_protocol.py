@@ -1,9 +1,9 @@
-"""What tells classes of paths apart, whatever the words are made of.
+"""Protocol of signatures: words that tell homotopy classes of paths apart.
 
 In the plane and among prisms letters are crossings of rays (`PlanarSignature`); in any scene they
-are those of a cubical complex (`netsp.plan.space.space_signature.SpaceSignature`). Either way the
-words of loops at one point make a group, and whoever asks whether a tether is as planned, or free,
-need not know which.
+come from a cubical complex (`netsp.plan.space.space_signature.SpaceSignature`). In both cases the
+words of loops at one point form a group, so callers that ask whether a tether is as planned, or
+free, need not know which.
 """
 
 from __future__ import annotations
@@ -23,20 +23,25 @@ class Signature(Protocol):
 
     @property
     def exact(self) -> bool:
-        """Whether paths between the same ends are of one class exactly when their words are equal.
-        If not, equal words still mean one class; words that differ may mean one, too."""
+        """True if paths between the same ends are of one class exactly when their words are equal.
+
+        If not, equal words still mean one class, and different words may mean one, too.
+        """
 
     def word(self, path: npt.ArrayLike, *, closed: bool = False) -> Word:
-        """The word of a polyline (k, 3). Where one path ends and another begins, the word of both
-        is `product` of their words."""
+        """Return the word of a polyline (k, 3).
+
+        The word of one path followed by another is the `product` of their words.
+        """
 
     def product(self, *words: Word) -> Word:
-        """The word of paths one after the other."""
+        """Return the word of paths one after the other."""
 
     def windings(self, word: Word) -> tuple[int, ...]:
-        """How often a path of a word winds around what there is, counted with signs: its class in
-        the abelianisation of the group. All zero for what is contractible, and not for that
-        alone."""
+        """Return how often a path of a word winds, with signs: its class in the abelianisation.
+
+        All numbers are 0 for a contractible path, but also for some others.
+        """
 
 
 class PlanarSignature:
@@ -60,50 +65,23 @@ class PlanarSignature:
         self.points: Floats = np.asarray(points, dtype=float).reshape(-1, 2)
 
     def word(self, path: npt.ArrayLike, *, closed: bool = False) -> Word:
-        """Letters of the rays that a polyline crosses, reduced.
+        """Return the letters of the rays that a polyline crosses, reduced.
 
         Parameters
         ----------
         path : array_like, shape (k, 2) or (k, 3)
-            Metres; only x and y count.
+            Polyline, metres; only x and y count.
         closed : bool
             Whether the last point is joined to the first.
-
-        Returns
-        -------
-        Word
-            Its word.
         """
         return signature(path, self.points, closed=closed)
 
     def product(self, *words: Word) -> Word:
-        """The word of paths one after the other.
-
-        Parameters
-        ----------
-        *words : Word
-            Their words.
-
-        Returns
-        -------
-        Word
-            Reduced.
-        """
+        """Return the reduced word of paths one after the other."""
         return concatenate(*words)
 
     def windings(self, word: Word) -> tuple[int, ...]:
-        """Winding numbers, one for each obstacle.
-
-        Parameters
-        ----------
-        word : Word
-            Of a loop.
-
-        Returns
-        -------
-        tuple of int
-            Crossings of each ray, counted with signs.
-        """
+        """Return the winding number of a loop around each obstacle."""
         out = [0] * len(self.points)
         for x in word:
             out[abs(x) - 1] += 1 if x > 0 else -1

@@ -17,17 +17,7 @@ EMPTY: Word = ()
 
 
 def reduce(letters: Iterable[int]) -> Word:
-    """Cancel adjacent inverses until none is left.
-
-    Parameters
-    ----------
-    letters : iterable of int
-        Letters: obstacle i + 1, negative from right to left.
-
-    Returns
-    -------
-    Word
-        The reduced word.
+    """Return the reduced word of some letters.
 
     Examples
     --------
@@ -44,17 +34,7 @@ def reduce(letters: Iterable[int]) -> Word:
 
 
 def concatenate(*words: Iterable[int]) -> Word:
-    """The reduced word of one path followed by the next.
-
-    Parameters
-    ----------
-    *words : iterable of int
-        Words, in the order of the paths.
-
-    Returns
-    -------
-    Word
-        The reduced word.
+    """Return the reduced word of one path followed by the next.
 
     Examples
     --------
@@ -65,17 +45,7 @@ def concatenate(*words: Iterable[int]) -> Word:
 
 
 def invert(word: Iterable[int]) -> Word:
-    """The word of the path walked backwards.
-
-    Parameters
-    ----------
-    word : iterable of int
-        A word.
-
-    Returns
-    -------
-    Word
-        Its letters in reverse, each negated.
+    """Return the word of the path in the opposite direction.
 
     Examples
     --------
@@ -86,39 +56,19 @@ def invert(word: Iterable[int]) -> Word:
 
 
 def is_looping(word: Word) -> bool:
-    """Whether a signed letter occurs twice in a reduced word.
+    """Return whether a signed letter occurs twice in a reduced word.
 
     The tether then passes the same gap twice in the same sense, so it wraps something.
     ``(1, -2, -1)`` does not loop, ``(1, 2, 1)`` does. This is the non-looping constraint of
     McCammon & Hollinger 2017, section IV-A, in the form of the authors' later code.
-
-    Parameters
-    ----------
-    word : Word
-        A reduced word.
-
-    Returns
-    -------
-    bool
-        Whether it loops.
     """
     return len(set(word)) < len(word)
 
 
 def cyclically_reduced(word: Iterable[int]) -> Word:
-    """The reduced word without the letters that cancel between its end and its beginning.
+    """Return the reduced word without letters that cancel between its end and its beginning.
 
     This is the class of a loop that may slide off its base.
-
-    Parameters
-    ----------
-    word : iterable of int
-        A word, reduced or not.
-
-    Returns
-    -------
-    Word
-        The word of the free loop.
 
     Examples
     --------
@@ -133,25 +83,15 @@ def cyclically_reduced(word: Iterable[int]) -> Word:
 
 
 def entangled(word: Iterable[int]) -> tuple[int, ...]:
-    """Obstacles that a closed path of this word is wrapped around.
+    """Return the obstacles, numbered from 1, that a closed path of this word is wrapped around.
 
-    These are the obstacles it winds around and, if the word would not cancel without them, those of
-    what is left of it. There are none exactly when the word is empty.
+    They are the obstacles that it winds around and, if the word does not cancel without them, those
+    of the remaining word. There are none exactly when the word is empty.
 
     McCammon & Hollinger 2016, section II-A, speak of the obstacles in the interior of the loop.
     Letters alone do not tell: in ``(1, 2, -1)`` the path only crosses the ray of obstacle 1 on its
     way to obstacle 2 and back. Nor do windings: ``(1, 2, -1, -2)`` encloses nothing and is
     entangled with both.
-
-    Parameters
-    ----------
-    word : iterable of int
-        Word of a closed path.
-
-    Returns
-    -------
-    tuple of int
-        Numbers of the obstacles, from 1, in order.
 
     Examples
     --------

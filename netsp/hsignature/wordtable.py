@@ -1,8 +1,8 @@
 """Words of a group as numbers, for compiled loops.
 
-A table is a tree of normal forms: number 0 is the empty word, and every other has the word without
-its last letter above it (what no rule applies to has only such prefixes). What a word becomes by
-one more letter is worked out once and kept.
+A table is a tree of normal forms: number 0 is the empty word, and the parent of any other word is
+the word without its last letter, which is a normal form, too. The product of a word and a letter is
+computed once and kept.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from netsp.base.compiled.kernel import kernel
 from netsp.hsignature.words import Word
 
 ABOVE, LETTER, FIRST, LENGTH = range(4)
-"""Columns of a word: the one without its last letter, that letter, its first product, length."""
+"""Columns of a word: its parent, its last letter, its first product, and its length."""
 
 BY, GIVES, NEXT = range(3)
-"""Columns of a product: by which letter, which word, the next product of the same word."""
+"""Columns of a product: the letter, the resulting word, and the next product of the same word."""
 
 
 class Rules(NamedTuple):
-    """Rewriting rules, one after the other.
+    """Rewriting rules as flat arrays.
 
     Attributes
     ----------
     left, right
         Letters of all left and right sides.
     left_at, right_at
-        (r + 1,) where each begins.
+        (r + 1,) start of each side, and the end of the last.
     """
 
     left: Ints
@@ -51,7 +51,7 @@ class Table(NamedTuple):
     products
         (capacity, 3) columns BY … NEXT.
     counts
-        (2,) how many of either there are.
+        (2,) number of words and of products.
     """
 
     words: Ints
@@ -60,7 +60,7 @@ class Table(NamedTuple):
 
 
 def packed(rules: Sequence[tuple[Word, Word]]) -> Rules:
-    """Rules of a `netsp.hsignature.groups.Group` for kernels."""
+    """Return the rules of a `netsp.hsignature.groups.Group` for kernels."""
 
     def side(k: int) -> tuple[Ints, Ints]:
         flat = np.array([x for r in rules for x in r[k]], dtype=np.int64)
@@ -70,14 +70,14 @@ def packed(rules: Sequence[tuple[Word, Word]]) -> Rules:
 
 
 def empty_table() -> Table:
-    """A table that has the empty word only."""
+    """Return a table that holds the empty word only."""
     words = np.zeros((256, 4), dtype=np.int64)
     words[0] = -1, 0, -1, 0
     return Table(words, np.zeros((256, 3), dtype=np.int64), np.array([1, 0]))
 
 
 def word_of(table: Table, number: int) -> Word:
-    """The letters of a word."""
+    """Return the letters of a word by its number."""
     out = []
     while number:
         out.append(int(table.words[number, LETTER]))
@@ -86,7 +86,7 @@ def word_of(table: Table, number: int) -> Word:
 
 
 def number_of(table: Table, rules: Rules, word: Iterable[int]) -> tuple[int, Table]:
-    """The number of a word's normal form, and the table, which may have grown."""
+    """Return the number of a word's normal form, and the table, which may have grown."""
     number = 0
     for x in word:
         number, table = times_letter(table, rules, number, x)
@@ -95,7 +95,7 @@ def number_of(table: Table, rules: Rules, word: Iterable[int]) -> tuple[int, Tab
 
 @kernel
 def _product(table: Table, number: int, letter: int) -> int:
-    """What is kept of a word by a letter; -1 where it was not asked before."""
+    """Return the known product of a word and a letter, -1 for none."""
     at = table.words[number, FIRST]
     while at >= 0:
         if table.products[at, BY] == letter:
@@ -119,7 +119,7 @@ def _keep(table: Table, number: int, letter: int, gives: int) -> Table:
 
 @kernel
 def _longer_by(table: Table, number: int, letter: int) -> tuple[int, Table]:
-    """A word and one more letter, where no rule applies to both together."""
+    """Return the word with one more letter, to which no rule applies, and the table."""
     found = _product(table, number, letter)
     if found >= 0:
         return found, table
@@ -135,7 +135,7 @@ def _longer_by(table: Table, number: int, letter: int) -> tuple[int, Table]:
 
 @kernel
 def times_letter(table: Table, rules: Rules, number: int, letter: int) -> tuple[int, Table]:
-    """A word and one more letter, in its normal form."""
+    """Return the normal form of a word and one more letter, and the table."""
     found = _product(table, number, letter)
     if found >= 0:
         return found, table
@@ -149,7 +149,10 @@ def times_letter(table: Table, rules: Rules, number: int, letter: int) -> tuple[
 
 @kernel
 def _rewritten(table: Table, rules: Rules, number: int, letter: int) -> tuple[int, Table]:
-    """As `netsp.hsignature.groups`: rules can only apply to the end of what is kept."""
+    """Return the normal form of a word and one more letter, by the rules.
+
+    As in `netsp.hsignature.groups`, rules can only apply to the end of the letters kept.
+    """
     n = table.words[number, LENGTH]
     kept = np.empty(n + 64, dtype=np.int64)
     at = number
@@ -200,7 +203,7 @@ def _rewritten(table: Table, rules: Rules, number: int, letter: int) -> tuple[in
 
 @kernel
 def times(table: Table, rules: Rules, a: int, b: int) -> tuple[int, Table]:
-    """One word and then another."""
+    """Return the product of two words, and the table."""
     n = table.words[b, LENGTH]
     if n == 1:
         return times_letter(table, rules, a, table.words[b, LETTER])
@@ -216,7 +219,7 @@ def times(table: Table, rules: Rules, a: int, b: int) -> tuple[int, Table]:
 
 @kernel
 def times_inverse(table: Table, rules: Rules, a: int, b: int) -> tuple[int, Table]:
-    """One word and then another backwards."""
+    """Return the product of a word and the inverse of another, and the table."""
     while b > 0:
         a, table = times_letter(table, rules, a, -table.words[b, LETTER])
         b = table.words[b, ABOVE]

@@ -110,7 +110,9 @@ def _all_legs(graph: TravelGraph, params: Params) -> tuple[Ints, Floats]:
             f"{params.max_legs} (option max_legs): choose fewer goals, a shorter tether or solver "
             "mip"
         )
-    check_available(params.bytes_per_leg * count, f"a program of {count:.0f} legs", "choose solver mip")
+    check_available(
+        params.bytes_per_leg * count, f"a program of {count:.0f} legs", "choose solver mip"
+    )
     finite = np.triu(np.isfinite(graph.costs), 1)
     legs = np.argwhere(finite & (graph.cluster[:, None] != graph.cluster[None, :]))
     return legs.astype(np.int64), graph.costs[legs[:, 0], legs[:, 1]]

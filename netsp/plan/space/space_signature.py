@@ -169,7 +169,7 @@ class SpaceSignature:
         meaning, rank, relators = eliminated(
             generators, [word_of(table, int(number)) for number in words]
         )
-        group = Group.of(rank, relators)
+        group = Group.presented(rank, relators)
         labels, table = _renumbered(labels, table, meaning, packed(group.rules))
         return cls(cells, begin, group, labels, far, generators, tolerance, policy, [table])
 

@@ -1,0 +1,53 @@
+"""Policies of groups of words, and of measures of entanglement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from netsp.base.number_ranges import check_positive
+
+
+@dataclass(frozen=True)
+class CompletionPolicy:
+    """Limits of a completion of rules (Knuth & Bendix). Beyond them a group is no longer exact.
+
+    Attributes
+    ----------
+    max_rules
+        Maximum number of rules.
+    max_side
+        Maximum number of letters in the longer side of a rule; longer rules are left out.
+    max_overlaps
+        Maximum number of overlaps of two rules that are examined.
+    """
+
+    max_rules: int = 100
+    max_side: int = 16
+    max_overlaps: int = 5000
+
+    def __post_init__(self) -> None:
+        check_positive(self)
+
+
+@dataclass(frozen=True)
+class MeasurePolicy:
+    """Accuracy of measures of entanglement.
+
+    Attributes
+    ----------
+    contact_depth
+        Depth by which a tether may enter an obstacle that it touches, as a share of the problem's
+        size.
+    sagitta
+        Distance by which two drawings of one arc may differ, as a share of the largest obstacle. A
+        path that retraces an arc drawn with chords would else seem to cross itself.
+    visibility_points
+        Points along a tether, besides its vertices, between which lines of sight are tried.
+    """
+
+    contact_depth: float = 1e-6
+    sagitta: float = 1e-3
+    visibility_points: int = 120
+
+    def __post_init__(self) -> None:
+        check_positive(self)
