@@ -162,8 +162,8 @@ PLACES = {
     "title of a picture": lambda p, s, b: _title(p, s),
     "report of a tour": lambda p, s, b: _summary(p, s, NOT_FLOWN),
     "progress": lambda p, s, b: table_row(b),
-    "page of the app": lambda p, s, b: solving.told_bound(s.status, s.length, s.bound)["proof"],
-    "page of the app, for programs": lambda p, s, b: solving.told_bound(
+    "page of the app": lambda p, s, b: solving.bound_message(s.status, s.length, s.bound)["proof"],
+    "page of the app, for programs": lambda p, s, b: solving.bound_message(
         s.status, s.length, s.bound
     )["lower_bound_of"],
     "cells of a comparison": lambda p, s, b: _cells_table(

@@ -60,19 +60,22 @@ class Cursor:
             share = np.clip(((np.array([x, y]) - a) * step).sum(1) / size, 0.0, 1.0)
             near = a + share[:, None] * step
             k = int(np.argmin(np.hypot(*(near - [x, y]).T)))
-            there = np.vstack([self._path[: k + 1, :2], near[k], [x, y]])
+            path_to_cursor = np.vstack([self._path[: k + 1, :2], near[k], [x, y]])
             rays = self.problem.representative_points
-            word = concatenate((), crossings(there, rays))
+            word = concatenate((), crossings(path_to_cursor, rays))
         found = self.tethers.to(x, y, word)
         if found is None and word is not None:
             found = self.tethers.to(x, y)
-        return {"x": x, "y": y} | (_told(found) if found else {"length": None})
+        return {"x": x, "y": y} | (_shown_tether(found) if found else {"length": None})
 
     def classes(self, goal: int) -> dict[str, Any]:
         """Return the shortest classes of a goal, and the number of all."""
         x, y, z = self.problem.goals[goal].position
         every = self.tethers.classes(x, y, z)
-        return {"classes": [_told(t) for t in every[:MAX_DRAWN_CLASSES]], "count": len(every)}
+        return {
+            "classes": [_shown_tether(t) for t in every[:MAX_DRAWN_CLASSES]],
+            "count": len(every),
+        }
 
     def along(self, share: float) -> dict[str, Any]:
         """Return the tether in the class that the tour has at a share of its length."""
@@ -86,17 +89,17 @@ class Cursor:
         walked = np.vstack([self._path[: k + 1], place])
         word = concatenate((), crossings(walked[:, :2], self.problem.representative_points))
         found = self.tethers.to(float(place[0]), float(place[1]), word, float(place[2]))
-        told = {
+        figures = {
             "x": float(place[0]),
             "y": float(place[1]),
             "z": float(place[2]),
             "share": share,
             "base_z": float(self.problem.base[2]),
         }
-        return told | (_told(found) if found else {"length": None})
+        return figures | (_shown_tether(found) if found else {"length": None})
 
 
-def _told(tether: TautTether) -> dict[str, Any]:
+def _shown_tether(tether: TautTether) -> dict[str, Any]:
     return {
         "length": tether.length,
         "word": list(tether.word),

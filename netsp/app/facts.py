@@ -49,9 +49,9 @@ def facts(
     for share in sorted({*np.linspace(0.0, 1.0, TETHER_SAMPLES + 1).tolist(), *visited}):
         if should_stop():
             return None
-        told = cursor.along(share)
+        tether_at_share = cursor.along(share)
         z = float(np.interp(share, cursor.shares, path[:, 2]))
-        rows.append([round(share, 5), told["length"], round(z, 4)])
+        rows.append([round(share, 5), tether_at_share["length"], round(z, 4)])
     found = None
     if problem.state is None:
         try:
@@ -84,8 +84,8 @@ def shortest_sufficient(problem: Problem) -> float | None:
         to = needed(problem)
     except InputError:
         return None
-    least = [min(to[problem.clusters == c]) for c in range(1, problem.visits + 1)]
-    longest = float(max(least))
+    tether_by_choice = [min(to[problem.clusters == c]) for c in range(1, problem.visits + 1)]
+    longest = float(max(tether_by_choice))
     return longest if np.isfinite(longest) else None
 
 

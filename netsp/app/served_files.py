@@ -129,19 +129,19 @@ class ImportAnswers:
         InputError
             A field is no positive number.
         """
-        said = {k: v.strip() for k, v in given.items() if v.strip()}
-        viewpoints = _positive(said, "viewpoints")
+        given_fields = {k: v.strip() for k, v in given.items() if v.strip()}
+        viewpoints = _positive(given_fields, "viewpoints")
         if viewpoints is not None and viewpoints != int(viewpoints):
             raise InputError(f"viewpoints: expected a whole number, got {viewpoints:g}")
         return cls(
-            base=said.get("base"),
-            crs=said.get("crs"),
-            units=said.get("units"),
+            base=given_fields.get("base"),
+            crs=given_fields.get("crs"),
+            units=given_fields.get("units"),
             viewpoints=None if viewpoints is None else int(viewpoints),
-            tether=_positive(said, "tether"),
-            radius=_positive(said, "radius"),
-            line_width=_positive(said, "line_width"),
-            standoff=_positive(said, "standoff"),
+            tether=_positive(given_fields, "tether"),
+            radius=_positive(given_fields, "radius"),
+            line_width=_positive(given_fields, "line_width"),
+            standoff=_positive(given_fields, "standoff"),
         )
 
 
@@ -170,16 +170,16 @@ def without_options(text: str) -> str:
     return re.sub(r"(;|,| or)\s[^;,]*--[a-z][^;]*", "", bare)
 
 
-def _positive(said: Mapping[str, str], field: str) -> float | None:
-    if field not in said:
+def _positive(given_fields: Mapping[str, str], field: str) -> float | None:
+    if field not in given_fields:
         return None
     called = field.replace("_", " ")
     try:
-        value = float(said[field])
+        value = float(given_fields[field])
     except ValueError:
         value = math.nan
     if not 0.0 < value < math.inf:
-        raise InputError(f"{called}: expected a positive number, got {shown(said[field])}")
+        raise InputError(f"{called}: expected a positive number, got {shown(given_fields[field])}")
     return value
 
 
@@ -239,8 +239,8 @@ def imported(
             raise UnansweredError(whole, plain, error.asks) from None
         except InputError as error:
             raise InputError(without_options(str(error).replace(f"{folder}/", ""))) from None
-    said = [without_options(note.replace(f"{folder}/", "")) for note in notes]
-    return json.loads(problem.to_json()), said
+    lines = [without_options(note.replace(f"{folder}/", "")) for note in notes]
+    return json.loads(problem.to_json()), lines
 
 
 def _site(
@@ -252,8 +252,10 @@ def _site(
     from netsp.roadmap.reachable_goals import UNREACHED, keep_reachable_goals, unreached_note
 
     about = Projection.parse(answers.base, name="base") if answers.base else None
-    asked = answers.viewpoints is not None and answers.standoff is not None
-    looking = Looking(answers.viewpoints or 1, answers.standoff or 0.0) if asked else None
+    makes_viewpoints = answers.viewpoints is not None and answers.standoff is not None
+    looking = (
+        Looking(answers.viewpoints or 1, answers.standoff or 0.0) if makes_viewpoints else None
+    )
     options = SiteOptions(
         tether=answers.tether,
         radius=answers.radius,
@@ -340,7 +342,7 @@ def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str,
         file = Path(folder) / EXPORTS[kind]
         points = export(problem, solution, file, kind)
         settings = ExportSettings()
-        said = export_notes(problem, points, kind, settings)
+        written = export_notes(problem, points, kind, settings)
         surface = surface_warning(problem, "set one depth for all in the panel")
         notes = [
             *([surface] if surface is not None else []),
@@ -351,8 +353,8 @@ def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str,
                 settings.policy.min_slack,
                 settings.policy.min_clearance,
             ),
-            *said.warnings,
-            *said.notes,
+            *written.warnings,
+            *written.notes,
         ]
         return file.name, file.read_text(encoding="utf-8"), notes
 

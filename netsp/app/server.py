@@ -27,6 +27,7 @@ from netsp.app.drawn_path import (
 from netsp.app.facts import facts
 from netsp.app.served_files import (
     EXPORTS,
+    MAX_FILE_BYTES,
     ImportAnswers,
     bare_name,
     exported,
@@ -34,7 +35,6 @@ from netsp.app.served_files import (
     imported,
     without_options,
 )
-from netsp.app.served_files import MAX_MESSAGE_BYTES as MOST_FILE
 from netsp.app.shown import Shown
 from netsp.app.solving import Worker
 from netsp.app.state import Document
@@ -95,7 +95,7 @@ class Session:
         self.drawn: list[list[float]] = []
         self._cursor: Cursor | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._worker = Worker(self._solver_told, time_limit) if shown is None else None
+        self._worker = Worker(self._on_solver_message, time_limit) if shown is None else None
 
     def begin(self) -> None:
         """Start the session; call it within the running event loop."""
@@ -246,12 +246,12 @@ class Session:
         if not isinstance(asked, str):
             raise InputError(f"save: expected the name of a file, got {shown(asked)}")
         name = bare_name(asked)
-        own = self.document.file
-        target = (own.parent if own is not None else Path()) / (
+        opened = self.document.file
+        target = (opened.parent if opened is not None else Path()) / (
             name if name.endswith(".json") else f"{name}.json"
         )
         if target.exists() and (
-            own is None or not own.exists() or not os.path.samefile(target, own)
+            opened is None or not opened.exists() or not os.path.samefile(target, opened)
         ):
             raise InputError(f"save: {target.name} exists already; expected another name")
         return target
@@ -323,24 +323,24 @@ class Session:
         assert self._worker is not None
         self._worker.solve(self.document.version, problem.to_json())
 
-    def _solver_told(self, said: dict[str, Any]) -> None:
+    def _on_solver_message(self, answer_message: dict[str, Any]) -> None:
         """Called in the thread that listens to the solver."""
         if self._loop is not None:
             with contextlib.suppress(RuntimeError):  # the server is going down
-                self._loop.call_soon_threadsafe(self._take, said)
+                self._loop.call_soon_threadsafe(self._apply_solver_message, answer_message)
 
-    def _take(self, said: dict[str, Any]) -> None:
-        if said["version"] != self.document.version:
+    def _apply_solver_message(self, answer_message: dict[str, Any]) -> None:
+        if answer_message["version"] != self.document.version:
             return
-        if "facts" in said:
-            self.facts = said["facts"]
+        if "facts" in answer_message:
+            self.facts = answer_message["facts"]
             self.tell({"facts": self.facts})
             return
-        self.solution = said.pop("solution", None)
-        self.answer = said
-        if self._cursor is not None and "path" in said:
-            self._cursor.follow(said["path"])
-        self.tell({"tour": said})
+        self.solution = answer_message.pop("solution", None)
+        self.answer = answer_message
+        if self._cursor is not None and "path" in answer_message:
+            self._cursor.follow(answer_message["path"])
+        self.tell({"tour": answer_message})
 
 
 def application(session: Session, token: str, port: int) -> Any:
@@ -403,8 +403,10 @@ def application(session: Session, token: str, port: int) -> Any:
         if not allowed(request.query_params.get("token")):
             return PlainTextResponse("netsp: the address lacks its token", status_code=403)
         size = request.headers.get("content-length", "")
-        if not size.isdigit() or int(size) > MOST_FILE:
-            return PlainTextResponse(f"netsp: expected at most {MOST_FILE} bytes", status_code=413)
+        if not size.isdigit() or int(size) > MAX_FILE_BYTES:
+            return PlainTextResponse(
+                f"netsp: expected at most {MAX_FILE_BYTES} bytes", status_code=413
+            )
         try:
             content = await request.body()
         except ClientDisconnect:  # nobody is left to read this answer
@@ -472,9 +474,11 @@ def application(session: Session, token: str, port: int) -> Any:
                     later.add(task := asyncio.create_task(solve_order(answer)))
                     task.add_done_callback(later.discard)
                     continue
-                said = session.asked(answer) if isinstance(answer, dict) else {"error": answer}
-                if said is not None:
-                    queue.put_nowait(json.dumps(said))
+                answer_message = (
+                    session.asked(answer) if isinstance(answer, dict) else {"error": answer}
+                )
+                if answer_message is not None:
+                    queue.put_nowait(json.dumps(answer_message))
         except WebSocketDisconnect:
             pass
         finally:
@@ -605,5 +609,5 @@ def _download(session: Session, name: str) -> Any:
 def _source(data: Mapping[str, Any]) -> str:
     """Return the import record of a document as text, which identifies the import."""
     site = data.get("site")
-    own = {k: v for k, v in site.items() if k != "edited"} if isinstance(site, dict) else None
-    return json.dumps(own, sort_keys=True)
+    same_site = {k: v for k, v in site.items() if k != "edited"} if isinstance(site, dict) else None
+    return json.dumps(same_site, sort_keys=True)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from netsp.app.solving import told_bound
+from netsp.app.solving import bound_message
 from netsp.base.errors import InputError
 from netsp.base.files import csv_rows, read_text
 from netsp.base.geometry import polylines
@@ -138,7 +138,7 @@ def _answer(problem: Problem, solution: Solution) -> dict[str, Any]:
         "stage": "done",
         "status": solution.status.value,
         "length": solution.length,
-        **told_bound(solution.status, solution.length, solution.bound),
+        **bound_message(solution.status, solution.length, solution.bound),
         "path": [list(p) for p in solution.path],
         "visits": [
             {"goal": v.goal, "tether": v.tether_length, "word": list(v.signature)}
@@ -173,7 +173,7 @@ def _of_execution(place: Path, problem: Problem, solution: Solution) -> Shown:
     }
     events = [
         {"time": r["time"], "event": r["event"], "text": f"{r['response']}: {r['reason']}"}
-        for r in _rows(place / "events.csv", ("time", "event", "response", "reason"), least=0)
+        for r in _rows(place / "events.csv", ("time", "event", "response", "reason"), min_count=0)
     ]
     return Shown(json.loads(problem.to_json()), answer, scene_of(problem), solution, frames, events)
 
@@ -234,10 +234,10 @@ def _frame(nodes: Any, row: dict[str, str]) -> dict[str, Any]:
     }
 
 
-def _rows(file: Path, columns: tuple[str, ...], least: int = 1) -> list[dict[str, str]]:
+def _rows(file: Path, columns: tuple[str, ...], min_count: int = 1) -> list[dict[str, str]]:
     text = read_text(file)
     rows = csv_rows(text, str(file))
-    if len(rows) < least:
+    if len(rows) < min_count:
         raise InputError(f"{file}: holds no row")
     missing = [c for c in columns if rows and c not in rows[0]]
     if missing:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 TOUR_INTERVAL_S = 0.15
 """Minimum time between two tours that are sent to the page, s."""
 
-Told = Callable[[dict[str, Any]], None]
+OnMessage = Callable[[dict[str, Any]], None]
 
 
 class Worker:
@@ -37,7 +37,7 @@ class Worker:
         Seconds for one version.
     """
 
-    def __init__(self, told: Told, time_limit: float = 60.0) -> None:
+    def __init__(self, told: OnMessage, time_limit: float = 60.0) -> None:
         self.told, self.time_limit = told, time_limit
         self._lock = threading.Lock()
         self._closed = False
@@ -156,7 +156,7 @@ def _solve(
         if row.incumbent == told[1] or time.monotonic() < told[0] + TOUR_INTERVAL_S:
             return
         told[:] = time.monotonic(), row.incumbent
-        said = told_bound(Status.FEASIBLE, row.incumbent, row.bound)
+        said = bound_message(Status.FEASIBLE, row.incumbent, row.bound)
         if not said["lower_bound"]:
             said["proof"] = "searching"  # a bound may still come
         connection.send(
@@ -199,7 +199,7 @@ def _solve(
                 "stage": "done",
                 "status": result.status.value,
                 "length": result.length,
-                **told_bound(result.status, result.length, result.bound),
+                **bound_message(result.status, result.length, result.bound),
                 "solution": found.to_json(),
                 **drawn(graph, result.tour),
             }
@@ -226,7 +226,7 @@ def _solve(
     return None
 
 
-def told_bound(status: Status, length: float | None, bound: LowerBound | None) -> dict[str, Any]:
+def bound_message(status: Status, length: float | None, bound: LowerBound | None) -> dict[str, Any]:
     """Return the fields of a tour's bound for the page: length, scope and the words shown."""
     from netsp.model.solution import proof
 

@@ -264,8 +264,8 @@ def _list(data: dict[str, Any], name: object) -> list[Any]:
     """Return a list of this version that may be changed: a copy, if versions share it."""
     if not isinstance(name, str) or name not in LISTS:
         raise InputError(f"edit: expected one of {', '.join(LISTS)}, got {shown(name)}")
-    own = data[name] = list(data.get(name, []))
-    return own
+    copied = data[name] = list(data.get(name, []))
+    return copied
 
 
 def _check_fields(data: dict[str, Any]) -> None:

@@ -61,16 +61,18 @@ class Frame:
             stderr=subprocess.PIPE,
             text=True,
         )
-        said = []
+        lines = []
         assert self._server.stderr is not None
         for line in self._server.stderr:
-            said.append(line)
+            lines.append(line)
             if found := re.search(r"http://\S+", line):
                 self.address = found.group()
                 return
         self._server.wait()
         self._server.stderr.close()
-        raise InputError("".join(said).strip().removeprefix("netsp: ") or "the map cannot be shown")
+        raise InputError(
+            "".join(lines).strip().removeprefix("netsp: ") or "the map cannot be shown"
+        )
 
     def problem(self) -> Problem:
         """Return the problem as it was saved last (Ctrl+S on the map).

@@ -62,12 +62,12 @@ def run(args: argparse.Namespace) -> int:
     kinds = (*FORMATS, PAGE)
     if Path(args.output).suffix.lower() not in kinds:
         raise InputError(f"{args.output}: expected a name ending in {', '.join(kinds)}")
-    for name, value, most in (
+    for name, value, maximum in (
         ("--seconds", args.seconds, MAX_SECONDS),
         ("--fps", args.fps, MAX_FPS),
     ):
-        if value > most:
-            raise InputError(f"{name}: expected at most {most}, got {value}")
+        if value > maximum:
+            raise InputError(f"{name}: expected at most {maximum}, got {value}")
     if len(args.source) > MAX_SIDE_BY_SIDE:
         raise InputError(
             f"SOURCE: {len(args.source)} of them; expected {MAX_SIDE_BY_SIDE} or fewer"
@@ -82,10 +82,10 @@ def run(args: argparse.Namespace) -> int:
 
     loud = not args.quiet and sys.stderr.isatty()
     save_animation(films, args.output, args.seconds, args.fps, tell if loud else None)
-    return _told(args)
+    return _animate_runs(args)
 
 
-def _told(args: argparse.Namespace) -> int:
+def _animate_runs(args: argparse.Namespace) -> int:
     if not args.quiet:
         print(f"picture {args.output}", file=sys.stderr)
     return 0
@@ -122,7 +122,7 @@ def _page(args: argparse.Namespace) -> int:
         from netsp.view.report.tour_page import report_tour
 
         report_tour(args.source[0], args.problem, args.output)
-    return _told(args)
+    return _animate_runs(args)
 
 
 def _film(source: str, problem_file: str | None, count: int) -> Film:

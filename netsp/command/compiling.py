@@ -281,6 +281,6 @@ def compile_time_s(kernel: Any, with_called: bool = False) -> float:
     """
     from netsp.base.compiled.compile_policy import current_policy
 
-    own = len(kernel.py_func.__code__.co_code)
+    bytecode_size = len(kernel.py_func.__code__.co_code)
     whole = getattr(kernel, "bytecode", None) if with_called else None
-    return current_policy().compile_time_s(whole() if whole is not None else own)
+    return current_policy().compile_time_s(whole() if whole is not None else bytecode_size)

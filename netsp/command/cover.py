@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from netsp.base.errors import InputError
-from netsp.command import json_output as told
+from netsp.command import json_output
 from netsp.command.command_clock import command_clock
 from netsp.command.types import check_writable, length, natural, seconds, vector
 
@@ -95,12 +95,12 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--plot", metavar="FILE", help="draw the waypoints (png, svg or pdf)")
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    told.json_flag(p)
+    json_output.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Place waypoints, write the mission, and return the exit code."""
-    told.check_stdout(args)
+    json_output.check_stdout(args)
     check_writable(args.output, args.plot, inputs=(args.scene,))
     if args.plot:
         from netsp.view.pictures import style
@@ -154,7 +154,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.quiet:
         print(_summary(found, scene.units, args.output, args.plot), file=sys.stderr)
     if args.json:
-        told.tell(
+        json_output.tell(
             {
                 "waypoints": len(found.viewpoints),
                 "fewest_possible": found.bound,
@@ -183,9 +183,9 @@ def _camera(text: str, patch: float) -> Camera:
         return Camera(**dict(zip(names, values, strict=False)), patch=patch)
     except InputError as error:
         # of what was given, or of the patch, which has a flag of its own
-        told = str(error).removeprefix("Camera: ")
-        flag = "--patch" if told.startswith("patch") else "--camera"
-        raise InputError(f"{flag}: {told}") from None
+        message = str(error).removeprefix("Camera: ")
+        flag = "--patch" if message.startswith("patch") else "--camera"
+        raise InputError(f"{flag}: {message}") from None
 
 
 def _summary(found: Cover, units: str, output: str | None, plot: str | None) -> str:

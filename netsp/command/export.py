@@ -181,10 +181,10 @@ def run(args: argparse.Namespace) -> int:
         messages.warning(line)
     if kind in FOR_VEHICLES:
         warn_of_problem(args, problem, solution.margin)
-    said = export_notes(problem, points, kind, settings)
-    for line in said.warnings:
+    export_warnings = export_notes(problem, points, kind, settings)
+    for line in export_warnings.warnings:
         messages.warning(line)
-    for line in said.notes:
+    for line in export_warnings.notes:
         messages.note(line)
     return 0
 

@@ -46,8 +46,8 @@ def fly(
     from netsp.base.compiled.compile_policy import long_work
 
     if output is not None:
-        there = [str(Path(output) / name) for name in WRITTEN if (Path(output) / name).exists()]
-        check_writable(*there, inputs=inputs)
+        existing = [str(Path(output) / name) for name in WRITTEN if (Path(output) / name).exists()]
+        check_writable(*existing, inputs=inputs)
     with until_interrupt(None) as clock, long_work():
         try:
             runs = _flown(

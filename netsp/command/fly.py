@@ -183,7 +183,7 @@ def run(args: argparse.Namespace) -> int:
             failure: BaseException | None = done
             has_pressed_again = isinstance(done, KeyboardInterrupt)
         else:
-            failure, has_pressed_again = _told_failure(args, done)
+            failure, has_pressed_again = _report_failure(args, done)
         if isinstance(failure, Exception):
             complain(f"{type(failure).__name__}: {failure}; the flight ends here")
         _stand_by(args, session, clock, has_pressed_again)
@@ -259,7 +259,7 @@ def complain(text: str) -> None:
         print(f"\nnetsp: {text}", file=sys.stderr, flush=True)
 
 
-def _told_failure(args: argparse.Namespace, done: Execution) -> tuple[Exception | None, bool]:
+def _report_failure(args: argparse.Namespace, done: Execution) -> tuple[Exception | None, bool]:
     """Write the files of the run and print its result; return an exception that this raised, and
     whether Ctrl-C was pressed meanwhile. The caller stands by the vehicle in either case."""
     from netsp.base.clock import deferred_interrupts
@@ -304,10 +304,10 @@ def _stand_by(
     from netsp.online.fly.standby import stand_by
 
     has_stopped = clock.is_stopped
-    said: list[str] = []
+    messages_sent: list[str] = []
 
     def say(text: str) -> None:
-        said.append(text)
+        messages_sent.append(text)
         with contextlib.suppress(OSError, ValueError):  # the terminal may have gone
             for line in session.new_texts():
                 print(f"the vehicle says: {line}", file=sys.stderr)
@@ -315,7 +315,7 @@ def _stand_by(
 
     def should_stop() -> bool:
         # where the first Ctrl-C has ended the flight, the next one interrupts
-        return bool(said) if has_pressed_again else clock.is_stopped and not has_stopped
+        return bool(messages_sent) if has_pressed_again else clock.is_stopped and not has_stopped
 
     stand_by(session, args.at_end, on_note=say, should_stop=should_stop)
 

@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
         table.end()
         print(_summary(result, spent, args.output, args.plot), file=sys.stderr)
     if args.json:
-        json_output.tell(_told(instance, result, spent))
+        json_output.tell(_summary_for_programs(instance, result, spent))
     if result.tour is None:
         return EXIT_INFEASIBLE if result.status.value == "infeasible" else EXIT_NOT_ALL
     return 0
@@ -135,7 +135,7 @@ def _summary(result: Result, spent: float, output: str | None, plot: str | None)
     return "\n".join(lines)
 
 
-def _told(instance: Instance, result: Result, spent: float) -> dict[str, object]:
+def _summary_for_programs(instance: Instance, result: Result, spent: float) -> dict[str, object]:
     """Return the result for programs."""
     return {
         "instance": instance.name,

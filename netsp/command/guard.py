@@ -115,9 +115,9 @@ def run(args: argparse.Namespace) -> int:
     from netsp.online.link.geo_frame import Frame
     from netsp.world.mission.mission import Mission
 
-    told_of = Mission.load(args.site) if is_mission(args.site) else Problem.load(args.site)
+    guarded_site = Mission.load(args.site) if is_mission(args.site) else Problem.load(args.site)
     options = GuardOptions(args.noise, args.drift, args.speed)
-    frame = Frame(told_of, args.frame)
+    frame = Frame(guarded_site, args.frame)
     fixes: list[Fix] = []
     if args.replay is not None:
         from netsp.online.guard.replay import read_fixes
@@ -126,8 +126,8 @@ def run(args: argparse.Namespace) -> int:
         say = None if args.quiet else messages.note
         fixes = list(read_fixes(args.replay, frame, args.system, on_note=say))
     with ExitStack() as stack:
-        guard = Guard(told_of, options)
-        told = _Told(guard.site, args.quiet)
+        guard = Guard(guarded_site, options)
+        counts = ReportCounts(guard.site, args.quiet)
         lines: TextIO | None = None
         if args.output == "-":
             lines = sys.stdout
@@ -141,7 +141,7 @@ def run(args: argparse.Namespace) -> int:
             print(f"the page is {page.address}", file=sys.stderr)
 
         def take(report: Report) -> None:
-            told.take(report)
+            counts.take(report)
             row = report.as_row() if lines is not None or page is not None else None
             if lines is not None:
                 lines.write(json.dumps(row, allow_nan=False) + "\n")
@@ -167,20 +167,20 @@ def run(args: argparse.Namespace) -> int:
                     state=args.state,
                     publish=args.publish,
                     corrections=None if page is None else page.corrections,
-                    on_note=None if args.quiet else told.say,
+                    on_note=None if args.quiet else counts.say,
                     ask_rates=args.ask_rates,
                 )
         except KeyboardInterrupt:
-            told.say("stopped")
+            counts.say("stopped")
     if args.output is None:
-        print(json.dumps(told.summary(), indent=1, allow_nan=False))
-    if told.last is None:
-        messages.warning(f"nothing was claimed about the tether: {told.reason}")
+        print(json.dumps(counts.summary(), indent=1, allow_nan=False))
+    if counts.last is None:
+        messages.warning(f"nothing was claimed about the tether: {counts.reason}")
         return EXIT_NOT_ALL
-    return EXIT_NOT_VERIFIED if told.last.loops else 0
+    return EXIT_NOT_VERIFIED if counts.last.loops else 0
 
 
-class _Told:
+class ReportCounts:
     """Reports so far, and the numbers in them."""
 
     def __init__(self, site: Site, quiet: bool) -> None:

@@ -272,13 +272,13 @@ def _extent(problem: Problem) -> str:
 
     places = np.vstack([problem.points[:, :2], problem.representative_points.reshape(-1, 2)])
     wide, high = np.round(np.ptp(places, axis=0), 3) + 0.0
-    said = f", clearance {problem.clearance:g} {problem.units}"
-    said += f"; {wide:.3g} x {high:.3g} {problem.units}"
+    description = f", clearance {problem.clearance:g} {problem.units}"
+    description += f"; {wide:.3g} x {high:.3g} {problem.units}"
     if problem.origin is not None:
         lat, lon = problem.origin.latitude, problem.origin.longitude
         north, east = "N" if lat >= 0.0 else "S", "E" if lon >= 0.0 else "W"
-        said += f", base at {abs(lat):.6g} {north}, {abs(lon):.6g} {east}"
-    return said
+        description += f", base at {abs(lat):.6g} {north}, {abs(lon):.6g} {east}"
+    return description
 
 
 def _is_image(args: argparse.Namespace) -> bool:

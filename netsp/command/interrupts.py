@@ -23,7 +23,7 @@ SIGNAL_INTERVAL_S = 0.05
 
 
 @contextmanager
-def interrupts_are_heard() -> Iterator[None]:
+def resending_lost_interrupts() -> Iterator[None]:
     """Make SIGTERM raise KeyboardInterrupt, as Ctrl-C does, and repeat an interrupt a moment later
     if it was raised where nobody can catch it."""
     before = sys.unraisablehook

@@ -184,8 +184,10 @@ def _rank(args: argparse.Namespace, library: Library) -> int:
             rank.by_name(args.solver, args.seed) if args.solver else rank.by_command(args.command)
         )
         label = args.label or args.solver or args.command.split()[0].rsplit("/", 1)[-1]
-        there = {(r.solver, r.limit, r.problem) for r in rows}
-        names = [n for n in _chosen(args, library) if (label, args.time_limit, n) not in there]
+        ranked_before = {(r.solver, r.limit, r.problem) for r in rows}
+        names = [
+            n for n in _chosen(args, library) if (label, args.time_limit, n) not in ranked_before
+        ]
         skipped = len(_chosen(args, library)) - len(names)
         if skipped and not args.quiet:
             messages.note(

@@ -29,7 +29,7 @@ from netsp.base.errors import (
 )
 from netsp.command import background_warm_up, messages
 from netsp.command.command_clock import begin_command
-from netsp.command.interrupts import interrupts_are_heard
+from netsp.command.interrupts import resending_lost_interrupts
 from netsp.command.status_line import status_line
 
 
@@ -80,7 +80,7 @@ def _main(argv: Sequence[str] | None) -> int:
             sys.stdout.flush()
             raise
         preparing = _preparation_messages(wanted, getattr(args, "quiet", False))
-        with interrupts_are_heard(), messages.warnings_in_one_line(), preparing:
+        with resending_lost_interrupts(), messages.warnings_in_one_line(), preparing:
             code = int(args.run(args))
         sys.stdout.flush()
         if argv is None and wanted is not None and wanted != "warm-up":

@@ -29,7 +29,7 @@ def note(text: str) -> None:
 @contextlib.contextmanager
 def warnings_in_one_line() -> Iterator[None]:
     """Print each `LeftOutWarning` once, in one line."""
-    said: set[str] = set()
+    shown_before: set[str] = set()
     with warnings.catch_warnings():
         warnings.simplefilter("always", LeftOutWarning)
         otherwise = warnings.showwarning
@@ -37,8 +37,8 @@ def warnings_in_one_line() -> Iterator[None]:
         def show(message: Warning | str, category: type[Warning], *rest: Any) -> None:
             if not issubclass(category, LeftOutWarning):
                 otherwise(message, category, *rest)
-            elif str(message) not in said:
-                said.add(str(message))
+            elif str(message) not in shown_before:
+                shown_before.add(str(message))
                 warning(str(message))
 
         warnings.showwarning = show  # type: ignore[assignment]

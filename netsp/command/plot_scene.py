@@ -35,9 +35,12 @@ def plot_scene(args: argparse.Namespace) -> int:
         note_scene(scene.name, field.notes)
         check_overlap(scene, field, path, args.solution)
         delta = args.delta or delta_for_path(field, path)
-        if (nodes := polylines.length(path) / delta) > (most := MissionLimits().max_tether_nodes):
+        if (nodes := polylines.length(path) / delta) > (
+            max_nodes := MissionLimits().max_tether_nodes
+        ):
             raise InputError(
-                f"--delta: {delta:g} makes {nodes:.2g} nodes of a tether; expected at most {most:g}"
+                f"--delta: {delta:g} makes {nodes:.2g} nodes of a tether; "
+                f"expected at most {max_nodes:g}"
             )
         tether = lay(field, path, args.tether_model, delta)
         print(

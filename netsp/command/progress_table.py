@@ -139,8 +139,8 @@ def summary(
         if not solution.status.is_optimal:
             verdict = solution.bound.says(solution.length, problem.units)
         elif not solution.bound.proves(solution.length):
-            said = solution.bound.says(solution.length, problem.units)
-            verdict = f"{solution.status.verdict}; {said}"
+            bound_text = solution.bound.says(solution.length, problem.units)
+            verdict = f"{solution.status.verdict}; {bound_text}"
     names = [problem.goal_name(v.goal) for v in solution.tour]
     if solution.classes == "shortest" and solution.status is not Status.OPTIMAL_OF_KEPT:
         verdict += "; not all classes were kept"

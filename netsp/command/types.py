@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from netsp.model.solution import Solution
 
 
-def choices(own: str, group: str) -> str:
+def choices(builtin_names: str, group: str) -> str:
     """Help for a choice of names: ours, then those that other packages add to a group of entry
     points."""
     others = sorted({e.name for e in importlib.metadata.entry_points(group=group)})
-    return f"{own}; from other packages: {', '.join(others)}" if others else own
+    return f"{builtin_names}; from other packages: {', '.join(others)}" if others else builtin_names
 
 
 def _above_zero(what: str) -> Callable[[str], float]:
@@ -125,10 +125,10 @@ def whole_bytes(text: str) -> int:
 
 def count_or_range(text: str) -> int | tuple[int, int]:
     """Parse a whole number from 0 on, or two of them as in ``1-20``."""
-    least, dash, most = text.partition("-")
-    if not (least and dash):
+    min_text, dash, max_text = text.partition("-")
+    if not (min_text and dash):
         return natural(text)
-    numbers = natural(least), natural(most)
+    numbers = natural(min_text), natural(max_text)
     if numbers[0] > numbers[1]:
         raise argparse.ArgumentTypeError(f"expected minimum-maximum, got {text!r}")
     return numbers

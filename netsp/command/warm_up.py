@@ -222,10 +222,10 @@ def steps() -> Iterator[Step]:
         graph = travel_graph(random_world(3, goals=4, tether_length=200.0))
         best = solve_graph(graph, "mip")
         assert best.length is not None
-        odd, ways = odd_letters(graph.signatures), graph.ways_by_parity()
-        assert ways is not None
+        odd, paths = odd_letters(graph.signatures), graph.ways_by_parity()
+        assert paths is not None
         stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour or ()]
-        for tower in ClassCovers(graph.costs, graph.cluster, odd), PathCovers(ways, np.inf):
+        for tower in ClassCovers(graph.costs, graph.cluster, odd), PathCovers(paths, np.inf):
             refine_covers(tower, stops, 1.02 * best.length, Limits())
 
     yield "covers", covered

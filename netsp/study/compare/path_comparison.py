@@ -419,10 +419,10 @@ def order_length(
         return None, "no goal is visited"
     if problem.state is not None:
         return None, "the order is solved for tours from the base only"
-    before, own = problem.precedences, problem.clusters
+    before, cluster_of = problem.precedences, problem.clusters
     for k, later in enumerate(order if len(before) else ()):
         for earlier in order[:k]:
-            if before[own[later], own[earlier]]:
+            if before[cluster_of[later], cluster_of[earlier]]:
                 first, then = problem.goal_name(later), problem.goal_name(earlier)
                 return None, f"the order breaks an 'after': {first} comes before {then}"
     try:

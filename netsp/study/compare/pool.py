@@ -148,5 +148,5 @@ def _limit_memory(gib: float) -> None:
 
     with open("/proc/self/statm") as file:
         now = int(file.read().split()[0]) * resource.getpagesize()
-    most = now + int(gib * 2**30)
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    max_bytes = now + int(gib * 2**30)
+    resource.setrlimit(resource.RLIMIT_AS, (max_bytes, max_bytes))

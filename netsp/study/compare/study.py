@@ -152,7 +152,7 @@ class Study(Model):
     ] = None
 
     @model_validator(mode="after")
-    def _told_apart(self) -> Self:
+    def _check_names_differ(self) -> Self:
         for what, specs in (("roadmaps", self.roadmaps), ("solvers", self.solvers)):
             labels = [s.label or s.name for s in specs]
             twice = [name for name in labels if labels.count(name) > 1]

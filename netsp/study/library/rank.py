@@ -265,18 +265,18 @@ def ranking(library: Library, rows: Iterable[Row]) -> list[dict[str, Any]]:
         if row.problem in library.records:
             groups.setdefault((row.solver, row.limit), []).append(row)
     out = []
-    for (solver, limit), some in groups.items():
-        above = [_above(row, library.records[row.problem].length) for row in some]
+    for (solver, limit), group in groups.items():
+        above = [_above(row, library.records[row.problem].length) for row in group]
         out.append(
             {
                 "solver": solver,
                 "limit": limit,
-                "problems": len(some),
-                "verified": sum(row.verified for row in some),
+                "problems": len(group),
+                "verified": sum(row.verified for row in group),
                 "best": sum(a <= SAME_LENGTH_TOLERANCE for a in above),
                 "above": statistics.fmean(above),
                 "worst": max(above),
-                "seconds": statistics.median(row.seconds for row in some),
+                "seconds": statistics.median(row.seconds for row in group),
             }
         )
     return sorted(out, key=lambda e: (e["above"], e["seconds"]))

@@ -140,8 +140,8 @@ class CarriedTether:
 
         heap = [(-bound(first, last), first, last)] if last - first >= 2 else []
         while heap:
-            most, a, b = heapq.heappop(heap)
-            if -most <= self.length(best) + error:
+            upper_bound, a, b = heapq.heappop(heap)
+            if -upper_bound <= self.length(best) + error:
                 break
             # the point in the middle of the path between them
             middle = int(np.searchsorted(along, 0.5 * (along[a] + along[b])))
@@ -168,8 +168,8 @@ class CarriedTether:
         """
         s = polylines.along(self._route[:, :2])
         out = []
-        for there in np.linspace(0.0, s[-1], count).tolist():
-            k = min(int(np.searchsorted(s, there, side="right")) - 1, len(s) - 1)
-            place = np.array([np.interp(there, s, self._route[:, j]) for j in range(3)])
-            out.append((there, self.length_to(k, place)))
+        for along_route in np.linspace(0.0, s[-1], count).tolist():
+            k = min(int(np.searchsorted(s, along_route, side="right")) - 1, len(s) - 1)
+            place = np.array([np.interp(along_route, s, self._route[:, j]) for j in range(3)])
+            out.append((along_route, self.length_to(k, place)))
         return np.array(out)

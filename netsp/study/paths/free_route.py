@@ -151,15 +151,15 @@ class FreeSpace:
             points.append(xy[inner])
             lengths.append(along[inner])
             s = np.array([_at(along, start), _at(along, end)])
-            way = self._round(_part(line, start, end))
-            if way is None:
+            detour = self._round(_part(line, start, end))
+            if detour is None:
                 shut_in = min(shut_in, float(s[0]))
-                way = _part(line, start, end)
-            share = polylines.along(way)
-            share = share / share[-1] if share[-1] else np.linspace(0.0, 1.0, len(way))
+                detour = _part(line, start, end)
+            share = polylines.along(detour)
+            share = share / share[-1] if share[-1] else np.linspace(0.0, 1.0, len(detour))
             if start <= 0.0:
-                points[0], lengths[0] = way[:0], along[:0]
-            points.append(way + self.origin)
+                points[0], lengths[0] = detour[:0], along[:0]
+            points.append(detour + self.origin)
             lengths.append(s[0] + share * (s[1] - s[0]))
             done = end
         inner = np.arange(int(np.floor(done + SAME_PLACE_TOLERANCE)) + 1, len(line))
@@ -192,24 +192,24 @@ class FreeSpace:
         ring = self._rings[which[0]]
         a, b = (float(ring.project(p)) for p in ends)
         forward = _along_ring(ring, a, b)
-        back = _along_ring(ring, b, a)[::-1]
+        backward = _along_ring(ring, b, a)[::-1]
         pierced = set(self._pierced(part))
         others = [i for i in range(len(self.problem.obstacles)) if i not in pierced]
         rays = self.problem.representative_points[others].reshape(-1, 2) - self.origin
 
-        def rank(way: Floats) -> tuple[int, int, float, float]:
+        def rank(detour: Floats) -> tuple[int, int, float, float]:
             """Return a key to compare both parts of the outline; a path and its reverse get the
             same part, even if both are as long."""
-            turns = winding_numbers(np.vstack([part, way[::-1], part[:1]]), rays)
-            middle = shapely.LineString(way).centroid
+            turns = winding_numbers(np.vstack([part, detour[::-1], part[:1]]), rays)
+            middle = shapely.LineString(detour).centroid
             return (
                 int(np.count_nonzero(np.round(turns))),
-                round(polylines.length(way) / self.place),
+                round(polylines.length(detour) / self.place),
                 middle.x,
                 middle.y,
             )
 
-        return min((forward, back), key=rank)
+        return min((forward, backward), key=rank)
 
     def _pierced(self, part: Floats) -> list[int]:
         """Return the obstacles that a part runs through."""

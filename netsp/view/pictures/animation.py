@@ -96,13 +96,13 @@ def save_animation(
         # renamed into place when it is whole: Ctrl-C leaves what was there before
         with tempfile.TemporaryDirectory(dir=target.parent, prefix=".netsp-") as folder:
             part = Path(folder) / f"film{suffix}"
-            write(part, _told(_pictures(films, count), count, on_progress), fps)
+            write(part, _report_frames(_pictures(films, count), count, on_progress), fps)
             part.replace(target)
     except OSError as error:
         raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None
 
 
-def _told(
+def _report_frames(
     pictures: Iterator[Any], count: int, on_progress: Callable[[int, int], None] | None
 ) -> Iterator[Any]:
     for k, picture in enumerate(pictures, 1):
@@ -287,8 +287,8 @@ def _check_ffmpeg(imageio_ffmpeg: Any) -> None:
     """InputError unless there is an ffmpeg that runs: a broken one would be blamed on the film."""
     try:
         program = imageio_ffmpeg.get_ffmpeg_exe()
-        said = subprocess.run([program, "-version"], capture_output=True, timeout=30).stdout
-        why = "" if b"ffmpeg version" in said else f"{program} is none"
+        version_text = subprocess.run([program, "-version"], capture_output=True, timeout=30).stdout
+        why = "" if b"ffmpeg version" in version_text else f"{program} is none"
     except (RuntimeError, OSError, subprocess.SubprocessError) as error:
         why = str(error)
     if why:

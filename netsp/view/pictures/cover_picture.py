@@ -42,9 +42,9 @@ def save(found: Cover, scene: Scene, file: str | Path) -> None:
         (~found.visible_patches, style.ROBOT, "cannot be seen"),
     )
     for chosen, colour, label in kinds:
-        there = patches.centres[chosen][::step]
-        if len(there):
-            space.scatter(*there.T, s=1.5, color=colour, label=label, depthshade=False)
+        shown_centres = patches.centres[chosen][::step]
+        if len(shown_centres):
+            space.scatter(*shown_centres.T, s=1.5, color=colour, label=label, depthshade=False)
     ahead = ARROW_LENGTH * np.column_stack(
         [np.cos(found.viewpoints.headings), np.sin(found.viewpoints.headings)]
     )

@@ -51,10 +51,10 @@ def draw_map(done: Execution, *, ax: Any = None) -> Any:
     problem = done.problem
     if ax is None:
         ax = Figure(figsize=(7, 6), layout="constrained").subplots()
-    few = len(problem.obstacles) <= 40
+    is_labelled = len(problem.obstacles) <= 40
     maps = done.maps or [(0.0, problem)]
     at_first = lasting_problem(maps)
-    draw_obstacles(ax, at_first, label=at_first.obstacle_name if few else None)
+    draw_obstacles(ax, at_first, label=at_first.obstacle_name if is_labelled else None)
     plan = np.array(done.solution.path).reshape(-1, 3)
     path = np.array([[r.x, r.y] for r in done.rows]).reshape(-1, 2)
     standing = [o.representative_point for o in at_first.obstacles]

@@ -107,10 +107,10 @@ def steps_of(films: Sequence[Film], count: int) -> tuple[str, list[Step]]:
     steps = []
     for share in np.linspace(0.0, 1.0, count):
         numbers = tuple(
-            round(min(share * most / film.length, 1.0) * (len(film.moments) - 1))
+            round(min(share * longest_tether / film.length, 1.0) * (len(film.moments) - 1))
             if film.length > 0.0
             else 0
-            for film, most in zip(films, longest, strict=True)
+            for film, longest_tether in zip(films, longest, strict=True)
         )
         steps.append(Step(f"{share * (longest[0] if alike else 100.0):.4g}", numbers))
     return films[0].measured_in if alike else "done (%)", steps

@@ -43,9 +43,9 @@ def draw_gtsp(instance: Instance, result: Result, *, ax: Any = None) -> Any:
         tour = places[[*result.tour, result.tour[0]]]
         ax.plot(*tour.T, "o-", color=style.PATH, ms=4.5, lw=1.6, zorder=3, label="tour")
     ax.set(xlabel="x", ylabel="y", aspect="equal")
-    told = "no tour" if result.length is None else f"tour {result.length:.8g}"
+    title = "no tour" if result.length is None else f"tour {result.length:.8g}"
     if result.bound is not None:
-        told += f", {result.bound.says(digits=8)}"
-    ax.set_title(f"{instance.name}: {instance.summary}; {told}", fontsize=9, loc="left")
+        title += f", {result.bound.says(digits=8)}"
+    ax.set_title(f"{instance.name}: {instance.summary}; {title}", fontsize=9, loc="left")
     ax.figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=8)
     return ax

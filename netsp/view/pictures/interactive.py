@@ -84,13 +84,13 @@ def write_figure(
     InputError
         The file cannot be written.
     """
-    told = {
+    trace_fields = {
         "data": figure.data,
         "layout": figure.layout,
         "frames": frames,
         "config": {"responsive": True, "displaylogo": False},
     }
-    packed = json.dumps([_packed_library(), _packed(json.dumps(_plain(told)))])
+    packed = json.dumps([_packed_library(), _packed(json.dumps(_plain(trace_fields)))])
     write_text(file, PAGE.format(title=html.escape(title), packed=packed))
 
 

@@ -139,8 +139,8 @@ def draw_tether(runs: Sequence[Run], *, ax: Any = None, units: str = "m") -> Any
         label="limit",
     )
     what = "payout" if any(r.payout > r.tether for run in runs for r in run.log) else "taut tether"
-    most = max(max(r.payout, r.limit) for run in runs for r in run.log)
-    ax.set(xlabel="time (s)", ylabel=f"{what} ({units})", ylim=(0, 1.06 * most))
+    max_length = max(max(r.payout, r.limit) for run in runs for r in run.log)
+    ax.set(xlabel="time (s)", ylabel=f"{what} ({units})", ylim=(0, 1.06 * max_length))
     ax.legend(loc="best", fontsize=8)
     return ax
 

@@ -85,15 +85,15 @@ def moments_of_plan(problem: Problem, solution: Solution, count: int) -> list[Mo
         state = model.lay(np.array(solution.start_tether))
     out, at = [], 0
     for u in np.linspace(0.0, s[-1], count + 1):
-        here = np.array([np.interp(u, s, path[:, k]) for k in range(3)])
+        robot_place = np.array([np.interp(u, s, path[:, k]) for k in range(3)])
         passed = int(np.searchsorted(s, u))
-        state = model.drive(state, np.vstack([path[at:passed], here]))[0]
+        state = model.drive(state, np.vstack([path[at:passed], robot_place]))[0]
         at = max(at, passed)
         text = (
             f"{u:.4g} of {s[-1]:.4g} {problem.units}; tether {state.length:.4g} of "
             f"{problem.tether_length:g} {problem.units}"
         )
-        gone = np.vstack([path[:passed], here])
+        gone = np.vstack([path[:passed], robot_place])
         visited = tuple(g for g, n in reached if s[n] <= u * (1.0 + 1e-12))
         out.append(Moment(state.nodes, gone, text, problem, {VISITED: visited}))
     return out
@@ -246,9 +246,9 @@ def moments_of_mission(mission: Mission, scene: Scene, count: int) -> list[Momen
     s = polylines.along(path)
     units, all_of, out, at = scene.units, len(mission.waypoints), [], 0
     for u in np.linspace(0.0, s[-1], count + 1):
-        here = np.array([np.interp(u, s, path[:, k]) for k in range(3)])
+        robot_place = np.array([np.interp(u, s, path[:, k]) for k in range(3)])
         passed = int(np.searchsorted(s, u))
-        state = model.drive(state, np.vstack([path[at:passed], here]))[0]
+        state = model.drive(state, np.vstack([path[at:passed], robot_place]))[0]
         at = max(at, passed)
         visited = tuple(range(int((ends <= u + 1e-9 * s[-1]).sum())))
         left = tuple(range(len(ends), all_of)) if u == s[-1] else ()
@@ -256,7 +256,7 @@ def moments_of_mission(mission: Mission, scene: Scene, count: int) -> list[Momen
             f"{u:.4g} of {s[-1]:.4g} {units}; tether {state.length:.4g} of "
             f"{mission.tether_length:g} {units}; {len(visited)} of {all_of} visited"
         )
-        gone = np.vstack([path[:passed], here])
+        gone = np.vstack([path[:passed], robot_place])
         out.append(Moment(state.nodes, gone, text, fates={VISITED: visited, LEFT_OUT: left}))
     return out
 

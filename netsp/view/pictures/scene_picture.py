@@ -198,16 +198,16 @@ def draw_stops(ax: Any, stops: WaypointMarks, axes: tuple[int, ...]) -> None:
     """Waypoints on two or three of the axes (0, 1, 2) of space, with their numbers in the order of
     the tour where these are few enough to be read."""
     columns = list(axes)
-    some = np.isin(np.arange(len(stops.places)), stops.left_out)
+    is_left_out = np.isin(np.arange(len(stops.places)), stops.left_out)
     to_visit = {"marker": "o", "ms": 4, "color": style.GOAL, "mec": style.PATH, "mew": 1.0}
     visited = {"marker": "o", "ms": 4, "color": style.VISITED}
     for chosen, look, label in (
-        (~some, visited if stops.visited else to_visit, stops.name),
-        (some, {"marker": "x", "ms": 6, "mew": 1.8, "color": style.LEFT_OUT}, "not visited"),
+        (~is_left_out, visited if stops.visited else to_visit, stops.name),
+        (is_left_out, {"marker": "x", "ms": 6, "mew": 1.8, "color": style.LEFT_OUT}, "not visited"),
     ):
-        there = stops.places[chosen][:, columns]
-        if len(there):
-            ax.plot(*there.T, ls="none", label=label, **look)
+        chosen_places = stops.places[chosen][:, columns]
+        if len(chosen_places):
+            ax.plot(*chosen_places.T, ls="none", label=label, **look)
     if len(columns) == 2 and len(stops.places) <= MAX_NUMBERED:
         for k, (x, y) in enumerate(stops.places[:, columns]):
             ax.annotate(

@@ -124,12 +124,12 @@ def _write(figure: Any, target: Any, **more: Any) -> None:
     # without a salt, the element ids of an SVG are random
     with warnings.catch_warnings(), rc_context({"svg.hashsalt": "netsp"}):
         warnings.filterwarnings("ignore", message=r"Glyph \d+|constrained_layout not applied")
-        with _steps_told(figure):
+        with _ticks_formatted(figure):
             literal(figure).savefig(target, **more)
 
 
 @contextmanager
-def _steps_told(figure: Any) -> Iterator[None]:
+def _ticks_formatted(figure: Any) -> Iterator[None]:
     """While the body draws a figure, what it consists of is counted."""
     parts = [part for axes in figure.axes for part in axes.get_children()]
     done = 0
@@ -183,7 +183,7 @@ def _fonts_of_other_scripts() -> tuple[str, ...]:
     """Return fonts of this machine with letters that Matplotlib's own font lacks."""
     from matplotlib import font_manager
 
-    there = set(font_manager.get_font_names())
+    known_fonts = set(font_manager.get_font_names())
     wanted = (
         "Noto Sans CJK JP",
         "Noto Sans CJK SC",
@@ -192,4 +192,4 @@ def _fonts_of_other_scripts() -> tuple[str, ...]:
         "Noto Sans",
         "Unifont",
     )
-    return tuple(name for name in wanted if name in there)
+    return tuple(name for name in wanted if name in known_fonts)

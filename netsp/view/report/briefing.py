@@ -66,17 +66,17 @@ def imported(site: Site) -> str:
         Elements.
     """
     head, *rows = site.table()
-    said = f"Imported from {site.file}. What was left out is not in the plan."
+    import_text = f"Imported from {site.file}. What was left out is not in the plan."
     if site.edited:
-        said += " The problem was edited after the import; the table shows the import."
+        import_text += " The problem was edited after the import; the table shows the import."
     if site.cropped is not None:
         x, y = site.cropped.center
-        said += (
+        import_text += (
             f" Obstacles farther than {site.cropped.radius:.4g} from ({x:.4g}, {y:.4g}) were left "
             "out: no tether of the length given at the import reaches them."
         )
     words = (0, len(head) - 1)
-    return f'<p class="note">{html.escape(said)}</p>' + table(head, rows, words)
+    return f'<p class="note">{html.escape(import_text)}</p>' + table(head, rows, words)
 
 
 def checks(verdict: Verification) -> str:
@@ -211,12 +211,15 @@ def tethers(problem: Problem, solution: Solution) -> str:
     rows = []
     for k, v in enumerate(solution.tour):
         tether, name = paths.tether_if_found(v.goal, v.signature), problem.goal_name(v.goal)
-        passed = back = "unknown: the taut tether was not found"
+        passed = homeward = "unknown: the taut tether was not found"
         if tether is not None:
             runs.append(passages(problem, tether, v.signature))
             names.append(name)
-            passed, back = listed(problem, runs[-1]), back_from(problem, runs, names, len(runs) - 1)
-        rows.append([str(k + 1), name, passed, back, str(list(v.signature))])
+            passed, homeward = (
+                listed(problem, runs[-1]),
+                back_from(problem, runs, names, len(runs) - 1),
+            )
+        rows.append([str(k + 1), name, passed, homeward, str(list(v.signature))])
     return table(
         ["visit", "goal", "the tether passes", "if it snags here, or on the way on", "word"],
         rows,

@@ -239,9 +239,11 @@ def round_step(span: float, parts: float) -> float:
     float
         The step.
     """
-    least = span / parts
-    power = 10.0 ** math.floor(math.log10(least))
-    return float(next(power * k for k in (1.0, 2.0, 5.0, 10.0) if power * k >= least * (1 - 1e-9)))
+    min_step = span / parts
+    power = 10.0 ** math.floor(math.log10(min_step))
+    return float(
+        next(power * k for k in (1.0, 2.0, 5.0, 10.0) if power * k >= min_step * (1 - 1e-9))
+    )
 
 
 def _frame(problem: Problem, view: View) -> list[str]:

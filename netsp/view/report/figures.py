@@ -112,23 +112,23 @@ def performance(by_method: dict[str, list[TrialRow]]) -> Any | None:
     figure, axes = _figure()
     panel = axes[0][0]
     finite = [r[np.isfinite(r)] for r in ratios.values()]
-    most = 2.0 * max(float(r.max(initial=1.0)) for r in finite)
+    axis_end = 2.0 * max(float(r.max(initial=1.0)) for r in finite)
     for k, (name, r) in enumerate(ratios.items()):
         held = r[np.isfinite(r)]
-        x = np.concatenate([[1.0], np.repeat(held, 2), [most]])
+        x = np.concatenate([[1.0], np.repeat(held, 2), [axis_end]])
         share = np.repeat(np.arange(len(held) + 1) / len(r), 2)
         style = {**_style(k), "marker": ""}
         panel.plot(x, share, label=name, **style)
     panel.set(
         xscale="log",
-        xlim=(1.0, most),
+        xlim=(1.0, axis_end),
         ylim=(-0.02, 1.02),
         ylabel="share proven",
         xlabel="times the seconds of the fastest",
     )
     panel.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     panel.xaxis.set_minor_formatter(NullFormatter())
-    if most < 30.0:  # less than two numbers would stand at powers of ten
+    if axis_end < 30.0:  # less than two numbers would stand at powers of ten
         panel.xaxis.set_major_locator(FixedLocator([1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0]))
     panel.grid(alpha=0.3)
     if panel.get_legend_handles_labels()[0]:

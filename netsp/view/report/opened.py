@@ -135,9 +135,9 @@ class Opened:
         """Since when an obstacle stands on a goal; inf where it was left out for another reason."""
         for time, problem in self.maps:
             if goal < len(problem.goals):
-                place, least = problem.goals[goal].position[:2], problem.clearance
+                place, min_distance = problem.goals[goal].position[:2], problem.clearance
                 if any(
-                    float(o.signed_distance(place)) < least - problem.tolerance
+                    float(o.signed_distance(place)) < min_distance - problem.tolerance
                     for o in problem.obstacles
                 ):
                     return time

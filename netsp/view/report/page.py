@@ -163,15 +163,17 @@ def _proofs_table(by_cell: dict[Cell, list[TrialRow]]) -> str:
     """Table I: mean seconds of the trials proven, and how many of how many."""
     out = []
     for method in dict.fromkeys(c.method for c in by_cell):
-        own = {(c.goals, c.tether): rows for c, rows in by_cell.items() if c.method == method}
-        if not any(is_proven(r) for rows in own.values() for r in rows):
+        rows_of_method = {
+            (c.goals, c.tether): rows for c, rows in by_cell.items() if c.method == method
+        }
+        if not any(is_proven(r) for rows in rows_of_method.values() for r in rows):
             continue
-        tethers = sorted({t for _, t in own})
+        tethers = sorted({t for _, t in rows_of_method})
         body = []
-        for goals in sorted({g for g, _ in own}):
+        for goals in sorted({g for g, _ in rows_of_method}):
             line: list[Any] = [goals]
             for tether in tethers:
-                rows = own.get((goals, tether), [])
+                rows = rows_of_method.get((goals, tether), [])
                 proven = [r["total_s"] for r in rows if is_proven(r)]
                 mean = f"{sum(proven) / len(proven):.3g} s " if proven else ""
                 line.append(f"{mean}({len(proven)}/{len(rows)})" if rows else "")

@@ -81,7 +81,7 @@ def page(what: Opened) -> str:
     film, fates = what.film(moving.MOVING_FRAMES), what.fates
     view = chart.View.of(problem, film)
     title = f"{problem.name}: {'a run' if run else 'a tour'}"
-    own = problem.sha256 == solution.problem.sha256
+    is_same_problem = problem.sha256 == solution.problem.sha256
     found = briefing.of_tour(problem, solution) if run is None else None
     parts = [
         f"<h1>{html.escape(title)}</h1>",
@@ -96,13 +96,13 @@ def page(what: Opened) -> str:
         if run is None
         else _reached(problem, solution, run, fates, what.rows),
     ]
-    if own and problem.state is None and solution.status is not Status.INVALID:
+    if is_same_problem and problem.state is None and solution.status is not Status.INVALID:
         parts += ["<h2>How the tether runs</h2>", briefing.tethers(problem, solution)]
     if found is not None:
         parts += ["<h2>Margins</h2>", briefing.margin_list(problem, found)]
-    if run is None or own:
+    if run is None or is_same_problem:
         parts += ["<h2>Checks</h2>", briefing.checks(verify(problem, solution))]
-    if problem.state is None and own:
+    if problem.state is None and is_same_problem:
         parts += [
             "<h2>Measures of entanglement</h2>",
             '<p class="note">Stricter notions from the literature, for comparison: the tour is '
@@ -142,10 +142,10 @@ def _summary(problem: Problem, solution: Solution, what: Opened) -> str:
     if what.run is not None:
         s = json_of(what.run / "summary.json")
         lengths = lengths_of(what.rows)
-        told = describe_limits(limit_periods(*lengths[:3]), overruns(*lengths), units)
+        visit_words = describe_limits(limit_periods(*lengths[:3]), overruns(*lengths), units)
         lines.append(
             f"Carried out in {s['time_s']:.5g} s over {s['path']:.6g} {units}: "
-            f"{counted(s['visited'], 'goal')} visited, tether {told}; "
+            f"{counted(s['visited'], 'goal')} visited, tether {visit_words}; "
             f"{'recovered free' if s['tether_free'] else 'not recovered free'} at the end."
         )
     return "".join(f"<p>{line}</p>" for line in lines)
@@ -181,7 +181,7 @@ def _reached(
     rows: list[list[str]] = []
     missed = list(planned)
 
-    def told(goal: int) -> list[str]:
+    def visit_words(goal: int) -> list[str]:
         v = planned.get(goal)
         return ["–", "–"] if v is None else [f"{v.tether_length:.5g}", str(list(v.signature))]
 
@@ -201,12 +201,12 @@ def _reached(
                 f"{out:.5g}",
                 f"{limit - out:.5g}",
                 str([int(a) for a in row["word"].split()]),
-                *told(goal),
+                *visit_words(goal),
             ]
         )
     for goal in missed:
         fate = fates.get(goal, "not reached")
-        rows.append(["–", problem.goal_name(goal), fate, "–", "–", "–", *told(goal)])
+        rows.append(["–", problem.goal_name(goal), fate, "–", "–", "–", *visit_words(goal)])
     return briefing.table(head, rows, (1, 5, 7))
 
 
