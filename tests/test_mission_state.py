@@ -225,7 +225,7 @@ def test_a_waypoint_that_a_solid_stands_on_is_left_out_and_the_others_are_visite
 
 def test_where_the_order_no_longer_holds_the_rest_is_planned_anew(planned, monkeypatch):
     """Without ways round what blocks a leg there is only another tour."""
-    monkeypatch.setattr(RepairPlanner, "_way_round", lambda *_: None)
+    monkeypatch.setattr(RepairPlanner, "_path_around", lambda *_: None)
     run = fly(planned, appear(middle_of(planned[0], 1), 0.15, 0.5), planning_limit=5.0)
     s = run.summary
     (repair,) = s["repairs"]

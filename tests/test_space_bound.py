@@ -16,6 +16,7 @@ from netsp.plan.space.path_bound import LegBounds, bound_all_tours
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import PlanningContext
 from netsp.plan.space.potential import (
+    Ends,
     Region,
     corner_edges,
     fast_march,
@@ -84,7 +85,7 @@ def test_no_path_through_a_slot_or_round_a_wall_is_shorter_than_its_bound(
     region = Region(room, np.array(BOUNDS, dtype=float).reshape(2, 3), a, math.inf)
     around = round_the_end(a, b, thick, room)
     least = min(around, through(a, b, y, width, thick, room))
-    bound = path_bound(field, a, b, region, 1.2 * around, CELLS)
+    bound = path_bound(field, Ends(a, b, 1.2 * around), region, CELLS)
     assert np.linalg.norm(b - a) <= bound <= least * (1.0 + 1e-9)
 
 
@@ -94,7 +95,7 @@ def test_the_bound_round_a_wall_is_most_of_the_way(cells):
     field = wall(-4.0, 0.0, thick=0.8).field()
     region = Region(0.05, np.array(BOUNDS, dtype=float).reshape(2, 3), a, math.inf)
     around = round_the_end(a, b, 0.8, 0.05)
-    bound = path_bound(field, a, b, region, 1.1 * around, cells)
+    bound = path_bound(field, Ends(a, b, 1.1 * around), region, cells)
     assert (0.75 if cells < 10_000 else 0.85) * around <= bound <= around
     assert np.linalg.norm(b - a) < 0.7 * around
 
@@ -105,10 +106,10 @@ def test_the_bound_of_an_arc_over_a_sphere_is_below_its_length():
     touching = math.sqrt(1.5**2 - 1.0)
     exact = 2.0 * (touching + (0.5 * math.pi - math.acos(1.0 / 1.5)))
     region = Region(0.0, EVERYWHERE, a, math.inf)
-    bound = path_bound(field, a, b, region, 1.2 * exact, 30_000)
+    bound = path_bound(field, Ends(a, b, 1.2 * exact), region, 30_000)
     assert 3.0 <= bound <= exact
     # and no path leads farther from the anchor than the tether reaches
-    short = path_bound(field, a, b, region._replace(reach=1.2), 1.2 * exact, 4_000)
+    short = path_bound(field, Ends(a, b, 1.2 * exact), region._replace(reach=1.2), 4_000)
     assert short >= 1.15 * exact
 
 
@@ -187,7 +188,7 @@ def test_a_bound_ends_with_its_clock_and_what_is_proven_by_then_is_a_bound():
     around = round_the_end(a, b, 0.8, 0.05)
     begin = time.process_time()
     for seconds in (0.0, 0.05):
-        bound = path_bound(field, a, b, region, 1.1 * around, 2_000_000, clock=Clock(seconds))
+        bound = path_bound(field, Ends(a, b, 1.1 * around), region, 2_000_000, clock=Clock(seconds))
         assert np.linalg.norm(b - a) <= bound <= around
     assert time.process_time() - begin < 1.0
 

@@ -363,10 +363,8 @@ class StateGraph:
         stops: list[TourVisit] = []
         total, fault, first_deviation = 0.0, None, None
         delta = context.mission.delta
-        word, at_home = (
-            context.word_number(tether.nodes),
-            context.word_number(context.start_tether.nodes),
-        )
+        word = context.word_number(tether.nodes)
+        at_home = context.word_number(context.start_tether.nodes)
         for state in [*tour, -1]:
             path = self.path(last, state)
             tether, longest = context.drive(tether, path, is_fine=True)
@@ -374,17 +372,17 @@ class StateGraph:
             expected = context.start_tether if state < 0 else states.entries[state].tether
             pair = (min(last, state), max(last, state))
             leg_word = context.word_number(path)
-            word = (
-                None if word is None or leg_word is None else context.words.multiply(word, leg_word)
-            )
+            if word is None or leg_word is None:
+                word = None
+            else:
+                word = context.words.multiply(word, leg_word)
             is_as_expected = word == (at_home if state < 0 else states.entries[state].word)
             # first leg after which the tether lies otherwise than in its state, or in another
             # class; no fault if the tether comes free in the end
-            first_deviation = (
-                None
-                if is_as_expected and hang_alike(tether, expected, delta)
-                else first_deviation or pair
-            )
+            if is_as_expected and hang_alike(tether, expected, delta):
+                first_deviation = None
+            else:
+                first_deviation = first_deviation or pair
             if fault is None and (longest > states.limit or word is None):
                 fault = first_deviation or pair
             if state >= 0:

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from netsp.base.arrays import Floats
+from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Flag, abandoned, end_if_abandoned
 from netsp.base.compiled.dynamic_array import write_ints
 from netsp.base.compiled.kernel import kernel
@@ -103,6 +104,34 @@ class Cells:
         return np.asarray(self.low + (np.asarray(cells) + 0.5) * self.cell)
 
 
+class Marking(NamedTuple):
+    """Cells whose edges and squares are marked, with room for the marking of one of them.
+
+    Attributes
+    ----------
+    field, low, cell, flags
+        As in `Cells`.
+    room
+        (nx, ny, nz) distance of the centre of each cell from solids, metres.
+    at
+        (3,) the cell that is marked.
+    to, centre
+        (3,) overwritten.
+    max_halvings
+        How often an edge or a square is divided to prove that it is free.
+    """
+
+    field: Field
+    low: Floats
+    cell: float
+    flags: npt.NDArray[np.uint8]
+    room: npt.NDArray[np.float32]
+    at: Ints
+    to: Ints
+    centre: Floats
+    max_halvings: int
+
+
 @kernel
 def complex_flags(
     field: Field,
@@ -131,66 +160,82 @@ def complex_flags(
                 room[i, j, k] = d
                 if d >= min_room_ratio * cell:
                     flags[i, j, k] = FREE_CELL
-    last = np.array([nx, ny, nz]) - 1
     at, to, centre = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64), np.empty(3)
+    marking = Marking(field, low, cell, flags, room, at, to, centre, max_halvings)
     for i in range(nx):
         if stop[0] != 0:
             break
         for j in range(ny):
             for k in range(nz):
-                if flags[i, j, k] == 0:
-                    continue
-                if room[i, j, k] >= 1.75 * cell:
-                    flags[i, j, k] |= OPEN_CELL
-                wide = room[i, j, k] >= 1.4143 * cell
-                at[0], at[1], at[2] = i, j, k
-                for axis in range(3):
-                    if at[axis] == last[axis]:
-                        continue
-                    write_ints(to, at, 3)
-                    to[axis] += 1
-                    if not flags[to[0], to[1], to[2]] & FREE_CELL:
-                        continue
-                    if not wide:
-                        for c in range(3):
-                            centre[c] = low[c] + (0.5 * (at[c] + to[c]) + 0.5) * cell
-                        if room[i, j, k] + room[to[0], to[1], to[2]] < 1.0001 * cell and (
-                            not is_covered(field, centre, cell, axis, -1, max_halvings)
-                        ):
-                            continue
-                    flags[i, j, k] |= EDGE_BIT << axis
+                if flags[i, j, k] != 0:
+                    at[0], at[1], at[2] = i, j, k
+                    mark_edges(marking)
     for i in range(nx):
         if stop[0] != 0:
             break
         for j in range(ny):
             for k in range(nz):
-                if flags[i, j, k] == 0:
-                    continue
-                wide = room[i, j, k] >= 1.4143 * cell
-                at[0], at[1], at[2] = i, j, k
-                for axis in range(3):
-                    a, b = (axis + 1) % 3, (axis + 2) % 3
-                    if at[a] == last[a] or at[b] == last[b]:
-                        continue
-                    if not (flags[i, j, k] & (EDGE_BIT << a) and flags[i, j, k] & (EDGE_BIT << b)):
-                        continue
-                    write_ints(to, at, 3)
-                    to[a] += 1
-                    if not flags[to[0], to[1], to[2]] & (EDGE_BIT << b):
-                        continue
-                    write_ints(to, at, 3)
-                    to[b] += 1
-                    if not flags[to[0], to[1], to[2]] & (EDGE_BIT << a):
-                        continue
-                    if not wide:
-                        for c in range(3):
-                            centre[c] = low[c] + (at[c] + 0.5) * cell
-                        centre[a] += 0.5 * cell
-                        centre[b] += 0.5 * cell
-                        if not is_covered(field, centre, cell, a, b, max_halvings):
-                            continue
-                    flags[i, j, k] |= SQUARE_BIT << axis
+                if flags[i, j, k] != 0:
+                    at[0], at[1], at[2] = i, j, k
+                    mark_squares(marking)
     return flags
+
+
+@kernel
+def mark_edges(marking: Marking) -> None:
+    """Set the bits of a free cell for its edges that are free, and for an open cell."""
+    low, cell, flags, room = marking.low, marking.cell, marking.flags, marking.room
+    at, to, centre = marking.at, marking.to, marking.centre
+    i, j, k = at[0], at[1], at[2]
+    if room[i, j, k] >= 1.75 * cell:
+        flags[i, j, k] |= OPEN_CELL
+    wide = room[i, j, k] >= 1.4143 * cell
+    for axis in range(3):
+        if at[axis] == flags.shape[axis] - 1:
+            continue
+        write_ints(to, at, 3)
+        to[axis] += 1
+        if not flags[to[0], to[1], to[2]] & FREE_CELL:
+            continue
+        if not wide:
+            for c in range(3):
+                centre[c] = low[c] + (0.5 * (at[c] + to[c]) + 0.5) * cell
+            if room[i, j, k] + room[to[0], to[1], to[2]] < 1.0001 * cell and (
+                not is_covered(marking.field, centre, cell, axis, -1, marking.max_halvings)
+            ):
+                continue
+        flags[i, j, k] |= EDGE_BIT << axis
+
+
+@kernel
+def mark_squares(marking: Marking) -> None:
+    """Set the bits of a free cell for its squares that are free; all edges are marked before."""
+    low, cell, flags, room = marking.low, marking.cell, marking.flags, marking.room
+    at, to, centre = marking.at, marking.to, marking.centre
+    i, j, k = at[0], at[1], at[2]
+    wide = room[i, j, k] >= 1.4143 * cell
+    for axis in range(3):
+        a, b = (axis + 1) % 3, (axis + 2) % 3
+        if at[a] == flags.shape[a] - 1 or at[b] == flags.shape[b] - 1:
+            continue
+        if not (flags[i, j, k] & (EDGE_BIT << a) and flags[i, j, k] & (EDGE_BIT << b)):
+            continue
+        write_ints(to, at, 3)
+        to[a] += 1
+        if not flags[to[0], to[1], to[2]] & (EDGE_BIT << b):
+            continue
+        write_ints(to, at, 3)
+        to[b] += 1
+        if not flags[to[0], to[1], to[2]] & (EDGE_BIT << a):
+            continue
+        if not wide:
+            for c in range(3):
+                centre[c] = low[c] + (at[c] + 0.5) * cell
+            centre[a] += 0.5 * cell
+            centre[b] += 0.5 * cell
+            if not is_covered(marking.field, centre, cell, a, b, marking.max_halvings):
+                continue
+        flags[i, j, k] |= SQUARE_BIT << axis
 
 
 @kernel

@@ -125,6 +125,12 @@ def _proven(gap: float | None) -> bool:
     return gap is not None and gap <= OPTIMALITY_TOLERANCE
 
 
+def _first_of(faults: list[str]) -> str:
+    """Return the first fault, and how many more there are; empty without any."""
+    more = f", and {len(faults) - 1} more" if len(faults) > 1 else ""
+    return f"{faults[0]}{more}" if faults else ""
+
+
 def _shown(point: Floats) -> str:
     return f"({', '.join(f'{v:.4g}' for v in point)})"
 
@@ -277,9 +283,7 @@ class _Judge:
             Check(
                 "words at the stops",
                 not wrong,
-                f"all as stated{certain}"
-                if not wrong
-                else f"{wrong[0]}" + (f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""),
+                _first_of(wrong) or f"all as stated{certain}",
             ),
             Check(
                 "empty word at the end",
@@ -301,16 +305,7 @@ class _Judge:
             if longest_on_leg > longest:
                 longest, longest_leg = longest_on_leg, k
             if k < len(self.tour.stops):
-                stop = self.tour.stops[k]
-                for length, stated, relation in (
-                    (tether.length, stop.tether_length, "at"),
-                    (longest_on_leg, stop.longest_tether, "on the way to"),
-                ):
-                    allowed = self.mission.delta + self.policy.max_length_error * stated
-                    if abs(length - stated) > allowed:
-                        deviations.append(
-                            f"{relation} stop {k}: {length:.3f} m, stated {stated:.3f}"
-                        )
+                deviations += self._deviations(k, tether.length, longest_on_leg)
         # as at the start, but to where the tour ends, which may be its reach away
         as_laid = model.update(laid, tether.robot)
         left = model.refine(tether).length - model.refine(as_laid).length
@@ -325,10 +320,7 @@ class _Judge:
             Check(
                 "tethers as long as stated",
                 not deviations,
-                "all"
-                if not deviations
-                else f"{deviations[0]}"
-                + (f", and {len(deviations) - 1} more" if len(deviations) > 1 else ""),
+                _first_of(deviations) or "all",
             ),
             Check(
                 "free at home",
@@ -336,6 +328,17 @@ class _Judge:
                 f"{max(left, 0.0):.3f} m longer than at the start",
             ),
         ]
+
+    def _deviations(self, k: int, length_at: float, longest_on_leg: float) -> list[str]:
+        """Return the lengths at a stop and on the way to it that differ from the stated ones."""
+        stop, out = self.tour.stops[k], []
+        for length, stated, relation in (
+            (length_at, stop.tether_length, "at"),
+            (longest_on_leg, stop.longest_tether, "on the way to"),
+        ):
+            if abs(length - stated) > self.mission.delta + self.policy.max_length_error * stated:
+                out.append(f"{relation} stop {k}: {length:.3f} m, stated {stated:.3f}")
+        return out
 
     def _length(self) -> Check:
         """Check the length of the tour."""

@@ -356,7 +356,7 @@ def solve_mission(
         if on_progress is not None:
             on_progress(text)
 
-    name = solver if isinstance(solver, str) else getattr(solver, "__name__", "solver")
+    options = _SolverOptions(solver, params, iteration_limit, seed)
     with until_interrupt(time_limit) as clock:
         check_plannable(mission, solver, params, seed)
         try:
@@ -375,24 +375,28 @@ def solve_mission(
             if clock.is_stopped and not (isinstance(time_limit, Clock) and time_limit.is_up):
                 raise KeyboardInterrupt from None
             raise
-        searched = _search(found, clock, name, solver, params, iteration_limit, seed)
-        planned = searched.plan
-        if found.given is None:
-            given, _ = flights.fly(mission, "the order as given")
-            found.keep_given_flight(given)
-            _offer_given_flight(found, seed)
-        _offer_going_on(found, seed)
-        if found.best is None:
-            raise searched.failure or LimitReachedError(
-                "waypoints: no tour was found whose tether stays within the limit all along"
-            )
-        found.fly_best()
-        _offer_given_flight(found, seed)
-        best = _with_bound(found.best, searched.bounds)
+        searched = _search(found, clock, options)
+        best = _with_bound(_finished(found, searched, seed), searched.bounds)
         best = replace(best, mission=with_gaps(best.mission, context))
         return replace(
-            best, given=found.given, plan=planned, interrupted=clock.is_stopped, gaps=gaps
+            best, given=found.given, plan=searched.plan, interrupted=clock.is_stopped, gaps=gaps
         )
+
+
+def _finished(found: _Incumbents, searched: _SearchResult, seed: int) -> SolvedMission:
+    """Offer the last tours after the search, and return the incumbent, flown if there is time."""
+    if found.given is None:
+        given, _ = found.flights.fly(found.flights.mission, "the order as given")
+        found.keep_given_flight(given)
+        _offer_given_flight(found, seed)
+    _offer_going_on(found, seed)
+    if found.best is None:
+        raise searched.failure or LimitReachedError(
+            "waypoints: no tour was found whose tether stays within the limit all along"
+        )
+    found.fly_best()
+    _offer_given_flight(found, seed)
+    return found.best
 
 
 def with_gaps(mission: Mission, context: PlanningContext) -> Mission:
@@ -400,6 +404,23 @@ def with_gaps(mission: Mission, context: PlanningContext) -> Mission:
     assert mission.tour is not None
     gaps = {"unresolved_gaps": context.unresolved_gaps}
     return mission.model_copy(update={"tour": mission.tour.model_copy(update=gaps)})
+
+
+@dataclass(frozen=True)
+class _SolverOptions:
+    """Solver, and its options as in `netsp.plan.solve_problem.solve_graph`."""
+
+    solver: SolverLike
+    params: Mapping[str, Any] | None
+    iteration_limit: int | None
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Return the name of the solver."""
+        if isinstance(self.solver, str):
+            return self.solver
+        return str(getattr(self.solver, "__name__", "solver"))
 
 
 @dataclass
@@ -460,7 +481,7 @@ def _offer_given_flight(found: _Incumbents, seed: int) -> None:
         return
     order = tuple(range(len(mission.waypoints)))
     context = found.flights.context
-    flown_tour = tour_of_flight(mission, order, given, context.field, context, None, seed, AS_GIVEN)
+    flown_tour = tour_of_flight(mission, order, given, context.field, context, seed, AS_GIVEN)
     if flown_tour is None or not flown_tour.tour.stops:
         return
     if best is None:
@@ -469,15 +490,7 @@ def _offer_given_flight(found: _Incumbents, seed: int) -> None:
         found.offer(flown_tour, "it as it will be written")
 
 
-def _search(
-    found: _Incumbents,
-    clock: Clock,
-    name: str,
-    solver: SolverLike,
-    params: Mapping[str, Any] | None,
-    iteration_limit: int | None,
-    seed: int,
-) -> _SearchResult:
+def _search(found: _Incumbents, clock: Clock, options: _SolverOptions) -> _SearchResult:
     """Offer the tours of the plane and along states and legs."""
     flights, out = found.flights, _SearchResult()
     if clock.is_up and found.best is not None:
@@ -486,11 +499,11 @@ def _search(
         flights.mission,
         scene=flights.scene,
         context=flights.context,
-        solver=solver,
-        params=params,
+        solver=options.solver,
+        params=options.params,
         clock=clock.part(flights.policy.planning_share),
-        iteration_limit=iteration_limit,
-        seed=seed,
+        iteration_limit=options.iteration_limit,
+        seed=options.seed,
         whole_tether=True,
         on_progress=flights.on_progress,
     )
@@ -507,11 +520,11 @@ def _search(
                 best = found.best
                 if plan.kind == PLANE and best is not None and best.tour.solver == PLANE:
                     continue  # the accepted tour, for the whole tether, is at most as long
-                clock.bounded(
-                    "bounding all tours", partial(_raise_bound, out, plan, flights, clock, seed)
-                )
+                bound_tours = partial(_raise_bound, out, plan, flights, clock, options.seed)
+                clock.bounded("bounding all tours", bound_tours)
                 out.plan = out.plan if out.plan is not None and plan.kind == OUT_AND_BACK else plan
-                found.offer(_solved_from_plan(plan, name, seed), f"the tour ({plan.kind})")
+                solved = _solved_from_plan(plan, options.name, options.seed)
+                found.offer(solved, f"the tour ({plan.kind})")
                 has_tour = found.best is not None
                 if has_tour and (plan.kind == TAUT_LEGS or (needs_tour and clock.is_up)):
                     break
@@ -613,7 +626,7 @@ def _offer_going_on(found: _Incumbents, seed: int) -> None:
             continue
         if run is None or clock.is_overdue:
             break
-        flown_tour = tour_of_flight(ordered, order, run, context.field, context, None, seed)
+        flown_tour = tour_of_flight(ordered, order, run, context.field, context, seed)
         if flown_tour is not None:
             found.offer(flown_tour, "it as it will be written")
 
@@ -629,7 +642,6 @@ def tour_of_flight(
     run: Run,
     field: DistanceField,
     context: PlanningContext | None = None,
-    bound: float | None = None,
     seed: int = 0,
     solver: str = GOING_ON,
 ) -> SolvedMission | None:
@@ -641,9 +653,6 @@ def tour_of_flight(
         Original numbers of the mission's waypoints.
     context : PlanningContext, optional
         Context for the words of the visits; computed if needed.
-    bound : float, optional
-        Bound on all tours through the waypoints, metres. It is reduced by twice the distance that
-        the robot kept from each waypoint, and once at home.
     solver : str
         Value of `solver` in the tour.
 
@@ -655,8 +664,7 @@ def tour_of_flight(
     """
     if not _is_good(run):
         return None
-    stops = run.summary["stops"]
-    visited = [int(stop["waypoint"]) for stop in stops]
+    visited = [int(stop["waypoint"]) for stop in run.summary["stops"]]
     left_out = [k for k in range(len(order)) if k not in visited]
     parts = _log_of_legs(run.log, visited)
     legs = [np.array([[r.x, r.y, r.z] for r in part]) for part in parts]
@@ -664,36 +672,27 @@ def tour_of_flight(
     if not all(keeps_clearance(field, leg, mission) for leg in legs):
         return None
     context = context or PlanningContext.for_mission(mission, mission.load_scene(), field)
-    planned_stops = []
-    for k, stop in enumerate(stops):
+    stops = []
+    for k, stop in enumerate(run.summary["stops"]):
         walked = np.vstack([context.present_tether.nodes, *legs[: k + 1]])
         word, broken = context.words.try_word(walked)
         if broken is not None:
             return None
-        planned_stops.append(
-            PlannedVisit(
-                path=thinned_path(legs[k]),
-                signature=word,
-                tether_length=stop["tether"],
-                longest_tether=max(r.tether for r in parts[k]),
-                given_as=order[visited[k]],
-            )
+        planned_stop = PlannedVisit(
+            path=thinned_path(legs[k]),
+            signature=word,
+            tether_length=stop["tether"],
+            longest_tether=max(r.tether for r in parts[k]),
+            given_as=order[visited[k]],
         )
-    length = polylines.length(path)
-    if bound is not None:
-        ends = np.array([leg[-1] for leg in legs[:-1]]).reshape(-1, 3)
-        distances = np.linalg.norm(ends - mission.places[visited].reshape(-1, 3), axis=1)
-        short_of_home = float(np.linalg.norm(legs[-1][-1] - np.array(mission.start)))
-        bound = min(length, max(0.0, bound - 2.0 * float(distances.sum()) - short_of_home))
+        stops.append(planned_stop)
     tour = PlannedTour(
-        stops=tuple(planned_stops),
+        stops=tuple(stops),
         home=thinned_path(legs[-1]),
         status=Status.FEASIBLE,
         solver=solver,
         seed=seed,
-        length=length,
-        bound_of_all=bound,
-        gap_to_all=relative_gap(length, bound),
+        length=polylines.length(path),
         states=len(visited),
         legs=len(legs),
         exact=context.words.exact,

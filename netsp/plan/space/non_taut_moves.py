@@ -144,9 +144,9 @@ class Detours:
             return None
         current = orders[0] if not found else [leg.place for leg in found[-1][0].legs[:-1]]
         seen: set[tuple[int, ...]] = set()
-        moved = True
-        while moved:
-            moved = False
+        has_moved = True
+        while has_moved:
+            has_moved = False
             for order in self._neighbouring_orders(current, shortest, cutoff):
                 if clock.is_up or len(seen) >= self._policy.max_orders:
                     break
@@ -157,7 +157,7 @@ class Detours:
                 stages = self._drive_order(order, cutoff, clock, current, found)
                 if stages is not None:
                     found, cutoff = stages, (1.0 - worth) * stages[-1][0].length
-                    current, moved = order, True
+                    current, has_moved = order, True
                     break
         return self._to_driven_tour(found[-1][0]) if found else None
 
@@ -291,7 +291,7 @@ class Detours:
         list or None
             Partial tours after each leg; None if no tour is short enough.
         """
-        context, states, places = self.paths.context, self.board.states, self.paths.places
+        context, places = self.paths.context, self.paths.places
         begin = HOME if places.present is None else places.present
         ends = [begin, *order, HOME]
         legs = [self._paths_between(n, m) for n, m in pairwise(ends)]
@@ -307,36 +307,54 @@ class Detours:
             shared += 1
             stages.append(known[shared])
         for k in range(shared, len(legs)):
-            last = k + 1 == len(legs)
-            ahead = sorted(
-                (line.length + polylines.length(path), i, j)
-                for i, line in enumerate(stages[k])
-                for j, (path, _) in enumerate(legs[k])
-                if line.length + polylines.length(path) + rest[k + 1] < cutoff
-            )
-            kept: list[_PartialTour] = []
-            for far, i, j in ahead:
-                if clock.is_up or len(kept) >= (1 if last else self.paths.effort.detour_tethers):
-                    break
-                line, (path, path_word) = stages[k][i], legs[k][j]
-                word = context.words.multiply(line.word, path_word)
-                tether, longest = context.drive(line.tether, path)
-                if longest > states.limit or any(
-                    self._is_same(other, tether, word) for other in kept
-                ):
-                    continue
-                if last and not self._is_free(tether, word):
-                    continue
-                in_flight = self._tether_in_flight(line, path, tether)
-                if in_flight is None:
-                    continue
-                kept.append(
-                    _PartialTour(far, tether, in_flight, word, line, ends[k + 1], path, longest)
-                )
+            kept = self._extend(stages[k], legs[k], ends[k + 1], rest[k + 1], cutoff, clock)
             if not kept:
                 return None
             stages.append(kept)
         return stages
+
+    def _extend(
+        self,
+        tours: list[_PartialTour],
+        paths: list[tuple[Floats, int]],
+        place: int,
+        rest: float,
+        cutoff: float,
+        clock: Clock,
+    ) -> list[_PartialTour]:
+        """Return the partial tours kept after another leg.
+
+        Parameters
+        ----------
+        rest : float
+            Least length of the legs after it, metres.
+        cutoff : float
+            Length that the whole tour must stay below, metres.
+        """
+        context, states, is_last = self.paths.context, self.board.states, place == HOME
+        ahead = sorted(
+            (tour.length + polylines.length(path), i, j)
+            for i, tour in enumerate(tours)
+            for j, (path, _) in enumerate(paths)
+            if tour.length + polylines.length(path) + rest < cutoff
+        )
+        kept: list[_PartialTour] = []
+        for length, i, j in ahead:
+            if clock.is_up or len(kept) >= (1 if is_last else self.paths.effort.detour_tethers):
+                break
+            tour, (path, path_word) = tours[i], paths[j]
+            word = context.words.multiply(tour.word, path_word)
+            tether, longest = context.drive(tour.tether, path)
+            if longest > states.limit or any(self._is_same(other, tether, word) for other in kept):
+                continue
+            if is_last and not self._is_free(tether, word):
+                continue
+            in_flight = self._tether_in_flight(tour, path, tether)
+            if in_flight is not None:
+                kept.append(
+                    _PartialTour(length, tether, in_flight, word, tour, place, path, longest)
+                )
+        return kept
 
     def _tether_in_flight(self, line: _PartialTour, path: Floats, after: Tether) -> Tether | None:
         """Return the tether of a robot in flight at the end of a leg; None if it does not hang as

@@ -17,7 +17,7 @@ from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock, end_if_abandoned
 from netsp.base.errors import LimitReachedError
 from netsp.plan.space.mission_policy import GapPolicy, WordPolicy
-from netsp.plan.space.potential import possibly_free, steepness
+from netsp.plan.space.potential import Ends, GridBox, Region, possibly_free, steepness
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.planned_tour import UnresolvedGap
 from netsp.world.paths.tree import Grid
@@ -159,23 +159,12 @@ def find_hidden_gaps(
     middle, whole = 0.5 * (grid.low + grid.high), float(np.linalg.norm(grid.high - grid.low))
     clock.check(SEARCHING)
     flag, steep = clock.flag, steepness(grid.field)
+    box = GridBox(grid.low, grid.high, grid.cell, shape)
+    # bounds of the region are those of the box; its reach and the ellipsoid hold the whole box
+    region = Region(grid.clearance, np.array([grid.low, grid.high]), middle, 2.0 * whole)
+    ends = Ends(middle, middle, 4.0 * whole)
     possible = clock.interruptible(
-        lambda: possibly_free(
-            grid.field.arrays,
-            grid.low,
-            grid.high,
-            grid.cell,
-            shape,
-            grid.clearance,
-            steep,
-            middle,
-            middle,
-            4.0 * whole,
-            middle,
-            2.0 * whole,
-            2,
-            flag,
-        )
+        lambda: possibly_free(grid.field.arrays, box, region, ends, steep, 2, flag)
     )
     gaps = _gaps_between(grid, free, free, possible, policy, clock)
     layers = _single_layers(free) & possible

@@ -30,7 +30,7 @@ from netsp.plan.space.planning_context import (
     DEPTH_TOLERANCE,
     is_straight_clear,
 )
-from netsp.plan.space.potential import Region, cells_at_level, path_bound
+from netsp.plan.space.potential import Ends, Region, cells_at_level, path_bound
 from netsp.plan.space.space_legs import RobotPaths
 from netsp.plan.space.upright import bound_by_upright_solids
 from netsp.roadmap.from_state import from_state
@@ -157,9 +157,8 @@ class LegBounds:
         if self.policy.cell_s * cells > clock.left:
             self.final[u, v] = self.final[v, u] = True
             return False
-        length = path_bound(
-            context.field, a, b, self._region(u, v), longest, cells, self.potential, clock
-        )
+        ends = Ends(a, b, longest)
+        length = path_bound(context.field, ends, self._region(u, v), cells, self.potential, clock)
         self.costs[u, v] = self.costs[v, u] = max(before, length)
         self._level[u, v] = self._level[v, u] = level
         if cells >= self.potential.max_cells or length >= (1.0 - self.policy.max_leg_gap) * longest:

@@ -18,7 +18,15 @@ from netsp.plan.space.cells import FREE_CELL, OPEN_CELL
 from netsp.plan.space.mission_policy import MissionPolicy
 from netsp.plan.space.passages import GapResolution
 from netsp.plan.space.space_signature import SpaceSignature
-from netsp.plan.space.word_search import NO_WORD, WordSearch, path_to_slot, shortest_words
+from netsp.plan.space.word_search import (
+    NO_WORD,
+    SearchBox,
+    SearchSpace,
+    Targets,
+    WordSearch,
+    path_to_slot,
+    shortest_words,
+)
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.planned_tour import UnresolvedGap
 from netsp.world.paths.standoff import move_off_surfaces
@@ -203,33 +211,26 @@ class PlanningContext:
         shape = np.array(cells.flags.shape)
         root = np.array(np.unravel_index(cell, cells.flags.shape), dtype=np.int64)
         first, last = np.zeros(3, dtype=np.int64), shape - 1
-        targets, scale = (
-            np.empty((0, 3), dtype=np.int64),
-            100.0 * self.policy.max_cell_path_ratio / cells.cell,
-        )
+        targets = np.empty((0, 3), dtype=np.int64)
+        scale = 100.0 * self.policy.max_cell_path_ratio / cells.cell
         if isinstance(max_length, float):
             limits = np.array([scale * max_length], dtype=np.int64)
         else:
             targets = np.column_stack(np.unravel_index(list(max_length), cells.flags.shape))
             limits = np.array([scale * v for v in max_length.values()], dtype=np.int64)
-            # a path is no farther from where it begins than half its length and what it leads to
+            # along each axis, no place of a path is farther from its begin than half of the sum of
+            # its length and the distance of its end
             distances = 100.0 * np.abs(targets - root)
             reach = np.ceil(0.005 * (limits[:, None] + distances).max(0)).astype(np.int64) + 1
             first, last = np.maximum(root - reach, 0), np.minimum(root + reach, shape - 1)
-        room = self.robot_cells if for_robot else self.tether_cells
+        passable = self.robot_cells if for_robot else self.tether_cells
         found, table = shortest_words(
-            cells.flags,
-            room,
-            self.open_cells[for_robot],
-            words.labels,
+            SearchSpace(cells.flags, words.labels, passable, self.open_cells[for_robot]),
             words.table,
             words.rules,
-            root,
-            first,
-            last,
+            SearchBox(root, first, last),
+            Targets(targets, limits),
             max_words,
-            targets,
-            limits,
             stop,
         )
         words.keep_table(table)

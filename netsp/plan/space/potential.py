@@ -53,12 +53,45 @@ class Region(NamedTuple):
     reach: float
 
 
+class GridBox(NamedTuple):
+    """Grid of a potential.
+
+    Attributes
+    ----------
+    low, high
+        (3,) corners of the box, metres; the last cells end at `high`.
+    cell
+        Size of a cell, metres.
+    shape
+        Numbers of cells along x, y and z.
+    """
+
+    low: Floats
+    high: Floats
+    cell: float
+    shape: tuple[int, int, int]
+
+
+class Ends(NamedTuple):
+    """Ends of the paths that a bound is for.
+
+    Attributes
+    ----------
+    a, b
+        (3,) the two ends, metres.
+    longest
+        Length of the longest paths, metres.
+    """
+
+    a: Floats
+    b: Floats
+    longest: float
+
+
 def path_bound(
     field: DistanceField,
-    a: Floats,
-    b: Floats,
+    ends: Ends,
     region: Region,
-    longest: float,
     cells: int,
     policy: PotentialPolicy | None = None,
     clock: Clock | None = None,
@@ -68,19 +101,18 @@ def path_bound(
 
     Parameters
     ----------
-    a, b : ndarray, shape (3,)
-        The two points, metres.
+    ends : Ends
+        The two points, and the upper limit of the bound: the grid covers the ellipsoid about the
+        points that holds all paths up to this length.
     region : Region
-        Region of the paths; both ends are in it.
-    longest : float
-        Upper limit of the bound, metres. The grid covers the ellipsoid about the two ends that
-        holds all paths up to this length.
+        Region of the paths; both points are in it.
     cells : int
         Approximate number of cells of the grid.
     clock : Clock, optional
         Clock of the run; when it is up, the bound proven so far is returned.
     """
     policy, clock = policy or PotentialPolicy(), clock or Clock()
+    a, b, longest = ends
     straight = float(np.linalg.norm(b - a))
     if not straight < longest < math.inf:
         return straight
@@ -92,23 +124,9 @@ def path_bound(
     nx, ny, nz = (max(1, math.ceil(s / cell - 1e-9)) for s in size)
     high = low + size
     flag, steep = clock.flag, steepness(field)
+    box = GridBox(low, high, cell, (nx, ny, nz))
     possible = clock.interruptible(
-        lambda: possibly_free(
-            field.arrays,
-            low,
-            high,
-            cell,
-            (nx, ny, nz),
-            region.room,
-            steep,
-            a,
-            b,
-            longest,
-            region.anchor,
-            region.reach,
-            policy.halvings,
-            flag,
-        )
+        lambda: possibly_free(field.arrays, box, region, ends, steep, policy.halvings, flag)
     )
     for end in (a, b):
         at = np.clip(((end - low) / cell).astype(np.int64), 0, np.array(possible.shape) - 1)
@@ -117,9 +135,7 @@ def path_bound(
         return straight
     return max(
         straight,
-        clock.interruptible(
-            lambda: _bound_of_potential(possible, low, cell, a, b, longest, policy, flag)
-        ),
+        clock.interruptible(lambda: _bound_of_potential(possible, box, ends, policy, flag)),
     )
 
 
@@ -162,17 +178,11 @@ def _box_of_ellipsoid(a: Floats, b: Floats, longest: float) -> tuple[Floats, Flo
 
 
 def _bound_of_potential(
-    possible: Bools,
-    low: Floats,
-    cell: float,
-    a: Floats,
-    b: Floats,
-    longest: float,
-    policy: PotentialPolicy,
-    stop: Flag,
+    possible: Bools, box: GridBox, ends: Ends, policy: PotentialPolicy, stop: Flag
 ) -> float:
     """Return the bound of the potential about one end over possibly free cells; 0 if the flag was
     set before one was proven."""
+    (a, b, longest), low, cell = ends, box.low, box.cell
     straight = float(np.linalg.norm(b - a))
     from_a, from_b = (distances_of_cells(possible.shape, low, cell, end) for end in (a, b))
     # start from the largest balls around the ends that hold no blocked cell: distances in them are
@@ -299,28 +309,17 @@ def may_have_room(
 
 @kernel
 def possibly_free(
-    field: Field,
-    low: Floats,
-    high: Floats,
-    cell: float,
-    shape: tuple[int, int, int],
-    room: float,
-    steep: float,
-    a: Floats,
-    b: Floats,
-    longest: float,
-    anchor: Floats,
-    reach: float,
-    halvings: int,
-    stop: Flag,
+    field: Field, box: GridBox, region: Region, ends: Ends, steep: float, halvings: int, stop: Flag
 ) -> Bools:
-    """Return the mask of the cells that paths from `a` to `b` may pass.
+    """Return the mask of the cells that paths between two ends may pass.
 
     A cell is left out if it is certain that none of its points has enough room and lies within the
-    box up to `high`, the ellipsoid about both ends and the reach of the tether. Once the flag
-    `stop` is set, the remaining cells count as possibly free.
+    box, the ellipsoid about both ends and the reach of the tether. Once the flag `stop` is set, the
+    remaining cells count as possibly free.
     """
-    nx, ny, nz = shape
+    low, high, cell = box.low, box.high, box.cell
+    a, b, anchor, room = ends.a, ends.b, region.anchor, region.room
+    nx, ny, nz = box.shape
     out = np.zeros((nx, ny, nz), dtype=np.bool_)
     centre, halves, at = np.empty(3), np.empty(3), np.empty(3, dtype=np.int64)
     for i in range(nx):
@@ -341,9 +340,9 @@ def possibly_free(
                     from_anchor += (centre[axis] - anchor[axis]) ** 2
                     diagonal += halves[axis] ** 2
                 diagonal = 1.00001 * math.sqrt(diagonal)
-                if math.sqrt(from_a) + math.sqrt(from_b) > longest + 2.0 * diagonal:
+                if math.sqrt(from_a) + math.sqrt(from_b) > ends.longest + 2.0 * diagonal:
                     continue
-                if math.sqrt(from_anchor) > reach + diagonal:
+                if math.sqrt(from_anchor) > region.reach + diagonal:
                     continue
                 out[i, j, k] = may_have_room(field, centre, halves, room, steep, halvings)
     return out

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,6 +17,7 @@ from netsp.plan.space.mission_policy import StateEffort
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import PlanningContext, is_straight_clear, keeps_clearance
 from netsp.plan.space.states import State, States
+from netsp.plan.space.word_search import WordSearch
 
 
 @dataclass
@@ -75,51 +76,61 @@ class RobotPaths:
             return
         context, words = self.context, self.context.words
         begin_cell = words.visible_cell(self.points[n])
-        found = None
+        found, end_cells = None, dict[int, int | None]()
         if begin_cell is not None and search:
             end_cells = {m: words.visible_cell(self.points[m]) for m in targets}
             max_lengths = {
-                c: self.effort.max_path_ratio * float(self._distances[n, m])
-                for m, c in end_cells.items()
-                if c is not None
+                cell: self._max_length(n, m) for m, cell in end_cells.items() if cell is not None
             }
-            found = (
-                context.search_words(True, begin_cell, self.effort.paths, max_lengths)
-                if max_lengths
-                else None
-            )
+            if max_lengths:
+                found = context.search_words(True, begin_cell, self.effort.paths, max_lengths)
         for m in targets:
-            paths = []
-            if is_straight_clear(
-                context.field, self.points[n], self.points[m], context.mission.clearance
-            ):
-                line = self.points[[n, m]]
-                word = context.word_number(line)
-                if word is not None:
-                    paths.append((word, line))
-            end_cell = end_cells[m] if found is not None else None
-            if found is not None and end_cell is not None:
-                for _, cells in context.paths_to(found, end_cell):
-                    path = context.pull_taut(np.vstack([self.points[n], cells, self.points[m]]))
-                    word = context.word_number(path)
-                    if word is not None and all(word != w for w, _ in paths):
-                        paths.append((word, path))
-            if found is None and not (tether_clock is not None and tether_clock.is_up):
+            paths = self._straight_path(n, m)
+            if found is not None:
+                self._add_searched(n, m, paths, found, end_cells[m])
+            elif not (tether_clock is not None and tether_clock.is_up):
                 self._add_along_tethers(n, m, paths)
-            paths.sort(key=lambda entry: polylines.length(entry[1]))
+            paths.sort(key=_length_of)
             if found is not None and paths:
-                max_length = self.effort.max_path_ratio * float(self._distances[n, m])
-                for path in find_bent_paths(context, [entry for _, entry in paths], max_length):
-                    word = context.word_number(path)
-                    if word is not None:
-                        paths.append((word, path))
-                paths.sort(key=lambda entry: polylines.length(entry[1]))
-            reversed_paths = []
-            for _, path in paths:
-                word = context.word_number(path[::-1])
-                if word is not None:
-                    reversed_paths.append((word, path[::-1]))
-            self._known[n, m], self._known[m, n] = paths, reversed_paths
+                known = [path for _, path in paths]
+                bent = find_bent_paths(context, known, self._max_length(n, m))
+                paths += self._numbered(bent)
+                paths.sort(key=_length_of)
+            self._known[n, m] = paths
+            self._known[m, n] = self._numbered([path[::-1] for _, path in paths])
+
+    def _max_length(self, n: int, m: int) -> float:
+        """Return the length of the longest path between two places, metres."""
+        return self.effort.max_path_ratio * float(self._distances[n, m])
+
+    def _numbered(self, paths: Iterable[Floats]) -> list[tuple[int, Floats]]:
+        """Return the paths that have a word, with its number."""
+        numbered = ((self.context.word_number(path), path) for path in paths)
+        return [(word, path) for word, path in numbered if word is not None]
+
+    def _straight_path(self, n: int, m: int) -> list[tuple[int, Floats]]:
+        """Return the straight path between two places and its word, if it is clear."""
+        a, b, context = self.points[n], self.points[m], self.context
+        if not is_straight_clear(context.field, a, b, context.mission.clearance):
+            return []
+        return self._numbered([self.points[[n, m]]])
+
+    def _add_searched(
+        self,
+        n: int,
+        m: int,
+        paths: list[tuple[int, Floats]],
+        found: WordSearch,
+        end_cell: int | None,
+    ) -> None:
+        """Add the paths that a search found, pulled taut, one for each class."""
+        if end_cell is None:
+            return
+        for _, cells in self.context.paths_to(found, end_cell):
+            path = self.context.pull_taut(np.vstack([self.points[n], cells, self.points[m]]))
+            word = self.context.word_number(path)
+            if word is not None and all(word != w for w, _ in paths):
+                paths.append((word, path))
 
     def _add_along_tethers(self, n: int, m: int, paths: list[tuple[int, Floats]]) -> None:
         """Add the shortest paths back along a tether of one place and out along one of another,
@@ -135,7 +146,7 @@ class RobotPaths:
                     continue
                 if word not in found or polylines.length(path) < polylines.length(found[word]):
                     found[word] = path
-        for word, path in sorted(found.items(), key=lambda entry: polylines.length(entry[1])):
+        for word, path in sorted(found.items(), key=_length_of):
             if len(paths) < self.effort.paths and all(word != w for w, _ in paths):
                 paths.append((word, path))
 
@@ -167,6 +178,11 @@ class RobotPaths:
             Number of the word, and path, metres.
         """
         return self._known.get((n, m), [])
+
+
+def _length_of(entry: tuple[int, Floats]) -> float:
+    """Return the length of a path that comes with its word, metres."""
+    return polylines.length(entry[1])
 
 
 @dataclass

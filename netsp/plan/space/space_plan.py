@@ -34,7 +34,7 @@ from netsp.plan.solver_table import SOLVERS
 from netsp.plan.space.board import DrivenTour, StateGraph, TourVisit, with_status
 from netsp.plan.space.given_order import drive_given_order
 from netsp.plan.space.judge import verify_mission
-from netsp.plan.space.mission_policy import MissionPolicy
+from netsp.plan.space.mission_policy import MissionPolicy, StageTimePolicy
 from netsp.plan.space.non_taut_moves import Detours
 from netsp.plan.space.passages import find_gaps_on, resolve_gaps
 from netsp.plan.space.places import Places
@@ -42,7 +42,7 @@ from netsp.plan.space.planning_context import PlanningContext
 from netsp.plan.space.prisms import drive_plane_tours
 from netsp.plan.space.short_orders import short_order_tour
 from netsp.plan.space.space_legs import RobotPaths, StateGrowth
-from netsp.plan.space.states import add_states_with_room, find_first_states
+from netsp.plan.space.states import States, add_states_with_room, find_first_states
 from netsp.plan.space.trees import add_states_of_trees
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.mission_limits import check_bounds, check_size, check_tether
@@ -336,7 +336,6 @@ def candidate_plans(
         A moving anchor; waypoints in solids; no tether that reaches any waypoint.
     """
     check_plannable(mission, solver, params, seed)
-    how = {"solver": solver, "seed": seed, "params": params, "iteration_limit": iteration_limit}
     if context is None:
         if field is None or grid is None:
             scene = scene or mission.load_scene()
@@ -349,7 +348,10 @@ def candidate_plans(
             on_progress=on_progress,
             policy=policy,
         )
-    yield from _planned(context, scene, clock, on_progress or _silent, how, whole_tether)
+    places = Places.for_mission(context.mission, context.field)
+    options = {"solver": solver, "seed": seed, "params": params, "iteration_limit": iteration_limit}
+    run = _Run(context, places, clock, on_progress or _silent, options)
+    yield from _candidates(run, scene, whole_tether)
 
 
 def prepare_context(
@@ -476,139 +478,216 @@ def _silent(_: str) -> None:
     """Ignore a line of progress."""
 
 
-def _planned(
-    context: PlanningContext,
-    scene: Scene | None,
-    clock: Clock,
-    on_progress: Callable[[str], None],
-    how: dict[str, Any],
-    whole_tether: bool,
+@dataclass(frozen=True)
+class _Run:
+    """Run of a search for candidate plans.
+
+    Attributes
+    ----------
+    context, places
+        Context of the mission, and its places.
+    clock
+        Clock of the run.
+    on_progress
+        Called with a line of text at each stage.
+    options
+        Options of `netsp.plan.solve_problem.solve_graph`.
+    """
+
+    context: PlanningContext
+    places: Places
+    clock: Clock
+    on_progress: Callable[[str], None]
+    options: dict[str, Any]
+
+    @property
+    def mission(self) -> Mission:
+        """Return the mission."""
+        return self.context.mission
+
+    @property
+    def times(self) -> StageTimePolicy:
+        """Return the division of the time."""
+        return self.context.policy.times
+
+    @property
+    def seed(self) -> int:
+        """Return the random seed."""
+        return int(self.options["seed"])
+
+
+def _plans_without_states(
+    run: _Run, scene: Scene | None, whole_tether: bool
 ) -> Iterator[SpacePlan]:
-    """Yield the candidates of `candidate_plans`."""
-    mission, field = context.mission, context.field
-    policy, times = context.policy, context.policy.times
-    places = Places.for_mission(mission, field)
-    # a robot that is farther out than the share may still come back
-    limit = max(
-        policy.tether_share * mission.tether_length,
-        context.present_tether.length * (1.0 + LENGTH_ROUNDING),
-    )
-    check_tether(mission, context.present_tether.length)
+    """Yield the tours of the plane, or if there are none, the tour in a short order."""
+    context, places = run.context, run.places
     in_plane = False
     if scene is not None:
+        policy = context.policy.plane
+        part = run.clock.part(policy.time_share)
         for driven in drive_plane_tours(
-            context,
-            scene,
-            places,
-            clock.part(policy.plane.time_share),
-            how["seed"],
-            policy.plane,
-            whole_tether,
+            context, scene, places, part, run.seed, policy, whole_tether
         ):
             in_plane = True
             yield _plan_of(context, places, driven, PLANE)
     if not in_plane:
-        on_progress("short orders")
-        driven_short = short_order_tour(context, places, clock, how["seed"])
-        if driven_short is not None and driven_short.visits:
-            yield _plan_of(context, places, driven_short, SHORT_ORDER)
-    on_progress("shortest tethers to each waypoint")
-    effort = context.policy.states.effort(len(places))
-    states = find_first_states(context, places, limit, effort, clock.part(times.first_states_share))
-    if not states.reached - {len(mission.waypoints)}:
-        nearest = float(np.linalg.norm(mission.places - np.array(mission.anchor), axis=1).min())
-        if nearest <= limit:
-            raise InputError(
-                f"waypoints: no way in the water leads a tether of {limit:.4g} m to any of them, "
-                f"though the nearest is {nearest:.4g} m from the anchor as the crow flies: walls, "
-                f"or gaps narrower than a cell ({context.words.cells.cell:.3g} m)"
-            )
-        raise InputError(
-            f"waypoints: no tether within the limit reaches any of them: {limit:.4g} m "
-            f"({100 * policy.tether_share:g} % of tether_length), and the nearest is {nearest:.4g} "
-            "m from the anchor as the crow flies"
-        )
-    hanging = {n: [states.entries[s].tether.nodes for s in of] for n, of in states.at_place.items()}
-    robot_paths = RobotPaths(context, places, effort, hanging)
-    board, growth = StateGraph(context, states), StateGrowth(states, robot_paths)
+        run.on_progress("short orders")
+        short = short_order_tour(context, places, run.clock, run.seed)
+        if short is not None and short.visits:
+            yield _plan_of(context, places, short, SHORT_ORDER)
 
-    def planned(result: Result, driven: DrivenTour, kind: str) -> SpacePlan:
-        visited = {stop.waypoint for stop in driven.visits}
-        unreached = tuple(n for n in range(len(mission.waypoints)) if n not in visited)
+
+def _found_states(run: _Run) -> States:
+    """Return the first states, or raise InputError if no tether reaches any waypoint."""
+    context, mission, share = run.context, run.mission, run.context.policy.tether_share
+    # a robot that is farther out than the share may still come back
+    present = context.present_tether.length * (1.0 + LENGTH_ROUNDING)
+    limit = max(share * mission.tether_length, present)
+    run.on_progress("shortest tethers to each waypoint")
+    effort = context.policy.states.effort(len(run.places))
+    part = run.clock.part(run.times.first_states_share)
+    states = find_first_states(context, run.places, limit, effort, part)
+    if states.reached - {len(mission.waypoints)}:
+        return states
+    nearest = float(np.linalg.norm(mission.places - np.array(mission.anchor), axis=1).min())
+    if nearest <= limit:
+        raise InputError(
+            f"waypoints: no way in the water leads a tether of {limit:.4g} m to any of them, "
+            f"though the nearest is {nearest:.4g} m from the anchor as the crow flies: walls, "
+            f"or gaps narrower than a cell ({context.words.cells.cell:.3g} m)"
+        )
+    raise InputError(
+        f"waypoints: no tether within the limit reaches any of them: {limit:.4g} m "
+        f"({100 * share:g} % of tether_length), and the nearest is {nearest:.4g} "
+        "m from the anchor as the crow flies"
+    )
+
+
+class _StateSearch:
+    """Search for tours along states and legs.
+
+    Parameters
+    ----------
+    run : _Run
+        The run.
+    states : States
+        First states; more are added.
+    """
+
+    def __init__(self, run: _Run, states: States) -> None:
+        self.run, self.states = run, states
+        self.effort = run.context.policy.states.effort(len(run.places))
+        tethers = {
+            n: [states.entries[s].tether.nodes for s in numbers]
+            for n, numbers in states.at_place.items()
+        }
+        self.paths = RobotPaths(run.context, run.places, self.effort, tethers)
+        self.board = StateGraph(run.context, states)
+        self.growth = StateGrowth(states, self.paths)
+
+    def connect(self) -> None:
+        """Find the robot's paths, and legs between the first states and those along trees."""
+        run, times, board = self.run, self.run.times, self.board
+        clock, on_progress = run.clock, run.on_progress
+        self.paths.find_all(clock, on_progress)
+        on_progress("trees of legs")
+        add_states_of_trees(self.states, self.paths, clock.part(times.tree_share))
+        board.update(self.growth.legs, clock.part(times.home_path_share))
+        if missing := set(range(len(run.mission.waypoints))) - board.reached_waypoints:
+            on_progress("ways with room for the robot")
+            part = clock.part(times.first_states_share)
+            add_states_with_room(self.states, missing, self.effort.words, part)
+            board.update(self.growth.legs, clock.part(times.home_path_share))
+        self.growth.grow(0, clock.part(times.tree_share), on_progress)
+
+    def best_along_taut_legs(self) -> tuple[tuple[Result, DrivenTour] | None, bool]:
+        """Grow states and legs in stages, and return the best tour along them, and whether all legs
+        were driven in some stage."""
+        run, times, board = self.run, self.run.times, self.board
+        on_progress, options = run.on_progress, run.options
+        clock = run.clock.part(times.taut_share)
+        best: tuple[Result, DrivenTour] | None = None
+        is_complete = False
+        for max_per_place in self.effort.states:
+            begin = clock.elapsed
+            enough = board.legs or times.growth_share * clock.left >= times.min_growth_s
+            growing = clock.part(times.growth_share) if enough else Clock(times.min_growth_s)
+            has_grown = self.growth.grow(max_per_place, growing, on_progress)
+            on_progress("ways by the anchor")
+            has_homes = board.update(self.growth.legs, clock.part(times.home_path_share))
+            is_complete = (has_homes and has_grown) or is_complete
+            is_last = max_per_place == self.effort.states[-1]
+            share = times.solve_share if is_last else times.early_solve_share
+            best = _better(best, _best_driven(board, clock, on_progress, best, share, options))
+            if clock.left < clock.elapsed - begin:
+                if not is_last and not (best is not None and best[0].status is Status.OPTIMAL):
+                    share = times.solve_share
+                    found = _best_driven(board, clock, on_progress, best, share, options)
+                    best = _better(best, found)
+                break
+        return best, is_complete
+
+    def shorter(self, best: DrivenTour | None, is_proven: bool) -> DrivenTour | None:
+        """Return a shorter tour with detours, if there is one.
+
+        If words tell all states apart, detours lead to the tethers that straight legs lead to.
+        """
+        if is_proven and not self.states.has_free_ends:
+            return None
+        run = self.run
+        return Detours(self.board, self.paths).shorten(best, run.clock, run.on_progress, run.seed)
+
+    def to_plan(self, result: Result | None, driven: DrivenTour, kind: str) -> SpacePlan:
+        """Return a tour as a plan; without a result, nothing is known of other tours."""
+        n_waypoints = len(self.run.mission.waypoints)
+        visited = {visit.waypoint for visit in driven.visits}
         return SpacePlan(
-            mission,
+            self.run.mission,
             tuple(driven.visits),
             driven.home,
             driven.length,
-            result,
-            len(states.entries),
-            len(board.legs),
-            unreached,
+            result or Result(None, driven.length, None, Status.FEASIBLE),
+            len(self.states.entries),
+            len(self.board.legs),
+            tuple(n for n in range(n_waypoints) if n not in visited),
             driven.free,
-            context,
-            robot_paths,
+            self.run.context,
+            self.paths,
             kind,
         )
 
-    robot_paths.find_all(clock, on_progress)
-    on_progress("trees of legs")
-    add_states_of_trees(states, robot_paths, clock.part(times.tree_share))
-    board.update(growth.legs, clock.part(times.home_path_share))
-    if lacking := set(range(len(mission.waypoints))) - board.reached_waypoints:
-        on_progress("ways with room for the robot")
-        add_states_with_room(states, lacking, effort.words, clock.part(times.first_states_share))
-        board.update(growth.legs, clock.part(times.home_path_share))
-    growth.grow(0, clock.part(times.tree_share), on_progress)
-    taut = clock.part(times.taut_share)
-    best: tuple[Result, DrivenTour] | None = None
-    complete = False
-    for most in effort.states:
-        begin = taut.elapsed
-        enough = board.legs or times.growth_share * taut.left >= times.min_growth_s
-        growing = taut.part(times.growth_share) if enough else Clock(times.min_growth_s)
-        grown = growth.grow(most, growing, on_progress)
-        on_progress("ways by the anchor")
-        complete = (
-            board.update(growth.legs, taut.part(times.home_path_share)) and grown
-        ) or complete
-        last = most == effort.states[-1]
-        share = times.solve_share if last else times.early_solve_share
-        best = _better(best, _best_driven(board, taut, on_progress, best, share, how))
-        if taut.left < taut.elapsed - begin:
-            if not last and not (best is not None and best[0].status is Status.OPTIMAL):
-                best = _better(
-                    best, _best_driven(board, taut, on_progress, best, times.solve_share, how)
-                )
-            break
-    if not board.reached_waypoints:
+
+def _candidates(run: _Run, scene: Scene | None, whole_tether: bool) -> Iterator[SpacePlan]:
+    """Yield the candidates of `candidate_plans`."""
+    mission = run.mission
+    check_tether(mission, run.context.present_tether.length)
+    yield from _plans_without_states(run, scene, whole_tether)
+    search = _StateSearch(run, _found_states(run))
+    search.connect()
+    best, is_complete = search.best_along_taut_legs()
+    if not search.board.reached_waypoints:
         raise InputError(
             f"waypoints: the robot gets to none of them with its clearance of {mission.clearance:g}"
         )
-    # where words tell all, detours lead to the tethers that straight legs lead to
-    proven = best is not None and best[0].status is Status.OPTIMAL and complete
-    shorter = None
-    if states.has_free_ends or not proven:
-        shorter = Detours(board, robot_paths).shorten(
-            best and best[1], clock, on_progress, how["seed"]
-        )
-
+    is_proven = best is not None and best[0].status is Status.OPTIMAL and is_complete
+    shorter = search.shorter(best and best[1], is_proven)
     along_taut = None
     if best is not None:
         result, driven = best
         if result.status is Status.OPTIMAL:
             # optimal over the graph only; an incomplete graph lacks legs within reach
-            of_states = Status.OPTIMAL_OF_STATES if complete else Status.FEASIBLE
+            of_states = Status.OPTIMAL_OF_STATES if is_complete else Status.FEASIBLE
             result = replace(result, status=of_states)
-        along_taut = planned(result, driven, TAUT_LEGS)
+        along_taut = search.to_plan(result, driven, TAUT_LEGS)
     if shorter is not None:
         # the solver's bound does not hold for the detours, which are not in its graph
-        yield planned(Result(None, shorter.length, None, Status.FEASIBLE), shorter, DETOURS)
+        yield search.to_plan(None, shorter, DETOURS)
     if along_taut is not None:
         yield along_taut
-    on_progress("out along the tether and back")
-    fallback = board.drive_out_and_back()
+    run.on_progress("out along the tether and back")
+    fallback = search.board.drive_out_and_back()
     if fallback is not None:
-        yield planned(Result(None, fallback.length, None, Status.FEASIBLE), fallback, OUT_AND_BACK)
+        yield search.to_plan(None, fallback, OUT_AND_BACK)
 
 
 def _try_out(solver: SolverLike, params: Mapping[str, Any] | None, seed: int) -> None:
@@ -644,7 +723,7 @@ def _best_driven(
     on_progress: Callable[[str], None],
     best: tuple[Result, DrivenTour] | None,
     share: float,
-    how: dict[str, Any],
+    options: dict[str, Any],
 ) -> tuple[Result, DrivenTour] | None:
     """Return the best tour that was driven without fault.
 
@@ -652,15 +731,14 @@ def _best_driven(
     are replaced by paths through the start.
     """
     times = board.context.policy.times
-    again, found = 0, None
-    warm = None if best is None else best[1].tour
-    while again < times.max_solves or clock.is_up:
+    n_solves, found = 0, None
+    warm_start = None if best is None else best[1].tour
+    while n_solves < times.max_solves or clock.is_up:
         if found is None:
-            on_progress(
-                "order" if again == 0 else f"order, {counted(again, 'leg')} at fault forbidden"
-            )
+            faults = f", {counted(n_solves, 'leg')} at fault forbidden" if n_solves else ""
+            on_progress(f"order{faults}")
             solving = Clock(times.min_solve_s) if clock.is_up else clock.part(share)
-            found = board.solve(solving, warm, **how)
+            found = board.solve(solving, warm_start, **options)
             if found is None:
                 return None
         result, tour = found
@@ -668,11 +746,11 @@ def _best_driven(
         driven = board.drive(tour)
         if driven.fault is None:
             return with_status(result, driven, LENGTH_ROUNDING), driven
-        joined = board.forbid(driven.fault)
-        if clock.is_up and not (joined and board.can_reach_all(tour)):
+        is_joined = board.forbid(driven.fault)
+        if clock.is_up and not (is_joined and board.can_reach_all(tour)):
             return None  # no time is left, and this tour can no longer be driven
-        warm = None  # it may go along that leg
-        again += 1
+        warm_start = None  # it may go along that leg
+        n_solves += 1
         if not clock.is_up:
             found = None
     return None

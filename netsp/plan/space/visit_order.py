@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from netsp.base.arrays import Ints
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
@@ -127,45 +128,12 @@ def waypoint_graph(
         The time was up.
     """
     clock, policy = clock or Clock(), policy or MissionPolicy()
-    model = GeodesicTether(field, mission.delta)
-    anchor, limit = np.array(mission.anchor), policy.tether_share * mission.tether_length
     points = mission.places
-    tree = ShortestTree(grid, anchor, points)
-    found = _Classes([], [])
-    for n in range(len(points)):
-        clock.check("looking for tethers to waypoints")
-        path = tree.path(n)
-        if path is None:
-            continue
-        tether = model.relaxed(path[::-1], policy.going_on.max_pull_rounds)
-        if tether.length <= limit:
-            found.point.append(n)
-            found.tether.append(tether)
+    found = _shortest_tethers(mission, field, grid, clock, policy)
     near = np.argsort(np.linalg.norm(points[:, None] - points[None], axis=2), axis=1)[
         :, 1 : policy.going_on.n_neighbours + 1
     ]
-    straight_legs: dict[tuple[int, int], float] = {}
-    v = 0
-    while v < len(found.point):
-        clock.check("driving straight legs")
-        n = found.point[v]
-        for m in near[n]:
-            if not is_straight_clear(field, points[n], points[m], mission.clearance):
-                continue
-            path = np.array([points[n], points[m]])
-            tether, lengths = model.drive(
-                found.tether[v], polylines.dense(path, drive_step(mission, policy.tether_share))
-            )
-            if lengths.max() > limit:
-                continue
-            w = found.find(int(m), tether, mission.delta)
-            if w is None and found.point.count(int(m)) < policy.going_on.max_classes:
-                w = len(found.point)
-                found.point.append(int(m))
-                found.tether.append(tether)
-            if w is not None:
-                straight_legs[v, w] = float(np.linalg.norm(path[1] - path[0]))
-        v += 1
+    straight_legs = _drive_straight_legs(mission, field, found, near, clock, policy)
     count = len(found.point)
     lengths = np.array([t.length for t in found.tether])
     costs = np.zeros((count + 1, count + 1))
@@ -189,3 +157,59 @@ def waypoint_graph(
         raise InputError("waypoints: no tether within the limit reaches any of them")
     cluster = [0, *(reached.index(n) + 1 for n in found.point)]
     return TravelGraph.from_costs(costs, cluster), [-1, *found.point], reached
+
+
+def _shortest_tethers(
+    mission: Mission, field: DistanceField, grid: Grid, clock: Clock, policy: MissionPolicy
+) -> _Classes:
+    """Return the shortest tether to each waypoint that one reaches."""
+    model, points = GeodesicTether(field, mission.delta), mission.places
+    limit = policy.tether_share * mission.tether_length
+    tree = ShortestTree(grid, np.array(mission.anchor), points)
+    found = _Classes([], [])
+    for n in range(len(points)):
+        clock.check("looking for tethers to waypoints")
+        path = tree.path(n)
+        if path is None:
+            continue
+        tether = model.relaxed(path[::-1], policy.going_on.max_pull_rounds)
+        if tether.length <= limit:
+            found.point.append(n)
+            found.tether.append(tether)
+    return found
+
+
+def _drive_straight_legs(
+    mission: Mission,
+    field: DistanceField,
+    found: _Classes,
+    near: Ints,
+    clock: Clock,
+    policy: MissionPolicy,
+) -> dict[tuple[int, int], float]:
+    """Drive each tether straight to the neighbours of its waypoint, add the classes in which it
+    arrives, and return the lengths of the legs, metres."""
+    model, points = GeodesicTether(field, mission.delta), mission.places
+    limit = policy.tether_share * mission.tether_length
+    step = drive_step(mission, policy.tether_share)
+    legs: dict[tuple[int, int], float] = {}
+    v = 0
+    while v < len(found.point):
+        clock.check("driving straight legs")
+        n = found.point[v]
+        for m in near[n]:
+            if not is_straight_clear(field, points[n], points[m], mission.clearance):
+                continue
+            path = np.array([points[n], points[m]])
+            tether, lengths = model.drive(found.tether[v], polylines.dense(path, step))
+            if lengths.max() > limit:
+                continue
+            w = found.find(int(m), tether, mission.delta)
+            if w is None and found.point.count(int(m)) < policy.going_on.max_classes:
+                w = len(found.point)
+                found.point.append(int(m))
+                found.tether.append(tether)
+            if w is not None:
+                legs[v, w] = float(np.linalg.norm(path[1] - path[0]))
+        v += 1
+    return legs

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Bools, Ints
+from netsp.base.clock import Flag
 from netsp.base.compiled.dynamic_array import more_int_rows
 from netsp.base.compiled.kernel import kernel
 from netsp.hsignature.wordtable import Rules, Table, times, times_inverse
@@ -60,21 +61,65 @@ class WordSearch(NamedTuple):
     slot: npt.NDArray[np.int8]
 
 
+class SearchSpace(NamedTuple):
+    """Cells that a search may pass, and the labels of their edges.
+
+    Attributes
+    ----------
+    flags, labels
+        Flags and labels of the whole complex.
+    passable
+        (nx, ny, nz) mask of the cells that paths may pass.
+    open_cells
+        (nx, ny, nz) mask of the cells whose 26 neighbours are free, passable and of one class.
+    """
+
+    flags: Flags
+    labels: Labels
+    passable: Bools
+    open_cells: Bools
+
+
+class SearchBox(NamedTuple):
+    """Box of cells of a search.
+
+    Attributes
+    ----------
+    root
+        (3,) cell where paths begin.
+    first, last
+        (3,) corners of the box, inclusive.
+    """
+
+    root: Ints
+    first: Ints
+    last: Ints
+
+
+class Targets(NamedTuple):
+    """Targets of a search.
+
+    Attributes
+    ----------
+    cells
+        (t, 3) target cells; if there are none, all cells are targets.
+    limits
+        (t,) length of the longest paths to each target, hundredths of a cell; (1,) without targets.
+    """
+
+    cells: Ints
+    limits: Ints
+
+
 @kernel
 def shortest_words(
-    flags: Flags,
-    passable: Bools,
-    open_cells: Bools,
-    labels: Labels,
+    space: SearchSpace,
     table: Table,
     rules: Rules,
-    root: Ints,
-    first: Ints,
-    last: Ints,
+    box: SearchBox,
+    targets: Targets,
     max_words: int,
-    targets: Ints,
-    limits: Ints,
-    stop: Ints,
+    stop: Flag,
 ) -> tuple[WordSearch, Table]:
     """Return the words with the shortest paths to the cells of a box that lead to some targets.
 
@@ -84,26 +129,13 @@ def shortest_words(
 
     Parameters
     ----------
-    flags, labels
-        Flags and labels of the whole complex.
-    passable
-        (nx, ny, nz) mask of the cells that paths may pass.
-    open_cells
-        (nx, ny, nz) mask of the cells whose 26 neighbours are free, passable and of one class.
-    root
-        (3,) cell where paths begin.
-    first, last
-        (3,) corners of the box, inclusive.
     max_words
         Maximum number of words of a cell.
-    targets
-        (t, 3) target cells; if there are none, all cells are targets.
-    limits
-        (t,) length of the longest paths to each target, hundredths of a cell; (1,) without targets.
     stop
         Flag of a clock. Once it is set, cells that have a word get no others; each cell that can be
         reached still gets its first one.
     """
+    flags, first, last = space.flags, box.first, box.last
     _, ny, nz = flags.shape
     sx, sy, sz = last[0] - first[0] + 1, last[1] - first[1] + 1, last[2] - first[2] + 1
     word = np.full((sx, sy, sz, max_words), NO_WORD, dtype=np.int32)
@@ -114,11 +146,11 @@ def shortest_words(
     # (slot of the box, length, next entry of its bucket)
     waiting, entries, spare = np.empty((4096, 3), dtype=np.int64), 1, -1
     bucket = np.full(BUCKETS, -1)
-    i, j, k = root[0] - first[0], root[1] - first[1], root[2] - first[2]
+    i, j, k = box.root[0] - first[0], box.root[1] - first[1], box.root[2] - first[2]
     word[i, j, k, 0], far[i, j, k, 0], step[i, j, k, 0] = 0, 0, 26
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = ((i * sy + j) * sz + k) * max_words, 0, -1
     bucket[0], empty, now = 0, 0, 0
-    longest = limits.max()
+    longest = targets.limits.max()
     while empty < BUCKETS and now <= longest:
         entry = bucket[now % BUCKETS]
         if entry < 0:
@@ -139,16 +171,9 @@ def shortest_words(
         done[i, j, k, n] = True
         current_word = word[i, j, k, n]
         x, y, z = i + first[0], j + first[1], k + first[2]
-        is_useful = len(targets) == 0
-        for t in range(len(targets)):
-            square = (targets[t, 0] - x) ** 2 + (targets[t, 1] - y) ** 2 + (targets[t, 2] - z) ** 2
-            left = limits[t] - now
-            if left >= 0 and 10_000 * square <= left * left:
-                is_useful = True
-                break
-        if not is_useful:
+        if not leads_to_targets(targets, x, y, z, now):
             continue
-        is_open = open_cells[x, y, z]
+        is_open = space.open_cells[x, y, z]
         arrival_step = step[i, j, k, n]
         inside = 0 < i < sx - 1 and 0 < j < sy - 1 and 0 < k < sz - 1
         can_prune = is_open and inside and arrival_step != 26
@@ -161,26 +186,18 @@ def shortest_words(
             if p < 0 or q < 0 or r < 0 or p >= sx or q >= sy or r >= sz:
                 continue
             u, v, w = p + first[0], q + first[1], r + first[2]
-            if not flags[u, v, w] & FREE_CELL or not passable[u, v, w]:
+            if not flags[u, v, w] & FREE_CELL or not space.passable[u, v, w]:
                 continue
             if far[p, q, r, max_words - 1] <= new_distance and done[p, q, r, max_words - 1]:
                 continue
             order = 0 if is_open else staircase_order(flags, x, y, z, s)
             if order < 0:
                 continue
-            new, table = word_after_step(
-                labels, table, rules, current_word, x, y, z, ny, nz, s, order
-            )
+            number = (x * ny + y) * nz + z
+            new, table = word_after_step(space, table, rules, current_word, number, s, order)
             if new < 0:
                 continue
-            # the slot of this word, else an empty one, else the farthest that is not done
-            to, worst = -1, new_distance
-            for m in range(max_words):
-                if word[p, q, r, m] == new:
-                    to = m if far[p, q, r, m] > new_distance else -2
-                    break
-                if far[p, q, r, m] > worst:
-                    worst, to = far[p, q, r, m], m
+            to = slot_for(word[p, q, r], far[p, q, r], new, new_distance)
             if to < 0 or done[p, q, r, to]:
                 continue
             word[p, q, r, to], far[p, q, r, to] = new, new_distance
@@ -196,37 +213,64 @@ def shortest_words(
             waiting[e, 0] = ((p * sy + q) * sz + r) * max_words + to
             waiting[e, 1], waiting[e, 2] = new_distance, bucket[new_distance % BUCKETS]
             bucket[new_distance % BUCKETS] = e
-    for a in range(sx):
-        for b in range(sy):
-            for c in range(sz):
-                for m in range(max_words):
-                    if not done[a, b, c, m]:
-                        word[a, b, c, m] = NO_WORD
+    empty_slots(word, done)
     return WordSearch(first, word, far, step, slot), table
 
 
 @kernel
+def leads_to_targets(targets: Targets, x: int, y: int, z: int, length: int) -> bool:
+    """Return whether a path of some length to a cell may lead on to a target within its limit."""
+    cells = targets.cells
+    for t in range(len(cells)):
+        square = (cells[t, 0] - x) ** 2 + (cells[t, 1] - y) ** 2 + (cells[t, 2] - z) ** 2
+        left = targets.limits[t] - length
+        if left >= 0 and 10_000 * square <= left * left:
+            return True
+    return len(cells) == 0
+
+
+@kernel
+def slot_for(
+    words: npt.NDArray[np.int32], far: npt.NDArray[np.int32], word: int, length: int
+) -> int:
+    """Return the slot of a cell for a word and the length of its path; negative if there is none.
+
+    It is the slot of this word if that has a longer path, else the one with the longest path, which
+    is empty if any is.
+    """
+    to, worst = -1, length
+    for m in range(len(words)):
+        if words[m] == word:
+            return m if far[m] > length else -2
+        if far[m] > worst:
+            worst, to = far[m], m
+    return to
+
+
+@kernel
+def empty_slots(word: npt.NDArray[np.int32], done: Bools) -> None:
+    """Empty the slots that the search has not finished."""
+    nx, ny, nz, n = word.shape
+    for i in range(nx):
+        for j in range(ny):
+            for k in range(nz):
+                for m in range(n):
+                    if not done[i, j, k, m]:
+                        word[i, j, k, m] = NO_WORD
+
+
+@kernel
 def word_after_step(
-    labels: Labels,
-    table: Table,
-    rules: Rules,
-    word: int,
-    i: int,
-    j: int,
-    k: int,
-    ny: int,
-    nz: int,
-    step: int,
-    order: int,
+    space: SearchSpace, table: Table, rules: Rules, word: int, cell: int, step: int, order: int
 ) -> tuple[int, Table]:
-    """Return the word after one step along edges in an order of `staircase_order`; -1 if the word
-    of an edge is not known."""
+    """Return the word after one step from a cell along edges in an order of `staircase_order`; -1
+    if the word of an edge is not known."""
+    _nx, ny, nz = space.flags.shape
     n, a, b, c = step_axes(step)
-    cell = (i * ny + j) * nz + k
     for m in range(n):
         axis = nth_axis(n, a, b, c, order, m)
         sign = STEPS[step, axis]
-        label = labels[3 * lower_end(cell, axis, sign, ny, nz) + axis]
+        label = space.labels[3 * lower_end(cell, axis, sign, ny, nz) + axis]
         if label == UNKNOWN:
             return -1, table
         if label != 0:
