@@ -213,9 +213,9 @@ class StateGraph:
 
     def _path_out(self, v: int) -> Floats:
         """Return the path (k, 3) from the start to a state that the robot can get to."""
-        own = self._out[v] if v >= 0 else self.context.start_tether.nodes[-1:]
-        if own is not None:
-            return own
+        path = self._out[v] if v >= 0 else self.context.start_tether.nodes[-1:]
+        if path is not None:
+            return path
         u = self._via[v]
         leg = self.legs[min(u, v), max(u, v)]
         return np.vstack([self._path_out(u), (leg if u < v else leg[::-1])[1:]])
@@ -360,7 +360,7 @@ class StateGraph:
         """Drive a tour in the given direction."""
         states, context, places = self.states, self.context, self.states.places
         tether, last = context.present_tether, -1 if states.present is None else states.present
-        stops: list[TourVisit] = []
+        visits: list[TourVisit] = []
         total, fault, first_deviation = 0.0, None, None
         delta = context.mission.delta
         word = context.word_number(tether.nodes)
@@ -387,7 +387,7 @@ class StateGraph:
                 fault = first_deviation or pair
             if state >= 0:
                 entry = states.entries[state]
-                stops.append(
+                visits.append(
                     TourVisit(
                         int(places.waypoint[entry.place]),
                         int(places.choice[entry.place]),
@@ -399,7 +399,7 @@ class StateGraph:
                 )
             last = state
         free = word == at_home and hang_alike(tether, context.start_tether, delta)
-        return DrivenTour(list(tour), stops, path, total, free, fault or first_deviation)
+        return DrivenTour(list(tour), visits, path, total, free, fault or first_deviation)
 
 
 def with_status(result: Result, driven: DrivenTour, tolerance: float) -> Result:

@@ -84,13 +84,13 @@ def cross_sections(
     """
     offset, all_upright = float(field.arrays.offset), field.voxel is None
     found: list[Circle | Polygon] = []
-    for kind, row in rows_of(field):
+    for kind, row in solid_rows(field):
         if kind == solids.HALF_SPACE and _is_level(row[3:6]):
             continue
         is_upright, obstacle = _section(field.arrays.data, kind, row, depths, dip, offset)
         if is_upright:
             found += [] if obstacle is None else [obstacle]
-        elif not _is_apart(kind, row, depths, dip + offset):
+        elif not _is_out_of_reach(kind, row, depths, dip + offset):
             all_upright = False
     return found, all_upright
 
@@ -104,7 +104,7 @@ def level_range(field: DistanceField, dip: float) -> tuple[float, float]:
         Depth to which paths and tethers may enter solids, metres.
     """
     low, high, offset = -math.inf, math.inf, float(field.arrays.offset)
-    for kind, row in rows_of(field):
+    for kind, row in solid_rows(field):
         if kind == solids.HALF_SPACE and _is_level(row[3:6]):
             if row[5] > 0.0:
                 low = max(low, row[2] + offset - dip)
@@ -113,7 +113,7 @@ def level_range(field: DistanceField, dip: float) -> tuple[float, float]:
     return low, high
 
 
-def rows_of(field: DistanceField) -> Iterator[tuple[int, Floats]]:
+def solid_rows(field: DistanceField) -> Iterator[tuple[int, Floats]]:
     """Yield the kind and the numbers of each solid of a field (`netsp.world.scene.solids`)."""
     data = field.arrays.data
     for n in range(int(data[COUNT])):
@@ -193,7 +193,7 @@ def _spans(ends: tuple[float, float], depths: Depths, spare: float) -> bool:
     return min(ends) <= depths.low - spare and max(ends) >= depths.high + spare
 
 
-def _is_apart(kind: int, row: Floats, depths: Depths, margin: float) -> bool:
+def _is_out_of_reach(kind: int, row: Floats, depths: Depths, margin: float) -> bool:
     """Return whether a solid is farther than a margin from all places in a range and in reach."""
     if kind in (solids.CYLINDER, solids.CAPSULE):
         a = row[:3]

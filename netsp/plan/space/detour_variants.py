@@ -41,7 +41,7 @@ def find_bent_paths(
     delta, policy = context.mission.delta, context.policy.detours
     for bent in _bent_paths(begin, end, max_length, policy):
         if not _is_free(context, bent) or any(
-            _is_seen_from(context, way, bent) for way in known + found
+            _is_seen_from(context, known_path, bent) for known_path in known + found
         ):
             continue
         path = context.pull_taut(bent)
@@ -84,10 +84,10 @@ def _is_free(context: PlanningContext, path: Floats) -> bool:
     return all(context.field.line_of_sight(a, b) for a, b in pairwise(path))
 
 
-def _is_seen_from(context: PlanningContext, way: Floats, bent: Floats) -> bool:
+def _is_seen_from(context: PlanningContext, known_path: Floats, bent: Floats) -> bool:
     """Return whether one path can be pulled straight across into the other."""
     shares = np.linspace(0.0, 1.0, context.policy.detours.n_sight_lines + 2)[1:-1]
-    one, other = _points_at(way, shares), _points_at(bent, shares)
+    one, other = _points_at(known_path, shares), _points_at(bent, shares)
     return all(context.field.line_of_sight(a, b) for a, b in zip(one, other, strict=True))
 
 

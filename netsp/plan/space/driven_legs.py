@@ -51,7 +51,7 @@ def drive_legs(context: PlanningContext, legs: Sequence[LegTo], home: Floats) ->
     """
     tether, word = context.present_tether, context.word_number(context.present_tether.nodes)
     limit = max(context.mission.tether_length, tether.length)
-    stops: list[TourVisit] = []
+    visits: list[TourVisit] = []
     total = 0.0
     for leg in (*legs, LegTo(-1, 0, home)):
         writes = context.word_number(leg.path)
@@ -68,9 +68,9 @@ def drive_legs(context: PlanningContext, legs: Sequence[LegTo], home: Floats) ->
         total += polylines.length(leg.path)
         if leg.waypoint >= 0:
             letters = context.words.letters(word)
-            stops.append(
+            visits.append(
                 TourVisit(leg.waypoint, leg.choice, letters, tether.length, leg.path, longest)
             )
     free = word == context.word_number(context.start_tether.nodes)
     free = free and hang_alike(tether, context.start_tether, context.mission.delta)
-    return DrivenTour([], stops, np.asarray(home), total, True, None) if free else None
+    return DrivenTour([], visits, np.asarray(home), total, True, None) if free else None

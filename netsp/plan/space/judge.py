@@ -121,7 +121,7 @@ def check_mission_tour(mission: Mission, scene: Scene, field: DistanceField) -> 
         raise InputError(f"tour: fails its check {failed[0].name!r}: {failed[0].detail}")
 
 
-def _proven(gap: float | None) -> bool:
+def _is_proven(gap: float | None) -> bool:
     return gap is not None and gap <= OPTIMALITY_TOLERANCE
 
 
@@ -151,18 +151,18 @@ class _Judge:
 
     def run(self) -> list[Check]:
         """Return all checks, in order."""
-        within = self._within()
+        within = self._check_extent()
         if not within.passed:  # nothing is known of the water there
-            return [self._joined(), within, self._length(), self._bounds()]
+            return [self._check_order(), within, self._check_length(), self._check_bounds()]
         return [
-            self._joined(),
+            self._check_order(),
             within,
-            self._left_out(),
-            self._clear(),
-            *self._words(),
-            *self._tethers(),
-            self._length(),
-            self._bounds(),
+            self._check_left_out(),
+            self._check_clearance(),
+            *self._check_words(),
+            *self._check_tethers(),
+            self._check_length(),
+            self._check_bounds(),
         ]
 
     @cached_property
@@ -170,11 +170,11 @@ class _Judge:
         """Return the paths (k, 3) of the legs; the last leads home."""
         return [*(np.array(s.path) for s in self.tour.stops), np.array(self.tour.home)]
 
-    def _name(self, leg: int) -> str:
+    def _leg_name(self, leg: int) -> str:
         """Return the name of a leg in messages."""
         return "the way home" if leg == len(self.tour.stops) else f"the way to stop {leg}"
 
-    def _within(self) -> Check:
+    def _check_extent(self) -> Check:
         """Check that paths stay within the scene's bounds and the tether's reach."""
         line, mission, name = self.tour.line, self.mission, "within the scene and the tether"
         if self.context.bounds is not None:
@@ -189,7 +189,7 @@ class _Judge:
             return Check(name, False, f"{detail}, the tether {mission.tether_length:g} long")
         return Check(name, True, "all paths")
 
-    def _joined(self) -> Check:
+    def _check_order(self) -> Check:
         """Check that each leg begins where the one before ended; the mission's validation checks
         the ends."""
         gaps = [float(np.linalg.norm(b[0] - a[-1])) for a, b in pairwise(self.legs)]
@@ -214,7 +214,7 @@ class _Judge:
             else f"a leg begins {largest_gap:.3g} m from where the one before it ended",
         )
 
-    def _left_out(self) -> Check:
+    def _check_left_out(self) -> Check:
         """Check that only waypoints out of reach are left out.
 
         A waypoint is in reach if the tether that follows a shortest path of the robot from the
@@ -239,7 +239,7 @@ class _Judge:
                 return Check(name, False, f"waypoint #{k}, which takes {tether.length:.3f} m")
         return Check(name, True, f"{len(left)} of {len(mission.waypoints)} waypoints")
 
-    def _clear(self) -> Check:
+    def _check_clearance(self) -> Check:
         """Check that paths keep clear of solids."""
         line, mission = self.tour.line, self.mission
         room = min_clearance_along(self.field, line)
@@ -256,14 +256,14 @@ class _Judge:
                 else f"; pulled taut, corners may be half of delta ({mission.delta:g}) nearer"
             )
         if tight:
-            detail += f", which {self._name(tight[0])} does not keep within half of delta"
+            detail += f", which {self._leg_name(tight[0])} does not keep within half of delta"
         return Check(
             "keeps clear of solids",
             free and not tight,
             detail if free else "passes through a solid",
         )
 
-    def _words(self) -> list[Check]:
+    def _check_words(self) -> list[Check]:
         """Check the words at the stops, and that the word at the end is empty."""
         mission, words = self.mission, self.context.words
         walked, wrong = self.context.present_tether.nodes, []
@@ -296,7 +296,7 @@ class _Judge:
             ),
         ]
 
-    def _tethers(self) -> list[Check]:
+    def _check_tethers(self) -> list[Check]:
         """Check the lengths of the tether, and that it is free at home."""
         model, laid = self.context.model, self.context.start_tether
         tether, longest, longest_leg, deviations = self.context.present_tether, 0.0, 0, []
@@ -340,7 +340,7 @@ class _Judge:
                 out.append(f"{relation} stop {k}: {length:.3f} m, stated {stated:.3f}")
         return out
 
-    def _length(self) -> Check:
+    def _check_length(self) -> Check:
         """Check the length of the tour."""
         length = sum(float(polylines.length(leg)) for leg in self.legs)
         stated = self.tour.length
@@ -353,7 +353,7 @@ class _Judge:
             else f"the path is {length:.6g} m long, stated {stated:.6g}",
         )
 
-    def _bounds(self) -> Check:
+    def _check_bounds(self) -> Check:
         """Check bounds, gaps and status."""
         tour, faults = self.tour, []
         for name, bound, gap in (
@@ -367,11 +367,11 @@ class _Judge:
             if (right is None) != (gap is None) or abs((right or 0.0) - (gap or 0.0)) > 1e-6:
                 faults.append(f"the gap of {name} is {right}, stated {gap}")
         left = len(self.mission.waypoints) - len(tour.stops)
-        if tour.status is Status.OPTIMAL and not _proven(tour.gap_to_all):
+        if tour.status is Status.OPTIMAL and not _is_proven(tour.gap_to_all):
             faults.append(f"status optimal with a gap of {tour.gap_to_all} to all tours")
         elif tour.status is Status.OPTIMAL and left:
             faults.append(f"status optimal with {counted(left, 'waypoint')} left out")
-        elif tour.status is Status.OPTIMAL_OF_STATES and not _proven(tour.gap):
+        elif tour.status is Status.OPTIMAL_OF_STATES and not _is_proven(tour.gap):
             faults.append(f"status optimal_of_states with a gap of {tour.gap}")
         elif tour.status not in (Status.OPTIMAL, Status.OPTIMAL_OF_STATES, Status.FEASIBLE):
             faults.append(

@@ -348,9 +348,9 @@ class RepairPlanner(PredictivePlanner):
         """Follow a new tour; the remaining waypoints come in its order from now on."""
         rest = found.to_mission(seed=self.options.seed)
         assert rest.tour is not None
-        good = [k for k in self._left if not self._is_lost(k)]
+        free_waypoints = [k for k in self._left if not self._is_lost(k)]
         lost = [k for k in self._left if self._is_lost(k)]
-        left = [*(good[n] for n in found.all_waypoints), *lost]
+        left = [*(free_waypoints[n] for n in found.all_waypoints), *lost]
         waypoints = (*rest.waypoints, *(self.mission.waypoints[k] for k in lost))
         self._splice(rest.tour, rest.tour.stops, rest.tour.home, waypoints, left)
 

@@ -376,14 +376,14 @@ def solve_mission(
                 raise KeyboardInterrupt from None
             raise
         searched = _search(found, clock, options)
-        best = _with_bound(_finished(found, searched, seed), searched.bounds)
+        best = _add_bound(_finish(found, searched, seed), searched.bounds)
         best = replace(best, mission=with_gaps(best.mission, context))
         return replace(
             best, given=found.given, plan=searched.plan, interrupted=clock.is_stopped, gaps=gaps
         )
 
 
-def _finished(found: _Incumbents, searched: _SearchResult, seed: int) -> SolvedMission:
+def _finish(found: _Incumbents, searched: _SearchResult, seed: int) -> SolvedMission:
     """Offer the last tours after the search, and return the incumbent, flown if there is time."""
     if found.given is None:
         given, _ = found.flights.fly(found.flights.mission, "the order as given")
@@ -566,7 +566,7 @@ def _solved_from_plan(planned: SpacePlan, solver: str, seed: int) -> SolvedMissi
     return SolvedMission(mission, planned.all_waypoints, None, None, planned)
 
 
-def _with_bound(best: SolvedMission, bounds: Mapping[frozenset[int], float]) -> SolvedMission:
+def _add_bound(best: SolvedMission, bounds: Mapping[frozenset[int], float]) -> SolvedMission:
     """Return a tour with the bound on all tours to the same waypoints, if there is one.
 
     A robot may turn back before it is at a waypoint. So the bound is reduced by twice the distance

@@ -423,7 +423,7 @@ class Detours:
         """Return a complete partial tour as a driven tour."""
         *legs, home = line.legs
         places, letters = self.paths.places, self.paths.context.words.letters
-        stops = [
+        visits = [
             TourVisit(
                 int(places.waypoint[leg.place]),
                 int(places.choice[leg.place]),
@@ -434,7 +434,7 @@ class Detours:
             )
             for leg in legs
         ]
-        return DrivenTour([], stops, _path(home), line.length, True, None)
+        return DrivenTour([], visits, _path(home), line.length, True, None)
 
 
 def _shortened_path(path: Floats, short: float) -> Floats:

@@ -124,7 +124,7 @@ class GapGrid:
         last = np.minimum(at.max(0) + around, np.array(self.shape) - 1)
         free = self.free(first, tuple(last - first + 1))
         parts, _ = label(free, np.ones((3, 3, 3)))
-        one, other = (_near(parts, place - first) for place in at)
+        one, other = (_labels_near(parts, place - first) for place in at)
         return bool(one & other)
 
 
@@ -132,7 +132,7 @@ SEARCHING = "searching for gaps that the cells do not show"
 """Name of the search in messages."""
 
 
-def _near(parts: Ints, at: Ints) -> set[int]:
+def _labels_near(parts: Ints, at: Ints) -> set[int]:
     """Return the labels of the connected parts at a cell and its neighbours."""
     box = tuple(slice(max(0, k - 1), k + 2) for k in at)
     return set(np.unique(parts[box]).tolist()) - {0}
@@ -203,13 +203,13 @@ def _gaps_between(
     nearest = np.moveaxis(
         distance_transform_edt(~ends_of, return_distances=False, return_indices=True), 0, -1
     )
-    cells = np.argwhere(_parting(possible & ~ends_of, nearest))
+    cells = np.argwhere(_parting_cells(possible & ~ends_of, nearest))
     if not len(cells):
         return []
     side = int(np.clip((policy.max_points / len(cells)) ** (1.0 / 3.0), 2, policy.finest))
-    ends, places, room = _links(grid, cells, nearest, side)
-    ends, places, room = _not_joined(free, ends, places, room, policy, clock)
-    return _grouped(grid, ends, places, room, policy)
+    ends, places, room = _find_links(grid, cells, nearest, side)
+    ends, places, room = _unconnected_links(free, ends, places, room, policy, clock)
+    return _group_links(grid, ends, places, room, policy)
 
 
 def _is_open(grid: GapGrid, gap: Gap, policy: GapPolicy) -> bool:
@@ -224,11 +224,11 @@ def _is_open(grid: GapGrid, gap: Gap, policy: GapPolicy) -> bool:
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     parts, _ = label(grid.field.distance(points) >= grid.clearance - 0.5 * spacing)
     at = np.rint((gap.sides - low) / (high - low) * (counts - 1)).astype(np.int64)
-    one, other = (_near(parts, place) for place in at)
+    one, other = (_labels_near(parts, place) for place in at)
     return bool(one & other)
 
 
-def _parting(between: Bools, nearest: Ints) -> Bools:
+def _parting_cells(between: Bools, nearest: Ints) -> Bools:
     """Return the mask of cells in `between` that have a neighbour in `between` whose nearest free
     cell is three or more cells away from their own."""
     out = np.zeros(between.shape, dtype=np.bool_)
@@ -258,7 +258,9 @@ def _shifted(
     return tuple(unshifted), tuple(shifted)
 
 
-def _links(grid: GapGrid, cells: Ints, nearest: Ints, side: int) -> tuple[Ints, Floats, Floats]:
+def _find_links(
+    grid: GapGrid, cells: Ints, nearest: Ints, side: int
+) -> tuple[Ints, Floats, Floats]:
     """Return the links across possible gaps.
 
     A link joins two neighbouring fine points that have enough room, and whose nearest free cells
@@ -292,7 +294,7 @@ def _links(grid: GapGrid, cells: Ints, nearest: Ints, side: int) -> tuple[Ints, 
     return np.concatenate(ends), np.concatenate(places), np.concatenate(rooms)
 
 
-def _not_joined(
+def _unconnected_links(
     free: Bools, ends: Ints, places: Floats, room: Floats, policy: GapPolicy, clock: Clock
 ) -> tuple[Ints, Floats, Floats]:
     """Return the links whose two free cells are not connected nearby."""
@@ -318,7 +320,7 @@ def _not_joined(
     return ends[keep], places[keep], room[keep]
 
 
-def _grouped(
+def _group_links(
     grid: GapGrid, ends: Ints, places: Floats, room: Floats, policy: GapPolicy
 ) -> list[Gap]:
     """Return one gap for each group of links near one another, at the place with the most room."""
@@ -343,7 +345,7 @@ def _grouped(
         through = sides[1] - sides[0]
         along = (0.5 * (sides[0] + sides[1]) - places[n]) @ through / (through @ through)
         for start in (places[n] + along * through, places[n]):  # halfway through, if that is free
-            place = _widest(grid, start, through)
+            place = _widest_place(grid, start, through)
             width = 2.0 * float(grid.field.distance(place))
             if width >= 2.0 * grid.clearance:
                 gaps.append(Gap(np.round(place, 3) + 0.0, width, sides))
@@ -351,7 +353,7 @@ def _grouped(
     return gaps
 
 
-def _widest(grid: GapGrid, place: Floats, through: Floats) -> Floats:
+def _widest_place(grid: GapGrid, place: Floats, through: Floats) -> Floats:
     """Return the place with the most room within half a cell of a place, across the passage."""
     along = through / max(float(np.linalg.norm(through)), 1e-300)
     _, _, across = np.linalg.svd(along[None])
@@ -433,7 +435,7 @@ class GapResolution:
     left: tuple[Gap, ...] | None = ()
 
     @property
-    def in_file(self) -> tuple[UnresolvedGap, ...] | None:
+    def as_in_tour(self) -> tuple[UnresolvedGap, ...] | None:
         """Return the gaps that stay hidden, as in a tour's `find_hidden_gaps`."""
         if self.left is None:
             return None

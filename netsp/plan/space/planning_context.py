@@ -139,7 +139,7 @@ class PlanningContext:
     @property
     def unresolved_gaps(self) -> tuple[UnresolvedGap, ...] | None:
         """Return the gaps that the grid does not show, as in a tour; None if not searched for."""
-        return None if self.gaps is None else self.gaps.in_file
+        return None if self.gaps is None else self.gaps.as_in_tour
 
     @cached_property
     def start_tether(self) -> Tether:

@@ -99,7 +99,7 @@ def floor_plan(scene: Scene, mission: Mission) -> FloorPlan | None:
         high = np.minimum(high, scene.bounds[3:])
     shapes = [solid.shape for solid in scene.all_solids()]
     for shape in shapes:
-        if isinstance(shape, HalfSpace) and _along_z(shape.normal):
+        if isinstance(shape, HalfSpace) and _is_vertical(shape.normal):
             if shape.normal[2] > 0.0:
                 low[2] = max(low[2], shape.point[2])
             else:
@@ -108,7 +108,7 @@ def floor_plan(scene: Scene, mission: Mission) -> FloorPlan | None:
     polygons: list[tuple[tuple[Corner, ...], float]] = []
     for shape in shapes:
         if isinstance(shape, HalfSpace):
-            if _along_z(shape.normal):
+            if _is_vertical(shape.normal):
                 continue
             if abs(shape.normal[2]) > UPRIGHT_TOLERANCE * math.hypot(*shape.normal):
                 return None
@@ -130,7 +130,7 @@ def floor_plan(scene: Scene, mission: Mission) -> FloorPlan | None:
     return FloorPlan(tuple(circles), tuple(polygons))
 
 
-def _along_z(direction: tuple[float, float, float]) -> bool:
+def _is_vertical(direction: tuple[float, float, float]) -> bool:
     """Return whether a direction is vertical."""
     return abs(direction[2]) >= (1.0 - UPRIGHT_TOLERANCE) * math.hypot(*direction)
 
@@ -143,7 +143,7 @@ def _circle_of(shape: Shape, low: float, high: float) -> tuple[Corner, float] | 
         a, b = shape.a, shape.b
         axis = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
         through = min(a[2], b[2]) <= low and max(a[2], b[2]) >= high
-        if through and math.hypot(*axis) > 0.0 and _along_z(axis):
+        if through and math.hypot(*axis) > 0.0 and _is_vertical(axis):
             return (a[0], a[1]), shape.radius
     return None
 
@@ -232,7 +232,7 @@ def drive_plane_tours(
             driven = drive_legs(context, legs, home)
             if driven is not None:
                 yield driven
-                longest = max(stop.longest_tether for stop in driven.visits)
+                longest = max(visit.longest_tether for visit in driven.visits)
                 if is_optimal and longest <= usable * context.mission.tether_length:
                     return
 
@@ -258,7 +258,7 @@ class _PlaneTour:
         points = np.vstack([places.points, mission.start])
         away = math.dist(mission.start, mission.anchor) > UPRIGHT_TOLERANCE
         goals = np.arange(len(points) if away else start)
-        goals = goals[self._in_reach(points, goals, share)]
+        goals = goals[self._goals_in_reach(points, goals, share)]
         needed = {places.present} if places.present is not None else set()
         needed |= {start} if away else set()
         if not needed <= set(goals.tolist()) or not set(goals.tolist()) - needed:
@@ -280,7 +280,7 @@ class _PlaneTour:
             )
         if home is None or (places.present is not None and begin is None):
             return None
-        found = _solved(graph, place, self.places, home, begin, clock, seed)
+        found = _solve_tour(graph, place, self.places, home, begin, clock, seed)
         if found is None:
             return None
         tour, is_optimal = found
@@ -309,21 +309,21 @@ class _PlaneTour:
             bounds=None if bounds is None else (bounds[0], bounds[1], bounds[3], bounds[4]),
         )
 
-    def _in_reach(self, points: Floats, goals: Ints, share: float) -> Ints:
+    def _goals_in_reach(self, points: Floats, goals: Ints, share: float) -> Ints:
         """Return the indices of the goals that the tether reaches in some class."""
         needed = shortest_tethers(self._problem(points[goals], share))
         return np.flatnonzero(needed <= share * self.context.mission.tether_length)
 
     def _vertex(
-        self, roadmap: TautRoadmap, graph: TravelGraph, here: Floats, line: Floats
+        self, roadmap: TautRoadmap, graph: TravelGraph, is_at_place: Floats, line: Floats
     ) -> int | None:
         """Return the vertex of a place whose tether lies in the class of a line."""
         word = signature(line, roadmap.problem.representative_points)
-        same = [v for v in np.flatnonzero(here).tolist() if graph.signatures[v] == word]
+        same = [v for v in np.flatnonzero(is_at_place).tolist() if graph.signatures[v] == word]
         return same[0] if same else None
 
 
-def _solved(
+def _solve_tour(
     graph: TravelGraph,
     place: Ints,
     places: Places,

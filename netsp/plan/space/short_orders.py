@@ -47,11 +47,11 @@ def short_order_tour(
     """
     policy = policy or context.policy.orders
     clock = clock.part(policy.time_share)
-    estimates = _estimates(context, places, clock, policy)
+    estimates = _estimate_lengths(context, places, clock, policy)
     best: DrivenTour | None = None
     seen: set[tuple[int, ...]] = set()
     for _ in range(policy.max_rounds):
-        order = _shortest_order(estimates, places, Clock(policy.max_solve_s, within=clock), seed)
+        order = _solve_order(estimates, places, Clock(policy.max_solve_s, within=clock), seed)
         if order is None or tuple(order) in seen:
             return best
         seen |= {tuple(order), tuple(order[::-1])}
@@ -60,27 +60,29 @@ def short_order_tour(
             if clock.is_up:
                 return best
             driven = drive_order(
-                context, [(int(n), int(c)) for n, c in _stops(places, direction)], clock
+                context,
+                [(int(n), int(c)) for n, c in _waypoints_and_choices(places, direction)],
+                clock,
             )
             if driven is None:
                 continue
             _update_estimates(estimates, places, direction, driven)
-            if best is None or _rank(driven) < _rank(best):
+            if best is None or _sort_key(driven) < _sort_key(best):
                 best = driven
     return best
 
 
-def _rank(driven: DrivenTour) -> tuple[int, float]:
+def _sort_key(driven: DrivenTour) -> tuple[int, float]:
     """Return the sort key of a tour: more stops first, then the shorter tour."""
     return -len(driven.visits), driven.length
 
 
-def _stops(places: Places, order: list[int]) -> Ints:
+def _waypoints_and_choices(places: Places, order: list[int]) -> Ints:
     """Return the waypoint and the choice of each place of an order, shape (n, 2)."""
     return np.column_stack([places.waypoint[order], places.choice[order]])
 
 
-def _estimates(
+def _estimate_lengths(
     context: PlanningContext, places: Places, clock: Clock, policy: OrderPolicy
 ) -> Floats:
     """Return the estimated lengths (n + 1, n + 1) of legs; row 0 is the start, then places."""
@@ -99,7 +101,7 @@ def _estimates(
     return np.asarray(lengths)
 
 
-def _shortest_order(estimates: Floats, places: Places, clock: Clock, seed: int) -> list[int] | None:
+def _solve_order(estimates: Floats, places: Places, clock: Clock, seed: int) -> list[int] | None:
     """Return the places of the shortest tour by estimates; None if the time is up."""
     cluster = np.r_[0, 1 + places.waypoint]
     graph, first = TravelGraph.from_costs(estimates, cluster), 1
@@ -115,8 +117,8 @@ def _update_estimates(
     """Replace the estimates of legs by the lengths that they were driven with."""
     place_of = {places.waypoint[n]: 1 + n for n in order}
     row = 0 if places.present is None else 1 + places.present
-    for stop in driven.visits:
-        column = place_of[stop.waypoint]
-        estimates[row, column] = estimates[column, row] = polylines.length(stop.path)
+    for visit in driven.visits:
+        column = place_of[visit.waypoint]
+        estimates[row, column] = estimates[column, row] = polylines.length(visit.path)
         row = column
     estimates[row, 0] = estimates[0, row] = polylines.length(driven.home)

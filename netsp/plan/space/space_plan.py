@@ -121,7 +121,7 @@ class SpacePlan:
     @property
     def order(self) -> tuple[int, ...]:
         """Return the numbers of the visited waypoints in the order of the tour."""
-        return tuple(stop.waypoint for stop in self.visits)
+        return tuple(visit.waypoint for visit in self.visits)
 
     @property
     def all_waypoints(self) -> tuple[int, ...]:
@@ -179,13 +179,13 @@ class SpacePlan:
         tour = PlannedTour(
             stops=tuple(
                 PlannedVisit(
-                    path=thinned_path(stop.path),
-                    signature=stop.word,
-                    tether_length=stop.tether_length,
-                    longest_tether=stop.longest_tether,
-                    given_as=stop.waypoint,
+                    path=thinned_path(visit.path),
+                    signature=visit.word,
+                    tether_length=visit.tether_length,
+                    longest_tether=visit.longest_tether,
+                    given_as=visit.waypoint,
                 )
-                for stop in self.visits
+                for visit in self.visits
             ),
             home=thinned_path(self.home),
             status=self._status(bound),
@@ -203,7 +203,7 @@ class SpacePlan:
         )
         all_of = self.mission.waypoints
         waypoints = (
-            *(all_of[stop.waypoint].at(stop.choice) for stop in self.visits),
+            *(all_of[visit.waypoint].at(visit.choice) for visit in self.visits),
             *(all_of[n] for n in self.all_waypoints[len(self.visits) :]),
         )
         return self.mission.model_copy(update={"waypoints": waypoints, "tour": tour})
@@ -257,7 +257,7 @@ def plan(
         No tour was found whose tether stays within its limit, or the time was up before the words
         of the scene were found.
     """
-    kept: SpacePlan | None = None
+    accepted: SpacePlan | None = None
     with until_interrupt(time_limit) as clock:
         for found in candidate_plans(
             mission,
@@ -272,16 +272,16 @@ def plan(
             on_progress=on_progress,
             policy=policy,
         ):
-            if kept is None or found.replaces(kept):
+            if accepted is None or found.replaces(accepted):
                 verdict = verify_mission(found.to_mission(), scene=scene, context=found.context)
-                kept = found if verdict else kept
-            if kept is not None and found.kind == TAUT_LEGS:
+                accepted = found if verdict else accepted
+            if accepted is not None and found.kind == TAUT_LEGS:
                 break
-        if kept is None:
+        if accepted is None:
             raise LimitReachedError(
                 "waypoints: no tour was found whose tether stays within the limit all along"
             )
-        return kept
+        return accepted
 
 
 def candidate_plans(
@@ -441,13 +441,13 @@ def plan_given_order(context: PlanningContext) -> SpacePlan | None:
     driven = drive_given_order(context)
     if driven is None:
         return None
-    return _plan_of(context, Places.for_mission(context.mission, context.field), driven, AS_GIVEN)
+    return _to_plan(context, Places.for_mission(context.mission, context.field), driven, AS_GIVEN)
 
 
-def _plan_of(context: PlanningContext, places: Places, driven: DrivenTour, kind: str) -> SpacePlan:
+def _to_plan(context: PlanningContext, places: Places, driven: DrivenTour, kind: str) -> SpacePlan:
     """Return a tour that was found without states and legs as a plan, without known paths between
     waypoints."""
-    visited = {stop.waypoint for stop in driven.visits}
+    visited = {visit.waypoint for visit in driven.visits}
     unreached = tuple(n for n in range(len(context.mission.waypoints)) if n not in visited)
     return SpacePlan(
         context.mission,
@@ -529,15 +529,15 @@ def _plans_without_states(
             context, scene, places, part, run.seed, policy, whole_tether
         ):
             in_plane = True
-            yield _plan_of(context, places, driven, PLANE)
+            yield _to_plan(context, places, driven, PLANE)
     if not in_plane:
         run.on_progress("short orders")
         short = short_order_tour(context, places, run.clock, run.seed)
         if short is not None and short.visits:
-            yield _plan_of(context, places, short, SHORT_ORDER)
+            yield _to_plan(context, places, short, SHORT_ORDER)
 
 
-def _found_states(run: _Run) -> States:
+def _find_states(run: _Run) -> States:
     """Return the first states, or raise InputError if no tether reaches any waypoint."""
     context, mission, share = run.context, run.mission, run.context.policy.tether_share
     # a robot that is farther out than the share may still come back
@@ -662,7 +662,7 @@ def _candidates(run: _Run, scene: Scene | None, whole_tether: bool) -> Iterator[
     mission = run.mission
     check_tether(mission, run.context.present_tether.length)
     yield from _plans_without_states(run, scene, whole_tether)
-    search = _StateSearch(run, _found_states(run))
+    search = _StateSearch(run, _find_states(run))
     search.connect()
     best, is_complete = search.best_along_taut_legs()
     if not search.board.reached_waypoints:

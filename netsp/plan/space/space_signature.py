@@ -145,7 +145,9 @@ class SpaceSignature:
         point = np.asarray(root, dtype=float)
         no_labels = np.empty(0, dtype=np.int32)
         everywhere = np.ones(cells.flags.shape, dtype=np.uint8)
-        at = find_visible_cell(_labelled(cells, no_labels, everywhere, tolerance, policy), point)
+        at = find_visible_cell(
+            _labelled_complex(cells, no_labels, everywhere, tolerance, policy), point
+        )
         if at < 0:
             raise InputError(
                 f"anchor: no free cell of {cells.cell:g} m is in sight of {shown(point)}; "
@@ -195,7 +197,9 @@ class SpaceSignature:
     @cached_property
     def _complex(self) -> LabelledComplex:
         """Return the labelled complex for kernels."""
-        return _labelled(self.cells, self.labels, self.reached_cells, self.tolerance, self.policy)
+        return _labelled_complex(
+            self.cells, self.labels, self.reached_cells, self.tolerance, self.policy
+        )
 
     @property
     def table(self) -> Table:
@@ -302,7 +306,7 @@ class SpaceSignature:
         return self.group.windings(word)
 
 
-def _labelled(
+def _labelled_complex(
     cells: Cells,
     labels: Labels,
     known: npt.NDArray[np.uint8],
