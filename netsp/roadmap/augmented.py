@@ -12,7 +12,7 @@ import heapq
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -142,6 +142,28 @@ class AugmentedGraph:
         return graph
 
 
+class DirectedEdges(NamedTuple):
+    """Edges of a roadmap in both directions, in compressed rows.
+
+    Attributes
+    ----------
+    start
+        (milestones + 1,) row starts into the two arrays that follow.
+    number
+        Number of each edge; -1 - number if it is run backwards.
+    head
+        Milestone to which each edge leads.
+    letters, row
+        Ray crossings of the undirected edges, and row starts into them.
+    """
+
+    start: Ints
+    number: Ints
+    head: Ints
+    letters: Ints
+    row: Ints
+
+
 def augment(
     points: Floats,
     edges: Ints,
@@ -173,17 +195,16 @@ def augment(
     # a directed edge is its undirected number, with the sign of its sense
     number = np.concatenate([np.arange(len(edges)), -1 - np.arange(len(edges))])[order]
     head = np.concatenate([edges[:, 1], edges[:, 0]])[order]
+    directed = DirectedEdges(start, number, head, letters[0], letters[1])
     milestone, node, length, trie, size, ok, complete = _reach_vertices(
-        start, number, head, cost, letters[0], letters[1], float(tether_length), max_vertices, stop
+        directed, cost, float(tether_length), max_vertices, stop
     )
     if not ok:
         raise InputError(
             f"tether_length: {tether_length:g} gives more than {max_vertices} vertices "
             "(milestone, word); lower tether_length or samples, or raise max_augmented"
         )
-    row, target, edge = _expand_edges(
-        start, number, head, letters[0], letters[1], milestone, node, trie, n
-    )
+    row, target, edge = _expand_edges(directed, milestone, node, trie, n)
     return AugmentedGraph(
         points,
         milestone,
@@ -195,6 +216,18 @@ def augment(
         Trie(trie, np.zeros(0), size),
         complete,
     )
+
+
+@kernel
+def _slot(key: int, keys: Ints) -> int:
+    """Return the slot of a key in a hash table with open addressing, or the empty slot for it."""
+    slots = len(keys)
+    slot = (key * 0x9E3779B1) % slots
+    while keys[slot] >= 0 and keys[slot] != key:
+        slot += 1
+        if slot == slots:
+            slot = 0
+    return int(slot)
 
 
 @kernel
@@ -237,17 +270,10 @@ def _is_looping(node: int, trie: Ints) -> bool:
 
 @kernel
 def _reach_vertices(
-    start: Ints,
-    number: Ints,
-    head: Ints,
-    cost: Floats,
-    letters: Ints,
-    row: Ints,
-    limit: float,
-    max_vertices: int,
-    stop: Ints,
+    edges: DirectedEdges, cost: Floats, limit: float, max_vertices: int, stop: Ints
 ) -> tuple[Ints, Ints, Floats, Ints, int, bool, bool]:
     """Search (milestone, word) by Dijkstra from (0, empty word), up to the tether length."""
+    start, number, head, letters, row = edges
     trie = np.full((256, 5), -1, dtype=np.int64)
     trie[0, LETTER] = 0
     size = 1
@@ -302,11 +328,7 @@ def _reach_vertices(
                 trie = more_int_rows(trie)
             w2, size = _word_after_edge(w, k, letters, row, trie, size)
             key = w2 * n + head[e]
-            slot = (key * 0x9E3779B1) % slots
-            while slot_key[slot] >= 0 and slot_key[slot] != key:
-                slot += 1
-                if slot == slots:
-                    slot = 0
+            slot = _slot(key, slot_key)
             if slot_key[slot] < 0:
                 if w2 != w and _is_looping(w2, trie):
                     continue
@@ -340,11 +362,7 @@ def _reach_vertices(
                     slot_id = np.empty(slots, dtype=np.int64)
                     for i in range(count):
                         code = ids[i, 1] * n + ids[i, 0]
-                        s = (code * 0x9E3779B1) % slots
-                        while slot_key[s] >= 0:
-                            s += 1
-                            if s == slots:
-                                s = 0
+                        s = _slot(code, slot_key)
                         slot_key[s], slot_id[s] = code, i
             else:
                 u = slot_id[slot]
@@ -397,18 +415,11 @@ def _sift_down(heap_d: Floats, heap_v: Ints, heap: int) -> None:
 
 @kernel
 def _expand_edges(
-    start: Ints,
-    number: Ints,
-    head: Ints,
-    letters: Ints,
-    row: Ints,
-    milestone: Ints,
-    node: Ints,
-    trie: Ints,
-    n: int,
+    edges: DirectedEdges, milestone: Ints, node: Ints, trie: Ints, n: int
 ) -> tuple[Ints, Ints, Ints]:
     """Return the edges among augmented vertices: row starts, targets and undirected edge
     numbers."""
+    start, number, head, letters, row = edges
     count = len(milestone)
     slots = 4
     while slots < 2 * count + 2:
@@ -418,11 +429,7 @@ def _expand_edges(
     total = 0
     for i in range(count):
         code = node[i] * n + milestone[i]
-        s = (code * 0x9E3779B1) % slots
-        while slot_key[s] >= 0:
-            s += 1
-            if s == slots:
-                s = 0
+        s = _slot(code, slot_key)
         slot_key[s], slot_id[s] = code, i
         total += start[milestone[i] + 1] - start[milestone[i]]
     out_row = np.zeros(count + 1, dtype=np.int64)
@@ -436,11 +443,7 @@ def _expand_edges(
             if w < 0:
                 continue
             code = w * n + head[e]
-            s = (code * 0x9E3779B1) % slots
-            while slot_key[s] >= 0 and slot_key[s] != code:
-                s += 1
-                if s == slots:
-                    s = 0
+            s = _slot(code, slot_key)
             if slot_key[s] == code:
                 target[m] = slot_id[s]
                 edge[m] = k if k >= 0 else -1 - k

@@ -25,7 +25,7 @@ from netsp.base.compiled.interpretation import interpreted, interprets
 from netsp.base.compiled.kernel import kernel
 from netsp.roadmap.arcs import Arcs
 from netsp.roadmap.slits import Ends, Slits, empty_workspace, max_word_length
-from netsp.roadmap.taut_by_word import NODE, SAME_ANGLE, SLID, empty_path, pull
+from netsp.roadmap.taut_by_word import NODE, SAME_ANGLE, SLID, Path, empty_path, pull
 from netsp.roadmap.tethertree import TetherTree
 
 SLIDE_TOLERANCE = 1e-9
@@ -188,7 +188,7 @@ def fill(
                 length, _, count = pull(a, b, ends, point, slits, arcs, room, path)
                 if length < 0.0:
                     return i, j
-                fill_parallel(a, b, length, count, path.whole, path.real, branches, lengths)
+                fill_parallel(a, b, length, count, path, branches, lengths)
             j += 1
         i += 1
         j = i + 1 if whole else 0
@@ -229,7 +229,7 @@ def _fill_in_numpy(
                 length, _, count = pull_one(a, b, ends, point, slits, arcs, room, path)
                 if length < 0.0:
                     return i, k
-                note_alike(a, b, length, count, path.whole, path.real, branches, lengths)
+                note_alike(a, b, length, count, path, branches, lengths)
         i += 1
         j = i + 1 if whole else 0
     return i, j
@@ -241,14 +241,13 @@ def fill_parallel(
     v: int,
     length: float,
     count: int,
-    on: Ints,
-    at: Floats,
+    path: Path,
     branches: Branches,
     lengths: Lengths,
 ) -> None:
     """Fill in all legs with the same crossing as the leg from u to v, given its planar length and
-    its path of `count` tangents (`Path.whole` and `Path.real`)."""
-    i0, i1, j0, j1 = _parallel_ranges(u, v, count, on, at, branches)
+    its path of `count` tangents."""
+    i0, i1, j0, j1 = _parallel_ranges(u, v, count, path, branches)
     order, planar, row = branches.order, lengths.planar, lengths.row
     saved = planar[u] + planar[v] - length
     # row by row, for memory's sake
@@ -282,13 +281,12 @@ def _fill_parallel_in_numpy(
     v: int,
     length: float,
     count: int,
-    on: Ints,
-    at: Floats,
+    path: Path,
     branches: Branches,
     lengths: Lengths,
 ) -> None:
     """Vectorise `fill_parallel` over all legs."""
-    i0, i1, j0, j1 = interpreted(_parallel_ranges)(u, v, count, on, at, branches)
+    i0, i1, j0, j1 = interpreted(_parallel_ranges)(u, v, count, path, branches)
     order, planar, row = branches.order, lengths.planar, lengths.row
     saved = planar[u] + planar[v] - length
     a, b = order[i0:i1], order[j0:j1]
@@ -304,19 +302,19 @@ def _fill_parallel_in_numpy(
 
 @kernel
 def _parallel_ranges(
-    u: int, v: int, count: int, on: Ints, at: Floats, branches: Branches
+    u: int, v: int, count: int, path: Path, branches: Branches
 ) -> tuple[int, int, int, int]:
     """Return the ranges of places of the vertices whose legs have the same crossing as that of u
     and v: on the side of u, and on the side of v."""
-    p, p_least, p_place = _find_fork(u, 1, 1, 1, count, on, at, branches)
-    q, q_least, q_place = _find_fork(v, count - 1, -1, 0, count, on, at, branches)
+    p, p_least, p_place = _find_fork(u, 1, 1, 1, count, path, branches)
+    q, q_least, q_place = _find_fork(v, count - 1, -1, 0, count, path, branches)
     i0, j0 = branches.rank[u], branches.rank[v]
     i1, j1 = i0 + 1, j0 + 1
     if p >= 0 and q >= 0 and p_place >= q_place:
         # around one arc from tether to tether: how far it slides is up to both ends, so those on
         # the side of u are to leave no earlier than u does
         if p_place == q_place:
-            i0, i1 = _first_place(p, p_least + at[p_place, SLID], branches), branches.end[p]
+            i0, i1 = _first_place(p, p_least + path.real[p_place, SLID], branches), branches.end[p]
             j0, j1 = _first_place(q, q_least, branches), branches.end[q]
     else:
         if p >= 0:
@@ -328,7 +326,7 @@ def _parallel_ranges(
 
 @kernel
 def _find_fork(
-    v: int, first: int, step: int, flip: int, count: int, on: Ints, at: Floats, branches: Branches
+    v: int, first: int, step: int, flip: int, count: int, path: Path, branches: Branches
 ) -> tuple[int, float, int]:
     """Return the bend at which a leg leaves the tether of its end v (-1 if there is none), the
     smallest angle at which what leaves that bend has the same crossing, and the leg's node there.
@@ -337,8 +335,8 @@ def _find_fork(
     bend, slid = branches.last[v], branches.slid[v]
     found, least, place = -1, 0.0, -1
     k = first
-    while 0 < k < count and bend > 0 and (on[k, NODE] ^ flip) == branches.node[bend]:
-        found, least, place = bend, slid - at[k, SLID], k
+    while 0 < k < count and bend > 0 and (path.whole[k, NODE] ^ flip) == branches.node[bend]:
+        found, least, place = bend, slid - path.real[k, SLID], k
         if abs(least) > SAME_ANGLE:
             break
         k += step

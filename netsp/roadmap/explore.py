@@ -177,15 +177,14 @@ def _follow_letters(
     hi: int,
     x: float,
     y: float,
-    letters: npt.NDArray[np.int32],
-    pending: Floats,
-    rule: int,
+    words: WordRules,
     trie: Ints,
     limit: Floats,
     size: int,
 ) -> tuple[int, int]:
     """Return the trie node after the letters lo … hi of the segment to a bend at (x, y), and the
     size of the trie. Missing nodes are added; the node is -1 if no wanted word can follow."""
+    letters, pending = words.letters, words.pending
     for k in range(lo, hi):
         a = int(letters[k])
         if node > 0 and trie[node, LETTER] == -a:
@@ -193,7 +192,7 @@ def _follow_letters(
             continue
         c = trie_child(node, a, trie)
         if c < 0:
-            joins = _joins_core(node, a, rule, trie)
+            joins = _joins_core(node, a, words.rule, trie)
             if not joins and pending[0 if a > 0 else 1, abs(a) - 1, XMIN] == np.inf:
                 return -1, size
             c = size
@@ -256,7 +255,6 @@ def explore(
     first, turn, gap, radius = net.first, net.turn, net.gap, net.radius
     segment_row, arrival_row, gap_row = net.segment_row, net.arrival_row, net.gap_row
     arc_nodes, rest, within = net.arc_nodes, ask.rest, ask.within
-    letters, pending, rule = words.letters, words.pending, words.rule
     state = np.empty((1024, 5), dtype=np.int64)
     real = np.empty((1024, 3))
     stack = np.empty((1024, 1), dtype=np.int64)
@@ -304,9 +302,7 @@ def explore(
                     segment_row[e, 1],
                     ends[e, 2],
                     ends[e, 3],
-                    letters,
-                    pending,
-                    rule,
+                    words,
                     trie,
                     limit,
                     size,
@@ -338,9 +334,7 @@ def explore(
                         arrival_row[e, 1],
                         ends[f, 0],
                         ends[f, 1],
-                        letters,
-                        pending,
-                        rule,
+                        words,
                         trie,
                         limit,
                         size,
@@ -370,9 +364,7 @@ def explore(
                 gap_row[e, 1],
                 ends[following, 0],
                 ends[following, 1],
-                letters,
-                pending,
-                rule,
+                words,
                 trie,
                 limit,
                 size,

@@ -108,11 +108,10 @@ def empty_horizons(place: Floats, arc_count: int, full: Bools, policy: SightPoli
 
 
 @kernel
-def _lower_sectors(
-    begin: float, angle: float, far: float, pencil: int, farthest: Singles, width: float
-) -> None:
+def _lower_sectors(begin: float, angle: float, far: float, pencil: int, horizons: Horizons) -> None:
     """Lower the horizon of all sectors wholly within an angle to a length. The angle begins at
     `begin` after the first sector."""
+    farthest, width = horizons.farthest, horizons.width[pencil]
     sectors = farthest.shape[1]
     far *= 1.0 + HORIZON_TOLERANCE
     begin %= TWO_PI
@@ -125,10 +124,9 @@ def _lower_sectors(
 
 
 @kernel
-def _is_hidden(
-    begin: float, angle: float, near: float, pencil: int, farthest: Singles, width: float
-) -> bool:
+def _is_hidden(begin: float, angle: float, near: float, pencil: int, horizons: Horizons) -> bool:
     """Return whether the horizon of all sectors that meet an angle is nearer than a length."""
+    farthest, width = horizons.farthest, horizons.width[pencil]
     sectors = farthest.shape[1]
     begin %= TWO_PI
     end = begin + angle
@@ -152,10 +150,7 @@ def _lower_horizons(
     radius: float,
     far: float,
     pencil: int,
-    farthest: Singles,
-    low: float,
-    width: float,
-    max_shift_share: float,
+    horizons: Horizons,
 ) -> None:
     """Lower horizons to what a connected set blocks.
 
@@ -168,11 +163,12 @@ def _lower_horizons(
     far
         Longest tangent to the set.
     """
+    width = horizons.width[pencil]
     ux, uy, vx, vy = p[0] - cx, p[1] - cy, q[0] - cx, q[1] - cy
     a, b = math.hypot(ux, uy), math.hypot(vx, vy)
     near = min(a, b)
     cross, dot = ux * vy - uy * vx, ux * vx + uy * vy
-    is_slim = abs(offset) + radius < max_shift_share * width * near
+    is_slim = abs(offset) + radius < horizons.max_shift_share * width * near
     if is_slim and dot > 0.0 and abs(cross) < 0.5 * width * a * b:
         return  # most edges subtend less than a sector
     first = math.atan2(uy, ux)
@@ -188,7 +184,7 @@ def _lower_horizons(
         )
         end = first + max(math.asin((radius + offset) / a), turn + math.asin((radius + offset) / b))
     if end - begin >= width:
-        _lower_sectors(begin - low, end - begin, far, pencil, farthest, width)
+        _lower_sectors(begin - horizons.low[pencil], end - begin, far, pencil, horizons)
 
 
 @kernel
@@ -203,9 +199,7 @@ def find_horizons(
 ) -> None:
     """Lower the horizons of pencils `begin` to `end` - 1 to what blocks them. Some stay too far
     when the flag of a clock is set."""
-    farthest, lows, widths = horizons.farthest, horizons.low, horizons.width
     min_clearance_ratio = horizons.min_clearance_ratio
-    max_shift_share = horizons.max_shift_share
     box, skip = blockers.tree.box, blockers.tree.skip
     tree_first, tree_stop, part = blockers.tree.first, blockers.tree.stop, blockers.part
     edges, circles, grow, eps = blockers.edges, blockers.circles, blockers.grow, blockers.eps
@@ -216,7 +210,7 @@ def find_horizons(
         i = pencil // 2 if pencil < 2 * a_count else pencil - a_count
         cx, cy, r = place[i, 0], place[i, 1], place[i, 2]
         offset = r if pencil % 2 == 0 else -r
-        low, width = lows[pencil], widths[pencil]
+        low, width = horizons.low[pencil], horizons.width[pencil]
         stack[0] = 0
         top = 1
         while top > 0:
@@ -229,7 +223,7 @@ def find_horizons(
                 if angle + 2.0 * shift < width:
                     continue
                 away -= low + shift
-                if _is_hidden(away, angle + 2.0 * shift, near, pencil, farthest, width):
+                if _is_hidden(away, angle + 2.0 * shift, near, pencil, horizons):
                     continue
                 first, last = tree_first[node], tree_stop[node] - 1
                 o, e = part[first, 0], part[first, 1]
@@ -247,10 +241,7 @@ def find_horizons(
                         grow[o] - 2.0 * eps,
                         far,
                         pencil,
-                        farthest,
-                        low,
-                        width,
-                        max_shift_share,
+                        horizons,
                     )
             if skip[node] > node + 1:
                 one, other = node + 1, skip[node + 1]
@@ -274,10 +265,7 @@ def find_horizons(
                             radius,
                             d,
                             pencil,
-                            farthest,
-                            low,
-                            width,
-                            max_shift_share,
+                            horizons,
                         )
                     continue
                 radius = grow[o] - 2.0 * eps
@@ -300,10 +288,7 @@ def find_horizons(
                         radius,
                         far,
                         pencil,
-                        farthest,
-                        low,
-                        width,
-                        max_shift_share,
+                        horizons,
                     )
 
 
@@ -369,7 +354,7 @@ def pairs_in_sight(
             if stop[0] != 0:
                 break
             pencil = 2 * i + ti if i < a_count else a_count + i
-            low, width = horizons.low[pencil], horizons.width[pencil]
+            low = horizons.low[pencil]
             node = int(np.int64(0))
             while node < len(skip):
                 if last[node] <= i:
@@ -384,8 +369,7 @@ def pairs_in_sight(
                         angle + 2.0 * shift,
                         near - r,
                         pencil,
-                        horizons.farthest,
-                        width,
+                        horizons,
                     ):
                         node = skip[node]
                         continue

@@ -163,53 +163,9 @@ def pull(
         tangents, and the angles slid before them, are in `path`.
     """
     low, bends = string(u, v, ends, slits, room)
-    count = _initial_arcs(
-        u,
-        v,
-        bends,
-        arcs.points + point[u],
-        arcs.points + point[v],
-        ends.place,
-        ends.cell,
-        slits.obstacle,
-        slits.x,
-        room.gate,
-        room.corner,
-        arcs.of,
-        arcs.row,
-        arcs.disk,
-        path.real,
-        path.whole,
-    )
-    count = _tighten(
-        count,
-        arcs.of,
-        arcs.row,
-        arcs.disk,
-        arcs.span,
-        arcs.table,
-        arcs.real,
-        arcs.solid,
-        arcs.edges,
-        path.real,
-        path.whole,
-        arcs.max_backward_turn,
-    )
-    length = _verified_length(
-        u,
-        v,
-        count,
-        ends.letters,
-        ends.row,
-        arcs.disk,
-        arcs.span,
-        arcs.real,
-        arcs.whole,
-        arcs.letters,
-        path.real,
-        path.whole,
-        path.word,
-    )
+    count = _initial_arcs(u, v, bends, ends, point, slits, arcs, room, path)
+    count = _tighten(count, arcs, path)
+    length = _verified_length(u, v, count, ends, arcs, path)
     return length, low, count - 1
 
 
@@ -235,21 +191,10 @@ def pull_one(ends: Ends, point: Ints, slits: Slits, arcs: Arcs) -> tuple[float, 
 
 
 @kernel
-def _tighten(
-    count: int,
-    of: Ints,
-    row: Ints,
-    disk: Floats,
-    span: Ints,
-    table: Ints,
-    real: Floats,
-    solid: Floats,
-    edges: Floats,
-    at: Floats,
-    on: Ints,
-    max_backward_turn: float,
-) -> int:
+def _tighten(count: int, arcs: Arcs, path: Path) -> int:
     """Pull a path taut and return its number of nodes; 0 if that is not possible."""
+    disk, real, table = arcs.disk, arcs.real, arcs.table
+    at, on = path.real, path.whole
     nodes = len(disk)
     at[0, SLID] = 0.0
     i, left = 0, 16 + 8 * count
@@ -262,7 +207,7 @@ def _tighten(
             # on along the arc, from where it was left to where it was met again
             sense = 1.0 - 2.0 * (a % 2)
             on_by = sense * (at[i + 1, ARRIVING] - at[i, LEAVING])
-            turns = math.floor((on_by + max_backward_turn) / TWO_PI)
+            turns = math.floor((on_by + arcs.max_backward_turn) / TWO_PI)
             at[i, LEAVING] = at[i + 1, LEAVING] - sense * turns * TWO_PI
             at[i, X_OUT], at[i, Y_OUT] = at[i + 1, X_OUT], at[i + 1, Y_OUT]
             _delete_node(i + 1, count, at, on)
@@ -270,7 +215,7 @@ def _tighten(
             continue
         e = find_tangent(a * nodes + b, table)
         if e < 0:
-            new, angle = _arc_between(a, b, i, of, row, disk, span, solid, edges, at)
+            new, angle = _arc_between(a, b, i, arcs, at)
             if new < 0 or new in (a, b):
                 return 0
             for k in range(count, i + 1, -1):
@@ -336,25 +281,22 @@ def _initial_arcs(
     u: int,
     v: int,
     bends: int,
-    from_: int,
-    to: int,
-    place: Floats,
-    cell: Ints,
-    obstacle: Ints,
-    line_x: Floats,
-    gate: Floats,
-    corner: Ints,
-    of: Ints,
-    row: Ints,
-    disk: Floats,
-    at: Floats,
-    on: Ints,
+    ends: Ends,
+    point: Ints,
+    slits: Slits,
+    arcs: Arcs,
+    room: Workspace,
+    path: Path,
 ) -> int:
     """Write the directed arcs that the bends of a string name, between its two ends, into a path.
     Return the number of nodes; 0 if an arc is not known."""
+    place, cell, obstacle, line_x = ends.place, ends.cell, slits.obstacle, slits.x
+    gate, corner = room.gate, room.corner
+    of, row, disk = arcs.of, arcs.row, arcs.disk
+    at, on = path.real, path.whole
     if bends and gate[corner[bends - 1, 0], LOW] == gate[corner[bends - 1, 0], HIGH]:
         bends -= 1  # that is its end
-    on[0, NODE] = from_
+    on[0, NODE] = arcs.points + point[u]
     x, y = place[u, 0], place[u, 1]
     _set_position(0, x, y, float(cell[u]), at)
     count = 1
@@ -396,7 +338,7 @@ def _initial_arcs(
         x, y = here_x, here_y
         if count + 2 >= len(at):
             return 0
-    on[count, NODE] = to
+    on[count, NODE] = arcs.points + point[v]
     _set_position(count, place[v, 0], place[v, 1], float(cell[v]), at)
     return count + 1
 
@@ -437,20 +379,11 @@ def _farthest_arc(
 
 
 @kernel
-def _arc_between(
-    a: int,
-    b: int,
-    i: int,
-    of: Ints,
-    row: Ints,
-    disk: Floats,
-    span: Ints,
-    solid: Floats,
-    edges: Floats,
-    at: Floats,
-) -> tuple[int, float]:
+def _arc_between(a: int, b: int, i: int, arcs: Arcs, at: Floats) -> tuple[int, float]:
     """Return the directed arc that a path has to pass between node a, number i of the path, and the
     next node b, and the angle at which it stands out; -1 if it is not known."""
+    disk, span, solid, edges = arcs.disk, arcs.span, arcs.solid, arcs.edges
+    of, row = arcs.of, arcs.row
     ra = 0.0 if span[a, OWNER] < 0 else disk[a, RADIUS] * (1.0 - 2.0 * (a % 2))
     rb = 0.0 if span[b, OWNER] < 0 else disk[b, RADIUS] * (1.0 - 2.0 * (b % 2))
     dx, dy = disk[b, CX] - disk[a, CX], disk[b, CY] - disk[a, CY]
@@ -504,23 +437,12 @@ def _arc_between(
 
 
 @kernel
-def _verified_length(
-    u: int,
-    v: int,
-    count: int,
-    letters: Ints,
-    row: Ints,
-    disk: Floats,
-    span: Ints,
-    real: Floats,
-    whole: Ints,
-    written: Ints,
-    at: Floats,
-    on: Ints,
-    word: Ints,
-) -> float:
+def _verified_length(u: int, v: int, count: int, ends: Ends, arcs: Arcs, path: Path) -> float:
     """Return the length of a path if it is taut and has the word of the leg from u to v; otherwise
     `NOT_PULLED`."""
+    letters, row = ends.letters, ends.row
+    disk, span, real, whole, written = arcs.disk, arcs.span, arcs.real, arcs.whole, arcs.letters
+    at, on, word = path.real, path.whole, path.word
     if count < 2:
         return NOT_PULLED
     n, total = 0, 0.0

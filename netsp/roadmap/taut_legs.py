@@ -176,9 +176,7 @@ class TautLegs:
                         out[row[branches.rank[x]], y] = around
                 continue
             length, path = found
-            fill_parallel(
-                u, v, length, len(path.whole) - 1, path.whole, path.real, branches, lengths
-            )
+            fill_parallel(u, v, length, len(path.whole) - 1, path, branches, lengths)
 
     def _search_leg(self, u: int, v: int, stop: Flag) -> tuple[float, Path] | None:
         """Search for a leg that could not be pulled. Return its planar length and its path, or None

@@ -57,6 +57,23 @@ class TetherTree(NamedTuple):
         return float(self.length[s])
 
 
+class Growth(NamedTuple):
+    """Arrays of a tree that grows.
+
+    Attributes
+    ----------
+    whole, real
+        (capacity, 4) and (capacity, 2) columns AT … and TURNED ….
+    last, slid
+        (V,) arrays of `TetherTree`; -1 for a tether that could not be pulled.
+    """
+
+    whole: Ints
+    real: Floats
+    last: Ints
+    slid: Floats
+
+
 class GrowingTree:
     """Tree of bends to which tethers are added.
 
@@ -67,72 +84,46 @@ class GrowingTree:
     """
 
     def __init__(self, vertices: int) -> None:
-        self._whole = np.full((256, 4), -1, dtype=np.int64)
-        self._real = np.zeros((256, 2))
+        self._growth = Growth(
+            np.full((256, 4), -1, dtype=np.int64),
+            np.zeros((256, 2)),
+            np.zeros(vertices, dtype=np.int64),
+            np.zeros(vertices),
+        )
         self._size = 1
-        self._last = np.zeros(vertices, dtype=np.int64)
-        self._slid = np.zeros(vertices)
 
     def pull(self, ends: Ends, point: Ints, slits: Slits, arcs: Arcs, stop: Flag) -> Ints:
         """Add the tethers from vertex 0, the base, to all vertices. Return the vertices whose
         tether could not be pulled. Vertices are missing when the flag is set."""
-        self._whole, self._real, self._size = _grow(
-            ends,
-            point,
-            slits,
-            arcs,
-            self._whole,
-            self._real,
-            self._size,
-            self._last,
-            self._slid,
-            stop,
-        )
-        missing = np.flatnonzero(self._last < 0)
-        self._last[missing] = 0
+        self._growth, self._size = _grow(ends, point, slits, arcs, self._growth, self._size, stop)
+        last = self._growth.last
+        missing = np.flatnonzero(last < 0)
+        last[missing] = 0
         return missing
 
     def add(self, vertex: int, path: Path, arcs: Arcs) -> None:
         """Add the tether of a vertex, given as a path."""
-        self._whole, self._real, self._size = _graft(
-            vertex,
-            len(path.whole) - 1,
-            path.whole,
-            path.real,
-            arcs,
-            self._whole,
-            self._real,
-            self._size,
-            self._last,
-            self._slid,
-        )
+        count = len(path.whole) - 1
+        self._growth, self._size = _graft(vertex, count, path, arcs, self._growth, self._size)
 
     def tree(self) -> TetherTree:
         """Return the tree as it is."""
-        whole, real = self._whole[: self._size], self._real[: self._size]
+        growth = self._growth
+        whole, real = growth.whole[: self._size], growth.real[: self._size]
         return TetherTree(
             whole[:, AT].copy(),
             whole[:, PARENT].copy(),
             real[:, TURNED].copy(),
             real[:, REACHED].copy(),
-            self._last,
-            self._slid,
+            growth.last,
+            growth.slid,
         )
 
 
 @kernel
 def _grow(
-    ends: Ends,
-    point: Ints,
-    slits: Slits,
-    arcs: Arcs,
-    whole: Ints,
-    real: Floats,
-    size: int,
-    last: Ints,
-    slid: Floats,
-    stop: Ints,
-) -> tuple[Ints, Floats, int]:
+    ends: Ends, point: Ints, slits: Slits, arcs: Arcs, growth: Growth, size: int, stop: Ints
+) -> tuple[Growth, int]:
     longest = max_word_length(ends.row)
     room, path = empty_workspace(longest, slits), empty_path(longest, arcs.max_bends)
     for v in range(1, len(point)):
@@ -140,32 +131,22 @@ def _grow(
             break
         length, _, count = pull(0, v, ends, point, slits, arcs, room, path)
         if length < 0.0:
-            last[v] = -1
+            growth.last[v] = -1
             continue
-        whole, real, size = _graft(
-            v, count, path.whole, path.real, arcs, whole, real, size, last, slid
-        )
-    return whole, real, size
+        growth, size = _graft(v, count, path, arcs, growth, size)
+    return growth, size
 
 
 @kernel
 def _graft(
-    v: int,
-    count: int,
-    on: Ints,
-    at: Floats,
-    arcs: Arcs,
-    whole: Ints,
-    real: Floats,
-    size: int,
-    last: Ints,
-    slid: Floats,
-) -> tuple[Ints, Floats, int]:
-    """Add the tether of vertex v, a path of `count` tangents (`Path.whole` and `Path.real`), and
-    return the tree."""
+    v: int, count: int, path: Path, arcs: Arcs, growth: Growth, size: int
+) -> tuple[Growth, int]:
+    """Add the tether of vertex v, a path of `count` tangents, and return the tree with its size."""
+    whole, real, on, at = growth.whole, growth.real, path.whole, path.real
+    disk, edge = arcs.disk, arcs.real
     bend, by, reached = 0, 0.0, 0.0
     for k in range(1, count):
-        reached += by * arcs.disk[on[k - 1, NODE], RADIUS] + arcs.real[on[k - 1, EDGE], LENGTH]
+        reached += by * disk[on[k - 1, NODE], RADIUS] + edge[on[k - 1, EDGE], LENGTH]
         child = whole[bend, CHILD]
         while child >= 0 and not (
             whole[child, AT] == on[k, NODE] and abs(real[child, TURNED] - by) <= SAME_ANGLE
@@ -181,5 +162,5 @@ def _graft(
             whole[bend, CHILD] = child
             real[child, TURNED], real[child, REACHED] = by, reached
         bend, by = child, at[k, SLID]
-    last[v], slid[v] = bend, by
-    return whole, real, size
+    growth.last[v], growth.slid[v] = bend, by
+    return Growth(whole, real, growth.last, growth.slid), size
