@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from netsp import solve, travel_graph
-from netsp.gtsp import searching
+from netsp.gtsp.gtsp_policy import GtspPolicy, ProofSearchPolicy
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.neighbourhood import cheapest_insertions
 from netsp.gtsp.travel.graph import least_tethers
+from netsp.mip.mip_policy import MipPolicy
 from netsp.mip.mip_solver import MipRun
 from netsp.plan.random_worlds import random_world
 from tests.travel_graphs import random_graph
@@ -59,10 +60,11 @@ def solve_all(graph):
     return result.length
 
 
-def test_a_proof_begins_with_a_tour_beside_which_there_is_none_better(monkeypatch):
-    monkeypatch.setattr(searching, "CORE", 40)  # three classes of each goal
+def test_a_proof_begins_with_a_tour_beside_which_there_is_none_better():
+    # three classes of each goal
+    policy = MipPolicy(gtsp=GtspPolicy(proof_search=ProofSearchPolicy(core_vertices=40)))
     graph = travel_graph(random_world(0, goals=20, tether_length=350.0))
-    run = MipRun(graph, Limits(iterations=10_000), search_rounds=300)
+    run = MipRun(graph, Limits(iterations=10_000), search_rounds=300, policy=policy)
     run.find_first_tour()
     first = solve_all(
         graph.subgraph(least_tethers(graph.costs_to_base, graph.cluster, run.core_classes_per_goal))

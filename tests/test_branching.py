@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp.gtsp.cost_matrix import CostMatrix
+from netsp.gtsp.gtsp_policy import CostPolicy
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.travel.graph import TravelGraph
@@ -31,18 +32,18 @@ from tests.travel_graphs import random_graph
 from tests.worlds import costs_of
 
 
-def root_of(graph, *, tour=None, rows=None):
+def root_of(graph, *, tour=None, rows=None, costs=CostPolicy()):
     """A root that has done nothing but hold all legs, with a poor tour or none."""
     run = MipRun(graph, Limits(on_progress=None if rows is None else rows.append))
     run.update_incumbent(tour)
-    return Root(run, CostMatrix(graph), HighsRelaxation, run.round_point)
+    return Root(run, CostMatrix(graph, policy=costs), HighsRelaxation, run.round_point)
 
 
-def test_the_first_legs_of_every_vertex_are_found_in_little_memory(monkeypatch):
+def test_the_first_legs_of_every_vertex_are_found_in_little_memory():
     """Of ten rows at a time, and nothing of these is kept but a few legs."""
     graph = random_graph(0, 60, most=12)
-    root = root_of(graph, tour=[0, *(graph.members(g)[0] for g in range(1, 61))])
-    monkeypatch.setattr("netsp.gtsp.cost_matrix.ROWS", 10)
+    tour = [0, *(graph.members(g)[0] for g in range(1, 61))]
+    root = root_of(graph, tour=tour, costs=CostPolicy(block_rows=10))
     tracemalloc.start()
     legs = root._first_legs()
     peak = tracemalloc.get_traced_memory()[1]

@@ -12,6 +12,7 @@ from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
 from netsp.plan import solve_problem as by_name
 from netsp.plan import tether_carry_columns
+from netsp.plan.solve_policy import CarryPolicy
 from netsp.plan.tether_carry_columns import Carried, with_carried
 from netsp.roadmap import taut
 
@@ -110,7 +111,7 @@ def test_a_tether_is_carried_along_and_no_farther_than_it_reaches():
     words = {}
     chain = tether_carry_columns._along_straight_lines(graph, np.random.default_rng(0), Clock())
     assert sorted(goal for goal, _ in chain) == list(range(1, 17))
-    again = tether_carry_columns._put_back(graph, chain, words, Clock())
+    again = tether_carry_columns._with_classes(graph, chain, words, Clock())
     assert list(words) == chain
     assert again.tethers.max() <= problem.tether_length * (1.0 + 1e-9)
     ended = Clock()
@@ -189,9 +190,9 @@ def test_ctrl_c_while_a_roadmap_is_made_that_is_nothing_until_it_is_whole(presse
         solve(windfarm(2))
 
 
-def test_searches_in_vain_end_although_there_is_no_end_of_classes(monkeypatch):
+def test_searches_in_vain_end_although_there_is_no_end_of_classes():
     # so few may be looked at that each search begins anew with those of least tether
-    monkeypatch.setattr(tether_carry_columns, "MOST_PER_GOAL", 4)
+    policy = CarryPolicy(max_classes_per_goal=4)
     graph = few(windfarm())
-    found = with_carried(graph, Clock(), np.random.default_rng(1))
+    found = with_carried(graph, Clock(), np.random.default_rng(1), policy=policy)
     assert found.graph.is_tour(found.tour)

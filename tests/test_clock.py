@@ -108,15 +108,13 @@ def test_a_cut_pool_never_gives_one_cut_the_count_of_another():
         assert pool.for_good.sum() == len(range(0, made, 5))
 
 
-def test_the_same_iterations_give_the_same_tour_whatever_the_machine_does(monkeypatch):
+def test_the_same_iterations_give_the_same_tour_whatever_the_machine_does():
     """The temperature of ruin and recreate falls by rounds, not by how many fit into a moment."""
-    import netsp.gtsp.search.local_search as search
-
     problem = random_world(2, goals=25, tether_length=300.0)
     found = set()
     for seconds in (0.02, 1e-9, 10.0):
-        monkeypatch.setattr(search, "CHUNK_SECONDS", seconds)
-        solution = solve(problem, "lns", seed=5, iteration_limit=300)
+        params = {"policy.local_search.min_chunk_s": seconds}
+        solution = solve(problem, "lns", seed=5, iteration_limit=300, params=params)
         found.add((solution.length, tuple(v.goal for v in solution.tour)))
     assert len(found) == 1
 

@@ -224,7 +224,7 @@ def test_solvers_that_crash_hang_or_eat_cost_one_row_each(tmp_path, monkeypatch)
     ("change", "said"),
     [
         (('name = "greedy"', 'name = "gredy"'), "line 12: solvers[0]: name: unknown solver"),
-        (("hot = 0.5", "hott = 1"), "unknown option 'hott'; expected one of cold, hot, swaps"),
+        (("hot = 0.5", "hott = 1"), "unknown option 'hott'; expected one of chunk, cold, hot, max"),
         (("hot = 0.5", "hot = -1"), "line 15: solvers[1]: solver 'anneal'"),
         (("goals = [3, 4]", "goals = [0]"), "line 3: goals[0]"),
         (("count = 2", "cuont = 2"), "line 9: worlds.cuont"),

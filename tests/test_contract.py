@@ -263,7 +263,7 @@ def test_that_there_is_no_tour_is_proven_by_mip_and_claimed_by_none_else(backend
         ),
         (
             {"solver": "mip", "params": {"hot": 1}},
-            "unknown option 'hot'; expected one of backend, search_rounds",
+            "unknown option 'hot'; expected one of backend, policy, search_rounds",
         ),
         ({"params": {"backend": "cplex"}}, "unknown 'cplex'; expected one of highs, cbc"),
         (
@@ -273,7 +273,7 @@ def test_that_there_is_no_tour_is_proven_by_mip_and_claimed_by_none_else(backend
         ({"solver": "greedy-tsp", "params": {"k": 1}}, "unknown option 'k'; it takes none"),
         (
             {"solver": "greedy-2016", "params": {"k": 1}},
-            "unknown option 'k'; expected one of retrace",
+            "unknown option 'k'; expected one of policy, retrace",
         ),
         (
             {"solver": "greedy-2016", "params": {"retrace": "tether"}},

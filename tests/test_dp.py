@@ -1,6 +1,5 @@
 """Walks that are partly remembered: their bounds, what they rule out, and the solver on top."""
 
-import importlib
 import itertools
 from fractions import Fraction
 
@@ -10,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError, Status, TravelGraph, solve_graph, travel_graph
-from netsp.gtsp.dp import walks as walks_module
 from netsp.gtsp.dp.label_kernels import translate
-from netsp.gtsp.dp.ng_sets import MOST, Memory
+from netsp.gtsp.dp.ng_sets import MAX_REMEMBERED, Memory
 from netsp.gtsp.dp.walks import Walks
+from netsp.gtsp.gtsp_policy import WalkPolicy
 from netsp.gtsp.solver_run import RunStopped
 from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.prices import Prices
@@ -21,8 +20,6 @@ from netsp.mip.program import Duals
 from tests.brute import brute_tour
 from tests.travel_graphs import random_graph
 from tests.worlds import costs_of, random_world
-
-SOLVE = importlib.import_module("netsp.gtsp.dp.dp_solver")
 
 
 def tours(graph):
@@ -97,19 +94,19 @@ def test_a_bound_is_below_its_own_walk_summed_in_exact_rationals(seed):
 
 
 @pytest.mark.parametrize("shuffled", [False, True])
-def test_a_matrix_is_taken_over_block_by_block_until_the_flag_is_set(shuffled, monkeypatch):
+def test_a_matrix_is_taken_over_block_by_block_until_the_flag_is_set(shuffled):
     graph = random_graph(5, goals=6, most=5)
     order = np.random.default_rng(0).permutation(len(graph)) if shuffled else np.arange(len(graph))
     cluster, costs = graph.cluster[order], graph.costs[np.ix_(order, order)].astype(np.float32)
     whole = Walks(cluster, costs)
-    monkeypatch.setattr("netsp.gtsp.dp.walks.ROWS", 3)
-    blocks = Walks(cluster, costs)
+    blocks = Walks(cluster, costs, policy=WalkPolicy(block_rows=3))
     assert (whole.values == blocks.values).all()
     assert whole.values.dtype == np.float64
     assert (whole.values == costs[np.ix_(whole.order, whole.order)]).all()
     assert whole.longest == blocks.longest == costs[np.isfinite(costs)].max()
     assert (whole._near() == blocks._near()).all()
-    walks = Walks(cluster, costs, np.ones(1, dtype=np.int64))
+    policy = WalkPolicy(block_rows=3)
+    walks = Walks(cluster, costs, np.ones(1, dtype=np.int64), policy=policy)
 
     def check():
         raise RunStopped
@@ -119,7 +116,7 @@ def test_a_matrix_is_taken_over_block_by_block_until_the_flag_is_set(shuffled, m
 
 
 @settings(max_examples=40, deadline=None)
-@given(st.integers(1, 30), st.integers(1, MOST), st.randoms(use_true_random=False))
+@given(st.integers(1, 30), st.integers(1, MAX_REMEMBERED), st.randoms(use_true_random=False))
 def test_memory_is_the_intersection_with_what_the_next_goal_remembers(n, size, random):
     near = np.array([random.sample(range(n + 1), n + 1) for _ in range(n + 1)])
     memory = Memory(near, size)
@@ -154,12 +151,11 @@ def test_more_memory_raises_the_bound_or_leaves_it(seed):
     assert len(set(walk.rows.tolist())) == 9
 
 
-def test_labels_do_not_depend_on_how_many_share_the_work(monkeypatch):
+def test_labels_do_not_depend_on_how_many_share_the_work():
     graph = travel_graph(random_world(3, circles=10, goals=9, tether=300.0))
     found = []
     for threads in (1, 2, 5):
-        monkeypatch.setattr(walks_module, "THREADS", threads)
-        walks = Walks(graph.cluster, costs_of(graph))
+        walks = Walks(graph.cluster, costs_of(graph), policy=WalkPolicy(threads=threads))
         walk = walks.solve(np.zeros(10), np.inf, lambda: None)
         found.append((walk.bound, walk.labels, walk.rows.tolist()))
     assert found[0] == found[1] == found[2]
@@ -172,10 +168,9 @@ def test_dp_proves_the_same_optimum_as_mip_whether_legs_are_measured_or_bounded(
 ):
     problem = random_world(seed, circles=12, goals=7, tether=330.0)
     expected = solve_graph(travel_graph(problem), "mip").length
-    monkeypatch.setattr("netsp.gtsp.cost_matrix.MEASURE_AT_ONCE", 20)
-    monkeypatch.setattr(SOLVE, "MEASURE_AT_ONCE", 20)
     monkeypatch.setattr(TravelGraph, "legs_at_once", at_once)
-    result = solve_graph(travel_graph(problem), "dp", params={"search_rounds": 0})
+    params = {"search_rounds": 0, "policy.costs.max_measured_vertices": 20}
+    result = solve_graph(travel_graph(problem), "dp", params=params)
     assert result.status is Status.OPTIMAL
     assert result.length == pytest.approx(expected, rel=2e-6)
 
@@ -190,10 +185,10 @@ def test_vertices_need_not_be_grouped_by_goal(seed):
     assert result.length == pytest.approx(brute_tour(graph), rel=2e-6)
 
 
-def test_dp_refuses_what_would_not_fit_into_memory(monkeypatch):
-    monkeypatch.setattr(SOLVE, "MOST_CELLS", 10)
+def test_dp_refuses_what_would_not_fit_into_memory():
+    params = {"policy.walks.max_table_cells": 10}
     with pytest.raises(InputError, match="too much memory; use 'auto' or 'lns'"):
-        solve_graph(random_graph(0, 4), "dp")
+        solve_graph(random_graph(0, 4), "dp", params=params)
 
 
 @pytest.mark.parametrize("solver", ["dp", "auto", "mip"])

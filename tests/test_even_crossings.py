@@ -1,7 +1,6 @@
 """Inequalities of even crossing: valid for tours, over goals and over classes, certified, and worth
 something."""
 
-import functools
 import itertools
 import math
 import random
@@ -16,6 +15,7 @@ from hypothesis import strategies as st
 from netsp import Circle, Problem, Status, solve_graph, travel_graph
 from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
+from netsp.gtsp.gtsp_policy import CostPolicy, GtspPolicy, ProofSearchPolicy
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.travel.costs import CostTable
@@ -36,6 +36,7 @@ from netsp.mip.parity_cuts import odd_letters, parity_cuts
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
 from netsp.plan.random_worlds import random_world
+from netsp.plan.solve_policy import RoutePolicy, SolvePolicy
 from tests.brute import brute_tour
 from tests.cut_points import all_legs, small, tours_as_points, towers
 from tests.travel_graphs import random_graph
@@ -214,6 +215,9 @@ def test_two_sheets_know_that_a_ring_around_an_obstacle_is_no_tour(kind):
     assert found.bound == pytest.approx(best.length, rel=1e-5)
 
 
+FEW_MEASURED = GtspPolicy(costs=CostPolicy(max_measured_vertices=50))
+
+
 @pytest.mark.parametrize("most", [30, 6000])
 @pytest.mark.parametrize("seed", range(2))
 def test_covers_in_between_prove_the_same(seed, most, monkeypatch):
@@ -226,8 +230,8 @@ def test_covers_in_between_prove_the_same(seed, most, monkeypatch):
         return seen[-1]
 
     monkeypatch.setattr("netsp.mip.goal_relaxation.refine_covers", on_cover_bound)
-    policy = MipPolicy(many_goals=5, covers=CoverPolicy(min_classes=50, max_cells=most))
-    monkeypatch.setattr("netsp.gtsp.searching.MEASURE_AT_ONCE", 50)
+    covers = CoverPolicy(min_classes=50, max_cells=most)
+    policy = MipPolicy(many_goals=5, covers=covers, gtsp=FEW_MEASURED)
     fewer = solve(travel_graph(problem), Params(policy=policy))
     assert len(seen) == 1
     assert whole.status is fewer.status is Status.OPTIMAL
@@ -240,12 +244,12 @@ def test_beyond_reach_of_the_program_over_all_classes_the_time_left_is_for_the_s
 ):
     problem = random_world(0, goals=14, tether_length=320.0)
     whole = solve(travel_graph(problem))
-    monkeypatch.setattr("netsp.gtsp.searching.MEASURE_AT_ONCE", 50)
     policy = MipPolicy(
         many_goals=5,
         large_goal_count=5,
         max_gap_after_covers=0.0,
         covers=CoverPolicy(min_classes=50, max_cells=16),
+        gtsp=FEW_MEASURED,
     )
     graph = travel_graph(problem)
     found = solve_graph(graph, "mip", params={"policy": policy}, **limits)
@@ -275,10 +279,9 @@ def test_however_long_covers_take_the_core_has_its_share_of_what_is_left(monkeyp
 
     monkeypatch.setattr(module.MipRun, "bound_by_goals", slowly)
     monkeypatch.setattr(module.MipRun, "program", program)
-    monkeypatch.setattr("netsp.gtsp.searching.MEASURE_AT_ONCE", 50)
-    monkeypatch.setattr("netsp.gtsp.searching.LARGER", 1)
     graph = travel_graph(random_world(0, goals=14, tether_length=320.0))
-    params = {"policy": MipPolicy(core_classes=50)}
+    core = GtspPolicy(FEW_MEASURED.costs, proof_search=ProofSearchPolicy(min_core_ratio=1.0))
+    params = {"policy": MipPolicy(core_classes=50, gtsp=core)}
     found = solve_graph(graph, "mip", params=params, time_limit=10.0)
     assert began
     assert proven[0]
@@ -311,11 +314,9 @@ def test_with_too_many_classes_for_a_matrix_covers_bound_the_tour(seed, monkeypa
     problem = random_world(seed, goals=26, tether_length=300.0)
     best = solve_graph(travel_graph(problem), "auto")
     goals = bound_over_goals(travel_graph(problem), proven_goals, Limits()).bound
-    monkeypatch.setattr("netsp.plan.auto.PROVABLE", 30)
-    policy = MipPolicy(covers=CoverPolicy(min_classes=30))
-    bound = functools.partial(bound_over_goals, policy=policy)
-    monkeypatch.setattr("netsp.plan.auto.bound_over_goals", bound)
-    found = solve_graph(travel_graph(problem), "auto", time_limit=3.0)
+    mip = MipPolicy(covers=CoverPolicy(min_classes=30))
+    policy = SolvePolicy(routes=RoutePolicy(max_proven_vertices=30), mip=mip)
+    found = solve_graph(travel_graph(problem), "auto", time_limit=3.0, params={"policy": policy})
     assert found.lower_bound <= best.length * (1.0 + 1e-6)
     assert found.length >= best.length * (1.0 - 1e-6)
     assert found.lower_bound > goals

@@ -22,11 +22,14 @@ from netsp import (
 )
 from netsp.base.clock import Clock
 from netsp.base.errors import MemoryLimitError
+from netsp.gtsp.gtsp_policy import CostPolicy, GtspPolicy
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.search import Instance, Search
 from netsp.mip.flows import Edges, min_cuts
+from netsp.mip.mip_policy import MipPolicy
 from netsp.mip.mip_solver import MipRun
 from netsp.mip.subtours import cover_branches
+from netsp.plan.solve_policy import RoutePolicy, SolvePolicy, SubsetPolicy
 from netsp.roadmap.slits import _taut_string, build_slits, slit_lengths
 from netsp.roadmap.taut import TautRoadmap
 from tests.brute import brute_tour
@@ -226,15 +229,15 @@ def test_auto_proves_what_it_can():
     assert verify(problem, solution)
 
 
-def test_auto_gives_a_tour_and_a_true_bound_where_mip_would_not_fit(monkeypatch):
-    import netsp.plan.auto
+NO_SUBSETS = SubsetPolicy(max_sums=0)
 
+
+def test_auto_gives_a_tour_and_a_true_bound_where_mip_would_not_fit():
     problem = random_world(1, goals=8, tether=300.0)
     best = solve(problem, "mip")
-    monkeypatch.setattr(netsp.plan.auto, "PROVABLE", 10)
-    monkeypatch.setattr(netsp.plan.auto.exact, "MOST_SUMS", 0.0)
-    monkeypatch.setattr(netsp.plan.auto, "FEW_GOALS", 4)
-    solution = solve(problem, "auto", iteration_limit=2_000)
+    routes = RoutePolicy(max_proven_vertices=10, max_walk_goals=4)
+    params = {"policy": SolvePolicy(routes=routes, subsets=NO_SUBSETS)}
+    solution = solve(problem, "auto", iteration_limit=2_000, params=params)
     assert verify(problem, solution)
     assert solution.lower_bound is not None
     assert 0.3 * best.length < solution.lower_bound <= best.length * (1 + 1e-9)
@@ -242,8 +245,6 @@ def test_auto_gives_a_tour_and_a_true_bound_where_mip_would_not_fit(monkeypatch)
 
 
 def test_auto_gives_a_tour_and_a_true_bound_where_there_is_no_room_for_the_legs(monkeypatch):
-    import netsp.plan.auto
-
     problem = random_world(1, goals=8, tether=300.0)
     best = solve(problem, "mip")
 
@@ -251,28 +252,25 @@ def test_auto_gives_a_tour_and_a_true_bound_where_there_is_no_room_for_the_legs(
         if size > 24.0 * 9**2:  # there is for the legs between the goals
             raise MemoryLimitError(f"{what} would take {size} bytes; {advice}")
 
-    monkeypatch.setattr(netsp.plan.auto.exact, "MOST_SUMS", 0.0)
-    monkeypatch.setattr("netsp.gtsp.cost_matrix.MEASURE_AT_ONCE", 0)
+    mip = MipPolicy(gtsp=GtspPolicy(costs=CostPolicy(max_measured_vertices=0)))
     monkeypatch.setattr("netsp.gtsp.cost_matrix.ask", none_left)
     with pytest.raises(MemoryLimitError, match="bounding every tour over"):
-        solve(problem, "mip")
-    solution = solve(problem, "auto")
+        solve(problem, "mip", params={"policy": mip})
+    policy = SolvePolicy(subsets=NO_SUBSETS, mip=mip)
+    solution = solve(problem, "auto", params={"policy": policy})
     assert verify(problem, solution)
     assert 0.3 * best.length < solution.lower_bound <= best.length * (1 + 1e-9)
     assert solution.length >= best.length * (1 - 1e-6)
 
 
 @pytest.mark.parametrize("kept", [16, 40, 4000])
-def test_few_goals_are_proven_over_the_shortest_classes(monkeypatch, kept):
+def test_few_goals_are_proven_over_the_shortest_classes(kept):
     """The status claims no more than was looked at, the bound holds for all."""
-    import netsp.plan.auto
-
     problem = random_world(1, goals=8, tether=300.0)
     best = solve(problem, "mip")
-    monkeypatch.setattr(netsp.plan.auto, "PROVABLE", 10)
-    monkeypatch.setattr(netsp.plan.auto.exact, "MOST_SUMS", 0.0)
-    monkeypatch.setattr(netsp.plan.auto, "MOST_KEPT", kept)
-    solution = solve(problem, "auto")
+    routes = RoutePolicy(max_proven_vertices=10, kept_vertices=kept)
+    params = {"policy": SolvePolicy(routes=routes, subsets=NO_SUBSETS)}
+    solution = solve(problem, "auto", params=params)
     assert verify(problem, solution)
     assert solution.lower_bound is not None
     assert 0.0 < solution.lower_bound <= best.length * (1 + 1e-9)
@@ -317,33 +315,23 @@ def test_a_limit_that_ends_in_the_root_leaves_a_true_bound(solver):
         assert result.length >= best * (1 - 1e-6)
 
 
-def test_auto_bounds_large_graphs_without_geometry_too(monkeypatch):
-    import netsp.plan.auto
-
+def test_auto_bounds_large_graphs_without_geometry_too():
     graph = random_graph(4, goals=6)
     best = brute_tour(graph)
-    monkeypatch.setattr(netsp.plan.auto, "PROVABLE", 5)
-    monkeypatch.setattr(netsp.plan.auto.exact, "MOST_SUMS", 0.0)
-    result = solve_graph(graph, "auto", iteration_limit=500)
+    routes = RoutePolicy(max_proven_vertices=5)
+    params = {"policy": SolvePolicy(routes=routes, subsets=NO_SUBSETS)}
+    result = solve_graph(graph, "auto", iteration_limit=500, params=params)
     assert 0.0 < result.lower_bound <= best * (1 + 1e-9)
     assert result.length >= best * (1 - 1e-9)
 
 
-def core_first(monkeypatch, problem, share=0.4, **limits):
+def core_first(problem, share=0.4, **limits):
     """A proof over the core, then over all, of a world so small that the core would not be worth
     it."""
-    import netsp.gtsp.cost_matrix
-    import netsp.gtsp.searching as searching
-
-    for module in (searching, netsp.gtsp.cost_matrix):
-        monkeypatch.setattr(module, "MEASURE_AT_ONCE", 0)
-    monkeypatch.setattr(searching, "LARGER", 1)
-    monkeypatch.setattr(searching, "MOST_CLASSES", 3)
-    monkeypatch.setattr(searching, "CORE", 1)
-    monkeypatch.setattr(searching, "CORE_SHARE", share)
-    run = solve_graph(travel_graph(problem), "mip", seed=0, **limits)
-    monkeypatch.undo()
-    return run
+    core = {"min_core_ratio": 1.0, "max_core_per_cluster": 3, "core_vertices": 1,
+            "core_time_share": share}  # fmt: skip
+    policy = {"gtsp": {"costs.max_measured_vertices": 0, "proof_search": core}}
+    return solve_graph(travel_graph(problem), "mip", seed=0, params={"policy": policy}, **limits)
 
 
 @pytest.mark.parametrize("at_once", [True, False])
@@ -352,7 +340,7 @@ def test_a_proof_over_the_core_first_ends_at_the_same_optimum(monkeypatch, seed,
     problem = random_world(seed, goals=7, tether=300.0)
     best = solve(problem, "mip", seed=0).length
     monkeypatch.setattr(TravelGraph, "legs_at_once", at_once)
-    run = core_first(monkeypatch, problem)
+    run = core_first(problem)
     assert any(row.stage == "core" for row in run.trace)
     goals = next(row for row in run.trace if row.stage == "goals")
     assert 0.3 * best < goals.bound.length <= best * (1 + 1e-9)
@@ -365,7 +353,7 @@ def test_a_proof_over_the_core_first_ends_at_the_same_optimum(monkeypatch, seed,
 def test_a_core_that_is_cut_short_claims_nothing(monkeypatch, iterations):
     problem = random_world(1, goals=7, tether=300.0)
     best = solve(problem, "mip", seed=0).length
-    run = core_first(monkeypatch, problem, iteration_limit=iterations)
+    run = core_first(problem, iteration_limit=iterations)
     assert (run.lower_bound or 0.0) <= best * (1 + 1e-6)
     assert run.status is not Status.INFEASIBLE
     if run.length is not None:
@@ -375,7 +363,7 @@ def test_a_core_that_is_cut_short_claims_nothing(monkeypatch, iterations):
 def test_a_core_whose_time_is_over_hands_over_to_the_proof_over_all(monkeypatch):
     problem = random_world(1, goals=7, tether=300.0)
     best = solve(problem, "mip", seed=0).length
-    run = core_first(monkeypatch, problem, share=1e-4, time_limit=100.0)
+    run = core_first(problem, share=1e-4, time_limit=100.0)
     assert run.status is Status.OPTIMAL
     assert run.length == pytest.approx(best, rel=1e-6)
 

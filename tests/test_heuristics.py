@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from netsp import Circle, NetspError, Polygon, Problem, solve_graph
 from netsp.anneal import icra2017, rss2016
 from netsp.base.compiled.rng import seeded, uniform
-from netsp.gtsp.cost_matrix import MEASURE_AT_ONCE
+from netsp.gtsp.gtsp_policy import CostPolicy
 from netsp.gtsp.search import Instance
 from netsp.hsignature import concatenate, entangled, signature
 from netsp.plan.random_worlds import random_world as papers_world
@@ -235,11 +235,11 @@ def test_a_goal_on_a_boundary_does_not_make_a_path_of_thousands_of_points():
 
 
 def test_greedy_measures_few_legs_of_a_long_tether_and_goes_the_same_way():
-    """Beyond `MEASURE_AT_ONCE` vertices it searches by lower bounds; the walk is that of the whole
+    """Beyond `max_measured_vertices` it searches by lower bounds; the walk is that of the whole
     matrix."""
     problem = papers_world(0, goals=8, tether_length=500.0)
     graph, measured = travel_graph(problem), travel_graph(problem)
-    assert len(graph) > MEASURE_AT_ONCE
+    assert len(graph) > CostPolicy().max_measured_vertices
     assert measured.costs.shape == (len(graph), len(graph))
     found = solve_graph(graph, "greedy")
     assert not graph.measured

@@ -10,6 +10,7 @@ from netsp import Problem, Status, solve_graph, travel_graph
 from netsp import solve as solve_problem
 from netsp.gtsp import cost_matrix
 from netsp.gtsp.cost_matrix import CostMatrix
+from netsp.gtsp.gtsp_policy import CostPolicy, GtspPolicy, ProofSearchPolicy
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.nearest_index import NearestIndex
 from netsp.gtsp.sparse_costs import SparseCosts
@@ -154,8 +155,8 @@ def test_prices_over_rows_are_those_over_a_matrix_and_rule_out_the_same(seed):
     assert np.isinf(in_rows.reduced_costs(gone)).all()
 
 
-def test_what_lies_nearest_is_so_along_legs_that_were_let_go_too(monkeypatch):
-    monkeypatch.setattr(cost_matrix, "ROUNDED_FROM", 0)  # never a matrix again
+def test_what_lies_nearest_is_so_along_legs_that_were_let_go_too():
+    never_a_matrix = CostPolicy(max_double_vertices=0)
     graph, rng = travel_graph(small(3, tether_length=150.0)), np.random.default_rng(0)
     costs, asked, find = graph.costs_rounded(np.arange(len(graph))), [], graph.costs_in_blocks
 
@@ -166,7 +167,7 @@ def test_what_lies_nearest_is_so_along_legs_that_were_let_go_too(monkeypatch):
     graph.costs_in_blocks = noted
     least = np.full((1, 1), -np.inf)  # no leg is left
     rows = SparseCosts(len(graph), find(), np.zeros(len(graph), dtype=np.int64), least, NO_TOUR)
-    held = CostMatrix(graph, rows)
+    held = CostMatrix(graph, rows, policy=never_a_matrix)
     some = rng.permutation(len(graph))[:30]
     for fresh in 30, 10, 0:
         near = held.nearest_among(some)
@@ -283,19 +284,14 @@ def test_what_a_leg_may_cost_is_no_less_than_it_costs_in_tours_as_short(seed):
 @pytest.fixture
 def rows_from_the_start(monkeypatch):
     """Legs of small graphs are held in rows, until few classes are left."""
-    monkeypatch.setattr(SOLVE, "ROUNDED_FROM", 20)
-    monkeypatch.setattr(cost_matrix, "ROUNDED_FROM", 20)
-    monkeypatch.setattr("netsp.gtsp.searching.CORE", 30)
-    monkeypatch.setattr("netsp.gtsp.searching.MEASURE_AT_ONCE", 10)
-    monkeypatch.setattr(cost_matrix, "MEASURE_AT_ONCE", 10)
     # covers prove little, so that the program over the classes has something to do
     covers = CoverPolicy(min_classes=20, coarse_covers=1, max_cells=25, patience=0)
     made, restricted = [], []
     make, restrict = CostMatrix.__init__, SparseCosts.restrict
 
-    def noted(self, graph, rows=None):
+    def noted(self, graph, rows=None, **policy):
         made.append(rows is not None)
-        make(self, graph, rows)
+        make(self, graph, rows, **policy)
 
     def heard(self, keep):
         restricted.append(int(keep.sum()))
@@ -303,7 +299,9 @@ def rows_from_the_start(monkeypatch):
 
     monkeypatch.setattr(CostMatrix, "__init__", noted)
     monkeypatch.setattr(SparseCosts, "restrict", heard)
-    return made, restricted, MipPolicy(many_goals=5, covers=covers)
+    costs = CostPolicy(max_measured_vertices=10, max_double_vertices=20)
+    gtsp = GtspPolicy(costs=costs, proof_search=ProofSearchPolicy(core_vertices=30))
+    return made, restricted, MipPolicy(many_goals=5, covers=covers, gtsp=gtsp)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -13,7 +13,7 @@ from netsp.gtsp.search.layers import Instance, best_classes
 from netsp.gtsp.search.links import Tables, best_place, link, no_links, put, take_out, write_order
 from netsp.gtsp.search.lns_solver import Params, solve
 from netsp.gtsp.search.local_search import Search
-from netsp.gtsp.search.ruin import ruin_and_recreate
+from netsp.gtsp.search.ruin import StringPolicy, ruin_and_recreate
 from tests.travel_graphs import random_graph
 
 
@@ -32,6 +32,8 @@ def test_every_restart_has_its_share_of_time_or_rounds(how):
     # and each went on to search
     assert all(stages[k + 1] == "search" for k in began)
 
+
+STRINGS = StringPolicy(max_string_length=10, mean_removed=10, blink_rate=0.01)
 
 PLACES = st.sampled_from([1, 5, 1000])
 """Few places for many vertices: ties."""
@@ -91,7 +93,7 @@ def test_no_move_breaks_a_precedence(seed, goals, places):
     links, tables, stop = no_links(goals + 1, i.largest), _tables(i), np.zeros(1, dtype=np.int64)
     length = link(order, links, i.start, i.costs, np.empty(i.largest))
     best, chance = order.copy(), seeded(rng)
-    ruin_and_recreate(order, best, length, length, 100, 100.0, tables, links, chance)
+    ruin_and_recreate(order, best, length, length, 100, 100.0, tables, links, STRINGS, chance)
     assert _keeps(order, i.before)
     assert _keeps(best, i.before)
     descend(order, tables, links, chance, stop)
@@ -129,7 +131,7 @@ def test_after_rounds_the_tables_are_those_of_the_order_however_they_were_counte
         length = shortest = link(order, links, i.start, i.costs, np.empty(i.largest))
         for count in counts:
             length, shortest = ruin_and_recreate(
-                order, best, length, shortest, count, 100.0, _tables(i), links, chance
+                order, best, length, shortest, count, 100.0, _tables(i), links, STRINGS, chance
             )
         _same_tables(i, links)
         assert length == pytest.approx(best_classes(order[1:], i.start, i.costs)[0], abs=1e-9)

@@ -2,6 +2,7 @@
 
 import ast
 import csv
+import functools
 import io
 import json
 import re
@@ -24,9 +25,9 @@ from netsp.gtsp.gtsplib.tour_file import tour_text
 from netsp.gtsp.travel.result import Progress, Result, of_part
 from netsp.model.bound_scope import LowerBound, Scope, above_shortest, gap_of, strongest
 from netsp.model.solution import Status, proof, solution_scope
-from netsp.plan import auto, exact
 from netsp.plan import solve_problem as by_name
 from netsp.plan.random_worlds import reachable_world
+from netsp.plan.solve_policy import RoutePolicy, SolvePolicy, SubsetPolicy
 from netsp.study.library.records import Record
 from netsp.view.pictures.problem_picture import _title, save_trace
 from netsp.view.report.page import _cells_table, _rows_link
@@ -372,19 +373,26 @@ def above(text):
     ]
 
 
+FEW_CLASSES = SolvePolicy(
+    routes=RoutePolicy(max_walk_goals=2, first_tour_classes=1), subsets=SubsetPolicy(max_sums=0)
+)
+
+
 @pytest.mark.parametrize("most", [4, 12])
 @pytest.mark.parametrize("solver", ["auto", "mip", "dp"])
-def test_no_row_over_few_classes_claims_a_bound_on_all_tours(restricted, most, solver, monkeypatch):
+def test_no_row_over_few_classes_claims_a_bound_on_all_tours(restricted, most, solver):
     problem, shortest = restricted
-    monkeypatch.setattr(exact, "fits", lambda _: False)
-    monkeypatch.setattr(auto, "FEW_GOALS", 2)
-    monkeypatch.setattr(auto, "FEW_CLASSES", 1)
     rows, text = [], io.StringIO()
+    params = {"policy": FEW_CLASSES} if solver == "auto" else None
     graph = travel_graph(problem, max_classes=most)
     assert not graph.complete
     with ProgressTable(text) as table:
         found = solve_graph(
-            graph, solver, time_limit=3, on_progress=lambda r: (rows.append(r), table(r))
+            graph,
+            solver,
+            time_limit=3,
+            params=params,
+            on_progress=lambda r: (rows.append(r), table(r)),
         )
     assert rows
     for row in (*rows, *found.trace):
@@ -424,9 +432,8 @@ def told_to_the_page(problem, time_limit, monkeypatch):
 
 def test_the_page_claims_no_more(restricted, monkeypatch):
     problem, shortest = restricted
-    monkeypatch.setattr(exact, "fits", lambda _: False)
-    monkeypatch.setattr(auto, "FEW_GOALS", 2)
-    monkeypatch.setattr(auto, "FEW_CLASSES", 1)
+    solve_over = functools.partial(by_name.solve_over, params={"policy": FEW_CLASSES})
+    monkeypatch.setattr(by_name, "solve_over", solve_over)
     for s in told_to_the_page(problem, 3.0, monkeypatch):
         assert s["lower_bound"] is None or s["lower_bound"] <= shortest * (1 + 1e-9)
         assert all(s["length"] <= shortest * (1.0 + v / 100.0) * 1.01 for v in above(s["proof"]))

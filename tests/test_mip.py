@@ -17,8 +17,10 @@ from scipy.sparse import csc_array, csr_array
 
 from netsp import travel_graph
 from netsp.gtsp import cost_matrix, searching
-from netsp.gtsp.cost_matrix import MEASURE_AT_ONCE, CostMatrix
+from netsp.gtsp.cost_matrix import CostMatrix
+from netsp.gtsp.gtsp_policy import CostPolicy, GtspPolicy, ProofSearchPolicy
 from netsp.gtsp.limits import Limits
+from netsp.gtsp.params import read_params
 from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.travel.costs import rounded_down
 from netsp.gtsp.travel.graph import TravelGraph
@@ -58,7 +60,7 @@ from tests.worlds import costs_of, random_world
 
 def solve(graph, params=None, **limits):
     """`mip` on a graph, with options and limits by name."""
-    return mip(graph, Params(**(params or {})), Limits(**limits))
+    return mip(graph, read_params(Params, "mip", params), Limits(**limits))
 
 
 BACKENDS = ["highs", "cbc"]
@@ -470,7 +472,7 @@ def test_a_long_tether_is_solved_without_measuring_most_legs_where_that_takes_lo
     monkeypatch.setattr(TravelGraph, "legs_at_once", False)
     lazy, whole = travel_graph(problem), travel_graph(problem)
     whole.costs  # noqa: B018
-    assert len(whole) > MEASURE_AT_ONCE
+    assert len(whole) > CostPolicy().max_measured_vertices
     asked = []
     lengths = lazy._legs.lengths
 
@@ -525,19 +527,17 @@ def test_rounded_costs_prove_the_same(monkeypatch, rounded_from, at_once):
     problem = far_world(0, goals=7, tether_length=450.0)
     plain = solve(travel_graph(problem))
     monkeypatch.setattr(TravelGraph, "legs_at_once", at_once)
-    monkeypatch.setattr(cost_matrix, "ROUNDED_FROM", rounded_from)
-    monkeypatch.setattr(cost_matrix, "ROWS", 100)
-    monkeypatch.setattr(cost_matrix, "LEGS", 70)
-    monkeypatch.setattr(cost_matrix, "MEASURE_AT_ONCE", 5)
-    monkeypatch.setattr(searching, "MEASURE_AT_ONCE", 5)
+    policy = CostPolicy(
+        max_measured_vertices=5, max_double_vertices=rounded_from, block_rows=100, block_legs=70
+    )
     graph = travel_graph(problem)
-    costs = CostMatrix(graph)
+    costs = CostMatrix(graph, policy=policy)
     assert costs.rounded
     assert costs.values.dtype == np.float32
     most = travel_graph(problem).costs if at_once else graph.lower_bounds()
     assert (costs.values[1:, 1:] <= most[1:, 1:]).all()
     assert (costs.exact is None) == at_once
-    found = solve(graph)
+    found = solve(graph, {"policy.gtsp.costs": policy})
     assert found.status is plain.status is Status.OPTIMAL
     assert found.length == pytest.approx(plain.length, rel=2e-6)
     assert found.length == pytest.approx(graph.tour_length(found.tour), rel=1e-12)
@@ -545,13 +545,12 @@ def test_rounded_costs_prove_the_same(monkeypatch, rounded_from, at_once):
 
 
 def test_what_is_measured_of_rounded_costs_is_as_long_as_it_is(monkeypatch):
-    monkeypatch.setattr(cost_matrix, "ROUNDED_FROM", 10)
-    monkeypatch.setattr(cost_matrix, "ROWS", 50)
-    monkeypatch.setattr(cost_matrix, "LEGS", 30)
-    monkeypatch.setattr(cost_matrix, "MEASURE_AT_ONCE", 5)
+    policy = CostPolicy(
+        max_measured_vertices=5, max_double_vertices=10, block_rows=50, block_legs=30
+    )
     monkeypatch.setattr(TravelGraph, "legs_at_once", False)
     graph = travel_graph(far_world(0, goals=5, tether_length=400.0))
-    costs, rng = CostMatrix(graph), np.random.default_rng(0)
+    costs, rng = CostMatrix(graph, policy=policy), np.random.default_rng(0)
     asked = rng.random(costs.values.shape) < 0.5
     asked = (asked | asked.T) & np.isfinite(costs.values)
     costs.measure_all(asked)
@@ -593,17 +592,17 @@ def test_with_many_classes_of_few_goals_a_bound_comes_before_all_legs_are_bounde
     held = []
 
     class OfSome(CostMatrix):
-        def __init__(self, part):
+        def __init__(self, part, **policy):
             if len(part) == len(graph):
                 raise RunStopped
             held.append(len(part))
-            super().__init__(part)
+            super().__init__(part, **policy)
 
     module = sys.modules["netsp.mip.mip_solver"]  # the function of that name hides it
     monkeypatch.setattr(module, "CostMatrix", OfSome)
-    monkeypatch.setattr(searching, "LARGER", 2)
-    assert len(graph) > MEASURE_AT_ONCE
-    run = MipRun(graph, Limits(), policy=MipPolicy(core_classes=10))
+    gtsp = GtspPolicy(proof_search=ProofSearchPolicy(min_core_ratio=2.0))
+    assert len(graph) > gtsp.costs.max_measured_vertices
+    run = MipRun(graph, Limits(), policy=MipPolicy(core_classes=10, gtsp=gtsp))
     found = run.solve("highs", None, walks=True)
     assert held
     assert found.status is Status.FEASIBLE
@@ -626,8 +625,8 @@ def test_the_matrices_of_a_proof_go_when_it_ends(monkeypatch):
     module = sys.modules["netsp.mip.mip_solver"]  # the function of that name hides it
 
     class Noted(CostMatrix):
-        def __init__(self, graph):
-            super().__init__(graph)
+        def __init__(self, graph, **policy):
+            super().__init__(graph, **policy)
             made.append(weakref.ref(self))
 
     monkeypatch.setattr(module, "CostMatrix", Noted)
@@ -700,8 +699,7 @@ def test_ctrl_c_in_a_proof_over_goals_ends_the_proof_over_classes_too(monkeypatc
         press()
 
     monkeypatch.setattr(root.Root, "_solve_lp", relaxed)
-    monkeypatch.setattr(searching, "LARGER", 2)
-    found = solve(graph)
+    found = solve(graph, {"policy.gtsp.proof_search.min_core_ratio": 2})
     assert calls == [9]  # base and goals
     assert found.status is Status.FEASIBLE
     assert graph.is_tour(found.tour)
@@ -783,8 +781,7 @@ def test_a_tour_that_the_relaxation_finds_is_kept_where_too_much_is_left_to_be_s
 ):
     problem = far_world(seed, goals=7, tether_length=400.0)
     plain = solve(travel_graph(problem))
-    monkeypatch.setattr(searching, "SEARCHED_WHOLE", 1)
     monkeypatch.setattr(searching.SearchingRun, "search", lambda *_: None)
-    found = solve(travel_graph(problem))
+    found = solve(travel_graph(problem), {"policy.gtsp.proof_search.max_whole_search": 1})
     assert found.status is plain.status is Status.OPTIMAL
     assert found.length == pytest.approx(plain.length, rel=2e-6)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from netsp import TravelGraph, travel_graph
 from netsp.gtsp.cost_matrix import CostMatrix
+from netsp.gtsp.gtsp_policy import CostPolicy, GtspPolicy
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.solver_run import RunStopped
 from netsp.mip import root
@@ -112,7 +113,9 @@ def test_the_search_for_ways_can_be_stopped():
 def test_once_few_legs_are_left_all_of_them_are_measured(seed, monkeypatch):
     problem = random_world(seed, goals=9, tether_length=400.0)
     known = MipRun(travel_graph(problem), Limits()).solve("highs", None)
-    policy = MipPolicy(pricing=PricingPolicy(max_measured_legs=10**9))
+    pricing = PricingPolicy(max_measured_legs=10**9)
+    gtsp = GtspPolicy(costs=CostPolicy(max_measured_vertices=20))
+    policy = MipPolicy(pricing=pricing, gtsp=gtsp)
     after = []
     measure = root.Root._measure_left
 
@@ -129,7 +132,6 @@ def test_once_few_legs_are_left_all_of_them_are_measured(seed, monkeypatch):
         return longer
 
     monkeypatch.setattr(root.Root, "_measure_left", note)
-    monkeypatch.setattr("netsp.gtsp.cost_matrix.MEASURE_AT_ONCE", 20)
     monkeypatch.setattr(TravelGraph, "legs_at_once", False)
     found = MipRun(travel_graph(problem), Limits(), policy=policy).solve("highs", None)
     assert after

@@ -1,7 +1,7 @@
-"""The temperature schedule.
+"""Temperature schedule.
 
-The papers say that θ decreases and no more. Here it falls geometrically from `hot` to `cold`, both
-fractions of the mean length of a leg in the start state, over the iterations or the time allowed.
+The papers say only that θ decreases. Here it falls geometrically from `hot` to `cold`, in mean legs
+of the start state, over the iterations or the time allowed.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from netsp.gtsp.solver_run import SolverRun
 
 @dataclass(frozen=True)
 class Cooling:
-    """Temperatures.
+    """Temperatures of a schedule.
 
     Attributes
     ----------
@@ -33,9 +33,10 @@ class Cooling:
 
 
 class Schedule:
-    """Temperature as a function of progress: the larger share of the iterations or of the time that
-    is used up. Without any limit `default` iterations are made. Only under an iteration limit that
-    comes first does the same seed give the same answer.
+    """Temperature as a function of progress: the larger of the used shares of iterations and time.
+
+    Without a limit, `default` iterations are made. The same seed gives the same result only if the
+    iteration limit is reached first.
     """
 
     def __init__(self, cooling: Cooling, run: SolverRun, leg: float, default: int) -> None:
@@ -47,7 +48,7 @@ class Schedule:
 
     @property
     def progress(self) -> float:
-        """From 0 at the start to 1 at the end."""
+        """Progress, from 0 at the start to 1 at the end."""
         run = self.run
         by_clock = 0.0
         if run.clock.limit is not None:
@@ -57,10 +58,10 @@ class Schedule:
 
     @property
     def temperature(self) -> float:
-        """θ now, in length."""
+        """Present θ, as a length."""
         c = self.cooling
         return float(self.unit * c.hot * (c.cold / c.hot) ** self.progress)
 
-    def chunk(self, most: int) -> int:
-        """How many iterations to make at this temperature."""
-        return int(min(most, self.run.iteration_limit - self.run.iterations))
+    def chunk(self, limit: int) -> int:
+        """Return the number of iterations to make at this temperature."""
+        return int(min(limit, self.run.iteration_limit - self.run.iterations))

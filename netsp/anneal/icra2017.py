@@ -22,19 +22,10 @@ from netsp.base.compiled.kernel import kernel
 from netsp.base.compiled.rng import below, metropolis, seeded
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.search.layers import Instance
-from netsp.gtsp.search.lns_solver import search_core
+from netsp.gtsp.search.lns_solver import max_classes_per_goal, search_core
 from netsp.gtsp.solver_run import SolverRun
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
-
-PROPOSALS_PER_GOAL = 1_000_000
-"""Default number of proposals, times the number of goals, when nothing is limited."""
-
-MOST_VERTICES = 4000
-"""So many classes at most, those of least tether, are walked over: all their legs are measured."""
-
-CHUNK = 100_000
-"""Proposals between two looks at the clock: some milliseconds."""
 
 
 @dataclass(frozen=True)
@@ -45,34 +36,32 @@ class Params(Cooling):
     ----------
     swaps
         Share of proposals that swap goals; the others change a class.
+    max_vertices
+        Maximum number of classes, those of shortest tether; all their legs are measured.
+    proposals_per_goal
+        Proposals for each goal if neither time nor iterations are limited.
+    chunk
+        Proposals between two checks of the clock, some milliseconds.
     """
 
     swaps: float = 0.5
+    max_vertices: int = 4000
+    proposals_per_goal: int = 1_000_000
+    chunk: int = 100_000
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 0.0 <= self.swaps <= 1.0:
             raise ValueError(f"option 'swaps': expected a share from 0 to 1, got {self.swaps}")
+        for name in ("max_vertices", "proposals_per_goal", "chunk"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"option {name!r}: expected 1 or more, got {getattr(self, name)}")
 
 
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
-    """Simulated annealing of the 2017 paper, from a random tour or from the warm start.
+    """Anneal as in the 2017 paper, from a random tour or the warm start; there is no bound.
 
     An iteration is one proposal. Source: McCammon & Hollinger 2017, section IV-D.
-
-    Parameters
-    ----------
-    graph : TravelGraph
-        What to solve.
-    params : Params, optional
-        Temperatures, and the share of swaps.
-    limits : Limits, optional
-        Time, iterations, random generator, warm start, listener.
-
-    Returns
-    -------
-    Result
-        The best tour met; no bound.
     """
     chosen, limits = params or Params(), limits or Limits()
     rng = limits.rng
@@ -88,7 +77,7 @@ def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     warm = run.tour is not None
     run.check()
     graph = run.graph
-    core = search_core(run, vertices=MOST_VERTICES)
+    core = search_core(run, max_classes_per_goal(graph, chosen.max_vertices))
     instance = Instance.among(graph, core)
     goals = graph.goal_count
     state = np.zeros(goals + 1, dtype=np.int64)
@@ -101,7 +90,8 @@ def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
             state[k + 1] = rng.integers(instance.start[c], instance.start[c + 1])
     of_vertex = np.repeat(np.arange(goals + 1), np.diff(instance.start))
     length = float(instance.costs[state, np.roll(state, -1)].sum())
-    schedule = Schedule(chosen, run, length / (goals + 1), default=PROPOSALS_PER_GOAL * goals)
+    proposals = chosen.proposals_per_goal * goals
+    schedule = Schedule(chosen, run, length / (goals + 1), default=proposals)
     best = state.copy()
     best_length = length
     chance = seeded(rng)
@@ -109,11 +99,20 @@ def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     run.report("anneal", current=length, entangled=0)
     while run.iterations < run.iteration_limit:
         run.check()
-        count = schedule.chunk(CHUNK)
+        count = schedule.chunk(chosen.chunk)
         length, best_length = anneal(
-            state, best, length, best_length, count, schedule.temperature, chosen.swaps,
-            instance.costs, instance.start, of_vertex, chance,
-        )  # fmt: skip
+            state,
+            best,
+            length,
+            best_length,
+            count,
+            schedule.temperature,
+            chosen.swaps,
+            instance.costs,
+            instance.start,
+            of_vertex,
+            chance,
+        )
         run.iterations += count
         run.update_incumbent(instance.original(best))
         run.report("anneal", current=length, entangled=0)
@@ -133,8 +132,13 @@ def anneal(
     cluster: Ints,
     chance: npt.NDArray[np.uint64],
 ) -> tuple[float, float]:
-    """Make `count` proposals at temperature θ, in place; returns the length of the present tour
-    and of the best, kept in `best`."""
+    """Make `count` proposals at temperature `theta`, in place.
+
+    Returns
+    -------
+    tuple of float
+        Lengths of the present tour and of the best, which is in `best`.
+    """
     n = len(tour)
     for _ in range(count):
         if n > 2 and (below(1 << 30, chance) < swaps * (1 << 30)):
@@ -176,7 +180,7 @@ def anneal(
             best_length = length
             for k in range(n):
                 best[k] = tour[k]
-    # summed afresh, so that rounding does not pile up
+    # summed afresh, so that rounding does not accumulate
     length = 0.0
     for k in range(n):
         length += costs[tour[k], tour[k + 1 if k + 1 < n else 0]]

@@ -34,15 +34,6 @@ from netsp.gtsp.solver_run import SolverRun
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
 
-PROPOSALS_PER_GOAL = 20_000
-"""Default number of proposals, times the number of goals, when nothing is limited."""
-
-REPORTS = 1_000
-"""Rows of the trace of a whole run."""
-
-CHUNK = 2_000
-"""Most proposals between two looks at the clock."""
-
 
 @dataclass(frozen=True)
 class Params(Cooling):
@@ -51,13 +42,22 @@ class Params(Cooling):
     Attributes
     ----------
     k
-        The paper's factor; the larger, the sooner entanglements go.
+        The paper's factor; the larger it is, the sooner entanglements go.
     swaps
         Share of proposals that swap goals; the others invert a path.
+    proposals_per_goal
+        Proposals for each goal if neither time nor iterations are limited.
+    chunk
+        Maximum number of proposals between two checks of the clock.
+    max_reports
+        Maximum number of rows of the trace if chunks are short.
     """
 
     k: float = 1.0
     swaps: float = 0.5
+    proposals_per_goal: int = 20_000
+    chunk: int = 2_000
+    max_reports: int = 1_000
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -65,11 +65,14 @@ class Params(Cooling):
             raise ValueError(f"option 'k': expected a positive number, got {self.k}")
         if not 0.0 <= self.swaps <= 1.0:
             raise ValueError(f"option 'swaps': expected a share from 0 to 1, got {self.swaps}")
+        for name in ("proposals_per_goal", "chunk", "max_reports"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"option {name!r}: expected 1 or more, got {getattr(self, name)}")
 
 
 class Table(NamedTuple):
-    """What does not change: `netsp.gtsp.travel.tether_blind_legs.Detours` (planar, height, letters,
-    row, far, near), and `_admissible` words (trie, vertex)."""
+    """Tables that do not change: those of `netsp.gtsp.travel.tether_blind_legs.Detours` (planar,
+    height, letters, row, far, near), and those of `_admissible` words (trie, vertex)."""
 
     planar: Floats
     height: Floats
@@ -82,9 +85,9 @@ class Table(NamedTuple):
 
 
 class Configuration(NamedTuple):
-    """What a proposal changes: order of the clusters (legs + 1,); via, the point by way of which
-    each leg goes, or -1 (legs,); the vertices at its visits (legs,), and those of the best
-    valid configuration; room for words: stack (3, letters), turns (obstacles + 1,)."""
+    """Order of the clusters (legs + 1,), and via (legs,), the sub-goal through which each leg goes,
+    or -1; the vertices at its visits (legs,), and those of the best valid configuration; room for
+    words: stack (3, letters), turns (obstacles + 1,)."""
 
     order: Ints
     via: Ints
@@ -95,30 +98,20 @@ class Configuration(NamedTuple):
 
 
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
-    """Simulated annealing of the 2016 paper, from a random order or that of the warm start, all
-    legs direct.
+    """Anneal as in the 2016 paper, from a random order or that of the warm start, all legs direct.
 
     An iteration is one proposal. Source: McCammon & Hollinger 2016, section III.
-
-    Parameters
-    ----------
-    graph : TravelGraph
-        What to solve.
-    params : Params, optional
-        Temperatures, shares of the proposals, penalties.
-    limits : Limits, optional
-        Time, iterations, random generator, warm start, listener.
 
     Returns
     -------
     Result
-        The best tour met; `no_solution_found` if no state met was free of entanglement with every
+        Best tour met; `no_solution_found` if no configuration was free of entanglement with every
         goal within the tether.
 
     Raises
     ------
     InputError
-        There is no geometry beneath the graph.
+        The graph has no geometry.
     """
     chosen, limits = params or Params(), limits or Limits()
     rng = limits.rng
@@ -143,20 +136,28 @@ def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     via = np.full(goals + 1, -1, dtype=np.int64)
     trie, vertex = _admissible(graph)
     table = Table(
-        detours.planar, detours.height, detours.letters, detours.row, detours.far, detours.near,
-        trie, vertex,
-    )  # fmt: skip
+        detours.planar,
+        detours.height,
+        detours.letters,
+        detours.row,
+        detours.far,
+        detours.near,
+        trie,
+        vertex,
+    )
     longest = (goals + 1) * 2 * int((detours.row[:, 1:] - detours.row[:, :-1]).max(initial=0)) + 1
     now = Configuration(
-        order, via,
+        order,
+        via,
         visits=np.zeros(goals + 1, dtype=np.int64),
         stack=np.zeros((3, longest), dtype=np.int64),
         turns=np.zeros(detours.far.shape[2] + 1, dtype=np.int64),
         best=np.zeros(goals + 1, dtype=np.int64),
-    )  # fmt: skip
+    )
     length, entangled, _ = evaluate(now, table)
-    schedule = Schedule(chosen, run, length / (goals + 1), default=PROPOSALS_PER_GOAL * goals)
-    chunk = int(max(1, min(CHUNK, run.iteration_limit / REPORTS)))
+    proposals = chosen.proposals_per_goal * goals
+    schedule = Schedule(chosen, run, length / (goals + 1), default=proposals)
+    chunk = int(max(1, min(chosen.chunk, run.iteration_limit / chosen.max_reports)))
     chance = seeded(rng)
     best_length = math.inf
     run.report("anneal", current=length, entangled=int(entangled))
@@ -174,8 +175,15 @@ def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
 
 
 def _admissible(graph: TravelGraph) -> tuple[Ints, Ints]:
-    """A trie of all words in the graph: (nodes, 2 n + 1) child by letter + n, -1 if none; and
-    (nodes, clusters) the vertex with that word, -1 if none."""
+    """Return a trie of all words in the graph.
+
+    Returns
+    -------
+    trie
+        (nodes, 2 n + 1) child by letter + n, -1 if none.
+    vertex
+        (nodes, clusters) vertex with that word, -1 if none.
+    """
     n = max((abs(x) for w in graph.signatures for x in w), default=0)
     children = [[-1] * (2 * n + 1)]
     vertex = [[-1] * (graph.goal_count + 1)]
@@ -199,7 +207,7 @@ def _detour_length(a: int, b: int, via: int, planar: Floats, height: Floats) -> 
 
 @kernel
 def _push(letter: int, size: int, stack: Ints, trie: Ints) -> int:
-    """Append a letter to the reduced word on the stack, with the trie node it leads to."""
+    """Append a letter to the reduced word on the stack, with its trie node, and return the size."""
     if size > 0 and stack[0, size - 1] == -letter:
         return size - 1
     node = 0 if size == 0 else stack[1, size - 1]
@@ -214,15 +222,10 @@ def _push(letter: int, size: int, stack: Ints, trie: Ints) -> int:
 
 @kernel
 def evaluate(now: Configuration, table: Table) -> tuple[float, int, int]:
-    """Length, entangled obstacles, and goals in a class the tether does not admit; `now.visits`
-    takes the vertices."""
-    order, via, visits, stack, turns = (
-        now.order,
-        now.via,
-        now.visits,
-        now.stack,
-        now.turns,
-    )
+    """Write the vertices of a configuration into `now.visits`, and return its length, entangled
+    obstacles, and goals in a class that the tether does not admit."""
+    order, via, visits = now.order, now.via, now.visits
+    stack, turns = now.stack, now.turns
     planar, height, letters, row = table.planar, table.height, table.letters, table.row
     trie, vertex = table.trie, table.vertex
     length = 0.0
@@ -247,7 +250,7 @@ def evaluate(now: Configuration, table: Table) -> tuple[float, int, int]:
             visits[k + 1] = v
             if v < 0:
                 missed += 1
-    # as `netsp.hsignature.entangled`, on the second half of the stack
+    # as in `netsp.hsignature.entangled`, with the third row of the stack
     for o in range(obstacles + 1):
         turns[o] = 0
     for i in range(size):
@@ -287,8 +290,14 @@ def anneal(
     table: Table,
     chance: npt.NDArray[np.uint64],
 ) -> tuple[float, int, float]:
-    """Make `count` proposals at temperature θ, in place; returns length and entanglement of the
-    present configuration and the length of the best valid one, whose vertices are in `now.best`."""
+    """Make `count` proposals at temperature `theta`, in place.
+
+    Returns
+    -------
+    tuple
+        Length and entangled obstacles of the present configuration, and length of the best valid
+        one, whose vertices are in `now.best`.
+    """
     order, via, visits, best = now.order, now.via, now.visits, now.best
     planar, far, near = table.planar, table.far, table.near
     legs = len(order) - 1

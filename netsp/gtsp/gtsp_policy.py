@@ -20,6 +20,11 @@ class CostPolicy:
     max_double_vertices
         Number of vertices up to which costs are in double precision. Above, they are rounded down
         to single precision; they are measured again in double once half of this number is left.
+    untimed_vertices
+        Number of vertices up to which legs among them are measured even if time is up, such as
+        those of a tour whose length is needed.
+    tried_legs
+        Legs that are measured at a time while the nearest vertex is sought in order of bounds.
     bytes_per_leg
         Memory of a proof for each entry of a matrix in double precision, bytes: the cost, what is
         known of the leg, and temporaries.
@@ -38,6 +43,8 @@ class CostPolicy:
 
     max_measured_vertices: int = 400
     max_double_vertices: int = 5000
+    untimed_vertices: int = 50
+    tried_legs: int = 16
     bytes_per_leg: float = 24.0
     bytes_per_rounded_leg: float = 8.0
     block_rows: int = 512
@@ -48,7 +55,7 @@ class CostPolicy:
     def __post_init__(self) -> None:
         check_not_negative(self)
         check_shares(self, "min_packed_share")
-        for name in ("block_rows", "block_legs", "task_rows"):
+        for name in ("tried_legs", "block_rows", "block_legs", "task_rows"):
             if getattr(self, name) < 1:
                 raise InputError(f"{name}: expected 1 or more, got {getattr(self, name)}")
 
@@ -252,6 +259,25 @@ class WalkPolicy:
     def __post_init__(self) -> None:
         check_positive(self)
         check_shares(self, "step_decay", "deflection", "min_progress", "max_kept_share")
+
+
+@dataclass(frozen=True)
+class FilePolicy:
+    """Size of the GTSPLIB files that are read.
+
+    Attributes
+    ----------
+    max_vertices
+        Maximum number of vertices; the costs of 20,000 take 3 GiB.
+    bytes_per_leg
+        Memory for each entry of the cost matrix while a file is read, bytes.
+    """
+
+    max_vertices: int = 20_000
+    bytes_per_leg: float = 40.0
+
+    def __post_init__(self) -> None:
+        check_positive(self)
 
 
 @dataclass(frozen=True)

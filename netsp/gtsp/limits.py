@@ -1,4 +1,4 @@
-"""What a run of a solver is given besides its graph and its options."""
+"""Limits of a run of a solver, with its random generator, warm start and listener."""
 
 from __future__ import annotations
 
@@ -14,23 +14,22 @@ from netsp.gtsp.travel.result import OnProgress
 
 @dataclass(frozen=True)
 class Limits:
-    """How long a solver may work, where it starts, and who listens.
+    """Limits and inputs of a run.
 
     Parameters
     ----------
     time : float or Clock, optional
-        Seconds, or the clock of the run that the work belongs to; None for no limit.
+        Seconds, or the clock of the run that this one is a part of; None for no limit.
     iterations : int, optional
-        Iterations of the solver, which says what one is; None for no limit.
+        Maximum number of iterations; each solver defines what one is.
     rng : numpy.random.Generator
-        Of all that is random.
+        Random generator.
     warm_start : sequence of int, optional
-        A tour to start from, as vertices from 0 on.
+        Tour to start from, as vertices from 0.
     on_progress : callable, optional
-        Called with a `netsp.gtsp.travel.result.Progress` now and then.
+        Called with a `netsp.gtsp.travel.result.Progress` from time to time.
     cutoff : float
-        Length of a tour that is known from elsewhere: a proof that none is shorter is enough; inf
-        for none.
+        Length of a tour known from elsewhere, inf for none; the run ends once no tour is shorter.
     """
 
     time: TimeLimit = None

@@ -1,11 +1,11 @@
 """A run of a solver that proves, with local search for its incumbents.
 
-While legs are only bounded, or many vertices are left, the search sees a core of classes, those of
-least tether and those beside the best tour (`netsp.gtsp.neighbourhood`); in the end it sees all
-that are left.
+While legs are only bounded, or many vertices remain, a search sees a selection of vertices: those
+nearest to the base and those near the incumbent (`netsp.gtsp.neighbourhood`). In the end it sees
+all that remain.
 
-With very many classes the proof is made over the core first (`SearchingRun.core`): its tour is
-often the best of all, and the program over all classes begins with its legs and cuts.
+With very many vertices the proof is made over a core first (`SearchingRun.core`): its tour is often
+the shortest of all, and the program over all vertices begins with its legs and cuts.
 """
 
 from __future__ import annotations
@@ -19,47 +19,15 @@ import numpy as np
 from netsp.base.arrays import Ints
 from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
-from netsp.gtsp.cost_matrix import MEASURE_AT_ONCE, CostMatrix
+from netsp.gtsp.cost_matrix import CostMatrix
+from netsp.gtsp.gtsp_policy import GtspPolicy
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.neighbourhood import classes_near_tour, searched_classes_per_goal
+from netsp.gtsp.neighbourhood import classes_near_tour
 from netsp.gtsp.search.layers import Instance
 from netsp.gtsp.search.local_search import Search
-from netsp.gtsp.solver_run import SLIVER, RunStopped, SolverRun
+from netsp.gtsp.solver_run import BOUND_ROUNDING, RunStopped, SolverRun
 from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
-
-CORE = 800
-"""About so many vertices, those of least tether, are proven over before all are."""
-
-SEARCHED_WHOLE = 1200
-"""So many vertices whose legs are measured are searched altogether."""
-
-FEW_CLASSES = 3
-"""Classes per goal of the first tour of all."""
-
-MOST_CLASSES = 12
-"""Most classes per goal among them."""
-
-CORE_SHARE = 0.4
-"""Part of the time that is left which the core may take."""
-
-TURNS, IN_VAIN, TURNS_SHARE = 8, 2, 0.1
-"""So many times at most, until so many in a row were in vain, and in that part of the time, a tour
-is sought beside the best one."""
-
-MOST_ENDS = 8
-"""Ends of searches that are kept."""
-
-ENOUGH_BESIDE = 10
-"""With fewer classes of a goal than these, a proof over those of least tether leaves cuts that are
-worth more for all classes than those beside the tour: with 100 goals at tether 500, 2 % of a gap
-are left where 5 % are; with 60 goals it is the other way round."""
-
-LARGER, LARGER_OF_MANY, OF_MANY = 3.0, 1.5, 100
-"""The core comes first where there are more than so many times as many vertices in all: below that
-it costs more than it saves, and shows no bound meanwhile. With so many goals it is worth it sooner:
-in a world of 200 with 1562 classes the program over all of them is as far after 72 s as it is after
-140 s without."""
 
 
 class SearchingRun(SolverRun):
@@ -69,11 +37,18 @@ class SearchingRun(SolverRun):
     ----------
     search_rounds
         Rounds of ruin and recreate of one search.
+    policy
+        Policy of costs, searches and the core.
+
+    Attributes
+    ----------
+    gtsp_policy
+        That policy; subclasses have further ones.
     outer
-        For a run over a core, the run over all classes and the core's vertices there: its
-        incumbent is updated, too, and its report shows it; bounds of the core mean nothing to it.
+        For a run over a core, the run over all vertices, and the core's vertices there. Its
+        incumbent is updated with that of the core, and it reports; bounds of the core stay here.
     local_optima
-        Tours in which the last searches ended, `MOST_ENDS` at most, no two the same.
+        Tours in which the last searches ended, no two the same.
     """
 
     def __init__(
@@ -82,65 +57,95 @@ class SearchingRun(SolverRun):
         limits: Limits | None = None,
         *,
         search_rounds: int = 500,
+        policy: GtspPolicy = GtspPolicy(),
     ) -> None:
-        super().__init__(graph, limits)
+        super().__init__(graph, limits, policy=policy.costs)
+        self.gtsp_policy = policy
         self.search_rounds = search_rounds
         self.outer: tuple[SearchingRun, Ints] | None = None
         self.local_optima: list[tuple[int, ...]] = []
         self.bound = 0.0
-        self._core: tuple[int, Instance] | None = None
-
-    def run_over(self, graph: TravelGraph, limits: Limits) -> Self:
-        """Return a run over another graph with the same settings."""
-        return type(self)(graph, limits, search_rounds=self.search_rounds)
+        self._whole: tuple[int, Instance] | None = None
 
     def find_first_tour(self) -> None:
-        """A first tour, among few classes, before all legs are bounded: with very many classes that
-        takes long, and whoever stops the run meanwhile wants a tour."""
-        graph = self.graph
-        if self.tour is not None or len(graph) <= MEASURE_AT_ONCE or not graph.roadmapped:
+        """Search for a tour among few vertices, before legs are bounded.
+
+        With very many vertices bounds take long, and a run that is stopped meanwhile should have a
+        tour.
+        """
+        graph, policy = self.graph, self.gtsp_policy
+        is_small = len(graph) <= policy.costs.max_measured_vertices
+        if self.tour is not None or is_small or not graph.roadmapped:
             return
-        core = least_tethers(graph.costs_to_base, graph.cluster, FEW_CLASSES)
-        search = Search(Instance.among(graph, core), self.rng, clock=self.clock)
+        core = least_tethers(
+            graph.costs_to_base, graph.cluster, policy.proof_search.first_tour_vertices
+        )
+        search = Search(self._among(core), self.rng, clock=self.clock)
         search.settle()
         self.offer_incumbent_from(search)
         self.report("begun", vertices=len(graph))
 
     def search_near_incumbent(self) -> Ints:
-        """Search among the classes of least tether, then among those beside the best tour, as long
-        as that is improved; the classes of the last search."""
-        graph, clock = self.graph, self.clock.part(TURNS_SHARE)
+        """Search near the base, then near the incumbent while it improves.
+
+        Returns
+        -------
+        ndarray of int
+            Vertices of the last search.
+        """
+        graph, policy = self.graph, self.gtsp_policy.proof_search
+        clock = self.clock.part(policy.search_time_share)
         core = least_tethers(graph.costs_to_base, graph.cluster, self.searched_classes_per_goal)
         vain = 0
-        for _ in range(TURNS):
+        for _ in range(policy.max_searches):
             before = self.length
             core = np.union1d(core, np.array(self.tour or (0,), dtype=np.int64))
-            self._search(Instance.among(graph, core), clock)
+            self._search(self._among(core), clock)
             self.report("begun", vertices=len(graph))
             vain = 0 if self.length < before else vain + 1
-            if clock.is_up or self.tour is None or vain == IN_VAIN:
+            if clock.is_up or self.tour is None or vain == policy.max_vain_searches:
                 break
-            core = self._beside()
+            core = self._near_incumbent()
         return core
 
     def on_cover_bound(self, bound: float, cells: int, classes: Ints) -> tuple[int, ...] | None:
-        """Take the bound of a cover of so many cells, and search among classes, if there are any,
-        and the tour's; the best tour."""
+        """Raise the bound to that of a cover, and search.
+
+        Parameters
+        ----------
+        bound
+            Lower bound that the cover proves.
+        cells
+            Number of cells of the cover.
+        classes
+            Vertices to search, besides those of the incumbent; none for no search.
+
+        Returns
+        -------
+        tuple of int or None
+            Incumbent.
+        """
         self.raise_bound(bound)
         if len(classes):
             core = np.union1d(classes, np.array(self.tour or (0,), dtype=np.int64))
-            self._search(Instance.among(self.graph, core), self.clock.part(TURNS_SHARE))
+            share = self.gtsp_policy.proof_search.search_time_share
+            self._search(self._among(core), self.clock.part(share))
         self.report("covers", vertices=cells)
         return self.tour
 
     def search_afresh(self, count: int, clock: Clock) -> list[tuple[int, ...]]:
-        """The tours of so many searches, each from the start, among the classes of least tether and
-        those beside the best tour; the one that was best before comes first."""
+        """Search several times from scratch, near the base and the incumbent.
+
+        Returns
+        -------
+        list of tuple of int
+            The incumbent, if there is one, and the tour of each search.
+        """
         graph = self.graph
         core = least_tethers(graph.costs_to_base, graph.cluster, self.searched_classes_per_goal)
         if self.tour is not None:
-            core = np.union1d(core, self._beside())
-        instance = Instance.among(graph, core)
+            core = np.union1d(core, self._near_incumbent())
+        instance = self._among(core)
         tours = [] if self.tour is None else [self.tour]
         for _ in range(count):
             if clock.is_up:
@@ -155,29 +160,42 @@ class SearchingRun(SolverRun):
                 tours.append(tour)
         return tours
 
-    def _beside(self) -> Ints:
-        """The classes beside the best tour."""
+    def _near_incumbent(self) -> Ints:
         graph, tour = self.graph, self.tour or (0,)
         return classes_near_tour(
-            graph.costs_to_base, graph.cluster, graph.lower_bounds(rows=tour), tour,
+            graph.costs_to_base,
+            graph.cluster,
+            graph.lower_bounds(rows=tour),
+            tour,
             self.searched_classes_per_goal,
-        )  # fmt: skip
+            self.gtsp_policy.neighbourhood,
+        )
+
+    def _among(self, vertices: Ints) -> Instance:
+        return Instance.among(self.graph, vertices, self.gtsp_policy.local_search)
 
     @contextmanager
     def core(self) -> Iterator[Self | None]:
-        """A run like this one over the classes of least tether, and those beside the best tour if
-        there is room for enough of them; None where they are too few to be worth it. Its share of
-        the time begins with `start_time_share`; when that is over, the body is left early."""
-        graph = self.graph
+        """Make a run like this one over a core, and leave the body early if its time is up.
+
+        The core holds the vertices near the base, or those near the incumbent if there is room for
+        enough of them. The run's share of the time begins with `start_time_share`.
+
+        Yields
+        ------
+        SearchingRun or None
+            The run; None if a core is too large a part of all vertices to pay.
+        """
+        graph, policy = self.graph, self.gtsp_policy
         core = least_tethers(graph.costs_to_base, graph.cluster, self.core_classes_per_goal)
-        larger = LARGER_OF_MANY if graph.goal_count >= OF_MANY else LARGER
-        few = len(graph) <= max(MEASURE_AT_ONCE, larger * len(core))
+        ratio = policy.proof_search.core_ratio(graph.goal_count)
+        few = len(graph) <= max(policy.costs.max_measured_vertices, ratio * len(core))
         if few or not graph.roadmapped or self.outer is not None:
             yield None
             return
-        beside = self.search_near_incumbent()
-        if self.core_classes_per_goal >= ENOUGH_BESIDE:
-            core = beside
+        near = self.search_near_incumbent()
+        if self.core_classes_per_goal >= policy.proof_search.min_near_tour_per_cluster:
+            core = near
         core = np.union1d(core, np.array(self.tour or (0,), dtype=np.int64))
         inner = self.run_over(graph.subgraph(core), Limits(self.clock, rng=self.rng))
         inner.iteration_limit = self.iteration_limit - self.iterations
@@ -191,19 +209,23 @@ class SearchingRun(SolverRun):
         finally:
             self.iterations += inner.iterations
 
+    def run_over(self, graph: TravelGraph, limits: Limits) -> Self:
+        """Return a run over another graph with the same settings."""
+        return type(self)(graph, limits, search_rounds=self.search_rounds, policy=self.gtsp_policy)
+
     def start_time_share(self) -> None:
-        """Give a run over a core its part of the time that is left now."""
-        self.clock = self.clock.part(CORE_SHARE)
+        """Begin the share of the time left that a run over a core has."""
+        self.clock = self.clock.part(self.gtsp_policy.proof_search.core_time_share)
 
     @property
     def core_classes_per_goal(self) -> int:
-        """In the core."""
-        return min(max(3, CORE // (self.graph.goal_count + 1)), MOST_CLASSES)
+        """Number of vertices of each cluster in the core."""
+        return self.gtsp_policy.proof_search.core_vertices_per_cluster(self.graph.goal_count)
 
     @property
     def searched_classes_per_goal(self) -> int:
-        """In a search."""
-        return searched_classes_per_goal(self.graph.goal_count)
+        """Number of vertices of each cluster in a search."""
+        return self.gtsp_policy.neighbourhood.vertices_per_cluster(self.graph.goal_count)
 
     def update_incumbent(
         self,
@@ -211,64 +233,71 @@ class SearchingRun(SolverRun):
         walk: Sequence[int] | None = None,
         length: float | None = None,
     ) -> bool:
-        """As `SolverRun.update_incumbent`; a tour of the core is one of the outer run as well."""
-        taken = super().update_incumbent(tour, walk, length)
-        if taken and self.outer and self.tour is not None:
+        """Update the incumbent of this run and, for a run over a core, of the outer run."""
+        updated = super().update_incumbent(tour, walk, length)
+        if updated and self.outer and self.tour is not None:
             outer, core = self.outer
             outer.update_incumbent(core[list(self.tour)].tolist(), length=self.length)
-        return taken
+        return updated
 
     def report(self, stage: str, **more: Any) -> None:
-        """As `SolverRun.report`; work on the core is reported by the outer run."""
+        """Report as `SolverRun.report`; for a run over a core the outer run does."""
         if self.outer is None:
             super().report(stage, **more)
         else:
             self.outer[0].report("core", **more)
 
     def searches_all_vertices(self, costs: CostMatrix) -> bool:
-        """Whether the heuristic searches all vertices that are left."""
-        few = len(costs) <= SEARCHED_WHOLE or not self.graph.roadmapped
+        """Return whether a search sees all remaining vertices."""
+        few = len(costs) <= self.gtsp_policy.proof_search.max_whole_search
+        few = few or not self.graph.roadmapped
         return costs.exact is None and costs.rows is None and few
 
     def instance(self, costs: CostMatrix, more: Ints) -> Instance:
-        """What the heuristic searches: everything if it is not too much, else the classes of least
-        tether, those beside the incumbent, its own, and more."""
+        """Return the instance that is searched.
+
+        It holds all remaining vertices if they are few. Otherwise it holds those near the base or
+        the incumbent, those of the incumbent, and `more` (positions).
+        """
+        policy = self.gtsp_policy
         if self.searches_all_vertices(costs):
-            if self._core is None or self._core[0] != len(costs):
+            if self._whole is None or self._whole[0] != len(costs):
                 values = np.asarray(costs.values, dtype=np.float64)
-                whole = Instance(costs.cluster, values, costs.vertices, self.graph.before)
-                self._core = len(costs), whole
-            return self._core[1]
-        tethers, own = (
-            costs.base_costs,
-            np.searchsorted(costs.vertices, np.array(self.tour or (0,))),
-        )
+                whole = Instance(
+                    costs.cluster, values, costs.vertices, self.graph.before, policy.local_search
+                )
+                self._whole = len(costs), whole
+            return self._whole[1]
+        base_costs = costs.base_costs
+        own = np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
+        count = self.searched_classes_per_goal
         if self.tour is None:
-            some = least_tethers(tethers, costs.cluster, self.searched_classes_per_goal)
+            near = least_tethers(base_costs, costs.cluster, count)
         else:
-            some = classes_near_tour(
-                tethers,
-                costs.cluster,
-                costs.lower_bounds_from(own),
-                own,
-                self.searched_classes_per_goal,
+            bounds = costs.lower_bounds_from(own)
+            near = classes_near_tour(
+                base_costs, costs.cluster, bounds, own, count, policy.neighbourhood
             )
-        core = np.unique(np.concatenate([some, own, more]))
+        core = np.unique(np.concatenate([near, own, more]))
         return Instance(
-            costs.cluster[core], costs.among(core), costs.vertices[core], self.graph.before
+            costs.cluster[core],
+            costs.among(core),
+            costs.vertices[core],
+            self.graph.before,
+            policy.local_search,
         )
 
     def search(self, costs: CostMatrix, more: Ints | None = None) -> None:
-        """Local search, then ruin and recreate, from the incumbent if there is one; again beside a
-        better tour, where not all classes are looked at."""
+        """Search from the incumbent, and again near a better one if not all vertices are seen."""
+        policy = self.gtsp_policy.proof_search
         more = np.zeros(0, dtype=np.int64) if more is None else more
-        clock = self.clock.part(TURNS_SHARE)
+        clock = self.clock.part(policy.search_time_share)
         vain = 0
-        for _ in range(TURNS):
+        for _ in range(policy.max_searches):
             before = self.length
             self._search(self.instance(costs, more), clock, rounded=costs.rounded)
             vain = 0 if self.length < before else vain + 1
-            if self.searches_all_vertices(costs) or clock.is_up or vain == IN_VAIN:
+            if self.searches_all_vertices(costs) or clock.is_up or vain == policy.max_vain_searches:
                 break
 
     def _search(self, instance: Instance, clock: Clock, *, rounded: bool = False) -> None:
@@ -279,17 +308,21 @@ class SearchingRun(SolverRun):
         self.offer_incumbent_from(search, rounded=rounded)
         length, tour = search.best()
         if np.isfinite(length) and tour not in self.local_optima:
-            self.local_optima = [*self.local_optima[1 - MOST_ENDS :], tour]
+            kept = self.gtsp_policy.proof_search.max_local_optima
+            self.local_optima = [*self.local_optima[1 - kept :], tour]
 
     def offer_incumbent_from(self, search: Search, *, rounded: bool = False) -> None:
-        """Offer what a search found; its legs are measured, so its length is known unless they were
-        rounded."""
+        """Update the incumbent with the best tour of a search, whose length is known exactly unless
+        its costs were rounded."""
         length, tour = search.best()
         self.update_incumbent(tour, length=None if rounded else length)
 
     @property
     def cutoff(self) -> float:
-        """Tours no shorter than this are of no interest: half the tolerance below the incumbent, or
-        the next multiple of a grain."""
+        """Length from which on tours are of no interest.
+
+        It is half the tolerance below the incumbent, or the next lower multiple of the grain.
+        """
         length, grain = min(self.length, self.known_length), self.graph.grain
-        return min(length * (1.0 - 0.5 * OPTIMALITY_TOLERANCE), length - grain * (1.0 - 2 * SLIVER))
+        by_grain = length - grain * (1.0 - 2 * BOUND_ROUNDING)
+        return min(length * (1.0 - 0.5 * OPTIMALITY_TOLERANCE), by_grain)

@@ -1,4 +1,4 @@
-"""What every solver run shares: the incumbent, the bound, the limits and the report."""
+"""A run of a solver: incumbent, bound, limits and progress."""
 
 from __future__ import annotations
 
@@ -9,46 +9,59 @@ from typing import Any
 
 import numpy as np
 
+from netsp.base.arrays import Ints
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError, LimitReachedError, MemoryLimitError, interrupted
+from netsp.gtsp.gtsp_policy import CostPolicy
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.travel.graph import UNTIMED, BaselessGraph, TravelGraph, least_tethers
+from netsp.gtsp.travel.graph import BaselessGraph, TravelGraph, least_tethers
 from netsp.gtsp.travel.result import Progress, Result, proven
 from netsp.model.bound_scope import LowerBound
 from netsp.model.solution import Status
 
 
 class RunStopped(Exception):
-    """A limit is reached."""
+    """A limit is reached, and the run ends with the best tour so far."""
 
 
-SLIVER = 1e-4
-"""Where lengths are multiples of a grain, a bound is rounded up to the next, but not by so small a
-part of it: bounds are off by rounding themselves."""
+BOUND_ROUNDING = 1e-4
+"""Tolerance of a bound, as a share of the grain that all lengths are multiples of. A bound that is
+above a multiple by less is not rounded up to the next, because it may be off by rounding."""
 
 
 class SolverRun:
     """One run of a solver on a travel graph.
 
-    `RunStopped` and Ctrl-C both end it with the best tour so far.
+    Parameters
+    ----------
+    policy
+        How costs are measured.
 
     Attributes
     ----------
     iterations
-        How many the solver has done; each solver says what one is.
+        Iterations so far; each solver defines what one is.
     known_length
-        Length of a tour from elsewhere: a bound that reaches it is all that is wanted.
+        Length of a tour from elsewhere, inf for none: a bound that reaches it ends the run.
+    walk
+        Vertices as they are walked, base to base, if that is not just the tour.
     """
 
-    def __init__(self, graph: TravelGraph, limits: Limits | None = None) -> None:
+    def __init__(
+        self,
+        graph: TravelGraph,
+        limits: Limits | None = None,
+        *,
+        policy: CostPolicy = CostPolicy(),
+    ) -> None:
         limits = limits or Limits()
         if isinstance(graph, BaselessGraph):
             raise InputError("graph: has no base; expected solve_graph to be called with it")
-        # compiled loops take it for granted that every goal has a class
+        # compiled loops rely on a vertex in every cluster
         lost = np.flatnonzero(np.bincount(graph.cluster) == 0)
         if len(lost):
             raise InputError(f"graph: no class of goal {lost[0]}; expected one of every goal")
-        self.graph = graph
+        self.graph, self.cost_policy = graph, policy
         self.known_length = limits.cutoff
         self.clock = Clock.from_limit(limits.time)
         self.iterations = 0
@@ -69,14 +82,14 @@ class SolverRun:
         walk: Sequence[int] | None = None,
         length: float | None = None,
     ) -> bool:
-        """Take a tour as incumbent if it is one and is shorter; whether it was taken.
+        """Make a tour the incumbent if it is valid and shorter, and return whether it was.
 
         Parameters
         ----------
         walk
-            The vertices as they are walked, base to base, when that is not just the tour.
+            Vertices as they are walked, base to base, if that is not just the tour.
         length
-            Of the walk, if the caller knows it already.
+            Length of the walk, if it is known.
         """
         if tour is None or not self.graph.is_tour(tour):
             return False
@@ -90,19 +103,21 @@ class SolverRun:
 
     @contextmanager
     def until_stopped(self, *, blind: bool = False) -> Iterator[None]:
-        """Run the body until it is done, a limit is reached, also while legs are measured, or
-        Ctrl-C is pressed. Where it has no tour yet by then, it gets the nearest one that there is,
-        unless it is blind: then its own is all that it may show."""
+        """Run the body until it is done, a limit is reached, or Ctrl-C is pressed.
+
+        If there is no tour by then, the run gets the nearest-neighbour tour, unless it is `blind`:
+        a baseline that shows nothing except its own tour.
+        """
         try:
             if not blind and not self.graph.complete and self.clock.limit is not None:
-                # a roadmap that was cut short says that nothing here is quick
+                # a roadmap that was cut short is too large for anything to be quick
                 self.ensure_tour()
             yield
         except MemoryLimitError:
             raise
         except (RunStopped, LimitReachedError, KeyboardInterrupt, SystemError) as error:
             if interrupted(error):
-                self.clock.end()  # for the run that this one is a part of, too
+                self.clock.end()  # also ends the run that this one is a part of
             elif isinstance(error, SystemError):
                 raise
             self.was_stopped = True
@@ -110,51 +125,62 @@ class SolverRun:
                 self.ensure_tour()
 
     def finish(self, stage: str, **more: Any) -> Result:
-        """The last report, which says so if the run was stopped, and the outcome."""
+        """Report a last time and return the result."""
         with suppress(KeyboardInterrupt):
             self.report("stopped" if self.was_stopped else stage, **more)
         return self.result()
 
     def solve_if_trivial(self) -> bool:
-        """Settle problems of no goal or one, where the answer is known."""
+        """Solve a problem of at most one goal, and return whether it was one."""
         if self.graph.goal_count > 1:
             return False
         if self.graph.goal_count == 0:
             self.update_incumbent([0])
         else:
-            there = self.graph.members(1)
-            self.update_incumbent([0, int(there[np.argmin(self.graph.costs_to_base[there])])])
+            members = self.graph.members(1)
+            nearest = int(members[np.argmin(self.graph.costs_to_base[members])])
+            self.update_incumbent([0, nearest])
         self.bound = self.length
         return True
 
     def ensure_tour(self) -> None:
-        """Take a first tour, whatever the time: the goals in the class of least tether, each the
-        nearest to the one before, by the bounds of legs where goals are many."""
+        """Build a first tour if there is none, even if time is up.
+
+        It visits the vertex of each cluster nearest to the base, by nearest neighbour; where a leg
+        takes long to measure, it returns to the base after each.
+        """
         graph = self.graph
         if self.tour is not None or not graph.roadmapped:
             return
         core = least_tethers(graph.costs_to_base, graph.cluster, 1)
-        if not graph.quick_legs:
-            # out and back to every goal: those legs are the tethers, which are known; a goal has
-            # fewer goals before it than any goal after it
-            out = core[1:].tolist()
-            if len(graph.before):
-                out.sort(key=lambda v: int(graph.before[:, graph.cluster[v]].sum()))
-            walk = [0, *(w for v in out for w in (v, 0))]
-            self.update_incumbent(
-                [0, *out], walk=walk, length=2.0 * float(graph.costs_to_base[out].sum())
-            )
-            return
-        # a few legs; without them there would be nothing to show. A clock without a limit, not
-        # none: a part of another graph would take that one's instead
+        if graph.quick_legs:
+            self._build_nearest_neighbour_tour(core)
+        else:
+            self._build_star_tour(core)
+
+    def _build_star_tour(self, core: Ints) -> None:
+        """Go out to each vertex and back: these legs are known without measuring."""
+        graph = self.graph
+        out = core[1:].tolist()
+        if len(graph.before):
+            # a cluster has fewer predecessors than any cluster that must follow it
+            out.sort(key=lambda v: int(graph.before[:, graph.cluster[v]].sum()))
+        walk = [0, *(w for v in out for w in (v, 0))]
+        length = 2.0 * float(graph.costs_to_base[out].sum())
+        self.update_incumbent([0, *out], walk=walk, length=length)
+
+    def _build_nearest_neighbour_tour(self, core: Ints) -> None:
+        """Visit vertices by nearest neighbour, by costs if they are few and by bounds otherwise."""
+        graph = self.graph
+        # a clock without a limit instead of None: a subgraph would use its graph's clock for None
         with graph.on_clock(Clock()):
-            few = len(core) <= UNTIMED
+            few = len(core) <= self.cost_policy.untimed_vertices
             near = graph.costs_among(core) if few else graph.lower_bounds(core)
             tour, left = [0], np.ones(len(core), dtype=bool)
             left[0] = False
-            before = graph.before[np.ix_(graph.cluster[core], graph.cluster[core])] if len(
-                graph.before
-            ) else np.zeros((len(core), len(core)), dtype=bool)  # fmt: skip
+            before = np.zeros((len(core), len(core)), dtype=bool)
+            if len(graph.before):
+                before = graph.before[np.ix_(graph.cluster[core], graph.cluster[core])]
             while left.any():
                 ready = left & ~before[left].any(axis=0)
                 k = int(np.argmin(np.where(ready, near[tour[-1]], np.inf)))
@@ -163,26 +189,26 @@ class SolverRun:
             self.update_incumbent(core[tour].tolist())
 
     def raise_bound(self, bound: float) -> None:
-        """Take a lower bound if it is better; never above the incumbent."""
+        """Raise the lower bound, at most to the length of the incumbent."""
         grain = self.graph.grain
         if grain and np.isfinite(bound):
-            bound = max(bound, grain * float(np.ceil(bound / grain - SLIVER)))
+            bound = max(bound, grain * float(np.ceil(bound / grain - BOUND_ROUNDING)))
         self.bound = min(max(self.bound or 0.0, bound), self.length)
 
     def check(self) -> None:
-        """Raise `RunStopped` when a limit is reached."""
+        """Raise `RunStopped` if a limit is reached."""
         if self.clock.is_up or self.iterations >= self.iteration_limit:
             raise RunStopped
 
     @property
     def is_done(self) -> bool:
-        """Whether the incumbent is proven optimal, or no shorter than what is known."""
+        """Whether no tour shorter than the incumbent, or than the known length, is left to find."""
         if self.tour is None or self.bound is None:
             return False
         return proven(min(self.length, self.known_length), self.bound)
 
     def report(self, stage: str, **more: Any) -> None:
-        """Add a row to the trace and hand it on; `more` are further fields of `Progress`."""
+        """Add a row to the trace and pass it on; `more` are further fields of `Progress`."""
         row = Progress(
             self.clock.elapsed,
             stage,
@@ -197,16 +223,19 @@ class SolverRun:
             self.on_progress(row)
 
     def result(self) -> Result:
-        """The outcome as it stands."""
+        """Return the result as it stands."""
         if self.tour is None:
             status = Status.INFEASIBLE if self.is_infeasible else Status.NO_SOLUTION_FOUND
-            return Result(
-                None, None, self.bound or None, status, tuple(self.trace),
-                lower_bound_of=self.graph.scope,
-            )  # fmt: skip
+            trace, scope = tuple(self.trace), self.graph.scope
+            return Result(None, None, self.bound or None, status, trace, lower_bound_of=scope)
         optimal = self.bound is not None and proven(self.length, self.bound)
         status = Status.OPTIMAL if optimal else Status.FEASIBLE
         return Result(
-            self.tour, self.length, self.bound, status, tuple(self.trace), walk=self.walk,
+            self.tour,
+            self.length,
+            self.bound,
+            status,
+            tuple(self.trace),
+            walk=self.walk,
             lower_bound_of=self.graph.scope,
-        )  # fmt: skip
+        )

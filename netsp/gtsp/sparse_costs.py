@@ -1,9 +1,8 @@
-"""The legs that may be in a better tour, vertex by vertex, and nothing of all others.
+"""Sparse costs: the legs that may be in a better tour, vertex by vertex.
 
 Among 20,000 vertices a matrix of all legs takes 1.5 GiB in single precision. A first bound over
-covers leaves fewer than one leg in ten (`netsp.mip.cost_fixing`), and it takes nothing but the legs
-of some vertices at a time to find them. What these rows take is proportional to the legs that are
-left.
+covers leaves fewer than one leg in ten (`netsp.mip.cost_fixing`), and finds them from the legs of
+some vertices at a time, so that memory grows with the legs that remain.
 """
 
 from __future__ import annotations
@@ -21,21 +20,16 @@ from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.compiled.dynamic_array import order_of
 from netsp.base.compiled.kernel import kernel
 from netsp.base.ram import check_available
+from netsp.gtsp.gtsp_policy import CostPolicy
 
 Columns = npt.NDArray[np.int32]
 
-ROWS = 256
-"""That a thread works on at a time."""
-
-BYTES = 8.0
-"""Of each leg, either way."""
-
-HALF = 0.5
-"""Rows are packed again when no more than this share of their room is in use."""
-
 
 class Rows(NamedTuple):
-    """Row v is places ``first[v]`` to ``first[v] + size[v]`` of `other`, ascending, and `cost`."""
+    """Costs by rows: row v is entries ``first[v]`` to ``first[v] + size[v]`` of `other` and `cost`.
+
+    `other` is ascending within a row. A row may have room after its last entry.
+    """
 
     first: Ints
     size: Ints
@@ -44,112 +38,131 @@ class Rows(NamedTuple):
 
 
 EMPTY_ROWS = Rows(
-    np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int32),
+    np.zeros(0, dtype=np.int64),
+    np.zeros(0, dtype=np.int64),
+    np.zeros(0, dtype=np.int32),
     np.zeros(0, dtype=np.float32),  # type: ignore[arg-type]
-)  # fmt: skip
-"""Where legs are held as a matrix."""
+)
+"""Rows where costs are a matrix."""
 
 
 class SparseCosts:
-    """The legs left among some vertices.
+    """Costs of the legs that remain among some vertices.
 
     Parameters
     ----------
     vertices
-        How many there are.
+        Number of vertices.
     blocks
-        Some vertices (r,) and the costs (r, V) of their legs in single precision, until all
-        vertices have been given.
+        Vertices (r,) and the costs (r, V) of their legs in single precision, block by block, until
+        each vertex has come once.
     own
-        (V,) the cell that each vertex lies in.
+        (V,) cell of each vertex; negative for none.
     longest
-        (m, m) what a leg between two cells may cost to be kept.
+        (m, m) largest cost of a leg between two cells that is kept.
     tour
-        Its vertices in order; its legs are kept whatever they cost.
+        Vertices of the incumbent, whose legs are kept whatever they cost.
+    policy
+        How costs are held.
 
     Raises
     ------
     MemoryLimitError
-        There is no room for those that are kept.
+        There is no room for the legs that are kept.
     """
 
     def __init__(
-        self, vertices: int, blocks: Iterable[tuple[Ints, Floats]], own: Ints, longest: Floats,
+        self,
+        vertices: int,
+        blocks: Iterable[tuple[Ints, Floats]],
+        own: Ints,
+        longest: Floats,
         tour: Ints,
-    ) -> None:  # fmt: skip
+        *,
+        policy: CostPolicy = CostPolicy(),
+    ) -> None:
+        self.policy = policy
         mates = np.full((vertices, 2), -1, dtype=np.int64)
         mates[tour] = np.column_stack([np.roll(tour, 1), np.roll(tour, -1)])
-        # what lies in no cell lies in the last, which has no legs
+        # vertices in no cell are put into a last one, which has no legs
         longest = np.pad(longest, (0, 1), constant_values=-np.inf)
         own = np.where(own < 0, len(longest) - 1, own)
         first, size = np.zeros(vertices, dtype=np.int64), np.zeros(vertices, dtype=np.int64)
         other: Columns = np.zeros(0, dtype=np.int32)
         cost: Floats = np.zeros(0, dtype=np.float32)  # type: ignore[assignment]
         for rows, costs in blocks:
-            kept = Kept(rows, costs, own, longest, mates)
+            block = Block(rows, costs, own, longest, mates)
             counts = np.zeros(len(rows), dtype=np.int64)
-            _by_rows(partial(_count, kept, counts), len(rows))
+            self._share_rows(partial(_count, block, counts), len(rows))
             check_available(
-                BYTES * counts.sum(), f"the legs left between {vertices} homotopy classes",
+                float(other.itemsize + cost.itemsize) * counts.sum(),
+                f"the legs left between {vertices} homotopy classes",
                 "lower tether_length or max_classes, or use solver 'lns'",
-            )  # fmt: skip
+            )
             begin = len(other) + np.cumsum(counts) - counts
             first[rows], size[rows] = begin, counts
-            # grows where it stands: two of them may be more than there is room for
+            # resized in place, because there may be no room for a second copy
             other.resize(len(other) + int(counts.sum()), refcheck=False)
             cost.resize(len(other), refcheck=False)
-            _by_rows(partial(_keep, kept, begin, other, cost), len(rows))
+            self._share_rows(partial(_keep, block, begin, other, cost), len(rows))
         self.held = Rows(first, size, other, cost)
+
+    def _share_rows(self, work: Callable[[int, int], None], count: int) -> None:
+        """Share the rows of a block among threads."""
+        task_rows = self.policy.task_rows
+        parts = range(0, count, task_rows)
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(lambda k: work(k, min(k + task_rows, count)), parts))
 
     def __len__(self) -> int:
         return len(self.held.first)
 
     def __getitem__(self, ends: tuple[Ints, Ints]) -> Bools:
-        """(k,) whether legs from us to vs are gone."""
+        """Return whether legs (k,) from us to vs are fixed out."""
         return np.asarray(np.isinf(self.costs_of(*ends)))
 
     def costs_of(self, us: Ints, vs: Ints) -> Floats:
-        """(k,) costs of legs from us to vs; inf where they are gone."""
+        """Return the costs (k,) of legs from us to vs; inf for legs fixed out."""
         return _costs_of(np.asarray(us), np.asarray(vs), self.held)
 
     def add_vertices(self, gone: Bools) -> None:
-        """Let go of all legs of some vertices (V,)."""
-        _without(gone, self.held)
-        if self.held.size.sum() < HALF * len(self.held.other):
+        """Fix out all legs of the marked vertices (V,)."""
+        _drop_vertices(gone, self.held)
+        if self.held.size.sum() < self.policy.min_packed_share * len(self.held.other):
             self._pack(np.ones(len(self), dtype=bool))
 
     def add_above(self, own: Ints, dead: Bools) -> None:
-        """Let go of all legs between cells whose own leg is dead.
+        """Fix out all legs between cells whose own leg is fixed out.
 
         Parameters
         ----------
         own
-            (V,) the cell of each vertex.
+            (V,) cell of each vertex.
         dead
-            (m, m) legs between cells.
+            (m, m) mask of legs between cells.
         """
-        _not_above(own, dead, self.held)
+        _drop_above(own, dead, self.held)
 
     @property
     def left(self) -> int:
-        """How many legs are left."""
+        """Number of remaining legs."""
         return int(self.held.size.sum()) // 2
 
     def legs_left(self) -> Ints:
-        """(k, 2) those that are left, u < v, in order."""
+        """Return the remaining legs (k, 2), u < v, in order."""
         return _legs(self.held)
 
     def with_legs(self) -> Bools:
-        """(V,) whether a vertex has a leg left."""
+        """Return whether each vertex (V,) has a remaining leg."""
         return np.asarray(self.held.size > 0)
 
-    def nearest_legs(self, most: int) -> Ints:
-        """(k, 2) the cheapest legs of every vertex, so many at most."""
-        return _cheapest(most, self.held)
+    def nearest_legs(self, count: int) -> Ints:
+        """Return the cheapest legs (k, 2) of each vertex, at most `count` of each."""
+        return _cheapest(count, self.held)
 
     def restrict(self, keep: Bools) -> None:
-        """Forget all vertices but those marked."""
-        _without(~keep, self.held)
+        """Remove all vertices except those marked."""
+        _drop_vertices(~keep, self.held)
         self._pack(keep)
 
     def _pack(self, keep: Bools) -> None:
@@ -157,9 +170,9 @@ class SparseCosts:
         self.held = Rows(*_packed(np.flatnonzero(keep), place, self.held))
 
 
-class Kept(NamedTuple):
-    """What is kept of the legs `costs` (r, V) of some vertices `rows`: those of their mates in the
-    tour, and what is no longer than the longest between two cells."""
+class Block(NamedTuple):
+    """Legs `costs` (r, V) of the vertices `rows`, and which of them are kept: those of their mates
+    in the tour, and those no longer than the longest between the two cells."""
 
     rows: Ints
     costs: Floats
@@ -169,16 +182,16 @@ class Kept(NamedTuple):
 
 
 @kernel
-def _kept(k: int, kept: Kept, other: Columns, cost: Floats) -> int:
-    """How many legs of a row are kept; the first of them go into `other` and `cost`, as many as
-    there is room for."""
-    costs, longest = kept.costs[k], kept.longest[kept.own[kept.rows[k]]]
-    before, after = kept.mates[kept.rows[k]]
+def _kept(k: int, block: Block, other: Columns, cost: Floats) -> int:
+    """Return the number of legs of row k that are kept, and write as many of them as fit into
+    `other` and `cost`."""
+    costs, longest = block.costs[k], block.longest[block.own[block.rows[k]]]
+    before, after = block.mates[block.rows[k]]
     top, count = longest.max(), 0
     for v in range(len(costs)):
         c = costs[v]
-        # few are as short as any may be: the others are passed over quickly
-        if (c <= top and c <= longest[kept.own[v]]) or v in (before, after):
+        # most legs are longer than any that is kept, and are passed over quickly
+        if (c <= top and c <= longest[block.own[v]]) or v in (before, after):
             if c == np.inf:
                 continue
             if count < len(other):
@@ -188,33 +201,24 @@ def _kept(k: int, kept: Kept, other: Columns, cost: Floats) -> int:
 
 
 @kernel
-def _count(kept: Kept, count: Ints, first: int, last: int) -> None:
-    """How many legs of some rows are kept."""
+def _count(block: Block, count: Ints, first: int, last: int) -> None:
+    """Count the legs of some rows that are kept."""
     other, cost = EMPTY_ROWS.other, EMPTY_ROWS.cost
     for k in range(first, last):
-        count[k] = _kept(k, kept, other, cost)
+        count[k] = _kept(k, block, other, cost)
 
 
 @kernel
-def _keep(
-    kept: Kept, begin: Ints, other: Columns, cost: Floats, first: int, last: int
-) -> None:  # fmt: skip
-    """Write them down, each row from its place on."""
+def _keep(block: Block, begin: Ints, other: Columns, cost: Floats, first: int, last: int) -> None:
+    """Write the legs of some rows that are kept, each row from its place on."""
     for k in range(first, last):
         end = begin[k + 1] if k + 1 < len(begin) else len(other)
-        _kept(k, kept, other[begin[k] : end], cost[begin[k] : end])
-
-
-def _by_rows(work: Callable[[int, int], None], count: int) -> None:
-    """Share the rows of a block among threads."""
-    parts = range(0, count, ROWS)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(lambda k: work(k, min(k + ROWS, count)), parts))
+        _kept(k, block, other[begin[k] : end], cost[begin[k] : end])
 
 
 @kernel
 def place_of(u: int, v: int, rows: Rows) -> int:
-    """The place of a leg, -1 if it is gone."""
+    """Return the place of a leg; -1 if it is fixed out."""
     low, high = rows.first[u], rows.first[u] + rows.size[u]
     end = high
     while low < high:
@@ -237,8 +241,8 @@ def _costs_of(us: Ints, vs: Ints, rows: Rows) -> Floats:
 
 
 @kernel
-def _without(gone: Bools, rows: Rows) -> None:
-    """Take legs of vertices that are gone out of all rows."""
+def _drop_vertices(gone: Bools, rows: Rows) -> None:
+    """Remove the legs of the marked vertices from all rows."""
     for u in range(len(rows.first)):
         if gone[u]:
             rows.size[u] = 0
@@ -252,7 +256,7 @@ def _without(gone: Bools, rows: Rows) -> None:
 
 
 @kernel
-def _not_above(own: Ints, dead: Bools, rows: Rows) -> None:
+def _drop_above(own: Ints, dead: Bools, rows: Rows) -> None:
     for u in range(len(rows.first)):
         first, kept = rows.first[u], 0
         for k in range(first, first + rows.size[u]):
@@ -264,7 +268,7 @@ def _not_above(own: Ints, dead: Bools, rows: Rows) -> None:
 
 @kernel
 def _packed(chosen: Ints, place: Ints, rows: Rows) -> tuple[Ints, Ints, Columns, Floats]:
-    """Rows of some vertices, numbered anew, without room between them."""
+    """Return the rows of the chosen vertices, renumbered by `place`, without room between them."""
     size = rows.size[chosen]
     first = np.cumsum(size) - size
     other = np.empty(np.sum(size), dtype=np.int32)
@@ -290,15 +294,15 @@ def _legs(rows: Rows) -> Ints:
 
 
 @kernel
-def _cheapest(most: int, rows: Rows) -> Ints:
-    out = np.empty((most * len(rows.first), 2), dtype=np.int64)
+def _cheapest(limit: int, rows: Rows) -> Ints:
+    out = np.empty((limit * len(rows.first), 2), dtype=np.int64)
     size = 0
     for u in range(len(rows.first)):
         first = rows.first[u]
         cost = np.empty(rows.size[u])
         for k in range(rows.size[u]):
             cost[k] = rows.cost[first + k]
-        for k in order_of(cost)[:most]:
+        for k in order_of(cost)[:limit]:
             out[size, 0], out[size, 1] = u, rows.other[first + k]
             size += 1
     return out[:size].copy()

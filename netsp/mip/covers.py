@@ -167,11 +167,11 @@ class _Level:
             cluster, _words(self.cells), np.zeros(len(cluster)), CostTable(costs, cluster)
         )
         # tours over cells are none over classes: the incumbent is one over classes
-        run = self.run = SearchingRun(graph, limits)
+        run = self.run = SearchingRun(graph, limits, policy=policy.gtsp)
         run.tour, run.length = tuple(self.cell_tour.tolist()), length
         if below is not None:
             run.bound = below.run.bound
-        matrix = CostMatrix(graph)
+        matrix = CostMatrix(graph, policy=policy.gtsp.costs)
         self.root = Root(run, matrix, HighsRelaxation, lambda *_: None, policy=policy)
         self.root.cover_patience = policy.covers.patience
         if below is not None:

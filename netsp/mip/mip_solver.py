@@ -16,11 +16,11 @@ import numpy as np
 
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock
-from netsp.gtsp.cost_matrix import ROUNDED_FROM, CostMatrix
+from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.dp.dp_solver import bound_by_walks
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.search import Search
-from netsp.gtsp.searching import TURNS_SHARE, SearchingRun
+from netsp.gtsp.searching import SearchingRun
 from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.sparse_costs import SparseCosts
 from netsp.gtsp.travel.graph import TravelGraph
@@ -122,7 +122,7 @@ class MipRun(SearchingRun):
         search_rounds: int = 500,
         policy: MipPolicy = MipPolicy(),
     ) -> None:
-        super().__init__(graph, limits, search_rounds=search_rounds)
+        super().__init__(graph, limits, search_rounds=search_rounds, policy=policy.gtsp)
         self.mip_policy = policy
 
     def run_over(self, graph: TravelGraph, limits: Limits) -> Self:
@@ -186,16 +186,16 @@ class MipRun(SearchingRun):
         """Return the costs of all legs or, if costs are sparse, of the legs that a cover leaves."""
         graph, bound, policy = self.graph, self._goal_bound, self.mip_policy
         if not self._uses_sparse_costs or bound is None or self.tour is None:
-            return CostMatrix(graph)
+            return CostMatrix(graph, policy=self.gtsp_policy.costs)
         if bound.cells is None:
             # half of the time was too little for a cover, so a search makes more of the rest
             search_and_merge(self, self._solve_merged, policy.merging)
             self.check()
-            return CostMatrix(graph)
+            return CostMatrix(graph, policy=self.gtsp_policy.costs)
         odd = odd_letters(graph.signatures)
         with graph.on_clock(self.clock):
             sparse = surviving_legs(graph, bound.cells, self.length, self.tour, odd, policy.pricing)
-            return CostMatrix(graph, sparse)
+            return CostMatrix(graph, sparse, policy=self.gtsp_policy.costs)
 
     def bound_by_goals(self, backend: str) -> None:
         """Find a first bound over goals or covers, before the proof over all classes has one."""
@@ -238,11 +238,11 @@ class MipRun(SearchingRun):
         graph = self.graph
 
         def matrix() -> Floats:
-            self._costs = CostMatrix(graph)
+            self._costs = CostMatrix(graph, policy=self.gtsp_policy.costs)
             return self._costs.values
 
         def keep(sparse: SparseCosts) -> None:
-            self._costs = CostMatrix(graph, sparse)
+            self._costs = CostMatrix(graph, sparse, policy=self.gtsp_policy.costs)
 
         if self._uses_sparse_costs:
             return CoverCosts(on_sparse=keep)
@@ -263,7 +263,7 @@ class MipRun(SearchingRun):
         # with many goals, all that covers prove is to hold for classes left out, too
         is_whole = graph.complete or graph.goal_count < self.mip_policy.many_goals
         is_known = is_whole and graph.legs_in_blocks and graph.knows_ways
-        return is_known and len(graph) > ROUNDED_FROM
+        return is_known and len(graph) > self.gtsp_policy.costs.max_double_vertices
 
     @property
     def _cover_time_share(self) -> float:
@@ -371,7 +371,8 @@ class MipRun(SearchingRun):
         classes = visited_classes(tours)
         if not np.isin(classes, self._merged).all():
             self._merged = classes
-            merge(self, tours, self._solve_merged, self.clock.part(TURNS_SHARE))
+            share = self.gtsp_policy.proof_search.search_time_share
+            merge(self, tours, self._solve_merged, self.clock.part(share))
 
     def _solve_merged(self, graph: TravelGraph, limits: Limits) -> Result:
         return solve_merged(graph, limits, self.mip_policy)

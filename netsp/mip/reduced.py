@@ -22,7 +22,7 @@ import numpy as np
 
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.search import Instance, best_classes
-from netsp.gtsp.search.lns_solver import search_core
+from netsp.gtsp.search.lns_solver import max_classes_per_goal, search_core
 from netsp.gtsp.solver_run import SolverRun
 from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.gtsp.travel.result import Progress, Result
@@ -95,7 +95,8 @@ def solve(
             outer.update_incumbent(kept[np.array(result.tour)].tolist())
             if chosen.polish and not whole:
                 outer.check()
-                instance = Instance.among(graph, search_core(outer, vertices=chosen.max_polished))
+                count = max_classes_per_goal(graph, chosen.max_polished)
+                instance = Instance.among(graph, search_core(outer, count))
                 order = graph.cluster[kept[np.array(result.tour[1:])]]
                 _, tour = best_classes(order, instance.start, instance.costs)
                 outer.update_incumbent(instance.original(tour))

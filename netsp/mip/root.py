@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
-from netsp.gtsp.cost_matrix import LEGS, CostMatrix
+from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.searching import SearchingRun
 from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.sparse_costs import SparseCosts
@@ -327,9 +327,10 @@ class Root:
             return False
         u, v = np.nonzero(left)
         legs = np.column_stack([u[u < v], v[u < v]])
-        for first in range(0, len(legs), LEGS):
+        block_legs = self.costs.policy.block_legs
+        for first in range(0, len(legs), block_legs):
             self.run.check()
-            self.costs.measure_legs(legs[first : first + LEGS])
+            self.costs.measure_legs(legs[first : first + block_legs])
         return len(legs) > 0
 
     def _measure_used(self, point: Point) -> bool:

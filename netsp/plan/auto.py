@@ -1,20 +1,20 @@
 """`auto`: the solver by the size of the problem; always a tour, a bound and a gap.
 
-With up to eight goals or so all sets of goals are gone through (`netsp.plan.exact`). Up to
-`PROVABLE` vertices it proves: the heuristic finds the tour; for up to `FEW_GOALS` goals walks
-(`netsp.gtsp.dp`) bound it where legs are a matrix, which at that size ends with a proof more often
-than not; cutting planes (`netsp.mip`) do the rest, or all of it with more goals or more vertices,
-on the vertices that are left. Beyond `PROVABLE` few goals are proven over the classes of least
-tether, which proves the tour for good where it is no longer than twice the tether of every other
-class. With many, `lns` searches among them, and the bound comes from covers of finitely many sheets
-(`netsp.mip.covers`), or where there are none from the goals alone, as the travelling salesperson's
-tour over the shortest paths between them in any class.
+Up to about eight goals it goes through all sets of goals (`netsp.plan.exact`). Up to
+`RoutePolicy.max_proven_vertices` it proves: a search finds the tour; with up to `max_walk_goals`
+goals, walks (`netsp.gtsp.dp`) bound it if costs are a matrix, which at that size mostly ends with a
+proof; cutting planes (`netsp.mip`) do the rest, or all of it, on the vertices that remain. Beyond
+that size, few goals are proven over the classes of shortest tether, which proves the tour if it is
+no longer than twice the tether of every other class. With many goals, the tour comes from a search,
+and the bound from covers (`netsp.mip.covers`) or, without them, from the travelling salesperson's
+tour over the shortest paths between goals in any class.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from netsp.gtsp.dp.dp_solver import Params as WalkParams
 from netsp.gtsp.dp.dp_solver import fits as walks_fit
 from netsp.gtsp.dp.dp_solver import solve as walk
 from netsp.gtsp.limits import Limits
+from netsp.gtsp.search.lns_solver import Params as SearchParams
 from netsp.gtsp.search.lns_solver import solve as search
 from netsp.gtsp.solver_run import SolverRun
 from netsp.gtsp.travel.graph import TravelGraph, least_tethers
@@ -36,36 +37,7 @@ from netsp.mip.mip_solver import Params as MipParams
 from netsp.mip.mip_solver import solve as prove
 from netsp.model.bound_scope import LowerBound, strongest
 from netsp.plan import exact
-from netsp.plan.search_effort import SearchEffort
-
-PROVABLE = 22_000
-"""Most vertices of a travel graph that `mip` is asked to bound: as many as the taut roadmap keeps,
-unless it is asked for more."""
-
-MOST_KEPT = 3_000
-"""With more vertices and few goals, about so many, those of least tether, are proven over."""
-
-FEW_GOALS = 24
-"""Most goals for which walks come first: with more, remembering them costs more than cuts do."""
-
-SEARCH_EFFORT = SearchEffort(max_proven_goals=FEW_GOALS)
-"""Rounds of ruin and recreate before and after the root."""
-
-FEW_CLASSES = 3
-"""Of a goal, where the roadmap had to leave classes out: a tour over them comes first."""
-
-FEW_SHARE = 0.4
-"""Part of the time that this may take."""
-
-GOALS_SHARE = 0.2
-"""Part of the time that a first bound from the goals may take."""
-
-SHARE = 0.6
-"""Part of the time that the search has at least where it shares it with a bound that is weak."""
-
-BOUND_SHARE = 0.8
-"""Where a proof over all classes is not tried, part of the time that is left for the bound after
-the first search."""
+from netsp.plan.solve_policy import SolvePolicy
 
 
 @dataclass(frozen=True)
@@ -75,102 +47,138 @@ class Params:
     Attributes
     ----------
     backend
-        Of `mip`.
+        Backend of `mip`.
+    policy
+        Routes by size, and policies of the solvers.
     """
 
     backend: str = "highs"
+    policy: SolvePolicy = field(default_factory=SolvePolicy)
 
     def __post_init__(self) -> None:
         MipParams(backend=self.backend)
 
 
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
-    """Solve by size. Iterations are those of the solver chosen."""
-    found = _by_size(graph, params or Params(), limits or Limits())
+    """Solve by size; iterations are those of the solver chosen."""
+    chosen = params or Params()
+    found = _solve_by_size(graph, chosen, limits or Limits())
     if not found.lower_bound:
-        bound_by_one_trees(graph)
+        bound_by_one_trees(graph, chosen.policy.mip.goals)
     return found
 
 
-def _by_size(graph: TravelGraph, chosen: Params, limits: Limits) -> Result:
-    if exact.fits(graph):
-        small = SolverRun(graph, limits)
-        with small.until_stopped():
-            small.update_incumbent(limits.warm_start)
-            if not small.solve_if_trivial():
-                exact.solve(small)
-        return small.finish("proven" if small.is_done else "exact")
+def _solve_by_size(graph: TravelGraph, chosen: Params, limits: Limits) -> Result:
+    routes = chosen.policy.routes
+    if exact.fits(graph, chosen.policy.subsets):
+        return _over_subsets(graph, limits)
     if len(graph.before):
-        return _in_part_ordered(graph, limits, chosen.backend)
-    clock = Clock.from_limit(limits.time)
-    limits = replace(limits, time=clock)
+        return _in_partial_order(graph, chosen, limits)
+    limits = replace(limits, time=Clock.from_limit(limits.time))
+    few_goals = graph.goal_count <= routes.max_walk_goals
     if not graph.complete and graph.roadmapped:
-        # it says that a proof over the classes that were kept may not come to an end
-        if graph.goal_count <= FEW_GOALS or not graph.knows_ways:
-            _bound_by_goals(graph, Limits(clock.part(GOALS_SHARE), rng=limits.rng))
-        if graph.goal_count > FEW_GOALS:
-            if limits.warm_start is None:
-                limits = _from_few(graph, limits, chosen.backend)
-            tour, otherwise = limits.warm_start, graph.least_by_way_of(graph.least_left_out)
-            if tour is not None and graph.knows_ways and otherwise < graph.tour_length(tour):
-                # no proof over the classes kept would count: others may be in a shorter tour
-                return _beyond(graph, limits)
-            if tour is None and graph.knows_ways:
-                _bound_by_goals(graph, Limits(clock.part(GOALS_SHARE), rng=limits.rng))
-    if len(graph) <= PROVABLE:
-        run = MipRun(graph, limits, search_rounds=_rounds(graph))
+        limits, proves = _prepare_truncated(graph, chosen, limits)
+        if not proves:
+            return _by_search(graph, chosen, limits)
+    if len(graph) <= routes.max_proven_vertices:
+        run = _mip_run(graph, chosen, limits)
         try:
-            return run.solve(chosen.backend, limits.warm_start, walks=graph.goal_count <= FEW_GOALS)
+            return run.solve(chosen.backend, limits.warm_start, walks=few_goals)
         except MemoryLimitError:
-            # a search and covers of ways need no matrix
-            return _beyond(graph, replace(limits, warm_start=run.tour or limits.warm_start))
-    if graph.goal_count <= FEW_GOALS and graph.roadmapped:
-        return _over_shortest(graph, limits, chosen.backend)
-    return _beyond(graph, limits)
+            # a search and covers of paths need no matrix
+            limits = replace(limits, warm_start=run.tour or limits.warm_start)
+            return _by_search(graph, chosen, limits)
+    if few_goals and graph.roadmapped:
+        return _over_shortest(graph, chosen, limits)
+    return _by_search(graph, chosen, limits)
 
 
-def _beyond(graph: TravelGraph, limits: Limits) -> Result:
-    """No proof over all classes: a search, the bound of covers with its tour, and more
-    searches if there is time left."""
-    run = MipRun(graph, limits, search_rounds=_rounds(graph))
+def _over_subsets(graph: TravelGraph, limits: Limits) -> Result:
+    run = SolverRun(graph, limits)
+    with run.until_stopped():
+        run.update_incumbent(limits.warm_start)
+        if not run.solve_if_trivial():
+            exact.solve(run)
+    return run.finish("proven" if run.is_done else "exact")
 
+
+def _prepare_truncated(graph: TravelGraph, chosen: Params, limits: Limits) -> tuple[Limits, bool]:
+    """Bound by goals, and find a first tour, before a proof over a truncated roadmap.
+
+    Such a proof may not come to an end. With many goals, a tour over few classes comes first.
+
+    Returns
+    -------
+    limits : Limits
+        Limits with the tour as warm start.
+    proves : bool
+        Whether a proof over the classes kept would count; not if a tour through another class may
+        be shorter.
+    """
+    routes, clock = chosen.policy.routes, Clock.from_limit(limits.time)
+    few_goals = graph.goal_count <= routes.max_walk_goals
+    if few_goals or not graph.knows_ways:
+        share = Limits(clock.part(routes.goal_bound_time_share), rng=limits.rng)
+        _bound_by_goals(graph, chosen, share)
+    if few_goals:
+        return limits, True
+    if limits.warm_start is None:
+        limits = _warmed_by_few_classes(graph, chosen, limits)
+    tour, elsewhere = limits.warm_start, graph.least_by_way_of(graph.least_left_out)
+    if tour is not None and graph.knows_ways and elsewhere < graph.tour_length(tour):
+        return limits, False
+    if tour is None and graph.knows_ways:
+        share = Limits(clock.part(routes.goal_bound_time_share), rng=limits.rng)
+        _bound_by_goals(graph, chosen, share)
+    return limits, True
+
+
+def _by_search(graph: TravelGraph, chosen: Params, limits: Limits) -> Result:
+    """Search, bound by covers, and search on, without a proof over all classes."""
+    run = _mip_run(graph, chosen, limits)
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)
         run.find_first_tour()
         run.search_near_incumbent()
-        share = run.clock.part(BOUND_SHARE) if run.clock.limit else run.clock
-        run.raise_bound(
-            _bound_by_goals(graph, Limits(share, rng=limits.rng), run.tour, run.on_cover_bound)
-        )
+        clock = run.clock
+        if clock.limit:
+            clock = clock.part(chosen.policy.routes.cover_time_share)
+        share = Limits(clock, rng=limits.rng)
+        run.raise_bound(_bound_by_goals(graph, chosen, share, run.tour, run.on_cover_bound))
         run.report("goals")
-        search_and_merge(run, solve_merged)
+        policy = chosen.policy.mip
+        search_and_merge(run, partial(solve_merged, policy=policy), policy.merging)
     return run.finish("proven" if run.is_done else "open")
 
 
-def _rounds(graph: TravelGraph) -> int:
-    """Return the number of rounds of one search."""
-    return SEARCH_EFFORT.rounds(graph.goal_count)
+def _mip_run(graph: TravelGraph, chosen: Params, limits: Limits) -> MipRun:
+    policy = chosen.policy
+    rounds = policy.search_effort.rounds(graph.goal_count)
+    return MipRun(graph, limits, search_rounds=rounds, policy=policy.mip)
 
 
-def _in_part_ordered(graph: TravelGraph, limits: Limits, backend: str) -> Result:
-    """With precedences: walks, which remember them, prove where goals are few; with many, a search.
-    The bound of the tours in any order holds, too, and is quickly had."""
-    clock = Clock.from_limit(limits.time)
+def _in_partial_order(graph: TravelGraph, chosen: Params, limits: Limits) -> Result:
+    """Solve with precedences: prove by walks, which remember them, if goals are few; else search.
+
+    A bound on tours in any order holds as well, and takes little time.
+    """
+    policy, clock = chosen.policy, Clock.from_limit(limits.time)
     limits = replace(limits, time=clock)
-    few = walks_fit(graph) and graph.goal_count <= FEW_GOALS
-    rounds = _rounds(graph)
+    few_goals = graph.goal_count <= policy.routes.max_walk_goals
     bound: LowerBound | None = None
-    if len(graph) <= PROVABLE:
-        share = Clock((1.0 - SHARE) * clock.left, within=clock) if clock.limit else clock
-        free = MipRun(
-            graph.unordered(), replace(limits, time=share, warm_start=None, on_progress=None),
-            search_rounds=rounds,
-        ).solve(backend, None)  # fmt: skip
+    if len(graph) <= policy.routes.max_proven_vertices:
+        share = clock
+        if clock.limit:
+            share = Clock((1.0 - policy.routes.search_time_share) * clock.left, within=clock)
+        part = replace(limits, time=share, warm_start=None, on_progress=None)
+        free = _mip_run(graph.unordered(), chosen, part).solve(chosen.backend, None)
         if free.bound is not None:
             bound = free.bound.for_part(graph.scope, "tours in the order asked for are tours")
-    found = (
-        walk(graph, WalkParams(rounds), limits) if few else search(graph, limits=limits)
-    )  # fmt: skip
+    if few_goals and walks_fit(graph, policy.gtsp.walks):
+        rounds = policy.search_effort.rounds(graph.goal_count)
+        found = walk(graph, WalkParams(rounds, policy.gtsp), limits)
+    else:
+        found = search(graph, SearchParams(policy=policy.gtsp), limits)
     if found.length is None:
         return found
     best = strongest(found.bound, bound)
@@ -178,40 +186,46 @@ def _in_part_ordered(graph: TravelGraph, limits: Limits, backend: str) -> Result
 
 
 def _bound_by_goals(
-    graph: TravelGraph, limits: Limits, tour: Sequence[int] | None = None,
-    told: OnBound = lambda *_: None,
-) -> float:  # fmt: skip
-    """A bound on the tours in any class; the one that is known if there is one, and no tour."""
+    graph: TravelGraph,
+    chosen: Params,
+    limits: Limits,
+    tour: Sequence[int] | None = None,
+    on_bound: OnBound = lambda *_: None,
+) -> float:
+    """Return a bound on the tours in any class; without a tour, the known one if there is one."""
     if tour is not None or not graph.bound_in_any_class:
+        params = MipParams(policy=chosen.policy.mip)
         bound_over_goals(
-            graph, lambda g, limits: (prove(g, limits=limits), ()), limits, tour, on_bound=told
+            graph,
+            lambda part, limits: (prove(part, params, limits), ()),
+            limits,
+            tour,
+            on_bound=on_bound,
+            policy=chosen.policy.mip,
         )
     return graph.bound_in_any_class
 
 
-def _from_few(graph: TravelGraph, limits: Limits, backend: str) -> Limits:
-    """The limits with a tour to start from, the shortest over few classes. A roadmap that had to
-    leave classes out has long words, whose legs take long: with all that it kept, a search would
-    have little time left."""
-    core = least_tethers(graph.costs_to_base, graph.cluster, FEW_CLASSES)
+def _warmed_by_few_classes(graph: TravelGraph, chosen: Params, limits: Limits) -> Limits:
+    """Return the limits with the shortest tour over few classes as warm start, if there is one."""
+    routes = chosen.policy.routes
+    core = least_tethers(graph.costs_to_base, graph.cluster, routes.first_tour_classes)
     if len(core) == len(graph):
         return limits
-    share = Clock.from_limit(limits.time).part(FEW_SHARE)
-    found = MipRun(
-        graph.subgraph(core),
-        # bounds over few classes say nothing of the others
-        replace(limits, time=share, on_progress=of_part(limits.on_progress, core, lambda _: None)),
-        search_rounds=_rounds(graph),
-    ).solve(backend, None)  # fmt: skip
+    share = Clock.from_limit(limits.time).part(routes.first_tour_time_share)
+    # a bound over few classes says nothing about the others
+    listener = of_part(limits.on_progress, core, lambda _: None)
+    part = replace(limits, time=share, on_progress=listener)
+    found = _mip_run(graph.subgraph(core), chosen, part).solve(chosen.backend, None)
     if found.tour is None:
         return limits
     return replace(limits, warm_start=[int(core[v]) for v in found.tour])
 
 
-def _over_shortest(graph: TravelGraph, limits: Limits, backend: str) -> Result:
-    """Prove over the classes of least tether; tours by way of the others are bounded by
-    twice its tether."""
-    core = least_tethers(graph.costs_to_base, graph.cluster, MOST_KEPT // graph.goal_count)
+def _over_shortest(graph: TravelGraph, chosen: Params, limits: Limits) -> Result:
+    """Prove over the classes of shortest tether; twice the tether of any other bounds its tours."""
+    count = chosen.policy.routes.kept_vertices // graph.goal_count
+    core = least_tethers(graph.costs_to_base, graph.cluster, count)
     given = limits.warm_start
     if given is not None:
         core = np.union1d(core, np.asarray(given, dtype=np.int64))
@@ -225,18 +239,15 @@ def _over_shortest(graph: TravelGraph, limits: Limits, backend: str) -> Result:
     def bound_of_whole(bound: LowerBound | None) -> LowerBound | None:
         return None if bound is None else bound.or_elsewhere(least, graph.scope, because)
 
-    run = MipRun(
-        graph.subgraph(core),
-        replace(limits, on_progress=of_part(limits.on_progress, core, bound_of_whole)),
-        search_rounds=_rounds(graph),
-    )
-    found = run.solve(backend, warm, walks=True)
+    listener = of_part(limits.on_progress, core, bound_of_whole)
+    run = _mip_run(graph.subgraph(core), chosen, replace(limits, on_progress=listener))
+    found = run.solve(chosen.backend, warm, walks=True)
     if found.tour is None:
         return with_classes_left_out(found, least, graph.scope, because)
     whole = replace(found, tour=tuple(int(core[v]) for v in found.tour))
-    otherwise = min(least, graph.least_by_way_of(graph.least_left_out))
+    elsewhere = min(least, graph.least_by_way_of(graph.least_left_out))
     clock = Clock.from_limit(limits.time)
-    if otherwise < (whole.length or 0.0) and not clock.is_up:
-        # of few goals the shortest tour in any class is soon known
-        _bound_by_goals(graph, Limits(clock, rng=limits.rng))
+    if elsewhere < (whole.length or 0.0) and not clock.is_up:
+        # with few goals the shortest tour in any class is known soon
+        _bound_by_goals(graph, chosen, Limits(clock, rng=limits.rng))
     return with_classes_left_out(whole, least, graph.scope, because)

@@ -1,9 +1,8 @@
-"""Few goals: dynamic programming over sets of goals, after Held & Karp (1962), with classes.
+"""Dynamic programming over sets of goals, after Held & Karp (1962), with classes, for few goals.
 
 The shortest path that visits a set of goals and ends at a vertex is one leg longer than the
-shortest that visits the set without that vertex's goal. So over n goals and V classes 2ⁿ V² sums
-prove the tour, in some milliseconds up to eight or nine goals, and nothing needs to be compiled for
-it.
+shortest that visits the set without that vertex's goal. So 2ⁿ V² sums over n goals and V classes
+prove the tour, in milliseconds up to eight or nine goals, and nothing needs to be compiled.
 """
 
 from __future__ import annotations
@@ -13,33 +12,29 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.gtsp.solver_run import SolverRun
 from netsp.gtsp.travel.graph import TravelGraph
-
-MOST_SUMS = 5e7
-"""About a quarter of a second."""
-
-SUMS_PER_CALL = 1500
-"""Every set is extended by every goal in a call of NumPy's, which takes as long as so many sums."""
-
-MOST_VERTICES = 1000
-"""All legs among so many are measured."""
+from netsp.plan.solve_policy import SubsetPolicy
 
 
-def fits(graph: TravelGraph) -> bool:
-    """Whether that takes about a quarter of a second at most."""
+def fits(graph: TravelGraph, policy: SubsetPolicy = SubsetPolicy()) -> bool:
+    """Return whether a graph is small enough."""
     v, n = len(graph), graph.goal_count
-    return v <= MOST_VERTICES and 2.0**n * (v * v + SUMS_PER_CALL * n) <= MOST_SUMS
+    if v > policy.max_vertices:
+        return False
+    return 2.0**n * (v * v + policy.sums_per_call * n) <= policy.max_sums
 
 
 def solve(run: SolverRun) -> None:
-    """Prove the shortest tour of a run's graph; the run's limits stop it. One iteration is all."""
+    """Prove the shortest tour of a run's graph in one iteration, within the run's limits."""
     graph = run.graph
     costs, n = graph.costs, graph.goal_count
     members = [graph.members(c) for c in range(1, n + 1)]
     # reach[s, v]: the shortest path from the base through the goals of the set s, ending at v
     reach: Floats = np.full((2**n, len(graph)), np.inf)
-    # the set of goals that come before each
-    needed = [sum(1 << b for b in np.flatnonzero(graph.before[1:, c + 1]).tolist())
-              if len(graph.before) else 0 for c in range(n)]  # fmt: skip
+    # the set of goals that must come before each
+    needed = [0] * n
+    if len(graph.before):
+        earlier = [np.flatnonzero(graph.before[1:, c + 1]).tolist() for c in range(n)]
+        needed = [sum(1 << b for b in goals) for goals in earlier]
     for c in range(n):
         if not needed[c]:
             reach[1 << c, members[c]] = costs[0, members[c]]

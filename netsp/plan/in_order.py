@@ -1,7 +1,7 @@
-"""The goals in the order given: only their classes are chosen, by a shortest path through layers.
+"""Shortest tour with the goals in a given order: a shortest path through layers of classes.
 
-A layer holds the classes of one goal; legs join neighbouring layers only, and only those legs are
-measured. What it finds is the shortest tour of that order, with proof.
+A layer holds the classes of one goal; only legs between neighbouring layers are measured. The tour
+is optimal among those of the order.
 """
 
 from __future__ import annotations
@@ -19,28 +19,23 @@ from netsp.model.solution import Status
 
 
 def solve_in_order(graph: TravelGraph, clock: Clock, on_progress: OnProgress | None) -> Result:
-    """The shortest tour that visits the goals in the order of their numbers.
+    """Return the shortest tour that visits the goals in the order of their numbers.
 
     Parameters
     ----------
     graph : TravelGraph
-        From a problem without a state.
+        Graph of a problem without a state.
     clock : Clock
-        Of the run.
+        Clock of the run.
     on_progress : callable, optional
         Called once.
-
-    Returns
-    -------
-    Result
-        Optimal among the tours of that order.
 
     Raises
     ------
     InputError
-        The tour starts at a state, or the order breaks the precedences.
+        The tour starts at a state, or the order breaks a precedence.
     LimitReachedError
-        The time was up before the legs were measured.
+        Time was up before the legs were measured.
     """
     if graph.start is not None:
         raise InputError("keep_order: a tour from a state is planned afresh; expected none")
@@ -52,15 +47,13 @@ def solve_in_order(graph: TravelGraph, clock: Clock, on_progress: OnProgress | N
     every = np.arange(len(graph))
     ahead = graph.cluster[:, None] - graph.cluster[None, :]
     last = graph.goal_count
-    asked = (np.abs(ahead) == 1) | (np.abs(ahead) == last)
+    needed = (np.abs(ahead) == 1) | (np.abs(ahead) == last)
     with graph.on_clock(clock):
-        instance = Instance(graph.cluster, graph.costs_among(every, asked))
+        instance = Instance(graph.cluster, graph.costs_among(every, needed))
     order = np.arange(1, last + 1, dtype=np.int64)
     length, tour = best_classes(order, instance.start, instance.costs)
     found = instance.original(tour)
     bound = LowerBound(float(length), graph.scope.in_order)
     if on_progress is not None:
         on_progress(Progress(clock.elapsed, "in order", bound.length, bound, tour=found))
-    return Result(
-        found, bound.length, bound.length, Status.OPTIMAL, lower_bound_of=bound.scope
-    )  # fmt: skip
+    return Result(found, bound.length, bound.length, Status.OPTIMAL, lower_bound_of=bound.scope)

@@ -1,4 +1,4 @@
-"""Names of roadmaps and solvers, and the one call that takes a problem to a solution."""
+"""From a problem to its solution, by names of roadmaps and solvers."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from netsp.plan import without_base
 from netsp.plan.answer import to_solution
 from netsp.plan.custom import call, read_options, whole_numbers
 from netsp.plan.in_order import solve_in_order
+from netsp.plan.solve_policy import SolvePolicy
 from netsp.plan.solver_table import ROADMAPS, SOLVERS
 from netsp.plan.tether_carry_columns import OnGraph, with_carried
 from netsp.plan.warm_start import old_tour, tour_from, with_old_classes
@@ -33,26 +34,28 @@ from netsp.plan.warm_start import old_tour, tour_from, with_old_classes
 SolverLike = str | Callable[..., Any]
 """A solver's name, or a callable that takes a travel graph (`netsp.plan.custom`)."""
 
-LARGEST_SEED = 2**62
+MAX_SEED = 2**62
+"""Format of result tables: largest seed or iteration limit, a signed 64-bit integer."""
 
-LONGEST_S = 1e9
-"""Of a time limit; some thirty years."""
-
-SPARE = 0.4
-"""Of a time limit, what is kept for drawing the tour when a roadmap was cut short; a second at
-most."""
+MAX_TIME_LIMIT_S = 1e9
+"""Tolerance of clocks: largest time limit, s; longer waits overflow in some operating systems."""
 
 CARRIED = ("auto", "lns")
-"""Solvers for which a roadmap that had to leave classes out gets those along good tours."""
+"""Solvers that also search classes along good tours if the roadmap left classes out."""
 
 DEFAULT_SOLVER = "auto"
 DEFAULT_ROADMAP = "taut"
 
 
 def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: Any) -> Any:
-    """The named roadmap over a problem.
+    """Return the named roadmap over a problem.
 
-    Raises InputError for an unknown roadmap or option, InfeasibleError if a goal cannot be reached.
+    Raises
+    ------
+    InputError
+        Unknown roadmap or option.
+    InfeasibleError
+        A goal cannot be reached.
     """
     if not isinstance(problem, Problem):
         raise InputError(f"problem: expected a Problem, got {problem!r}")
@@ -66,7 +69,7 @@ def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: A
 def _built(problem: Problem, roadmap: str, build: Any, options: dict[str, Any]) -> Any:
     known = {k for k, p in inspect.signature(build).parameters.items() if p.kind == p.KEYWORD_ONLY}
     if isinstance(options.get("time_limit"), Clock) and "time_limit" not in known:
-        del options["time_limit"]  # of another package, which cannot be hurried
+        del options["time_limit"]  # a roadmap of another package, which has no clock
     unknown = sorted(set(options) - known)
     if unknown:
         raise InputError(
@@ -77,26 +80,21 @@ def _built(problem: Problem, roadmap: str, build: Any, options: dict[str, Any]) 
 
 
 def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: Any) -> TravelGraph:
-    """The travel graph of a problem by the named roadmap.
+    """Return the travel graph of a problem by the named roadmap.
 
     Parameters
     ----------
     problem : Problem
-        What to build it for.
+        Problem.
     roadmap : str
         Name of the roadmap.
     **options : Any
-        As `roadmap_options` of `solve`.
-
-    Returns
-    -------
-    TravelGraph
-        Augmented goals with the costs of the legs between them.
+        Options of the roadmap, as `roadmap_options` of `solve`.
 
     Raises
     ------
     InputError
-        Unknown names, bad options.
+        Unknown name, or bad option.
     InfeasibleError
         Some goal is out of the tether's reach.
     """
@@ -110,7 +108,7 @@ def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: An
 
 
 def _graph_of_places(problem: Problem, roadmap: str, options: dict[str, Any]) -> TravelGraph:
-    """The travel graph whose goals are the problem's."""
+    """Return the travel graph whose goals are the places of the problem."""
     if problem.state is not None:
         if roadmap != "taut":
             raise InputError(f"state: needs roadmap 'taut', got {roadmap!r}")
@@ -148,35 +146,36 @@ def solve_graph(
     Parameters
     ----------
     graph : TravelGraph
-        From a roadmap or from `TravelGraph.from_costs`.
+        Graph of a roadmap or of `TravelGraph.from_costs`.
     solver : str or callable
-        A name, or a callable `f(graph) -> tour`; it may ask for `params`, `limits`, `rng` and more
-        by name (`netsp.plan.custom.call`).
+        Name, or callable `f(graph) -> tour`, which may have parameters named `params`, `limits`,
+        `rng` and more (`netsp.plan.custom.call`).
     time_limit : float or Clock, optional
-        Seconds, or the clock of a run that this one is a part of; the best tour so far is returned
-        when it is up.
+        Seconds, or the clock of a run that this one is a part of. When time is up, the best tour so
+        far is returned.
     iteration_limit : int, optional
-        Iterations of the solver; each says what one is. Under an iteration limit alone, the same
-        seed gives the same answer.
+        Maximum number of iterations; each solver defines what one is. Under an iteration limit
+        alone, the same seed gives the same result.
     seed : int
-        Feeds the solver's random generator.
+        Seed of the solver's random generator.
     params : mapping, optional
-        The solver's options by name.
+        Options of the solver by name, such as ``{"policy": SolvePolicy(...)}`` for ``auto`` or
+        ``{"policy.routes.max_walk_goals": 10}``.
     warm_start : sequence of int, optional
-        A tour to start from, as vertices from 0 on.
+        Tour to start from, as vertices from 0.
     on_progress : callable, optional
-        Called with a `netsp.gtsp.travel.result.Progress` now and then.
+        Called with a `netsp.gtsp.travel.result.Progress` from time to time.
 
     Returns
     -------
     Result
-        The best tour found, and what is proven of it.
+        Best tour found, and its bound.
 
     Raises
     ------
     InputError
-        Unknown names, bad limits, a warm start that is no tour of the graph, and a solver that
-        needs geometry (`geometric` in `netsp.plan.solver_table`) on a graph that has none.
+        Unknown name, bad limit, a warm start that is no tour of the graph, or a solver that needs
+        geometry (`geometric` in `netsp.plan.solver_table`) on a graph that has none.
 
     Examples
     --------
@@ -195,9 +194,12 @@ def solve_graph(
     with graph.on_clock(clock):
         limits = Limits(clock, iteration_limit, rng, tour, graph.progress_listener(on_progress))
         if isinstance(graph, BaselessGraph):
-            proves = isinstance(solver, str) and SOLVERS.named(solver).proves
             return without_base.solve(
-                graph, lambda g, limits: _run(g, solver, params, limits), limits, proves=proves
+                graph,
+                lambda part, limits: _run(part, solver, params, limits),
+                limits,
+                proves=isinstance(solver, str) and SOLVERS.named(solver).proves,
+                policy=policy_of(solver, params).baseless,
             )
         result = _run(graph, solver, params, limits)
     return graph.as_asked(result)
@@ -206,7 +208,7 @@ def solve_graph(
 def _run(
     graph: TravelGraph, solver: SolverLike, params: Mapping[str, Any] | None, limits: Limits
 ) -> Result:
-    """Call a solver: ours with its options read and checked, others' with what they ask for."""
+    """Call a solver of netsp with its options checked, or another with the parameters it names."""
     if callable(solver):
         return call(solver, name_of(solver), graph, params, limits)
     record = SOLVERS.named(solver)
@@ -225,8 +227,17 @@ def _run(
         return call(function, solver, graph, params, limits)
 
 
+def policy_of(solver: SolverLike, params: Mapping[str, Any] | None) -> SolvePolicy:
+    """Return the policy among a solver's options; the default if the solver has none."""
+    record = SOLVERS.named(solver) if isinstance(solver, str) else None
+    if record is None or not record.ours or not record.params:
+        return SolvePolicy()
+    policy = getattr(read_params(load(record.params), record.name, params), "policy", None)
+    return policy if isinstance(policy, SolvePolicy) else SolvePolicy()
+
+
 def name_of(solver: SolverLike) -> str:
-    """What a solution file calls its solver."""
+    """Return the name of a solver in solution files."""
     return solver if isinstance(solver, str) else getattr(solver, "__name__", "custom")
 
 
@@ -254,56 +265,56 @@ def solve(
     Parameters
     ----------
     problem : Problem
-        What to solve.
+        Problem.
     solver : str or callable
-        As of `solve_graph`.
+        Solver, as in `solve_graph`.
     roadmap : str
-        Name of the roadmap: `taut` (exact), `prm`, or another package's.
+        Name of the roadmap: `taut` (exact), `prm`, or one of another package.
     roadmap_options : mapping, optional
         For ``taut``: ``classes``, ``max_classes``; for ``prm``: ``samples``, ``shortcut``.
     time_limit : float or Clock, optional
-        Seconds for the whole call, or the clock of a run that this one is a part of; the best tour
-        so far is returned when it is up.
+        Seconds for the whole call, or the clock of a run that this one is a part of. When time is
+        up, the best tour so far is returned.
     iteration_limit : int, optional
-        Iterations of the solver; each says what one is.
+        Maximum number of iterations; each solver defines what one is.
     seed : int
-        Feeds the solver's random generator, and the sampling of a roadmap that samples.
+        Seed of the solver's random generator, and of a roadmap that samples.
     params : mapping, optional
-        The solver's options by name.
+        Options of the solver by name, as in `solve_graph`.
     warm_start : Solution, optional
-        A solution of the problem, or of an older version of it, to start from, by whatever solver
+        Solution of the problem, or of an older version of it, by any solver
         (`netsp.plan.warm_start`).
     margin : float
-        The tour is to bear obstacles that are off by so much (`netsp.plan.sizing.tether_margins`):
-        all are grown by it, in the problem's units.
+        Distance by which obstacles may be misplaced (`netsp.plan.sizing.tether_margins`); all are
+        grown by it, in the problem's units.
     slack : float
-        Share of the taut length that is to fit within the tether's length beyond it, up to 1.
+        Share of the taut length that must remain of the tether beyond it, up to 1.
     friction : float
-        Coefficient of friction of tether on obstacle.
+        Coefficient of friction of the tether on obstacles.
     max_tension_ratio : float, optional
-        Most that friction may multiply the tension by, anywhere on the tour; None for no limit.
+        Maximum factor of friction on the tension, anywhere on the tour; None for no limit.
     keep_order : bool
-        The goals are visited in the problem's order, and only their classes are chosen; with proof,
-        whatever the solver.
+        Whether goals are visited in the problem's order. Then only their classes are chosen, with
+        proof, whatever the solver.
     on_progress : callable, optional
-        Called with a `netsp.gtsp.travel.result.Progress` now and then.
+        Called with a `netsp.gtsp.travel.result.Progress` from time to time.
     should_stop : callable, optional
-        Asked every 20 ms in a thread of its own; once it says so, the run ends as at its time
+        Called every 20 ms in its own thread. Once it returns true, the run ends as at its time
         limit, with the best tour so far.
 
     Returns
     -------
     Solution
-        The best tour found, and what is proven of it.
+        Best tour found, and its bound.
 
     Raises
     ------
     InputError
-        Unknown names, bad limits, a warm start without any goal of the problem.
+        Unknown name, bad limit, or a warm start without any goal of the problem.
     InfeasibleError
-        Some goal is out of the tether's reach; says which and by how much.
+        Some goal is out of the tether's reach; the message says which, and by how much.
     LimitReachedError
-        The time was up before the travel graph was complete.
+        Time was up before the travel graph was complete.
 
     Examples
     --------
@@ -324,22 +335,38 @@ def solve(
     if margin or slack:
         grown = problem.grown(margin, slack)
         found = solve(
-            grown, solver, roadmap=roadmap, roadmap_options=roadmap_options,
-            time_limit=time_limit, iteration_limit=iteration_limit, seed=seed, params=params,
+            grown,
+            solver,
+            roadmap=roadmap,
+            roadmap_options=roadmap_options,
+            time_limit=time_limit,
+            iteration_limit=iteration_limit,
+            seed=seed,
+            params=params,
             warm_start=None if warm_start is None else _for_grown(warm_start, problem, grown),
-            friction=friction, max_tension_ratio=max_tension_ratio, keep_order=keep_order,
-            on_progress=on_progress, should_stop=should_stop,
-        )  # fmt: skip
+            friction=friction,
+            max_tension_ratio=max_tension_ratio,
+            keep_order=keep_order,
+            on_progress=on_progress,
+            should_stop=should_stop,
+        )
         own = ProblemReference(name=problem.name, sha256=problem.sha256)
         return found.model_copy(
             update={"problem": own, "margin": float(margin), "slack": float(slack)}
         )
     if problem.visits < len(problem.goals) and _walks_between_places(solver):
         return _over_nearest_places(
-            problem, solver, roadmap=roadmap, roadmap_options=roadmap_options,
-            time_limit=time_limit, iteration_limit=iteration_limit, seed=seed, params=params,
-            on_progress=on_progress, should_stop=should_stop,
-        )  # fmt: skip
+            problem,
+            solver,
+            roadmap=roadmap,
+            roadmap_options=roadmap_options,
+            time_limit=time_limit,
+            iteration_limit=iteration_limit,
+            seed=seed,
+            params=params,
+            on_progress=on_progress,
+            should_stop=should_stop,
+        )
     limits = {
         "friction": checked_argument("friction", friction, 0.0, MAX_FRICTION),
         "max_tension_ratio": _tension_ratio(max_tension_ratio, friction),
@@ -377,9 +404,16 @@ def solve(
                 update={"kept_order": True, "timings": _timings(clock, built, graph), **limits}
             )
         graph, result = solve_over(
-            problem, graph, solver, rest, iteration_limit=iteration_limit, seed=seed,
-            params=params, warm_start=warm_start, on_progress=on_progress,
-        )  # fmt: skip
+            problem,
+            graph,
+            solver,
+            rest,
+            iteration_limit=iteration_limit,
+            seed=seed,
+            params=params,
+            warm_start=warm_start,
+            on_progress=on_progress,
+        )
         timings = _timings(clock, built, graph)
         found = to_solution(problem, graph, result, name_of(solver), seed, timings)
         return found.model_copy(update=limits) if friction else found
@@ -424,12 +458,14 @@ def solve_over(
     result : Result
         Result whose tour refers to the returned graph.
     """
+    policy = policy_of(solver, params)
     # keep time to draw a tour of a problem that is too large for its limit
-    spare = 0.0 if graph.complete else min(SPARE * (clock.limit or 0.0), 1.0)
+    drawing_s = policy.drawing_time_share * (clock.limit or 0.0)
+    spare = 0.0 if graph.complete else min(drawing_s, policy.max_drawing_s)
     start: Sequence[int] | None = None
     if warm_start is not None:
-        graph = with_old_classes(problem, warm_start, graph, clock)
-        start = tour_from(problem, warm_start, graph)
+        graph = with_old_classes(problem, warm_start, graph, clock, policy.warm_start)
+        start = tour_from(problem, warm_start, graph, policy.warm_start)
         if on_graph is not None:
             on_graph(graph)
         if on_progress is not None and start is not None:
@@ -438,7 +474,9 @@ def solve_over(
     if solver in CARRIED:
         rng = np.random.default_rng(seed)
         with until_interrupt(clock) as stoppable:
-            carried = with_carried(graph, stoppable, rng, on_progress, on_graph, start)
+            carried = with_carried(
+                graph, stoppable, rng, on_progress, on_graph, start, policy.carry
+            )
         graph, start = carried.graph, carried.tour
         clock = stoppable if stoppable.is_stopped else clock
     if on_graph is not None:
@@ -461,7 +499,7 @@ def _walks_between_places(solver: SolverLike) -> bool:
 
 
 def _over_nearest_places(problem: Problem, solver: SolverLike, **more: Any) -> Solution:
-    """The solution over one place of every goal with alternatives. What it proves is of these."""
+    """Solve over one place of each goal with alternatives; the bound is dropped."""
     from netsp.roadmap.class_alternatives import nearest_places
 
     chosen = nearest_places(problem)
@@ -503,7 +541,7 @@ def _timings(clock: Clock, built: float, graph: TravelGraph) -> Timings:
 
 
 def _for_grown(warm: Solution, problem: Problem, grown: Problem) -> Solution:
-    """A solution to start from as one of the problem with its obstacles grown."""
+    """Return a warm start of a problem as one of the problem with its obstacles grown."""
     if warm.problem.sha256 != problem.sha256:
         return warm
     own = ProblemReference(name=grown.name, sha256=grown.sha256)
@@ -511,7 +549,7 @@ def _for_grown(warm: Solution, problem: Problem, grown: Problem) -> Solution:
 
 
 def check_solver(solver: SolverLike, params: Mapping[str, Any] | None) -> None:
-    """InputError if there is no such solver, or an option of it is unknown or out of range."""
+    """Raise InputError if a solver, or an option of it, is unknown or out of range."""
     if callable(solver):
         read_options(solver, name_of(solver), params)
         return
@@ -527,13 +565,13 @@ def check_solver(solver: SolverLike, params: Mapping[str, Any] | None) -> None:
 def _check_limits(time_limit: TimeLimit, iteration_limit: int | None) -> None:
     if time_limit is not None and not isinstance(time_limit, Clock):
         number = isinstance(time_limit, (int, float, np.number)) and time_limit is not True
-        if not (number and (0 < time_limit <= LONGEST_S or time_limit == np.inf)):
+        if not (number and (0 < time_limit <= MAX_TIME_LIMIT_S or time_limit == np.inf)):
             raise InputError(
                 f"time_limit: expected a positive number of seconds, got {shown(time_limit)}"
             )
     if iteration_limit is not None:
         whole = isinstance(iteration_limit, (int, np.integer)) and iteration_limit is not True
-        if not (whole and 1 <= iteration_limit < 2**62):
+        if not (whole and 1 <= iteration_limit < MAX_SEED):
             raise InputError(
                 f"iteration_limit: expected a whole number from 1 on, got {shown(iteration_limit)}"
             )
@@ -541,10 +579,8 @@ def _check_limits(time_limit: TimeLimit, iteration_limit: int | None) -> None:
 
 def _seed(seed: int) -> int:
     whole = isinstance(seed, (int, np.integer)) and seed is not True
-    if not (whole and 0 <= seed <= LARGEST_SEED):
-        raise InputError(
-            f"seed: expected a whole number from 0 to {LARGEST_SEED}, got {shown(seed)}"
-        )
+    if not (whole and 0 <= seed <= MAX_SEED):
+        raise InputError(f"seed: expected a whole number from 0 to {MAX_SEED}, got {shown(seed)}")
     return int(seed)
 
 

@@ -1,4 +1,4 @@
-"""The solvers and roadmaps there are, one record each."""
+"""Registries of solvers and roadmaps."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ class Solver:
     Parameters
     ----------
     name : str
-        What it is called on the command line, in files and in messages.
+        Name on the command line, in files and in messages.
     function : str
         ``module:attribute`` of `(graph, params, limits) -> Result`, or of any callable that
         `netsp.plan.custom` can call.
     params : str, optional
         ``module:attribute`` of the dataclass of its options; None if it takes none.
     geometric : bool
-        Needs the paths beneath a travel graph, so no graph made from costs will do.
+        Whether it needs the paths of a travel graph, and refuses a graph made from costs.
     blind : bool
-        A baseline blind to the tether, whose tours may be `invalid`.
+        Whether it is a baseline that ignores the tether, whose tours may be `invalid`.
     ordered : bool
-        Keeps precedences (`TravelGraph.before`).
+        Whether it keeps precedences (`TravelGraph.before`).
     proves : bool
-        Looks for a proof.
+        Whether it looks for a proof.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Solver:
 
     @property
     def ours(self) -> bool:
-        """Whether it takes `(graph, params, limits)`."""
+        """Whether it is a part of netsp and takes `(graph, params, limits)`."""
         return self.function.startswith("netsp.")
 
 
@@ -51,11 +51,11 @@ class RoadmapKind:
     Parameters
     ----------
     name : str
-        What it is called on the command line, in files and in messages.
+        Name on the command line, in files and in messages.
     build : str
         ``module:attribute`` of a class over a problem with `to_travel_graph()`.
     seeded : bool
-        Its samples are drawn with the run's seed.
+        Whether its samples are drawn with the run's seed.
     """
 
     name: str
@@ -64,7 +64,7 @@ class RoadmapKind:
 
     @property
     def ours(self) -> bool:
-        """Whether what it raises is a defect of ours."""
+        """Whether it is a part of netsp, so that its exceptions are defects of netsp."""
         return self.build.startswith("netsp.")
 
 

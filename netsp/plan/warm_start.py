@@ -1,9 +1,9 @@
-"""A solution to start from, also of a problem that has been edited since.
+"""Warm starts, also from the solution of an older version of a problem.
 
-Goals are found again by their names, and those without by their places; obstacles by where the old
-path passes them: the path writes the words of the problem that there is now. New goals are put
-where they lengthen the way least, goals that are gone are left out, and where a class is not in the
-travel graph, the best for the order are taken.
+Goals are identified by name, and those without by place; obstacles by where the old path passes
+them: the words are those that the path writes among the present obstacles. New goals are inserted
+where they lengthen the tour least, removed goals are left out, and where a class is not in the
+travel graph, the best classes for the order are chosen.
 """
 
 from __future__ import annotations
@@ -22,26 +22,21 @@ from netsp.hsignature.rays import crossings
 from netsp.model.arrangement import respects_precedences
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
-
-NEAR = 0.02
-"""Of the problem's size: a goal without a name that has moved no farther is found again."""
-
-FEW_CLASSES = 3
-"""Of every goal, when classes are chosen for an order."""
+from netsp.plan.solve_policy import WarmStartPolicy
 
 
 @dataclass(frozen=True)
 class OldTour:
-    """What is left of a tour.
+    """The part of an old tour that is left in the present problem.
 
     Parameters
     ----------
     goals : tuple of int
-        Goals of the problem that there is now, from 0, in the order of the visits.
+        Goals of the present problem, from 0, in the order of the visits.
     words : tuple of Word
-        At each of them, the word that the old path writes there now.
+        Word of the old path at each of them, among the present obstacles.
     gone : int
-        Visits to goals that are not there any more.
+        Number of visits to goals that no longer exist.
     """
 
     goals: tuple[int, ...]
@@ -49,20 +44,24 @@ class OldTour:
     gone: int
 
 
-def old_tour(problem: Problem, solution: Solution) -> OldTour:
-    """Find the goals of a solution again.
+def old_tour(
+    problem: Problem, solution: Solution, policy: WarmStartPolicy = WarmStartPolicy()
+) -> OldTour:
+    """Identify the goals of a solution in a problem.
 
     Parameters
     ----------
     problem : Problem
-        That there is now.
+        The present problem.
     solution : Solution
-        Of this problem, or of one that it was edited from.
+        Solution of it, or of an older version.
+    policy : WarmStartPolicy
+        How far a goal may have moved.
 
     Returns
     -------
     OldTour
-        Without goals if the solution has no tour.
+        Tour without goals if the solution has none.
 
     Raises
     ------
@@ -86,12 +85,12 @@ def old_tour(problem: Problem, solution: Solution) -> OldTour:
         if visit.position is None:
             continue
         place = np.array(visit.position)
-        there = at + int(np.argmin(np.linalg.norm(path[at:] - place, axis=1)))
-        word = concatenate(word, crossings(path[at : there + 1, :2], rays))
-        at = there
+        end = at + int(np.argmin(np.linalg.norm(path[at:] - place, axis=1)))
+        word = concatenate(word, crossings(path[at : end + 1, :2], rays))
+        at = end
         goal = by_name.get(visit.name, -1) if visit.name is not None else -1
         if goal < 0:
-            goal = _nearest(problem, place, taken)
+            goal = _nearest(problem, place, taken, policy)
         if goal < 0 or goal in taken:
             gone += 1
             continue
@@ -104,43 +103,33 @@ def old_tour(problem: Problem, solution: Solution) -> OldTour:
     return OldTour(tuple(goals), tuple(words), gone)
 
 
-def _nearest(problem: Problem, place: Floats, taken: set[int]) -> int:
-    """The goal at a place that is not found yet; -1 for none."""
+def _nearest(problem: Problem, place: Floats, taken: set[int], policy: WarmStartPolicy) -> int:
+    """Return the goal at a place that is not taken yet; -1 for none."""
     away = np.linalg.norm(problem.points[1:] - place, axis=1)
     away[list(taken)] = np.inf
     k = int(np.argmin(away))
-    return k if away[k] <= NEAR * problem.scale else -1
+    return k if away[k] <= policy.max_goal_move * problem.scale else -1
 
 
 def with_old_classes(
-    problem: Problem, solution: Solution, graph: TravelGraph, clock: Clock
+    problem: Problem,
+    solution: Solution,
+    graph: TravelGraph,
+    clock: Clock,
+    policy: WarmStartPolicy = WarmStartPolicy(),
 ) -> TravelGraph:
     """Return the graph with the classes of an old tour, if its roadmap left some out.
 
-    Parameters
-    ----------
-    problem : Problem
-        The problem as it is now.
-    solution : Solution
-        Solution of the problem, or of an earlier version.
-    graph : TravelGraph
-        Travel graph of the problem.
-    clock : Clock
-        Clock of the run; when it is up, no further class is added.
-
-    Returns
-    -------
-    TravelGraph
-        Graph with these classes; the same graph if it is complete.
+    No further class is added once the clock is up.
 
     Raises
     ------
     InputError
-        None of its goals is in the problem.
+        None of the solution's goals is in the problem.
     """
     if graph.complete or graph.carrier is None:
         return graph
-    found = old_tour(problem, solution)
+    found = old_tour(problem, solution, policy)
     wanted = [(goal + 1, word) for goal, word in zip(found.goals, found.words, strict=True)]
     before = graph.before
     graph = graph.carrier.with_classes(wanted, lambda: clock.is_up)
@@ -148,29 +137,25 @@ def with_old_classes(
     return graph
 
 
-def tour_from(problem: Problem, solution: Solution, graph: TravelGraph) -> list[int] | None:
-    """A tour to start from.
-
-    Parameters
-    ----------
-    problem : Problem
-        That there is now.
-    solution : Solution
-        Of this problem, or of one that it was edited from.
-    graph : TravelGraph
-        Of the problem.
+def tour_from(
+    problem: Problem,
+    solution: Solution,
+    graph: TravelGraph,
+    policy: WarmStartPolicy = WarmStartPolicy(),
+) -> list[int] | None:
+    """Return a warm start from a solution of the problem, or of an older version.
 
     Returns
     -------
     list of int or None
-        Vertices; None if the solution has no tour, or its order is not allowed any more.
+        Vertices of the graph; None if the solution has no tour, or its order breaks a precedence.
 
     Raises
     ------
     InputError
-        None of its goals is in the problem.
+        None of the solution's goals is in the problem.
     """
-    found = old_tour(problem, solution)
+    found = old_tour(problem, solution, policy)
     if not found.goals or graph.start is not None:
         return None
     cluster_of = dict(zip(graph.goal.tolist(), graph.cluster.tolist(), strict=True))
@@ -190,23 +175,23 @@ def tour_from(problem: Problem, solution: Solution, graph: TravelGraph) -> list[
         return None
     if len(known) == len(order):
         return [0, *known]
-    core = np.union1d(least_tethers(graph.costs_to_base, graph.cluster, FEW_CLASSES), known)
+    shortest = least_tethers(graph.costs_to_base, graph.cluster, policy.classes_per_goal)
+    core = np.union1d(shortest, known)
     instance = Instance.among(graph, core.astype(np.int64))
     _, tour = best_classes(np.array(order, dtype=np.int64), instance.start, instance.costs)
     return list(instance.original(tour))
 
 
 def _insert(order: list[int], c: int, points: Floats, place_of: dict[int, int]) -> None:
-    """Put a cluster where it lengthens the way least, in straight lines."""
-    stops = points[[0, *(place_of[k] + 1 for k in order), 0]]
-    here = points[place_of[c] + 1]
-    away = np.linalg.norm(stops - here, axis=1)
-    more = away[:-1] + away[1:] - np.linalg.norm(np.diff(stops, axis=0), axis=1)
+    """Insert a cluster where it lengthens the tour least, in straight lines."""
+    visits = points[[0, *(place_of[k] + 1 for k in order), 0]]
+    away = np.linalg.norm(visits - points[place_of[c] + 1], axis=1)
+    more = away[:-1] + away[1:] - np.linalg.norm(np.diff(visits, axis=0), axis=1)
     order.insert(int(np.argmin(more)), c)
 
 
 def told(problem: Problem, solution: Solution) -> str | None:
-    """What became of the goals of a solution, for people; None where nothing was edited."""
+    """Return a message about what became of a solution's goals; None if nothing was edited."""
     if solution.problem.sha256 == problem.sha256 or not solution.tour:
         return None
     found = old_tour(problem, solution)

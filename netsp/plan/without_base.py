@@ -1,7 +1,7 @@
 """Travel graphs without a base: one run from each vertex of the smallest cluster.
 
-What one run has found is of use to the next: no tour that is as long as it is of interest, and a
-run that proves so much of its own tours is done.
+The best tour of the runs before is the cutoff of the next: a run ends once it proves that none of
+its tours is shorter.
 """
 
 from __future__ import annotations
@@ -22,42 +22,45 @@ from netsp.gtsp.travel.result import OnProgress, Progress, Result, of_part, prov
 from netsp.mip.goal_relaxation import bound_by_one_trees
 from netsp.model.bound_scope import Scope
 from netsp.model.solution import Status
-
-ROUNDS_PER_CLUSTER = 2000
-"""Of a first search, shared among the vertices: it says where to begin, and what is found ahead of
-a proof spares it most of the work."""
-
-FIRST_SHARE = 0.2
-"""Part of the time that these may take."""
+from netsp.plan.solve_policy import BaselessPolicy
 
 Run = Callable[[TravelGraph, Limits], Result]
 
 
-def solve(graph: BaselessGraph, run: Run, limits: Limits, *, proves: bool) -> Result:
+def solve(
+    graph: BaselessGraph,
+    run: Run,
+    limits: Limits,
+    *,
+    proves: bool,
+    policy: BaselessPolicy = BaselessPolicy(),
+) -> Result:
     """Run a solver from each vertex of the smallest cluster.
 
     Parameters
     ----------
     graph : BaselessGraph
-        What to solve.
+        Graph without a base.
     run : callable
-        The solver.
+        Solver.
     limits : Limits
-        Time and iterations are shared among the runs.
+        Limits, whose time and iterations the runs share.
     proves : bool
-        Whether the solver looks for a proof, so that a tour found otherwise is of use to it.
+        Whether the solver looks for a proof, so that a tour found before is of use to it.
+    policy : BaselessPolicy
+        Search before the runs.
 
     Returns
     -------
     Result
-        The best tour, by the graph's vertices, and the least of the bounds.
+        Best tour, as vertices of the graph, and minimum of the bounds.
     """
     roots = graph.roots
     with until_interrupt(limits.time) as clock:
         limits = replace(limits, time=clock)
         best = _given(graph, limits)
         if proves:
-            best, roots = _searched(graph, roots, limits, best)
+            best, roots = _search(graph, roots, limits, best, policy)
         bounds, rows = [], list[Progress]()
         for k, root in enumerate(roots.tolist()):
             left = len(roots) - k
@@ -65,17 +68,18 @@ def solve(graph: BaselessGraph, run: Run, limits: Limits, *, proves: bool) -> Re
                 bounds += [0.0] * left
                 break
             part, vertices = graph.rooted(root)
-            tell = _told(
+            listener = _listener(
                 graph.scope, rows, limits.on_progress, clock, best, bounds if left == 1 else None
             )
+            iterations = limits.iterations
             share = replace(
-                limits, time=clock if left == 1 else clock.part(1.0 / left),
-                iterations=None if limits.iterations is None
-                else max(1, limits.iterations // len(roots)),
-                on_progress=of_part(tell, vertices, lambda b: b),
-                warm_start=_from(root, best, vertices),
+                limits,
+                time=clock if left == 1 else clock.part(1.0 / left),
+                iterations=None if iterations is None else max(1, iterations // len(roots)),
+                on_progress=of_part(listener, vertices, lambda b: b),
+                warm_start=_tour_from(root, best, vertices),
                 cutoff=math.inf if best.length is None else best.length,
-            )  # fmt: skip
+            )
             found = run(part, share)
             if found.status is Status.INFEASIBLE:
                 bounds.append(math.inf)
@@ -94,25 +98,25 @@ def solve(graph: BaselessGraph, run: Run, limits: Limits, *, proves: bool) -> Re
         return replace(best, status=status, lower_bound=None, trace=tuple(rows))
     bound = min(bound, best.length)
     status = Status.OPTIMAL if proven(best.length, bound) else Status.FEASIBLE
-    told = None if bound == 0.0 and status is not Status.OPTIMAL else bound
-    return replace(best, status=status, lower_bound=told, trace=tuple(rows))
+    claimed = None if bound == 0.0 and status is not Status.OPTIMAL else bound
+    return replace(best, status=status, lower_bound=claimed, trace=tuple(rows))
 
 
 def _given(graph: BaselessGraph, limits: Limits) -> Result:
-    """The warm start, if any."""
+    """Return the warm start as a result, if there is one."""
     tour = limits.warm_start
     if tour is None:
         return Result(None, None, None, Status.NO_SOLUTION_FOUND)
     return Result(tuple(tour), graph.tour_length(tour), None, Status.FEASIBLE)
 
 
-def _searched(
-    graph: BaselessGraph, roots: Ints, limits: Limits, best: Result
+def _search(
+    graph: BaselessGraph, roots: Ints, limits: Limits, best: Result, policy: BaselessPolicy
 ) -> tuple[Result, Ints]:
-    """A first tour from each root; the best of all, and the roots, that of the shortest first."""
+    """Search from each root, and return the best tour and the roots by length of their tours."""
     lengths = []
-    clock = Clock.from_limit(limits.time).part(FIRST_SHARE)
-    rounds = max(1, ROUNDS_PER_CLUSTER // len(roots)) * graph.cluster_count
+    clock = Clock.from_limit(limits.time).part(policy.time_share)
+    rounds = max(1, policy.rounds_per_cluster // len(roots)) * graph.cluster_count
     for k, root in enumerate(roots.tolist()):
         part, vertices = graph.rooted(root)
         share = Limits(clock.part(1.0 / (len(roots) - k)), rounds, limits.rng)
@@ -124,8 +128,8 @@ def _searched(
     return best, roots[np.argsort(lengths, kind="stable")]
 
 
-def _from(root: int, best: Result, vertices: Ints) -> list[int] | None:
-    """The best tour, if it is one from this root, by the vertices of the rooted graph."""
+def _tour_from(root: int, best: Result, vertices: Ints) -> list[int] | None:
+    """Return the best tour from a root, as vertices of the rooted graph, if it visits the root."""
     if best.tour is None or root not in best.tour:
         return None
     k = best.tour.index(root)
@@ -133,15 +137,21 @@ def _from(root: int, best: Result, vertices: Ints) -> list[int] | None:
     return [place[v] for v in (*best.tour[k:], *best.tour[:k])]
 
 
-def _told(
-    scope: Scope, rows: list[Progress], listener: OnProgress | None, clock: Clock, best: Result,
+def _listener(
+    scope: Scope,
+    rows: list[Progress],
+    on_progress: OnProgress | None,
+    clock: Clock,
+    best: Result,
     bounds: list[float] | None,
-) -> OnProgress:  # fmt: skip
-    """A listener to one run that tells the best tour of all runs, and in the last of them, when
-    each has a bound, the least of these."""
+) -> OnProgress:
+    """Return a listener to one run that reports the best tour of all runs.
+
+    In the last run, when each has a bound, it reports the minimum of the bounds as well.
+    """
     others = math.inf if bounds is None else min(bounds, default=math.inf)
 
-    def tell(row: Progress) -> None:
+    def listen(row: Progress) -> None:
         bound = None
         if bounds is not None and row.bound is not None:
             bound = row.bound.or_elsewhere(others, scope, "each other root has a bound")
@@ -149,7 +159,7 @@ def _told(
         if best.length is not None and best.length <= (row.incumbent or math.inf):
             row = replace(row, incumbent=best.length, tour=best.tour)
         rows.append(row)
-        if listener is not None:
-            listener(row)
+        if on_progress is not None:
+            on_progress(row)
 
-    return tell
+    return listen

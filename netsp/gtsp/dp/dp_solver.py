@@ -1,54 +1,34 @@
-"""`dp`: dynamic programming over partly remembered walks, with prices and elimination.
+"""`dp`: dynamic programming over walks with limited memory, prices and elimination of states.
 
-Where there are few goals and very many classes this is by far the fastest proof: the states are
-(visit, vertex, remembered goals), the legs of a class cost nothing to keep apart, and what a bound
-rules out shrinks the next pass. Where legs take long it starts on lower bounds of them; in most
-worlds nine classes in ten are dead before a leg is measured.
+With few goals and very many classes this is by far the fastest proof: states are (visit, vertex,
+remembered goals), it costs nothing to keep the legs of a class apart, and what a bound rules out
+shrinks the next pass. If legs take long, it starts on their lower bounds, and most classes are
+eliminated before a leg is measured.
 
-Prices follow the walk (deflected subgradient): goals it misses become dearer to miss, goals it
-repeats cheaper. Memory follows it too: where it repeats a goal, that is remembered from now on.
+Prices follow the walk (deflected subgradient): those of goals that it misses rise, those of goals
+that it repeats fall. So does memory: a goal that the walk repeats is remembered from then on.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
-from netsp.gtsp.cost_matrix import MEASURE_AT_ONCE, CostMatrix
+from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.dp.handover import Handover
 from netsp.gtsp.dp.walks import Walks
+from netsp.gtsp.gtsp_policy import GtspPolicy, WalkPolicy
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.searching import SearchingRun
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
 from netsp.model.arrangement import respects_precedences
 
-STEP, SHORTER = 0.5, 0.7
-"""First step of the prices as a share of the gap, and its factor after `STALL` passes in vain."""
-
-STALL = 5
-
-DEFLECTION = 0.5
-"""Weight of the present walk in the direction of the prices; the rest is that of the last step."""
-
-MOST_LABELS = 2_000_000
-"""With more labels in a pass the memory is not widened."""
-
-SLOW_PASSES, WORTH = 12, 0.03
-"""Passes after which something must have come of them: this share of the gap closed, or of the
-states dead."""
-
-SHRINK = 0.95
-"""Vertices are forgotten when no more than this share of them is left."""
-
-MOST_CELLS = 100_000_000
-"""Most (goal, goal, vertex) cells: tables of 0.8 GiB."""
-
 NO_HANDOVER = Handover()
-"""Handover that never happens: walks go on as long as they make progress."""
+"""Handover that never happens: walks continue as long as they make progress."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +39,12 @@ class Params:
     ----------
     search_rounds
         Rounds of ruin and recreate at the start, and again when all legs are measured.
+    policy
+        Policy of walks, searches and costs.
     """
 
     search_rounds: int = 500
+    policy: GtspPolicy = field(default_factory=GtspPolicy)
 
     def __post_init__(self) -> None:
         if self.search_rounds < 0:
@@ -73,22 +56,8 @@ class Params:
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Bound and prove by walks, for few goals with many classes.
 
-    With many goals it stops with the gap at which the walks make no more progress. An iteration is
-    one pass over all layers.
-
-    Parameters
-    ----------
-    graph : TravelGraph
-        What to solve.
-    params : Params, optional
-        See `Params`.
-    limits : Limits, optional
-        Time, iterations, random generator, warm start, listener.
-
-    Returns
-    -------
-    Result
-        The best tour, and what is proven of it.
+    With many goals it ends with the gap at which walks make no more progress. An iteration is one
+    pass over all layers.
 
     Raises
     ------
@@ -96,38 +65,42 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
         The tables would not fit into memory.
     """
     chosen, limits = params or Params(), limits or Limits()
-    if not fits(graph):
+    if not fits(graph, chosen.policy.walks):
         raise InputError(
             f"solver 'dp': {graph.goal_count} goals with {len(graph)} classes need too much memory;"
             " use 'auto' or 'lns'"
         )
-    run = SearchingRun(graph, limits, search_rounds=chosen.search_rounds)
+    run = SearchingRun(graph, limits, search_rounds=chosen.search_rounds, policy=chosen.policy)
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)
         if not run.solve_if_trivial():
             run.find_first_tour()
-            costs = CostMatrix(graph)
+            costs = CostMatrix(graph, policy=chosen.policy.costs)
             run.search(costs)
             run.report("heuristic", vertices=len(costs))
             bound_by_walks(run, costs)
     return run.finish("proven" if run.is_done else "open")
 
 
-def fits(graph: TravelGraph) -> bool:
-    """Whether the tables of the walks over a graph are of a reasonable size."""
-    return (graph.goal_count + 1) ** 2 * len(graph) <= MOST_CELLS
+def fits(graph: TravelGraph, policy: WalkPolicy = WalkPolicy()) -> bool:
+    """Return whether the tables of the walks over a graph are of a reasonable size."""
+    return (graph.goal_count + 1) ** 2 * len(graph) <= policy.max_table_cells
 
 
 def bound_by_walks(
     run: SearchingRun, costs: CostMatrix, *, handover: Handover = NO_HANDOVER
 ) -> None:
-    """Raise the bound of a run and forget vertices, until the proof is done or progress stalls, or
-    few legs are left that are all measured: what is proven of those is up to the caller."""
+    """Raise the bound of a run and remove vertices.
+
+    It ends with a proof, when progress stalls, or when few legs remain that are all measured; then
+    the caller goes on with the proof over those.
+    """
+    policy = run.gtsp_policy.walks
     before = run.graph.before
-    walks = Walks(costs.cluster, costs.values, run.clock.flag, before)
+    walks = Walks(costs.cluster, costs.values, run.clock.flag, before, policy)
     prices = initial_prices(run, costs)
     direction: Floats = np.zeros(walks.n + 1)
-    best, kept, step, vain = -np.inf, prices, STEP, 0
+    best, kept, step, vain = -np.inf, prices, policy.first_step, 0
     history: list[tuple[float, int]] = []
     searched = run.searches_all_vertices(costs)
     while not run.is_done:
@@ -157,34 +130,34 @@ def bound_by_walks(
         run.report("walks", vertices=len(costs), legs=len(costs) * (len(costs) - 1) // 2)
         if whole:
             if measured and not run.is_done:
-                return  # rounding is all that is missing, and no price can mend that
-            best = -np.inf  # its legs have grown
+                return  # only rounding is missing, which no price can mend
+            best = -np.inf  # its legs are longer now
             continue
         if walk.bound > best:
             best, kept, vain = walk.bound, prices, 0
         else:
             vain += 1
-            if vain % STALL == 0:
-                step, prices = step * SHORTER, kept
+            if vain % policy.patience == 0:
+                step, prices = step * policy.step_decay, kept
         history.append((best, int(walks.alive.sum())))
-        stalls = _stalls(history, run.length)
-        if costs.exact is not None and (stalls or len(costs) <= MEASURE_AT_ONCE):
+        stalls = _stalls(history, run.length, policy)
+        if costs.exact is not None and (stalls or len(costs) <= costs.policy.max_measured_vertices):
             _measure(run, walks, costs)
             searched = run.searches_all_vertices(costs)
-            best, step = -np.inf, STEP
+            best, step = -np.inf, policy.first_step
             history.clear()
         elif stalls:
             return
         if costs.exact is None and handover.is_due(len(costs), walk.labels):
             return
-        widened = walk.labels < MOST_LABELS and walks.memory.widen(goals.tolist())
-        if once:  # in an order that is not allowed, which prices cannot mend
+        widened = walk.labels < policy.max_widened_labels and walks.memory.widen(goals.tolist())
+        if once:  # in an order that breaks a precedence, which prices cannot mend
             if not widened:
                 return
             continue
         missed: Floats = np.asarray(1.0 - visits, dtype=np.float64)
         missed[0] = 0.0
-        direction = DEFLECTION * missed + (1.0 - DEFLECTION) * direction
+        direction = policy.deflection * missed + (1.0 - policy.deflection) * direction
         if direction @ direction < 0.1:
             direction = missed
         target = run.length if run.tour is not None else 1.1 * abs(walk.bound) + 1e-9
@@ -192,8 +165,10 @@ def bound_by_walks(
 
 
 def initial_prices(run: SearchingRun, costs: CostMatrix) -> Floats:
-    """(n + 1,) for every goal half of the two legs of the incumbent there: its prices pay for its
-    legs, but for half of those of the base."""
+    """Return prices (n + 1,): half the sum of the incumbent's two legs at each goal.
+
+    They pay for its legs, except for half of those of the base.
+    """
     prices = np.zeros(run.graph.goal_count + 1)
     if run.tour is not None:
         rows = np.searchsorted(costs.vertices, np.array(run.tour))
@@ -204,18 +179,18 @@ def initial_prices(run: SearchingRun, costs: CostMatrix) -> Floats:
 
 
 def _forget(run: SearchingRun, walks: Walks, costs: CostMatrix) -> None:
-    """Drop vertices without a state, once they are many; the incumbent's stay."""
+    """Remove vertices without a state once they are many, except those of the incumbent."""
     keep = walks.left
     if run.tour is not None:
         keep[np.searchsorted(costs.vertices, np.array(run.tour))] = True
-    if keep.sum() <= SHRINK * len(keep):
+    if keep.sum() <= walks.policy.max_kept_share * len(keep):
         walks.restrict(keep)
         costs.restrict(keep)
         walks.set_values(costs.values)
 
 
 def _measure(run: SearchingRun, walks: Walks, costs: CostMatrix) -> None:
-    """Measure all legs that are left, and search among them."""
+    """Measure all remaining legs, and search among them."""
     run.check()
     costs.measure_all(np.isfinite(costs.values))
     run.search(costs)
@@ -223,10 +198,15 @@ def _measure(run: SearchingRun, walks: Walks, costs: CostMatrix) -> None:
     run.report("measured", vertices=len(costs), legs=len(costs) * (len(costs) - 1) // 2)
 
 
-def _stalls(history: list[tuple[float, int]], length: float) -> bool:
-    """Whether the last `SLOW_PASSES` passes closed little of the gap and killed few states."""
-    if len(history) <= SLOW_PASSES:
+def _stalls(history: list[tuple[float, int]], length: float, policy: WalkPolicy) -> bool:
+    """Return whether the last passes closed little of the gap and eliminated few states.
+
+    `history` holds the bound and the number of states after each pass.
+    """
+    passes, progress = policy.stall_passes, policy.min_progress
+    if len(history) <= passes:
         return False
-    (bound_then, states_then), (bound, states) = history[-1 - SLOW_PASSES], history[-1]
-    closed = bound - bound_then > WORTH * (length - bound_then if length < np.inf else abs(bound))
-    return not closed and states > (1.0 - WORTH) * states_then
+    (bound_then, states_then), (bound, states) = history[-1 - passes], history[-1]
+    gap = length - bound_then if length < np.inf else abs(bound)
+    closed = bound - bound_then > progress * gap
+    return not closed and states > (1.0 - progress) * states_then

@@ -32,15 +32,7 @@ class Handover:
         check_not_negative(self)
 
     def is_due(self, vertices: int, labels: int) -> bool:
-        """Return whether cuts take over.
-
-        Parameters
-        ----------
-        vertices : int
-            Number of remaining vertices; all legs between them are measured.
-        labels : int
-            Number of labels in the last pass.
-        """
+        """Return whether cuts take over, by remaining vertices and labels of the last pass."""
         legs = vertices * (vertices - 1) // 2
         is_slow = labels > self.max_labels
         return legs <= self.max_legs or (is_slow and legs <= self.max_legs_of_slow_walks)

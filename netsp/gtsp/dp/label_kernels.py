@@ -1,11 +1,11 @@
-"""The kernels: states of walks, layer by layer.
+"""Kernels of walks: their labels, layer by layer.
 
 A walk leaves the base, makes n visits to goals and returns. Its cost is that of its legs less a
-price for every visit. A *label* at (k, v) is a walk that makes its k-th visit at vertex v: its cost
+price for each visit. A *label* at (k, v) is a walk that makes its k-th visit at vertex v: its cost
 and its memory. Vertices are grouped by goal: those of goal g are start[g] to start[g + 1] - 1.
 
-Costs are symmetric, so a walk read backwards is a walk: what is known about the first k visits is
-known about the last k.
+Costs are symmetric, so a walk read backwards is a walk: bounds on the first k visits hold for the
+last k, too.
 """
 
 from __future__ import annotations
@@ -19,21 +19,13 @@ from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.compiled.dynamic_array import order_of, write_floats
 from netsp.base.compiled.interpretation import interprets
 from netsp.base.compiled.kernel import kernel
-from netsp.gtsp.dp.ng_sets import CHUNK
+from netsp.gtsp.dp.ng_sets import BITS_PER_TABLE
 
-LOW = (1 << CHUNK) - 1
-
-MAX_SETS_PER_MEMORY = 64
-"""Maximum number of goal sets per memory for which `_undominated` goes through all sets. With more,
-it compares the memories pairwise; at about this ratio both take the same time."""
-
-COMPARED_BLOCK_SIZE = 32
-"""Number of memories that `_undominated_of` compares with all others in one NumPy operation.
-Smaller and larger blocks are a little slower."""
+TABLE_MASK = (1 << BITS_PER_TABLE) - 1
 
 
 class Graph(NamedTuple):
-    """Legs (V, V), the goal of each vertex (V,), and where the vertices of each goal begin."""
+    """Costs of legs (V, V), goal of each vertex (V,), and where the vertices of each goal begin."""
 
     costs: Floats
     goal: Ints
@@ -49,8 +41,8 @@ class Labels(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """What labels are kept for: onward (n + 1, V), the least of the visits still to make; limit
-    (V,), most that a label may cost before the price is taken off; cut, most that a walk may."""
+    """Which labels are kept: onward (n + 1, V), minimum cost of the visits still to make; limit
+    (V,), maximum cost of a label before its price is taken off; cut, maximum cost of a walk."""
 
     onward: Floats
     limit: Floats
@@ -66,17 +58,17 @@ def completions(
     onward: Floats,
     stop: Ints,
 ) -> None:
-    """Walks without memory but that of the goal before last: bounds on how labels are completed.
+    """Fill bounds on the completion of labels: walks that remember only the goal before the last.
 
     Parameters
     ----------
     least
-        (n + 1, V) cost of the best k visits ending at v.
+        (n + 1, V) minimum cost of k visits that end at v.
     onward
-        (n + 1, n + 1, V) cost of the best k visits of which the last is to goal h, and of the leg
-        from there to vertex v, whose goal is not that of the visit before.
+        (n + 1, n + 1, V) minimum cost of k visits, the last to goal h, and of the leg from there to
+        vertex v, whose goal is not that of the visit before.
     stop
-        Of a clock; the tables are unfinished when it is set.
+        Flag of a clock; the tables are incomplete once it is set.
     """
     costs, goal, start = graph.costs, graph.goal, graph.start
     count = len(goal)
@@ -159,11 +151,11 @@ def _completions_in_numpy(
 
 @kernel
 def translate(tables: npt.NDArray[np.int32], g: int, h: int, memory: int) -> int:
-    """The memory at goal h of a walk that comes from goal g; negative if it must not."""
+    """Return the memory at goal h of a walk that comes from goal g; negative if it must not."""
     mask: int = (
-        tables[g, h, 0, memory & LOW]
-        | tables[g, h, 1, (memory >> CHUNK) & LOW]
-        | tables[g, h, 2, memory >> (2 * CHUNK)]
+        tables[g, h, 0, memory & TABLE_MASK]
+        | tables[g, h, 1, (memory >> BITS_PER_TABLE) & TABLE_MASK]
+        | tables[g, h, 2, memory >> (2 * BITS_PER_TABLE)]
     )
     return mask
 
@@ -180,10 +172,12 @@ def extend(
     prices: Floats,
     stop: Ints,
 ) -> tuple[Ints, Floats, npt.NDArray[np.int32]]:
-    """Labels of the next layer at goals first to last - 1, from those of this layer: a label is
-    kept if none costs less and remembers no more. Some are missing when the clock's `stop` is
-    set. (The tables of `translate` come by themselves: out of a tuple, every call of it would count
-    references, which is a twelfth of the time.)"""
+    """Return the labels of the next layer at goals first to last - 1.
+
+    A label is kept if none costs less and remembers no more. Some are missing once the clock's flag
+    `stop` is set. The tables of `translate` are passed by themselves, because each call of it would
+    count references of a tuple, a twelfth of the time.
+    """
     costs, start = graph.costs, graph.start
     pointer, cost, memory = labels.pointer, labels.cost, labels.memory
     onward, limit, cut = bounds.onward, bounds.limit, bounds.cut
@@ -326,22 +320,25 @@ def _translated(
     tables: npt.NDArray[np.int32], goals: Ints, h: int, memory: npt.NDArray[np.int32]
 ) -> npt.NDArray[np.int32]:
     """Vectorise `translate` over memories and the goals that they come from."""
-    masks: npt.NDArray[np.int32] = tables[goals, h, 0, memory & LOW]
-    masks |= tables[goals, h, 1, (memory >> CHUNK) & LOW]
-    masks |= tables[goals, h, 2, memory >> (2 * CHUNK)]
+    masks: npt.NDArray[np.int32] = tables[goals, h, 0, memory & TABLE_MASK]
+    masks |= tables[goals, h, 1, (memory >> BITS_PER_TABLE) & TABLE_MASK]
+    masks |= tables[goals, h, 2, memory >> (2 * BITS_PER_TABLE)]
     return masks
 
 
-def _undominated(memory: npt.NDArray[np.int32], order: Ints) -> Bools:
+def _undominated(
+    memory: npt.NDArray[np.int32], order: Ints, max_sets_per_memory: int = 64
+) -> Bools:
     """Return, for each row of an order, which memories have no subset earlier in the row.
 
     Where the memories are a large part of all sets of their goals, the first place of a subset is
     found for all sets together, by a minimum over one goal after another (Yates 1937, "The design
-    and analysis of factorial experiments").
+    and analysis of factorial experiments"). With more than `max_sets_per_memory` sets for each
+    memory they are compared pairwise; at about the default both take the same time.
     """
     used = int(np.bitwise_or.reduce(memory)) & ~int(np.bitwise_and.reduce(memory))
     goals = [k for k in range(used.bit_length()) if used >> k & 1]
-    if 1 << len(goals) > MAX_SETS_PER_MEMORY * len(memory):
+    if 1 << len(goals) > max_sets_per_memory * len(memory):
         return np.array([_undominated_of(memory[row]) for row in order])
     sets = np.zeros(len(memory), dtype=np.int64)
     for place, k in enumerate(goals):
@@ -355,15 +352,19 @@ def _undominated(memory: npt.NDArray[np.int32], order: Ints) -> Bools:
     return np.asarray(first[sets[order], rows] == places)
 
 
-def _undominated_of(memory: npt.NDArray[np.int32]) -> Bools:
-    """Return which memories have no subset among the earlier memories."""
+def _undominated_of(memory: npt.NDArray[np.int32], block_size: int = 32) -> Bools:
+    """Return which memories have no subset among the earlier memories.
+
+    Blocks of `block_size` memories are compared with all others at once; smaller and larger ones
+    are a little slower.
+    """
     kept, left = np.zeros(len(memory), dtype=bool), np.arange(len(memory))
     while len(left):
-        some, left = left[:COMPARED_BLOCK_SIZE], left[COMPARED_BLOCK_SIZE:]
-        own = memory[some, None]
-        some = some[~np.triu((own & own.T) == own, 1).any(axis=0)]
-        kept[some] = True
-        left = left[~((memory[left, None] & memory[some]) == memory[some]).any(axis=1)]
+        block, left = left[:block_size], left[block_size:]
+        own = memory[block, None]
+        block = block[~np.triu((own & own.T) == own, 1).any(axis=0)]
+        kept[block] = True
+        left = left[~((memory[left, None] & memory[block]) == memory[block]).any(axis=1)]
     return kept
 
 
@@ -374,8 +375,11 @@ def join(
     a: Labels,
     b: Labels,
 ) -> Floats:
-    """(V,) cost of the best walk through v, from walks that end there and such read backwards: they
-    may remember no goal in common but that of v."""
+    """Return the cost (V,) of the best walk through each vertex v.
+
+    It joins a walk that ends at v with one read backwards; the two may remember no goal in common
+    except that of v.
+    """
     a_pointer, a_cost, a_memory = a.pointer, a.cost, a.memory
     b_pointer, b_cost, b_memory = b.pointer, b.cost, b.memory
     count = len(goal)
@@ -432,7 +436,7 @@ def step_back(
     at_memory: int,
     labels: Labels,
 ) -> tuple[int, int]:
-    """(vertex, label) of the layer before that a label at v came from."""
+    """Return the vertex and label, in the layer before, that a label at v came from."""
     costs, goal = graph.costs, graph.goal
     pointer, cost, memory = labels.pointer, labels.cost, labels.memory
     off, from_vertex, from_label = np.inf, -1, -1

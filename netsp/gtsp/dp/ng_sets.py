@@ -1,8 +1,8 @@
-"""Who remembers whom: the sets of the ng-route relaxation (Baldacci, Mingozzi & Roberti 2011).
+"""Sets of the ng-route relaxation (Baldacci, Mingozzi & Roberti 2011): what each goal remembers.
 
 A walk that has reached goal g remembers, of the goals it visited, those that g remembers and that
-it never forgot on the way: M(h) = (M(g) ∩ N(h)) ∪ {h}. It must not go to a goal it remembers. With
-all of N full the walks are tours; with little memory there are few states and the bound is weaker.
+it never forgot since: M(h) = (M(g) ∩ N(h)) ∪ {h}. It must not visit a goal it remembers. If all N
+are full, the walks are tours; with little memory there are few states and the bound is weaker.
 Where the best walk repeats a goal, the goals between learn to remember it (Roberti & Mingozzi 2014,
 Martinelli, Pecin & Poggi 2014).
 """
@@ -17,25 +17,28 @@ from netsp.model.arrangement import UNORDERED
 
 Masks = npt.NDArray[np.int32]
 
-CHUNK = 7
-"""Bits of a memory that one table translates."""
+BITS_PER_TABLE = 7
+"""Format of memories: bits that one table translates."""
 
-MOST = 3 * CHUNK
-"""Most goals that a goal can remember, itself among them."""
+TABLES = 3
+"""Format of memories: tables that translate a memory, whose parts are joined by "or"."""
+
+MAX_REMEMBERED = TABLES * BITS_PER_TABLE
+"""Format of memories: maximum number of goals that a goal remembers, itself among them."""
 
 
 class Memory:
-    """For every goal the goals it remembers; bit k of a memory at goal g stands for the k-th.
+    """For each goal the goals it remembers; bit k of a memory at goal g stands for the k-th of g.
 
     Parameters
     ----------
     near
-        (n + 1, k) clusters, nearest first, of every cluster.
+        (n + 1, k) clusters nearest to each cluster, nearest first.
     size
-        So many nearest goals are remembered at first, the goal itself being one (bit 0).
+        Number of nearest goals that are remembered at first, the goal itself (bit 0) among them.
     before
         (n + 1, n + 1) which goals come before which (`TravelGraph.before`), (0, 0) for none: a walk
-        that remembers a goal must not go to one that comes before it.
+        that remembers a goal must not visit one that comes before it.
     """
 
     def __init__(self, near: Ints, size: int, before: Bools = UNORDERED) -> None:
@@ -49,13 +52,16 @@ class Memory:
 
     @property
     def bits(self) -> Ints:
-        """(n + 1,) how many goals each remembers."""
+        """(n + 1,) number of goals that each remembers."""
         return np.array([1, *(len(s) for s in self.sets[1:])], dtype=np.int64)
 
     def tables(self, *, backwards: bool = False) -> Masks:
-        """(n + 1, n + 1, 3, 2^CHUNK) by goal g left, goal h entered and chunk of the memory at g:
-        that chunk's part of the memory at h, to be joined by "or"; negative if h is remembered, or
-        a goal that it comes before. Of walks read backwards it is the other way round."""
+        """Return the tables that translate memories, (n + 1, n + 1, TABLES, 2^BITS_PER_TABLE).
+
+        By goal g left, goal h entered and part of the memory at g, they hold that part of the
+        memory at h; it is negative if h is remembered, or a goal that h must precede. For walks
+        read backwards, precedences are reversed.
+        """
         if backwards in self._tables:
             return self._tables[backwards]
         n = self.n
@@ -63,17 +69,17 @@ class Memory:
         bit = np.full((n + 1, n + 1), -1)
         for g in range(1, n + 1):
             bit[g, self.sets[g]] = np.arange(len(self.sets[g]))
-        tables = np.zeros((n + 1, n + 1, 3, 1 << CHUNK), dtype=np.int32)
+        tables = np.zeros((n + 1, n + 1, TABLES, 1 << BITS_PER_TABLE), dtype=np.int32)
         tables[:, :, 0] = 1
-        chunk = np.arange(1 << CHUNK)
+        chunk = np.arange(1 << BITS_PER_TABLE)
         for g in range(1, n + 1):
             for k, remembered in enumerate(self.sets[g]):
-                part, place = divmod(k, CHUNK)
+                part, place = divmod(k, BITS_PER_TABLE)
                 held = (chunk >> place) & 1
                 image = np.where(bit[:, remembered] >= 0, 1 << np.maximum(bit[:, remembered], 0), 0)
                 tables[g, :, part] |= (image[:, None] * held[None, :]).astype(np.int32)
             for k, remembered in enumerate(self.sets[g]):
-                part, place = divmod(k, CHUNK)
+                part, place = divmod(k, BITS_PER_TABLE)
                 held = (chunk >> place) & 1 == 1
                 tables[g, remembered, part, held] = -1
                 for earlier in np.flatnonzero(before[:, remembered]):
@@ -82,8 +88,8 @@ class Memory:
         return tables
 
     def widen(self, goals: list[int]) -> bool:
-        """Remember along the cycles of a walk, the short ones first, and between goals in the wrong
-        order; whether anything changed."""
+        """Remember along the cycles of a walk, short ones first, and between goals in the wrong
+        order, and return whether a memory changed."""
         last: dict[int, int] = {}
         cycles = []
         for k, g in enumerate(goals):
@@ -95,9 +101,9 @@ class Memory:
         changed = False
         for _, first, again in sorted(cycles):
             g = goals[first]
-            forget = [h for h in set(goals[first + 1 : again]) if g not in self.sets[h]]
-            if all(len(self.sets[h]) < MOST for h in forget):
-                for h in forget:
+            forgetful = [h for h in set(goals[first + 1 : again]) if g not in self.sets[h]]
+            if all(len(self.sets[h]) < MAX_REMEMBERED for h in forgetful):
+                for h in forgetful:
                     self.sets[h].append(g)
                     changed = True
         if changed:

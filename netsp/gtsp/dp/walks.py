@@ -1,14 +1,15 @@
-"""The relaxation: the cheapest closed walk that visits n goals, under prices and little memory.
+"""Relaxation: the cheapest closed walk of n visits, under prices and with limited memory.
 
-Every tour is such a walk, whatever the memory. With a price p_g for every visit to goal g,
+Every tour is such a walk, whatever the memory. With a price p_g for each visit to goal g,
 
     length of a tour >= cost of the cheapest walk + Σ_g p_g,
 
-for a tour visits every goal once and pays every price once. And if the cheapest walk that has
-vertex v at its k-th visit is no cheaper than an incumbent, no better tour has it there: the state
-(k, v) is dead, for these prices and for good.
+because a tour visits every goal once and pays every price once. If the cheapest walk that has
+vertex v at its k-th visit is no cheaper than an incumbent, no better tour has v there: the state
+(k, v) is eliminated for good, whatever the prices later are.
 
-Sums are of floating point: `ROUNDING` times the size of what is summed is taken off a bound.
+Sums are of floating-point numbers: `SUM_ROUNDING` times the size of the summands is taken off a
+bound.
 """
 
 from __future__ import annotations
@@ -24,19 +25,11 @@ from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import NEVER, Flag
 from netsp.gtsp.dp.label_kernels import Bounds, Graph, Labels, completions, extend, join, step_back
 from netsp.gtsp.dp.ng_sets import Memory
+from netsp.gtsp.gtsp_policy import WalkPolicy
 from netsp.model.arrangement import UNORDERED
 
-ROUNDING = 1e-12
-"""Relative rounding allowed for: some hundred additions at 1.1e-16 each, with room to spare."""
-
-THREADS = 2
-"""The goals of a layer are shared among so many; the labels do not depend on it."""
-
-ROWS = 512
-"""Of the matrix that are worked on at a time, so that what is in between stays small."""
-
-REMEMBERED = 6
-"""Goals that each goal remembers at first."""
+SUM_ROUNDING = 1e-12
+"""Tolerance, relative, of the sums of a pass: some hundred additions with 1.1e-16 each."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +39,11 @@ class Walk:
     Attributes
     ----------
     bound
-        On every tour shorter than the cutoff.
+        Lower bound on every tour shorter than the cutoff.
     rows
-        Of the vertices visited, in order, without the base.
+        Rows of the vertices visited, in order, without the base.
     labels
-        How many there were.
+        Number of labels in the pass.
     """
 
     bound: float
@@ -64,21 +57,32 @@ class Walks:
     Parameters
     ----------
     cluster
-        (V,).
+        (V,) goal of each vertex.
     values
-        (V, V) symmetric costs of legs, inf where there is none.
-    alive
-        (n + 1, V) whether a better tour may make its k-th visit there, with vertices taken in
-        `order`, which groups them by goal.
+        (V, V) symmetric costs of legs, inf for missing legs.
     stop
-        Of the clock; `check` must then raise.
+        Flag of the clock; once it is set, `check` must raise.
     before
         Which goals come before which (`TravelGraph.before`).
+    policy
+        Policy of walks.
+
+    Attributes
+    ----------
+    alive
+        (n + 1, V) whether a better tour may make its k-th visit at a vertex; vertices are in
+        `order`, which groups them by goal.
     """
 
     def __init__(
-        self, cluster: Ints, values: Floats, stop: Flag = NEVER, before: Bools = UNORDERED
+        self,
+        cluster: Ints,
+        values: Floats,
+        stop: Flag = NEVER,
+        before: Bools = UNORDERED,
+        policy: WalkPolicy = WalkPolicy(),
     ) -> None:
+        self.policy = policy
         self.stop, self.ordered = stop, len(before) > 0
         self.n = int(cluster.max())
         self.alive: Bools = np.ones((self.n + 1, len(cluster)), dtype=bool)
@@ -86,7 +90,7 @@ class Walks:
         self.alive[:, 0] = False
         self._group(cluster)
         self.set_values(values)
-        self.memory = Memory(self._near(), REMEMBERED, before)
+        self.memory = Memory(self._near(), policy.remembered_goals, before)
         if self.ordered:
             sooner = before.sum(axis=0)[self.goal]
             later = before.sum(axis=1)[self.goal]
@@ -100,8 +104,10 @@ class Walks:
         self.start: Ints = np.searchsorted(self.goal, np.arange(self.n + 2))
 
     def set_values(self, values: Floats) -> None:
-        """Change the costs of legs. Once the flag is set they may be anything: `solve` raises then
-        before it uses them."""
+        """Change the costs of legs.
+
+        Once the flag is set they are incomplete, and `solve` raises before it uses them.
+        """
         order = self.order if (np.diff(self.cluster) < 0).any() else None
         as_they_are = order is None and values.dtype == np.float64 and values.flags.c_contiguous
         self.values: Floats = values if as_they_are else np.empty(values.shape)
@@ -115,33 +121,41 @@ class Walks:
             self.longest = max(self.longest, float(longest))
 
     def _blocks(self) -> Iterator[slice]:
-        """The rows of the matrix, some at a time; no more of them once the flag is set."""
-        for first in range(0, len(self.goal), ROWS):
+        """Yield the rows of the matrix, some at a time, until the flag is set."""
+        for first in range(0, len(self.goal), self.policy.block_rows):
             if self.stop[0]:
                 return
-            yield slice(first, first + ROWS)
+            yield slice(first, first + self.policy.block_rows)
 
     def restrict(self, keep: Bools) -> None:
-        """Forget the rows that are not marked; `set_values` must follow."""
+        """Remove the rows that are not marked; `set_values` must follow."""
         self.alive = np.ascontiguousarray(self.alive[:, keep[self.order]])
         self._group(self.cluster[keep])
 
     @property
     def left(self) -> Bools:
-        """(V,) rows that a better tour may visit; the base is one."""
+        """(V,) mask of the rows that a better tour may visit, the base among them."""
         out = np.zeros(len(self.goal), dtype=bool)
         out[self.order] = self.alive.any(axis=0)
         out[0] = True
         return out
 
     def solve(self, prices: Floats, cutoff: float, check: Callable[[], None]) -> Walk | None:
-        """The cheapest walk below the cutoff, and death to states that none goes through; None if
-        there is no walk. `check` is called after every layer and may raise.
+        """Return the cheapest walk below the cutoff, and eliminate states that no such walk visits.
 
         Parameters
         ----------
         prices
-            (n + 1,) of a visit to each goal.
+            (n + 1,) price of a visit to each goal.
+        cutoff
+            Length of tours that are of no interest.
+        check
+            Called after every layer; may raise.
+
+        Returns
+        -------
+        Walk or None
+            None if there is no walk.
         """
         n, goal = self.n, self.goal
         cut = cutoff - float(prices[1:].sum()) + self.rounding(prices)
@@ -169,13 +183,13 @@ class Walks:
         return Walk(bound, self.order[rows], labels)
 
     def rounding(self, prices: Floats) -> float:
-        """What the sums of a pass can be off by."""
-        return ROUNDING * (2.0 * float(np.abs(prices).sum()) + (self.n + 1) * self.longest)
+        """Return the largest error of the sums of a pass."""
+        return SUM_ROUNDING * (2.0 * float(np.abs(prices).sum()) + (self.n + 1) * self.longest)
 
     def _layers(
         self, prices: Floats, cut: float, check: Callable[[], None], *, backwards: bool = False
     ) -> list[Labels]:
-        """Labels of walks from the base on, or from their end backwards."""
+        """Return the labels of walks from the base on, or from their end backwards."""
         n, goal = self.n, self.goal
         # a walk's k-th visit is the (n + 1 - k)-th from its end
         mirrored = np.concatenate([self.alive[:1], self.alive[:0:-1]])
@@ -187,7 +201,7 @@ class Walks:
         bits, tables = self.memory.bits, self.memory.tables(backwards=backwards)
         none = np.zeros(0, dtype=np.int32)
         layers = [Labels(np.zeros(len(goal) + 1, dtype=np.int64), np.zeros(0), none)]
-        with np.errstate(invalid="ignore"):  # inf - inf: neither cut nor way to complete
+        with np.errstate(invalid="ignore"):  # inf - inf: no cut and no completion
             limits = np.where(own[1:], cut - least[:0:-1], -np.inf)
         first = self.values[0]
         kept = np.isfinite(first) & (first <= limits[0])
@@ -199,7 +213,7 @@ class Walks:
             )
         )
         parts = self._parts()
-        with ThreadPoolExecutor(THREADS) as pool:
+        with ThreadPoolExecutor(self.policy.threads) as pool:
             for k in range(2, n + 1):
                 check()
 
@@ -219,8 +233,8 @@ class Walks:
         return Graph(self.values, self.goal, self.start)
 
     def _parts(self) -> list[tuple[int, int]]:
-        """Ranges of goals with about as many vertices each."""
-        shares = np.linspace(1, len(self.goal), THREADS + 1)[1:-1].astype(int)
+        """Return ranges of goals with about the same number of vertices, one for each thread."""
+        shares = np.linspace(1, len(self.goal), self.policy.threads + 1)[1:-1].astype(int)
         ends = [1, *self.goal[np.minimum(shares, len(self.goal) - 1)].tolist(), self.n + 1]
         return [(a, b) for a, b in pairwise(ends) if a < b]
 
@@ -233,11 +247,11 @@ class Walks:
             _, cost, memory = layers[k + 1]
             out[k - 1], label = step_back(
                 self._graph, prices, tables, out[k], cost[label], memory[label], layers[k]
-            )  # fmt: skip
+            )
         return out
 
     def _near(self) -> Ints:
-        """(n + 1, n + 1) goals by the least leg between any of their classes, nearest first."""
+        """Return the goals (n + 1, n + 1) by their shortest leg from each goal, nearest first."""
         least = np.zeros((len(self.goal), self.n + 1))
         for rows in self._blocks():
             least[rows] = np.minimum.reduceat(self.values[rows], self.start[:-1], axis=1)
@@ -246,7 +260,7 @@ class Walks:
 
 
 def _together(parts: list[Labels]) -> Labels:
-    """Labels of consecutive ranges of vertices; vertex 0 has none."""
+    """Join the labels of consecutive ranges of vertices; vertex 0 has none."""
     offset = 0
     pointers = [np.zeros(1, dtype=np.int64)]
     for pointer, cost, _ in parts:

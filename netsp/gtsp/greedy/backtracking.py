@@ -1,4 +1,4 @@
-"""Greedy backtracking: nearest goal by tether, then back along the own path.
+"""Greedy backtracking: the nearest goal by tether, then back along the path.
 
 McCammon & Hollinger 2017, section V-A: the robot goes to the closest goal that does not violate the
 tether length, again and again, and retraces its path after the last one (`greedy`).
@@ -13,27 +13,24 @@ retraces its path back to the start position, ensuring no entanglements". It has
   the 2017 paper, so the tour is that of `greedy`.
 
 On the covering space a leg between two admissible classes never needs more tether than its ends do
-(docs/theory.md), so "does not violate the tether length" is: is a vertex of the travel graph. With
-a roadmap every vertex is joined to every other, so greedy always succeeds; on a graph made from
-costs it can run into a dead end, and says that it found nothing. Such a graph has no way to retrace
+(docs/theory.md), so "does not violate the tether length" means: is a vertex of the travel graph.
+With a roadmap every vertex is joined to every other, so greedy always succeeds. On a graph made
+from costs it can run into a dead end, and then finds no tour. Such a graph has no path to retrace
 (its costs need not be those of a metric), so there the tour is closed by its own leg.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from netsp.base.arrays import Floats, Ints
-from netsp.gtsp.cost_matrix import MEASURE_AT_ONCE
+from netsp.gtsp.gtsp_policy import CostPolicy
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.solver_run import SolverRun
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
-
-BATCH = 16
-"""So many legs are measured at a time when the nearest goal is looked for."""
 
 
 @dataclass(frozen=True)
@@ -43,11 +40,14 @@ class Params:
     Attributes
     ----------
     retrace
-        ``path``, home along the own path as in the paper, or ``tether``, home along the taut tether
-        from the last goal, which is never longer.
+        ``path``, home along the path of the way out as in the paper, or ``tether``, home along the
+        taut tether from the last goal, which is never longer.
+    policy
+        How costs are measured.
     """
 
     retrace: str = "path"
+    policy: CostPolicy = field(default_factory=CostPolicy)
 
     def __post_init__(self) -> None:
         if self.retrace not in ("path", "tether"):
@@ -55,27 +55,12 @@ class Params:
 
 
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
-    """`greedy`: to the nearest goal not yet visited, in whatever class is nearest on the covering
-    space; home from the last.
+    """Go to the nearest goal not yet visited, in its nearest class, and home from the last.
 
-    One iteration builds the whole tour.
-
-    Parameters
-    ----------
-    graph : TravelGraph
-        What to solve.
-    params : Params, optional
-        See `Params`.
-    limits : Limits, optional
-        Time, iterations, random generator, warm start, listener.
-
-    Returns
-    -------
-    Result
-        The tour; no bound.
+    One iteration builds the whole tour. There is no bound.
     """
     chosen, limits = params or Params(), limits or Limits()
-    run = SolverRun(graph, limits)
+    run = SolverRun(graph, limits, policy=chosen.policy)
     stage = "trivial"
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)
@@ -88,37 +73,41 @@ def _nearest_by_tether(run: SolverRun, *, retrace: bool) -> str:
     graph = run.graph
     tour = [0]
     left = graph.cluster != 0
-    small = graph.measured or len(graph) <= MEASURE_AT_ONCE
+    exact = graph.measured or len(graph) <= run.cost_policy.max_measured_vertices
     every = np.arange(len(graph))
     while left.any():
         run.check()
         at = tour[-1]
-        bounds = graph.costs[at] if small else graph.lower_bounds(every, [at])[0]
-        here = _nearest(graph, at, np.flatnonzero(left), bounds, exact=small)
-        if here is None:
+        bounds = graph.costs[at] if exact else graph.lower_bounds(every, [at])[0]
+        nearest = _nearest(run, at, np.flatnonzero(left), bounds, exact=exact)
+        if nearest is None:
             return "dead end"
-        tour.append(here)
-        left &= graph.cluster != graph.cluster[here]
+        tour.append(nearest)
+        left &= graph.cluster != graph.cluster[nearest]
     run.iterations = 1
     run.update_incumbent(tour, walk=[*tour, *tour[-2::-1]] if retrace else None)
     return "greedy"
 
 
 def _nearest(
-    graph: TravelGraph, here: int, candidates: Ints, bounds: Floats, *, exact: bool
+    run: SolverRun, at: int, candidates: Ints, bounds: Floats, *, exact: bool
 ) -> int | None:
-    """The candidate with the cheapest leg from here; None if no leg leads on. Legs are measured in
-    the order of their lower bounds, until no bound is below the best leg."""
+    """Return the candidate with the cheapest leg from vertex `at`; None if no leg leads on.
+
+    Unless the bounds are exact, legs are measured in their order, until no bound is below the
+    cheapest leg.
+    """
+    graph = run.graph
     candidates = candidates[np.argsort(bounds[candidates], kind="stable")]
     if exact:
         return int(candidates[0]) if np.isfinite(bounds[candidates[0]]) else None
     best, nearest = np.inf, None
-    for batch in np.array_split(candidates, -(-len(candidates) // BATCH)):
+    for batch in np.array_split(candidates, -(-len(candidates) // run.cost_policy.tried_legs)):
         if bounds[batch[0]] >= best:
             break
         star = np.zeros((len(batch) + 1, len(batch) + 1), dtype=bool)
         star[0] = star[:, 0] = True
-        legs = graph.costs_among([here, *batch], star)[0, 1:]
+        legs = graph.costs_among([at, *batch], star)[0, 1:]
         k = int(np.argmin(legs))
         if legs[k] < best:
             best, nearest = float(legs[k]), int(batch[k])
@@ -132,11 +121,14 @@ class Params2016:
     Attributes
     ----------
     retrace
-        Time at which the robot retraces its path: ``goal``, after every goal, or ``end``, after the
-        last goal only. The paper's sentence can be read either way.
+        When the robot retraces its path: ``goal``, after every goal, or ``end``, after the last
+        goal only. The paper's sentence can be read either way.
+    policy
+        How costs are measured.
     """
 
     retrace: str = "goal"
+    policy: CostPolicy = field(default_factory=CostPolicy)
 
     def __post_init__(self) -> None:
         if self.retrace not in ("goal", "end"):
@@ -146,28 +138,14 @@ class Params2016:
 def solve_2016(
     graph: TravelGraph, params: Params2016 | None = None, limits: Limits | None = None
 ) -> Result:
-    """`greedy-2016`: out to the goal nearest to the base and back, then the next.
+    """Go out to the goal nearest to the base and back, then to the next.
 
-    This is the first of two readings of the paper's sentence (see `Params2016`). By it no leg
-    between goals is ever measured. One iteration builds the whole tour. Source: McCammon &
+    This is the first of two readings of the paper's sentence (see `Params2016`). No leg between
+    goals is measured. One iteration builds the whole tour; there is no bound. Source: McCammon &
     Hollinger 2016, section IV.
-
-    Parameters
-    ----------
-    graph : TravelGraph
-        What to solve.
-    params : Params2016, optional
-        See `Params2016`.
-    limits : Limits, optional
-        Time, iterations, random generator, warm start, listener.
-
-    Returns
-    -------
-    Result
-        The tour; no bound.
     """
     chosen, limits = params or Params2016(), limits or Limits()
-    run = SolverRun(graph, limits)
+    run = SolverRun(graph, limits, policy=chosen.policy)
     stage = "greedy"
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)

@@ -1,8 +1,8 @@
-"""The entangling baseline: nearest neighbour, blind to what the tether does.
+"""Nearest-neighbour baseline that ignores the tether and may entangle it.
 
 McCammon & Hollinger 2016, section IV-A: "Greedy-TSP" goes to the closest goal not yet visited, by
-the shortest path whatever its class. Its tours may entangle obstacles, loop, or need more tether
-than there is; then the status is `invalid` and the trajectory tells what was walked.
+the shortest path in any class. Its tours may entangle obstacles, loop, or need more tether than
+there is; then the status is `invalid` and the trajectory holds the path.
 """
 
 from __future__ import annotations
@@ -20,54 +20,45 @@ from netsp.model.solution import Status
 
 
 def solve(graph: TravelGraph, params: None = None, limits: Limits | None = None) -> Result:
-    """`greedy-tsp`: to the nearest goal not yet visited, blind to the tether.
+    """Go to the nearest goal not yet visited by the shortest path in any class.
 
-    A warm start is not used: a baseline shows what it does by itself. One iteration builds the
-    whole tour. Source: McCammon & Hollinger 2016, section IV.
-
-    Parameters
-    ----------
-    graph : TravelGraph
-        What to solve.
-    params : None
-        It has no options.
-    limits : Limits, optional
-        Time, iterations, random generator, warm start, listener.
+    A warm start is not used, because a baseline shows what it does by itself. One iteration builds
+    the whole tour. Source: McCammon & Hollinger 2016, section IV.
 
     Returns
     -------
     Result
-        The tour, or status `invalid` with what was walked.
+        The tour, or status `invalid` with the trajectory.
 
     Raises
     ------
     InputError
-        There is no geometry beneath the graph.
+        The graph has no geometry.
     """
     limits = limits or Limits()
     run = SolverRun(graph, limits)
-    walked: Trajectory | None = None
+    trajectory: Trajectory | None = None
     with run.until_stopped(blind=True):
         if not run.solve_if_trivial():
             run.check()
-            walked = _nearest_neighbour(run)
-    if walked is None:
+            trajectory = _nearest_neighbour(run)
+    if trajectory is None:
         return run.finish("greedy")
-    held = len(entangled(walked.word))
-    seen = run.finish("greedy", current=walked.length, entangled=held)
-    return Result(None, walked.length, None, Status.INVALID, seen.trace, trajectory=walked)
+    length, wrapped = trajectory.length, len(entangled(trajectory.word))
+    trace = run.finish("greedy", current=length, entangled=wrapped).trace
+    return Result(None, length, None, Status.INVALID, trace, trajectory=trajectory)
 
 
 def _nearest_neighbour(run: SolverRun) -> Trajectory | None:
-    """The trajectory, or None if it is a tour of the graph: then that is the incumbent."""
+    """Return the trajectory, or None if it is a tour of the graph and so the incumbent."""
     graph = run.graph
     detours = graph.detours(sub_goals=False, check=run.check)
-    order, here = [], 0
+    order, at = [], 0
     left = set(range(1, graph.goal_count + 1))
     while left:
-        here = min(left, key=lambda b: (detours.length(here, b), b))
-        left.remove(here)
-        order.append(here)
+        at = min(left, key=lambda goal: (detours.length(at, goal), goal))
+        left.remove(at)
+        order.append(at)
     run.iterations = 1
     visits = [0, *order, 0]
     words: list[Word] = [()]
@@ -75,7 +66,7 @@ def _nearest_neighbour(run: SolverRun) -> Trajectory | None:
         words.append(concatenate(words[-1], detours.word(a, b)))
     tour = graph.vertices_of(order, words[1:-1])
     if not words[-1] and tour is not None:
-        # it happens to keep all promises; the walk is the same, for its legs are taut
+        # a valid tour after all, and the same path, because its legs are taut
         run.update_incumbent([0, *tour])
         return None
     legs = [detours.path(a, b) for a, b in pairwise(visits)]

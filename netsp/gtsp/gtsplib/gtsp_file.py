@@ -1,7 +1,6 @@
-"""Reading the files: keywords, then sections of numbers.
+"""Reader of TSPLIB and GTSPLIB files: keywords, then sections of numbers.
 
-No library reads the sets: `tsplib95` (the last release is of 2020) knows the sections of TSPLIB
-alone.
+No library reads sets of vertices: `tsplib95` (last release 2020) knows only the sections of TSPLIB.
 """
 
 from __future__ import annotations
@@ -18,11 +17,12 @@ from netsp.base.errors import InputError
 from netsp.base.files import read_text
 from netsp.base.ram import check_available
 from netsp.base.validated import shown
+from netsp.gtsp.gtsp_policy import FilePolicy
 from netsp.gtsp.gtsplib.metrics import METRICS
 from netsp.gtsp.travel.graph import TravelGraph
 
 SYMMETRIC, ASYMMETRIC = ("GTSP", "TSP"), ("AGTSP", "ATSP")
-"""Types of problem; a TSP is a GTSP whose clusters are its vertices."""
+"""Types of problems; a TSP is a GTSP with one vertex in each cluster."""
 
 IGNORED = ("DISPLAY_DATA_SECTION",)
 
@@ -39,14 +39,10 @@ TRIANGLES = {
     "UPPER_DIAG_ROW": (True, 0), "LOWER_DIAG_COL": (True, 0),
     "LOWER_DIAG_ROW": (False, 0), "UPPER_DIAG_COL": (False, 0),
 }  # fmt: skip
-"""Half a matrix: whether row by row it is the upper half, and how far from the diagonal it begins.
-Of a symmetric matrix, one half by columns is the other by rows."""
+"""Format of half a matrix: whether it is the upper half, row by row, and its distance from the
+diagonal. One half of a symmetric matrix by columns is the other by rows."""
 
 FORMATS = ("FULL_MATRIX", *TRIANGLES)
-
-MOST_VERTICES = 20_000
-
-BYTES_PER_LEG = 40.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,13 +52,13 @@ class Instance(ComparesArrays):
     Parameters
     ----------
     name : str
-        As the file says.
+        Name in the file.
     costs : ndarray, shape (n, n)
-        Symmetric.
+        Symmetric costs.
     clusters : ndarray of int, shape (n,)
         Cluster of each vertex, from 0.
     places : ndarray, shape (n, 2), optional
-        Where the vertices are, for a picture.
+        Coordinates of the vertices, for a picture.
     """
 
     name: str
@@ -72,7 +68,7 @@ class Instance(ComparesArrays):
 
     @property
     def summary(self) -> str:
-        """In a line."""
+        """One line with the numbers of vertices and clusters."""
         sizes = np.bincount(self.clusters)
         return (
             f"{len(self.clusters)} vertices in {len(sizes)} clusters of {sizes.min()} to "
@@ -80,38 +76,34 @@ class Instance(ComparesArrays):
         )
 
     def to_travel_graph(self) -> TravelGraph:
-        """The travel graph, without a base.
+        """Return the travel graph, without a base, for `netsp.solve_graph`.
 
-        Returns
-        -------
-        TravelGraph
-            For `netsp.solve_graph`; its vertex k is the file's vertex k + 1.
+        Its vertex k is the file's vertex k + 1.
 
         Raises
         ------
         InputError
-            Asymmetric costs, or none that make a tour.
+            Asymmetric costs, or no tour of finite cost.
         """
         return TravelGraph.from_costs(self.costs, self.clusters, base=None)
 
 
-def load(path: str | Path) -> Instance:
+def load(path: str | Path, policy: FilePolicy = FilePolicy()) -> Instance:
     """Read a file of TSPLIB's format with the sets of GTSPLIB's.
 
     Parameters
     ----------
     path : str or Path
-        The file; ``-`` for standard input.
-
-    Returns
-    -------
-    Instance
-        What it holds.
+        File; ``-`` for standard input.
+    policy : FilePolicy
+        Size of the files that are read.
 
     Raises
     ------
     InputError
-        Anything that is wrong, by line; overlapping sets, asymmetric costs.
+        Anything wrong with the file, by line; overlapping sets, asymmetric costs.
+    MemoryLimitError
+        There is no room for the costs.
 
     Examples
     --------
@@ -121,14 +113,14 @@ def load(path: str | Path) -> Instance:
     >>> solve_graph(instance.to_travel_graph()).length
     136.0
     """
-    return _Reader(str(path), read_text(path)).read()
+    return _Reader(str(path), read_text(path), policy).read()
 
 
 class _Reader:
-    """One file: `words` are the numbers of each section, with their lines."""
+    """Reader of one file: values of its keywords, and words of its sections with their lines."""
 
-    def __init__(self, path: str, text: str) -> None:
-        self.path = path
+    def __init__(self, path: str, text: str, policy: FilePolicy) -> None:
+        self.path, self.policy = path, policy
         self.values: dict[str, str] = {}
         self.sections: dict[str, list[tuple[int, str]]] = {}
         section: list[tuple[int, str]] | None = None
@@ -165,15 +157,13 @@ class _Reader:
     def read(self) -> Instance:
         kind = self.values.get("TYPE", "GTSP").upper()
         if kind not in (*SYMMETRIC, *ASYMMETRIC):
-            raise self.wrong(
-                None, f"TYPE: expected one of {', '.join((*SYMMETRIC, *ASYMMETRIC))}, got "
-                f"{shown(kind)}",
-            )  # fmt: skip
-        n = self.whole("DIMENSION", 1, MOST_VERTICES)
+            known = ", ".join((*SYMMETRIC, *ASYMMETRIC))
+            raise self.wrong(None, f"TYPE: expected one of {known}, got {shown(kind)}")
+        n = self.whole("DIMENSION", 1, self.policy.max_vertices)
+        size = self.policy.bytes_per_leg * n * n
         check_available(
-            BYTES_PER_LEG * n * n, f"{self.path}: the legs among {n} vertices",
-            "take a smaller instance",
-        )  # fmt: skip
+            size, f"{self.path}: the legs among {n} vertices", "take a smaller instance"
+        )
         metric = self.values.get("EDGE_WEIGHT_TYPE", "EUC_2D").upper()
         if metric == "EXPLICIT":
             costs, places = self.matrix(n), None
@@ -182,12 +172,10 @@ class _Reader:
             places = self.places(n, dimensions)
             costs = measure(places)
         else:
-            raise self.wrong(
-                None, f"EDGE_WEIGHT_TYPE: expected EXPLICIT or one of {', '.join(METRICS)}, got "
-                f"{shown(metric)}",
-            )  # fmt: skip
+            expected = f"EXPLICIT or one of {', '.join(METRICS)}"
+            raise self.wrong(None, f"EDGE_WEIGHT_TYPE: expected {expected}, got {shown(metric)}")
         np.fill_diagonal(costs, 0.0)
-        self.symmetric(costs)
+        self.check_symmetric(costs)
         clusters = self.sets(n) if "GTSP_SET_SECTION" in self.sections else None
         if clusters is None:
             if kind in ("GTSP", "AGTSP"):
@@ -197,19 +185,19 @@ class _Reader:
         name = self.values.get("NAME", "") or Path(self.path).stem
         return Instance(name, costs, clusters, flat)
 
-    def whole(self, name: str, least: int, most: int) -> int:
-        """The value of a keyword."""
+    def whole(self, name: str, minimum: int, maximum: int) -> int:
+        """Return the value of a keyword, a whole number."""
         text = self.values.get(name)
         if text is None:
-            raise self.wrong(None, f"{name}: expected a number from {least} on, got none")
+            raise self.wrong(None, f"{name}: expected a number from {minimum} on, got none")
         if not (text.isascii() and text.isdigit() and len(text) < 10):
             raise self.wrong(None, f"{name}: expected a whole number, got {shown(text)}")
-        if not least <= int(text) <= most:
-            raise self.wrong(None, f"{name}: expected {least} to {most}, got {text}")
+        if not minimum <= int(text) <= maximum:
+            raise self.wrong(None, f"{name}: expected {minimum} to {maximum}, got {text}")
         return int(text)
 
     def numbers(self, section: str, count: int, what: str) -> list[tuple[int, float]]:
-        """A section of so many numbers, with their lines."""
+        """Return the numbers of a section, with their lines."""
         words = self.sections.get(section)
         if words is None:
             raise self.wrong(None, f"{section}: expected {what}, got none")
@@ -230,18 +218,16 @@ class _Reader:
         return value
 
     def vertex(self, line: int, word: str, n: int) -> int:
-        """A vertex, from 0; the file counts from 1."""
+        """Return a vertex, counted from 0; the file counts from 1."""
         value = self.number(line, word)
         if value != int(value) or not 1 <= value <= n:
             raise self.wrong(line, f"expected a vertex from 1 to {n}, got {shown(word)}")
         return int(value) - 1
 
     def places(self, n: int, dimensions: int) -> Floats:
-        """(n, k) coordinates."""
-        words = self.numbers(
-            "NODE_COORD_SECTION", n * (dimensions + 1),
-            f"a number and {dimensions} coordinates for each of {n} vertices",
-        )  # fmt: skip
+        """Return the coordinates (n, k)."""
+        expected = f"a number and {dimensions} coordinates for each of {n} vertices"
+        words = self.numbers("NODE_COORD_SECTION", n * (dimensions + 1), expected)
         rows = [words[k : k + dimensions + 1] for k in range(0, len(words), dimensions + 1)]
         out = np.full((n, dimensions), np.nan)
         for (line, number), *coordinates in rows:
@@ -252,7 +238,7 @@ class _Reader:
         return out
 
     def matrix(self, n: int) -> Floats:
-        """(n, n) costs."""
+        """Return the costs (n, n) that the file lists."""
         form = self.values.get("EDGE_WEIGHT_FORMAT", "FULL_MATRIX").upper()
         if form not in FORMATS:
             raise self.wrong(
@@ -269,8 +255,8 @@ class _Reader:
         out[rows, columns] = out[columns, rows] = [x for _, x in words]
         return out
 
-    def symmetric(self, costs: Floats) -> None:
-        """InputError for asymmetric costs."""
+    def check_symmetric(self, costs: Floats) -> None:
+        """Raise InputError for asymmetric costs."""
         uneven = np.argwhere(np.triu(costs != costs.T))
         if len(uneven):
             u, v = uneven[0].tolist()
@@ -282,7 +268,7 @@ class _Reader:
             )
 
     def sets(self, n: int) -> Ints:
-        """(n,) cluster of each vertex."""
+        """Return the cluster (n,) of each vertex."""
         words = self.sections["GTSP_SET_SECTION"]
         groups: list[tuple[int, list[tuple[int, str]]]] = []
         open_: list[tuple[int, str]] = []

@@ -1,4 +1,4 @@
-"""Distances by the names of TSPLIB, rounded as it rounds them.
+"""Distances by the names of TSPLIB, rounded as TSPLIB rounds them.
 
 Source: Reinelt, "TSPLIB95" (1995), section 2. Its functions are in C, where a cast to int cuts off
 the fraction; `nint(x)` is ``(int) (x + 0.5)``.
@@ -13,7 +13,7 @@ import numpy as np
 from netsp.base.arrays import Floats
 
 Differences = Floats
-"""(k, n, n) of each coordinate."""
+"""(k, n, n) differences of each coordinate."""
 
 
 def _nint(x: Floats) -> Floats:
@@ -42,21 +42,27 @@ def _pseudo_euclidean(places: Floats) -> Floats:
     return np.where(t < r, t + 1.0, t)
 
 
-PI, RADIUS = 3.141592, 6378.388
-"""As TSPLIB has them; kilometres."""
+TSPLIB_PI = 3.141592
+"""Format of TSPLIB: its value of pi."""
+
+TSPLIB_RADIUS_KM = 6378.388
+"""Format of TSPLIB: its radius of the earth, km."""
 
 
 def _geographical(places: Floats) -> Floats:
-    """Of degrees and minutes, as DDD.MM. TSPLIB's document rounds the degrees; its own optima are
-    those of degrees cut off, which solvers therefore use."""
+    """Return distances between places in degrees and minutes, as DDD.MM.
+
+    TSPLIB's document rounds the degrees; its published optima are those of truncated degrees, which
+    solvers therefore use.
+    """
     degrees = np.trunc(places)
-    radians = PI * (degrees + 5.0 * (places - degrees) / 3.0) / 180.0
+    radians = TSPLIB_PI * (degrees + 5.0 * (places - degrees) / 3.0) / 180.0
     latitude, longitude = radians.T
     q1 = np.cos(longitude[:, None] - longitude[None, :])
     q2 = np.cos(latitude[:, None] - latitude[None, :])
     q3 = np.cos(latitude[:, None] + latitude[None, :])
     inner = np.clip(0.5 * ((1.0 + q1) * q2 - (1.0 - q1) * q3), -1.0, 1.0)
-    return np.asarray(np.trunc(RADIUS * np.arccos(inner) + 1.0))
+    return np.asarray(np.trunc(TSPLIB_RADIUS_KM * np.arccos(inner) + 1.0))
 
 
 METRICS: dict[str, tuple[int, Callable[[Floats], Floats]]] = {
@@ -70,4 +76,4 @@ METRICS: dict[str, tuple[int, Callable[[Floats], Floats]]] = {
     "ATT": (2, _pseudo_euclidean),
     "GEO": (2, _geographical),
 }
-"""Name → number of coordinates, (n, n) distances of (n, k) places."""
+"""Name → number k of coordinates, and function from places (n, k) to distances (n, n)."""

@@ -7,30 +7,26 @@ from netsp.gtsp.travel.result import Result
 
 
 def tour_text(instance: Instance, result: Result) -> str:
-    """The file.
+    """Return a tour as the text of a file, with length, bound and status in its comment.
 
     Parameters
     ----------
     instance : Instance
-        Its problem.
+        Problem of the tour.
     result : Result
-        With a tour.
-
-    Returns
-    -------
-    str
-        Vertices count from 1; length, bound and status are in the comment.
+        Result with a tour.
     """
     vertices = result.tour or ()
     bound = "no bound" if result.bound is None else result.bound.says(digits=12)
-    return "\n".join([
+    lines = [
         f"NAME : {instance.name}.tour",
         f"COMMENT : length {result.length:.12g}, {bound}, {result.status.value}",
         "TYPE : TOUR",
         f"DIMENSION : {len(vertices)}",
         "TOUR_SECTION",
-        *(str(v + 1) for v in vertices),
+        *(str(v + 1) for v in vertices),  # vertices count from 1
         "-1",
         "EOF",
         "",
-    ])  # fmt: skip
+    ]
+    return "\n".join(lines)

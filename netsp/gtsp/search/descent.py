@@ -16,13 +16,17 @@ from netsp.gtsp.search.links import Links, Tables, best_place, link, put, take_o
 def descend(
     order: Ints, tables: Tables, links: Links, chance: npt.NDArray[np.uint64], stop: Ints
 ) -> float:
-    """Take every cluster out and put it back where it costs least, until nothing improves; return
-    the length. ``links`` are those of the order, before and after.
+    """Move each cluster to where it costs least until no move shortens the tour.
 
-    The tables of the links carry the rounding of the largest numbers that went through them. A gain
-    within that rounding counts only if the tour is shorter when it is measured afresh. A length
-    that is measured afresh depends on the order alone, and it falls from pass to pass, so the
-    descent ends whatever the costs are.
+    ``links`` are those of the order, before and after. The tables of the links carry the rounding
+    of the largest numbers that went through them, so a gain within that rounding counts only if the
+    tour is shorter when measured afresh. That length depends on the order alone and falls from pass
+    to pass, so the descent ends whatever the costs are.
+
+    Returns
+    -------
+    float
+        Length of the tour.
     """
     start, costs, nearest, near, first, beside, _, before, min_gain, rounding = tables
     after, prior, ahead, behind, grown, rest = links
@@ -39,9 +43,23 @@ def descend(
             was = prior[c]
             d = take_out(c, after, prior, start, costs, ahead, behind, grown, rest, row)
             p, more = best_place(
-                c, after, prior, start, costs, nearest, near, first, beside, before, ahead, behind,
-                rest, place, 0.0, chance,
-            )  # fmt: skip
+                c,
+                after,
+                prior,
+                start,
+                costs,
+                nearest,
+                near,
+                first,
+                beside,
+                before,
+                ahead,
+                behind,
+                rest,
+                place,
+                0.0,
+                chance,
+            )
             gain = -(d + more)
             if p != was and gain > min_gain * length:
                 if gain > rounding or _is_shorter(
@@ -67,11 +85,20 @@ def descend(
 
 @kernel
 def _is_shorter(
-    c: int, p: int, was: int, min_gain: float, after: Ints, prior: Ints, start: Ints,
-    costs: Floats, work: Ints,
-) -> bool:  # fmt: skip
-    """Measure the tour with cluster c, which is out of it, after p and after the cluster where it
-    was, and return whether the former is shorter. `work` is room for an order."""
+    c: int,
+    p: int,
+    was: int,
+    min_gain: float,
+    after: Ints,
+    prior: Ints,
+    start: Ints,
+    costs: Floats,
+    work: Ints,
+) -> bool:
+    """Return whether the tour, measured afresh, is shorter with cluster c after p than after `was`.
+
+    Cluster c is out of the tour; `work` is room for an order.
+    """
     _write_order_with(c, was, after, work)
     length, _ = best_classes(work[1:], start, costs)
     _write_order_with(c, p, after, work)
@@ -81,7 +108,7 @@ def _is_shorter(
 
 @kernel
 def _write_order_with(c: int, p: int, after: Ints, order: Ints) -> None:
-    """Write the clusters down in their order, base first, with cluster c after p."""
+    """Write the clusters into `order`, base first, with cluster c after p."""
     x, k = 0, 0
     while k < len(order):
         order[k] = x
@@ -94,9 +121,11 @@ def _write_order_with(c: int, p: int, after: Ints, order: Ints) -> None:
 
 @kernel
 def two_opt(order: Ints, tables: Tables, stop: Ints) -> float:
-    """Reverse stretches of the order as long as that shortens the tour; candidates are those whose
-    two new legs could be shorter than the two old ones; return the length. Lengths are measured
-    afresh, so they fall from move to move, and it ends whatever the costs are."""
+    """Reverse stretches of the order as long as that shortens the tour, and return its length.
+
+    Stretches are tried whose two new legs could be shorter than the two old ones. Lengths are
+    measured afresh, so they fall from move to move, and the descent ends whatever the costs are.
+    """
     start, costs, nearest, before = tables.start, tables.costs, tables.nearest, tables.before
     n = len(order)
     work = order.copy()
@@ -108,7 +137,7 @@ def two_opt(order: Ints, tables: Tables, stop: Ints) -> float:
             for j in range(i + 1, n):
                 if stop[0] != 0:
                     return float(length)
-                if len(before) > 0 and _bound_to_any(order, i, j, before):
+                if len(before) > 0 and _precedes_any(order, i, j, before):
                     break
                 after = (j + 1) % n
                 old = costs[tour[i - 1], tour[i]] + costs[tour[j], tour[after]]
@@ -126,6 +155,6 @@ def two_opt(order: Ints, tables: Tables, stop: Ints) -> float:
 
 
 @kernel
-def _bound_to_any(order: Ints, i: int, j: int, before: Bools) -> bool:
-    """Whether a cluster from position i on must come before the one at position j."""
+def _precedes_any(order: Ints, i: int, j: int, before: Bools) -> bool:
+    """Return whether a cluster from position i on must come before the one at position j."""
     return bool(before[order[i:j], order[j]].any())

@@ -1,4 +1,4 @@
-"""For a fixed order of goals the best classes are a shortest path through layers."""
+"""Vertices grouped by cluster, and the best of them for a fixed order of clusters."""
 
 from __future__ import annotations
 
@@ -11,22 +11,18 @@ import numpy.typing as npt
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.compiled.interpretation import interprets
 from netsp.base.compiled.kernel import kernel
-from netsp.gtsp.search.links import EVEN
+from netsp.base.deprecated import deprecated_method
+from netsp.gtsp.gtsp_policy import LocalSearchPolicy
+from netsp.gtsp.search.links import EQUAL_LENGTHS
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.model.arrangement import UNORDERED
 
-NEAR = 12
-"""A cluster is put back next to one of so many nearest clusters."""
-
-RANKED = 60
-"""Neighbours of a cluster that are taken out with it."""
-
 MIN_GAIN = 1e-9
-"""Least relative saving of an accepted move, if costs are not whole numbers. Lengths of legs are
-accurate to about this share."""
+"""Tolerance of the saving of an accepted move, relative to the length, if costs are not whole
+numbers: lengths of legs are accurate to about this share."""
 
-EXACT = 2.0**53
-"""Limit below which double precision adds whole numbers without rounding."""
+MAX_EXACT_SUM = 2.0**53
+"""Tolerance of whole numbers: up to this size double precision adds them without rounding."""
 
 
 class Instance:
@@ -37,16 +33,24 @@ class Instance:
     cluster : ndarray of int, shape (V,)
         Cluster of each vertex.
     costs : ndarray, shape (V, V)
-        Leg costs; where there is no leg (inf), a cost that no tour of legs alone can reach is put.
+        Costs of legs. A missing leg (inf) gets a cost that no tour of existing legs reaches.
     labels : ndarray of int, shape (V,), optional
-        What the vertices are called outside.
+        Vertices of the travel graph; by default the positions.
     before : ndarray of bool, optional
         Which clusters come before which (`TravelGraph.before`).
+    policy : LocalSearchPolicy
+        Policy of searches over this instance.
     """
 
     def __init__(
-        self, cluster: Ints, costs: Floats, labels: Ints | None = None, before: Bools = UNORDERED
+        self,
+        cluster: Ints,
+        costs: Floats,
+        labels: Ints | None = None,
+        before: Bools = UNORDERED,
+        policy: LocalSearchPolicy = LocalSearchPolicy(),
     ) -> None:
+        self.policy = policy
         self.before = before
         self.clusters = int(cluster.max()) + 1
         self.order: Ints = np.argsort(cluster, kind="stable").astype(np.int64)
@@ -56,69 +60,70 @@ class Instance:
         self.labels = self.order if labels is None else labels[self.order]
         grouped = costs[np.ix_(self.order, self.order)]
         finite = np.isfinite(grouped)
-        most = float(np.max(grouped[finite], initial=0.0))
-        self.penalty = 2.0 * self.clusters * most + 1.0
+        largest = float(np.max(grouped[finite], initial=0.0))
+        self.penalty = 2.0 * self.clusters * largest + 1.0
         grouped[~finite] = self.penalty
         self.costs: Floats = np.ascontiguousarray(grouped)
-        self._largest_cost = most if finite.all() else self.penalty
+        self._largest_cost = largest if finite.all() else self.penalty
 
     @cached_property
     def min_gain(self) -> float:
-        """Least relative saving of an accepted move; 0 if lengths are exact."""
+        """Minimum relative saving of an accepted move; 0 if lengths are exact."""
         sums = (self.clusters + 1) * self._largest_cost
-        exact = sums < EXACT and bool((self.costs == np.rint(self.costs)).all())
+        exact = sums < MAX_EXACT_SUM and bool((self.costs == np.rint(self.costs)).all())
         return 0.0 if exact else MIN_GAIN
 
     @property
     def rounding(self) -> float:
         """Largest gain that rounding may cause in the tables of `netsp.gtsp.search.links`: the
-        share `EVEN` of the highest cost for each cluster, ahead and behind."""
-        return 2.0 * (self.clusters + 1) * EVEN * self._largest_cost
+        share `EQUAL_LENGTHS` of the largest cost for each cluster, ahead and behind."""
+        return 2.0 * (self.clusters + 1) * EQUAL_LENGTHS * self._largest_cost
 
     @classmethod
-    def of(cls, graph: TravelGraph) -> Instance:
-        """All of a travel graph.
+    def of_graph(
+        cls, graph: TravelGraph, policy: LocalSearchPolicy = LocalSearchPolicy()
+    ) -> Instance:
+        """Return an instance of all vertices of a travel graph, whose legs are measured.
 
         Parameters
         ----------
         graph : TravelGraph
-            The graph; its legs are measured.
-
-        Returns
-        -------
-        Instance
-            All its vertices.
+            Travel graph.
+        policy : LocalSearchPolicy
+            Policy of searches.
         """
-        return cls(graph.cluster, graph.costs, before=graph.before)
+        return cls(graph.cluster, graph.costs, before=graph.before, policy=policy)
+
+    of = deprecated_method("of", "of_graph")
 
     @classmethod
-    def among(cls, graph: TravelGraph, core: Ints) -> Instance:
-        """Some vertices of a travel graph.
+    def among(
+        cls, graph: TravelGraph, core: Ints, policy: LocalSearchPolicy = LocalSearchPolicy()
+    ) -> Instance:
+        """Return an instance of some vertices of a travel graph, whose legs are measured.
 
         Parameters
         ----------
         graph : TravelGraph
-            The graph; the legs among these vertices are measured.
+            Travel graph.
         core : ndarray of int
-            The vertices, the base first.
-
-        Returns
-        -------
-        Instance
-            These vertices.
+            Vertices, the base first.
+        policy : LocalSearchPolicy
+            Policy of searches.
         """
         if len(core) == len(graph):
-            return cls.of(graph)
-        return cls(graph.cluster[core], graph.costs_among(core), core, graph.before)
+            return cls.of_graph(graph, policy)
+        costs = graph.costs_among(core)
+        return cls(graph.cluster[core], costs, core, graph.before, policy)
 
     @property
     def largest(self) -> int:
-        """Most vertices of a cluster."""
+        """Number of vertices of the largest cluster."""
         return int(np.diff(self.start).max())
 
     @cached_property
     def cluster_costs(self) -> Floats:
-        """(m + 1, m + 1) least leg cost between clusters; inf on the diagonal."""
+        """(m + 1, m + 1) minimum cost of a leg between clusters; inf on the diagonal."""
         rows = np.minimum.reduceat(self.costs, self.start[:-1], axis=0)
         out = np.minimum.reduceat(rows, self.start[:-1], axis=1)
         np.fill_diagonal(out, np.inf)
@@ -126,44 +131,44 @@ class Instance:
 
     @cached_property
     def rank(self) -> Ints:
-        """(m + 1, k) clusters nearest to each, nearest first; the base is among them."""
+        """(m + 1, k) nearest clusters of each, the base among them, nearest first."""
         d = self.cluster_costs
-        return np.argsort(d, axis=1, kind="stable")[:, : min(RANKED, len(d) - 1)]
+        count = min(self.policy.ruined_neighbours, len(d) - 1)
+        return np.argsort(d, axis=1, kind="stable")[:, :count]
 
     @cached_property
     def near(self) -> npt.NDArray[np.bool_]:
-        """(m + 1, m + 1) whether one of two clusters is among the `NEAR` nearest of the other."""
+        """(m + 1, m + 1) whether a cluster may be inserted next to another, because one of the two
+        is among the nearest of the other."""
         out = np.zeros_like(self.cluster_costs, dtype=bool)
-        out[np.arange(len(out))[:, None], self.rank[:, :NEAR]] = True
+        out[np.arange(len(out))[:, None], self.rank[:, : self.policy.near_clusters]] = True
         return np.asarray(out | out.T)
 
     @cached_property
     def beside(self) -> tuple[Ints, Ints]:
-        """Next to which clusters each is put: where those of each begin (m + 2,), and all of them,
-        the nearest first."""
+        """Clusters that each may be inserted next to, nearest first: where those of each begin
+        (m + 2,), and all of them."""
         c, p = np.nonzero(self.near)
         order = np.lexsort((self.cluster_costs[c, p], c))
         return np.searchsorted(c, np.arange(len(self.near) + 1)), p[order]
 
     def original(self, tour: npt.ArrayLike) -> tuple[int, ...]:
-        """Labels of the vertices at positions in `order`.
+        """Return the labels of positions in `order`.
 
         Parameters
         ----------
         tour : array_like of int
             Positions.
-
-        Returns
-        -------
-        tuple of int
-            Labels.
         """
         return tuple(int(v) for v in self.labels[np.asarray(tour, dtype=np.int64)])
 
 
 @kernel
 def best_classes(clusters: Ints, start: Ints, costs: Floats) -> tuple[float, Ints]:
-    """Length and vertices (base first) of the best tour that visits clusters in the given order."""
+    """Return length and vertices (base first) of the best tour that visits clusters in an order.
+
+    It is a shortest path through layers.
+    """
     n = len(clusters)
     largest = 0
     for k in range(n):

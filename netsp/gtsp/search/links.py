@@ -1,16 +1,19 @@
-"""A tour as links between clusters, with what every place in it costs.
+"""A tour as links between clusters, with what each place in it costs.
 
 For each cluster c of the tour, ``ahead[c, j]`` is the shortest path from the base through all
-clusters before it to its vertex j, less the least of them over j, and ``grown[c]`` by how much that
-least is longer than that of the cluster before; ``behind[c, j]`` and ``rest[c]`` are the same for
-paths home. The base begins and ends the tour: ``rest[0]`` is of its first leg, ``grown[0]`` of its
-last. The tour's length is the sum of ``grown``; with vertex i of p and l of q, its successor,
-``min ahead[p, i] + c_ij + c_jl + behind[q, l]`` less ``min ahead[p, i] + c_il + behind[q, l]`` is
-what cluster c costs between them, every class of every other goal chosen anew.
+clusters before it to its vertex j, less the minimum over j, and ``grown[c]`` is the increase of
+that minimum over the one of the cluster before; ``behind[c, j]`` and ``rest[c]`` are the same for
+paths home. The base begins and ends the tour: ``rest[0]`` belongs to its first leg, ``grown[0]`` to
+its last. The tour's length is the sum of ``grown``. Between p and its successor q, cluster c costs
 
-Both tables are known up to a constant for each cluster only, so a change is written down as far as
-it changes which classes are best, and no farther: seldom more than a few clusters, however long the
-tour is. Legs are the same in either sense.
+    min over i, j, l of ahead[p, i] + c_ij + c_jl + behind[q, l]
+    less min over i, l of ahead[p, i] + c_il + behind[q, l],
+
+where the vertex of every other cluster is chosen anew.
+
+Both tables are known up to a constant for each cluster. So a change is written only as far as it
+changes which vertices are best, which is seldom more than a few clusters, however long the tour.
+Costs are symmetric.
 """
 
 from __future__ import annotations
@@ -25,19 +28,20 @@ from netsp.base.compiled.interpretation import interprets
 from netsp.base.compiled.kernel import kernel
 from netsp.base.compiled.rng import uniform
 
-EVEN = 1e-13
-"""Relative difference up to which two lengths are equal. Each table may be off by this share of its
-largest number at every cluster along the tour (`netsp.gtsp.search.layers.Instance.rounding`)."""
+EQUAL_LENGTHS = 1e-13
+"""Tolerance, relative, within which two lengths are equal. At each cluster along the tour a table
+may be off by this share of its largest number (`netsp.gtsp.search.layers.Instance.rounding`)."""
 
 
 class Tables(NamedTuple):
-    """Of an instance: where the vertices of each cluster begin; legs; least legs between clusters
-    (m + 1, m + 1); whether a cluster is put next to another, and for each cluster c to which, from
-    first[c] to first[c + 1] of ``beside``; the nearest clusters of each (m + 1, k), nearest first;
-    which clusters come before which, (0, 0) for none; the share of the tour's length that a move
-    must save to count, and the gain that rounding in the tables of the links may feign
-    (`netsp.gtsp.search.layers.Instance`). The kernels that are called most take what they need of
-    it one by one: handing a tuple of arrays on costs them more than the work."""
+    """What an instance holds for kernels.
+
+    ``nearest`` is (m + 1, m + 1), ``rank`` (m + 1, k). The clusters that cluster c may be inserted
+    next to are ``beside[first[c]:first[c + 1]]``, as in ``near``. ``min_gain`` is the share of the
+    tour's length that a move must save, ``rounding`` the gain that rounding may feign
+    (`netsp.gtsp.search.layers.Instance`). The kernels that are called most often get these arrays
+    one by one, because passing a tuple of arrays on would cost more than their work.
+    """
 
     start: Ints
     costs: Floats
@@ -52,8 +56,7 @@ class Tables(NamedTuple):
 
 
 class Links(NamedTuple):
-    """Of a tour: the clusters after and before each, -1 for one that is out of it; the tables of
-    the module."""
+    """A tour: the clusters after and before each, -1 for one that is out of it, and its tables."""
 
     after: Ints
     prior: Ints
@@ -64,7 +67,7 @@ class Links(NamedTuple):
 
 
 def no_links(clusters: int, largest: int) -> Links:
-    """Links to be filled, of so many clusters, the base included, of so many vertices at most."""
+    """Return empty links of some clusters, the base included, of at most `largest` vertices."""
     ahead, behind = np.zeros((2, clusters, largest))
     grown, rest = np.zeros((2, clusters))
     after, prior = np.full((2, clusters), -1, dtype=np.int64)
@@ -73,14 +76,23 @@ def no_links(clusters: int, largest: int) -> Links:
 
 @kernel
 def carry_on(
-    c: int, sure: int, after: Ints, prior: Ints, start: Ints, costs: Floats, ahead: Floats,
-    grown: Floats, row: Floats,
-) -> float:  # fmt: skip
-    """Fill ``ahead`` and ``grown`` from cluster c on, until a cluster after the next `sure` ones
-    has what it had; returns by how much the tour has become longer. With ``after`` and ``prior``
-    exchanged it is ``behind`` and ``rest`` that are filled, towards the base. What is there already
-    stays where it is within rounding: were it written again and again without those after it, they
-    would drift apart."""
+    c: int,
+    sure: int,
+    after: Ints,
+    prior: Ints,
+    start: Ints,
+    costs: Floats,
+    ahead: Floats,
+    grown: Floats,
+    row: Floats,
+) -> float:
+    """Fill ``ahead`` and ``grown`` from cluster c on, and return the change of the tour's length.
+
+    It ends at a cluster, after the next `sure` ones, whose numbers do not change. With ``after``
+    and ``prior`` exchanged it fills ``behind`` and ``rest``, towards the base. Numbers that are
+    equal within rounding are not rewritten: if they were, without those after them, the tables
+    would drift apart.
+    """
     longer = 0.0
     while True:
         p, begin, size = prior[c], start[c], start[c + 1] - start[c]
@@ -101,7 +113,7 @@ def carry_on(
             return float(longer)
         even = sure <= 0
         for j in range(size):
-            if abs(row[j] - least - ahead[c, j]) > EVEN * row[j]:
+            if abs(row[j] - least - ahead[c, j]) > EQUAL_LENGTHS * row[j]:
                 even = False
         if even:
             return float(longer)
@@ -113,9 +125,16 @@ def carry_on(
 
 @interprets(carry_on)
 def _carry_on_in_numpy(
-    c: int, sure: int, after: Ints, prior: Ints, start: Ints, costs: Floats, ahead: Floats,
-    grown: Floats, row: Floats,
-) -> float:  # fmt: skip
+    c: int,
+    sure: int,
+    after: Ints,
+    prior: Ints,
+    start: Ints,
+    costs: Floats,
+    ahead: Floats,
+    grown: Floats,
+    row: Floats,
+) -> float:
     """Vectorise `carry_on` over the vertices of a cluster."""
     longer = 0.0
     while True:
@@ -129,7 +148,7 @@ def _carry_on_in_numpy(
         if c == 0:
             return longer
         rest = best - least
-        if sure <= 0 and not (np.abs(rest - ahead[c, : len(best)]) > EVEN * best).any():
+        if sure <= 0 and not (np.abs(rest - ahead[c, : len(best)]) > EQUAL_LENGTHS * best).any():
             return longer
         ahead[c, : len(best)] = rest
         sure -= 1
@@ -138,7 +157,7 @@ def _carry_on_in_numpy(
 
 @kernel
 def link(order: Ints, links: Links, start: Ints, costs: Floats, row: Floats) -> float:
-    """Link clusters in an order, base first, and fill the tables; returns the tour's length."""
+    """Link clusters in an order, base first, fill the tables, and return the tour's length."""
     after, prior, ahead, behind, grown, rest = links
     n = len(order)
     after[:], prior[:] = -1, -1
@@ -152,7 +171,7 @@ def link(order: Ints, links: Links, start: Ints, costs: Floats, row: Floats) -> 
 
 @kernel
 def tour_length(after: Ints, grown: Floats) -> float:
-    """Length of the tour."""
+    """Return the length of the tour."""
     length, c = grown[0], after[0]
     while c != 0:
         length += grown[c]
@@ -162,7 +181,7 @@ def tour_length(after: Ints, grown: Floats) -> float:
 
 @kernel
 def write_order(after: Ints, order: Ints) -> None:
-    """Write the clusters of the tour down in their order, base first."""
+    """Write the clusters of the tour into `order`, base first."""
     c = 0
     for k in range(len(order)):
         order[k] = c
@@ -171,10 +190,19 @@ def write_order(after: Ints, order: Ints) -> None:
 
 @kernel
 def put(
-    c: int, p: int, after: Ints, prior: Ints, start: Ints, costs: Floats, ahead: Floats,
-    behind: Floats, grown: Floats, rest: Floats, row: Floats,
-) -> float:  # fmt: skip
-    """Put cluster c after p; returns by how much the tour has become longer."""
+    c: int,
+    p: int,
+    after: Ints,
+    prior: Ints,
+    start: Ints,
+    costs: Floats,
+    ahead: Floats,
+    behind: Floats,
+    grown: Floats,
+    rest: Floats,
+    row: Floats,
+) -> float:
+    """Insert cluster c after p and return the change of the tour's length."""
     q = after[p]
     after[p], prior[c], after[c], prior[q] = c, p, q, c
     carry_on(c, 1, prior, after, start, costs, behind, rest, row)
@@ -183,10 +211,18 @@ def put(
 
 @kernel
 def take_out(
-    c: int, after: Ints, prior: Ints, start: Ints, costs: Floats, ahead: Floats,
-    behind: Floats, grown: Floats, rest: Floats, row: Floats,
-) -> float:  # fmt: skip
-    """Take a cluster out; returns by how much the tour has become longer, a number below 0."""
+    c: int,
+    after: Ints,
+    prior: Ints,
+    start: Ints,
+    costs: Floats,
+    ahead: Floats,
+    behind: Floats,
+    grown: Floats,
+    rest: Floats,
+    row: Floats,
+) -> float:
+    """Remove cluster c and return the change of the tour's length, which is negative."""
     p, q, own = prior[c], after[c], grown[c]
     after[p], prior[q], after[c], prior[c] = q, p, -1, -1
     grown[c] = 0.0
@@ -196,68 +232,99 @@ def take_out(
 
 @kernel
 def between(
-    c: int, p: int, most: float, after: Ints, start: Ints, costs: Floats, nearest: Floats,
-    ahead: Floats, behind: Floats, rest: Floats,
-) -> float:  # fmt: skip
-    """By how much the best tour becomes longer with cluster c after p; `most` if by no less."""
+    c: int,
+    p: int,
+    limit: float,
+    after: Ints,
+    start: Ints,
+    costs: Floats,
+    nearest: Floats,
+    ahead: Floats,
+    behind: Floats,
+    rest: Floats,
+) -> float:
+    """Return by how much cluster c after p lengthens the best tour; `limit` if by at least that."""
     q = after[p]
     now = np.inf
     for i in range(start[p + 1] - start[p]):
         now = min(now, ahead[p, i] + behind[p, i])
     now += rest[p]
     # no leg is shorter than the least between its clusters, and both tables are 0 or more
-    if nearest[p, c] + nearest[c, q] - now >= most:
-        return most
-    limit = most + now
-    best = limit
+    if nearest[p, c] + nearest[c, q] - now >= limit:
+        return limit
+    bar = limit + now
+    best = bar
     for j in range(start[c], start[c + 1]):
-        there = np.inf
+        reached = np.inf
         for i in range(start[p], start[p + 1]):
             d = ahead[p, i - start[p]] + costs[j, i]
-            if d < there:
-                there = d
-        if there >= best:
+            if d < reached:
+                reached = d
+        if reached >= best:
             continue
         for i in range(start[q], start[q + 1]):
-            d = there + costs[j, i] + behind[q, i - start[q]]
+            d = reached + costs[j, i] + behind[q, i - start[q]]
             if d < best:
                 best = d
-    return best - now if best < limit else most
+    return best - now if best < bar else limit
 
 
 @interprets(between)
 def _between_in_numpy(
-    c: int, p: int, most: float, after: Ints, start: Ints, costs: Floats, nearest: Floats,
-    ahead: Floats, behind: Floats, rest: Floats,
-) -> float:  # fmt: skip
+    c: int,
+    p: int,
+    limit: float,
+    after: Ints,
+    start: Ints,
+    costs: Floats,
+    nearest: Floats,
+    ahead: Floats,
+    behind: Floats,
+    rest: Floats,
+) -> float:
     """Vectorise `between` over the vertices of the clusters."""
     q = after[p]
     left, right = start[p], start[q]
     left_end, right_end = start[p + 1], start[q + 1]
     far = ahead[p, : left_end - left]
     now = float(np.fmin.reduce(far + behind[p, : left_end - left]) + rest[p])
-    if nearest[p, c] + nearest[c, q] - now >= most:
-        return most
-    limit = float(most + now)
+    if nearest[p, c] + nearest[c, q] - now >= limit:
+        return limit
+    bar = float(limit + now)
     legs = costs[start[c] : start[c + 1]]
-    there = np.fmin.reduce(legs[:, left:left_end] + far, 1)
-    onward = there[:, None] + legs[:, right:right_end]
+    reached = np.fmin.reduce(legs[:, left:left_end] + far, 1)
+    onward = reached[:, None] + legs[:, right:right_end]
     onward += behind[q, : right_end - right]
     best = float(np.fmin.reduce(onward, None))
-    return best - now if best < limit else most
+    return best - now if best < bar else limit
 
 
 @kernel
 def best_place(
-    c: int, after: Ints, prior: Ints, start: Ints, costs: Floats, nearest: Floats, near: Bools,
-    first: Ints, beside: Ints, before: Bools, ahead: Floats, behind: Floats, rest: Floats,
-    place: Ints, blink: float, chance: npt.NDArray[np.uint64],
-) -> tuple[int, float]:  # fmt: skip
-    """After which cluster c costs least, and by how much the tour becomes longer: next to one of
-    its near clusters, or at either end of the stretch between those that come before and after it,
-    without precedences the base. With precedences closed transitively there is such a stretch,
-    whatever is still to be put back. Other places than its ends are overlooked with the chance
-    `blink`; `place` is room for the places of clusters in the order."""
+    c: int,
+    after: Ints,
+    prior: Ints,
+    start: Ints,
+    costs: Floats,
+    nearest: Floats,
+    near: Bools,
+    first: Ints,
+    beside: Ints,
+    before: Bools,
+    ahead: Floats,
+    behind: Floats,
+    rest: Floats,
+    place: Ints,
+    blink: float,
+    chance: npt.NDArray[np.uint64],
+) -> tuple[int, float]:
+    """Return the cluster after which cluster c costs least, and what it costs there.
+
+    Places are next to one of its near clusters, and at either end of the stretch between those that
+    must come before and after it, without precedences next to the base. With precedences closed
+    transitively there is such a stretch, whatever remains to be inserted. Other places than its
+    ends are skipped with probability `blink`. `place` is room for the places of clusters.
+    """
     low, high = 0, prior[0]
     if len(before) > 0:
         x, k = after[0], 1
@@ -281,7 +348,7 @@ def best_place(
         if k % 2 == 1:
             p = prior[p]
             if near[c, p]:
-                continue  # the place after that one
+                continue  # tried as the place after that one
         if p in (low, high):
             continue
         if len(before) > 0 and not place[low] <= place[p] <= place[high]:

@@ -13,17 +13,7 @@ from netsp.base.compiled.rng import seeded
 from netsp.gtsp.search.descent import descend, two_opt
 from netsp.gtsp.search.layers import Instance, best_classes
 from netsp.gtsp.search.links import Tables, link, no_links
-from netsp.gtsp.search.ruin import ruin_and_recreate
-
-HOT, COLD = 1.0, 2e-2
-"""First and last temperature of ruin and recreate, in mean legs of the tour. A tenth of the first
-ends in the same poor tour from most starts, with few rounds and with many."""
-
-STEPS = 100
-"""Temperatures from first to last, when the rounds are limited."""
-
-CHUNK_SECONDS = 0.02
-"""About the time between two looks at the clock."""
+from netsp.gtsp.search.ruin import StringPolicy, ruin_and_recreate
 
 
 def local_search(
@@ -34,29 +24,29 @@ def local_search(
     clock: Clock,
     start_order: npt.ArrayLike | None = None,
 ) -> tuple[float, tuple[int, ...]]:
-    """The best tour after rounds of ruin and recreate, or when the clock runs out.
+    """Return the best tour after rounds of ruin and recreate, or when the clock runs out.
 
-    Deterministic by `rng` as long as the clock does not run out.
+    Until the clock runs out, the result depends on `rng` alone.
 
     Parameters
     ----------
     instance : Instance
-        What is searched.
+        Instance that is searched.
     rng : numpy.random.Generator
-        Of all that is random.
+        Random generator.
     rounds : int
         Rounds of ruin and recreate.
     clock : Clock
-        Ends it.
+        Clock that ends the search.
     start_order : array_like of int, optional
-        Clusters in the order to start from; by default a random one.
+        Clusters in the order to start from; by default by farthest insertion.
 
     Returns
     -------
     length : float
-        Its length.
+        Length of the tour.
     tour : tuple of int
-        Its vertices in the travel graph.
+        Vertices of the travel graph.
     """
     search = Search(instance, rng, start_order, clock)
     search.settle()
@@ -69,14 +59,10 @@ class Search:
 
     Parameters
     ----------
-    instance : Instance
-        What is searched.
-    rng : numpy.random.Generator
-        Of all that is random.
-    start_order : array_like of int, optional
-        Clusters in the order to start from; by default a random one.
+    instance, rng, start_order
+        As in `local_search`.
     clock : Clock, optional
-        Ends it.
+        Clock that ends the descent.
     """
 
     def __init__(
@@ -88,11 +74,9 @@ class Search:
     ) -> None:
         self.instance = instance
         self._stop = NEVER if clock is None else clock.flag
-        order = (
-            _insertion(instance.cluster_costs, instance.before)
-            if start_order is None else start_order
-        )  # fmt: skip
-        self.order: Ints = np.array(order, dtype=np.int64)
+        if start_order is None:
+            start_order = _farthest_insertion(instance.cluster_costs, instance.before)
+        self.order: Ints = np.array(start_order, dtype=np.int64)
         self._links = no_links(len(self.order), instance.largest)
         self._row = np.empty(instance.largest)
         self.chance = seeded(rng)
@@ -103,17 +87,24 @@ class Search:
     def _tables(self) -> Tables:
         i = self.instance
         return Tables(
-            i.start, i.costs, i.cluster_costs, i.near, *i.beside, i.rank, i.before, i.min_gain,
+            i.start,
+            i.costs,
+            i.cluster_costs,
+            i.near,
+            *i.beside,
+            i.rank,
+            i.before,
+            i.min_gain,
             i.rounding,
-        )  # fmt: skip
+        )
 
     def _link(self) -> None:
-        """Links of the present order."""
+        """Fill the links of the present order, and measure it."""
         i = self.instance
         self.length = link(self.order, self._links, i.start, i.costs, self._row)
 
     def settle(self) -> None:
-        """Descend to an order that no move of one cluster and no reversal improves."""
+        """Descend to an order that no move of one cluster and no reversal shortens."""
         n = len(self.order)
         before = np.inf
         while True:
@@ -131,51 +122,63 @@ class Search:
         rounds: float,
         clock: Clock,
         progress: Callable[[], float] | None = None,
-        tell: Callable[[int], None] | None = None,
+        on_chunk: Callable[[int], None] | None = None,
     ) -> None:
-        """Ruin and recreate, cooling from `HOT` to `COLD`.
+        """Ruin and recreate, cooling from the first temperature to the last.
 
         Parameters
         ----------
         rounds : float
             Rounds of ruin and recreate; inf for as long as the clock allows.
         clock : Clock
-            Ends it.
+            Clock that ends the search.
         progress : callable, optional
-            How far the cooling is, from 0 to 1; by default by the rounds.
-        tell : callable, optional
-            Called after every chunk with the number of rounds it had.
+            Returns how far the cooling is, from 0 to 1; by default that of the rounds.
+        on_chunk : callable, optional
+            Called after every chunk with the number of its rounds.
         """
+        policy = self.instance.policy
         n = len(self.order)
         self._link()
         done, chunk = 0, 1
         leg = self.length / n
-        # the temperature falls in steps of so many rounds, whatever the time that they take
-        step = 1 if progress else max(1, int(rounds) // STEPS)
+        # a temperature lasts a number of rounds, whatever time they take, so that runs repeat
+        step = 1 if progress else max(1, int(rounds) // policy.temperature_steps)
+        hot, cold = policy.first_temperature, policy.last_temperature
+        strings = StringPolicy(policy.max_string_length, policy.mean_removed, policy.blink_rate)
         while done < rounds and n > 3 and not clock.is_up:
             share = progress() if progress else (done - done % step) / rounds
-            theta = leg * HOT * (COLD / HOT) ** min(share, 1.0)
+            theta = leg * hot * (cold / hot) ** min(share, 1.0)
             count = int(min(chunk, rounds - done if progress else step - done % step))
             begin = clock.elapsed
             self.length, self.best_length = ruin_and_recreate(
-                self.order, self.best_order, self.length, self.best_length, count, theta,
-                self._tables, self._links, self.chance,
-            )  # fmt: skip
+                self.order,
+                self.best_order,
+                self.length,
+                self.best_length,
+                count,
+                theta,
+                self._tables,
+                self._links,
+                strings,
+                self.chance,
+            )
             done += count
-            if clock.elapsed - begin < CHUNK_SECONDS and chunk < max(1, rounds / STEPS):
+            was_short = clock.elapsed - begin < policy.min_chunk_s
+            if was_short and chunk < max(1, rounds / policy.temperature_steps):
                 chunk *= 2
-            if tell:
-                tell(count)
+            if on_chunk:
+                on_chunk(count)
 
     def best(self) -> tuple[float, tuple[int, ...]]:
-        """The best tour so far.
+        """Return the best tour so far.
 
         Returns
         -------
         length : float
-            Its length; inf if it would need a leg that there is not.
+            Length; inf if the tour needs a missing leg.
         tour : tuple of int
-            Its vertices.
+            Vertices of the travel graph.
         """
         i = self.instance
         length, tour = best_classes(self.best_order[1:], i.start, i.costs)
@@ -187,8 +190,11 @@ class Search:
             self.best_order[:] = self.order
 
 
-def _insertion(d: npt.NDArray[np.float64], before: Bools) -> Ints:
-    """Order of clusters, base first, by farthest insertion on the least legs between clusters."""
+def _farthest_insertion(d: npt.NDArray[np.float64], before: Bools) -> Ints:
+    """Return an order of clusters, base first, by farthest insertion.
+
+    `d` is the minimum cost of a leg between clusters.
+    """
     left = list(range(1, len(d)))
     tour = [0]
     while left:

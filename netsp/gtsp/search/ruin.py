@@ -1,14 +1,15 @@
-"""Ruin and recreate on orders of clusters, with the classes of every order chosen exactly.
+"""Ruin and recreate on orders of clusters, with the vertices of each order chosen exactly.
 
 Slack induction by string removals (Christiaens & Vanden Berghe 2020, "Slack induction by string
-removals for vehicle routing problems"), carried over to the generalised TSP: a stretch of the tour
-near a random goal is taken out, its clusters are put back one by one where they cost least
-(`netsp.gtsp.search.links`), and the new tour is accepted by simulated annealing.
+removals for vehicle routing problems"), adapted to the generalised TSP: strings of the tour near a
+random cluster are removed, their clusters are inserted one by one where they cost least
+(`netsp.gtsp.search.links`), and simulated annealing accepts the new tour or not.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -28,14 +29,13 @@ from netsp.gtsp.search.links import (
     write_order,
 )
 
-LONGEST_STRING = 10
-"""Most clusters in one removed stretch."""
 
-REMOVED = 10
-"""Average number of clusters removed together."""
+class StringPolicy(NamedTuple):
+    """Removal and insertion, for kernels (`netsp.gtsp.gtsp_policy.LocalSearchPolicy`)."""
 
-BLINK = 0.01
-"""Chance that a place is overlooked (same paper, section 3.3)."""
+    max_string_length: int
+    mean_removed: int
+    blink_rate: float
 
 
 @kernel
@@ -48,17 +48,24 @@ def ruin_and_recreate(
     theta: float,
     tables: Tables,
     links: Links,
+    policy: StringPolicy,
     chance: npt.NDArray[np.uint64],
 ) -> tuple[float, float]:
-    """Make `count` rounds at temperature θ, in place; returns the lengths of the present order and
-    of the best, which is kept in `best`. ``links`` are those of the present order, before and
-    after; they are never filled afresh in between, so that nothing depends on how rounds are
-    counted out. A round that is not accepted is undone by a copy of them."""
+    """Make `count` rounds at temperature `theta`, in place.
+
+    ``links`` are those of the present order, before and after. They are never filled afresh in
+    between, so that the result does not depend on how rounds are grouped into calls. A round that
+    is not accepted is undone by a copy of them.
+
+    Returns
+    -------
+    tuple of float
+        Lengths of the present order and of the best, which is in `best`.
+    """
     start, costs, nearest, near, first, beside, rank, before, _, rounding = tables
     n = len(order)
-    after, prior, ahead, behind = (
-        links.after.copy(), links.prior.copy(), links.ahead.copy(), links.behind.copy()
-    )  # fmt: skip
+    after, prior = links.after.copy(), links.prior.copy()
+    ahead, behind = links.ahead.copy(), links.behind.copy()
     grown, rest = links.grown.copy(), links.rest.copy()
     out = np.zeros(n, dtype=np.bool_)
     gone, place = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
@@ -66,8 +73,8 @@ def ruin_and_recreate(
     key, row = np.empty(n), np.empty(ahead.shape[1])
     for _ in range(count):
         # strings around clusters near a seed, as in the paper, section 3.1
-        longest = min(LONGEST_STRING, n - 1)
-        strings = int(uniform(chance) * (4.0 * REMOVED / (1.0 + longest))) + 1
+        longest = min(policy.max_string_length, n - 1)
+        strings = int(uniform(chance) * (4.0 * policy.mean_removed / (1.0 + longest))) + 1
         seed = 1 + below(n - 1, chance)
         removed = 0
         for r in range(-1, rank.shape[1]):
@@ -104,7 +111,7 @@ def ruin_and_recreate(
                 d += carry_on(q, 0, after, prior, start, costs, ahead, grown, row)
             if after[p] >= 0:
                 carry_on(p, 0, prior, after, start, costs, behind, rest, row)
-        # put back in random order, the farthest from the base first, or the nearest first
+        # inserted in random order, or farthest from the base first, or nearest first
         mode = below(4, chance)
         for r in range(removed):
             if mode == 0:
@@ -122,9 +129,23 @@ def ruin_and_recreate(
             gone[k + 1], key[k + 1] = c, x
         for r in range(removed):
             p, _ = best_place(
-                gone[r], after, prior, start, costs, nearest, near, first, beside, before, ahead,
-                behind, rest, place, BLINK, chance,
-            )  # fmt: skip
+                gone[r],
+                after,
+                prior,
+                start,
+                costs,
+                nearest,
+                near,
+                first,
+                beside,
+                before,
+                ahead,
+                behind,
+                rest,
+                place,
+                policy.blink_rate,
+                chance,
+            )
             d += put(gone[r], p, after, prior, start, costs, ahead, behind, grown, rest, row)
         if d < length - theta * math.log(max(uniform(chance), 1e-300)):
             _write(links, Links(after, prior, ahead, behind, grown, rest))
@@ -153,8 +174,10 @@ def _write(to: Links, links: Links) -> None:
 
 @kernel
 def _is_shorter(after: Ints, best: Ints, start: Ints, costs: Floats, work: Ints) -> bool:
-    """Measure the tour and the best one afresh and return whether the tour is shorter: the tables
-    of the links carry the rounding of the largest numbers that went through them."""
+    """Measure the tour and the best one afresh, and return whether the tour is shorter.
+
+    The tables of the links carry the rounding of the largest numbers that went through them.
+    """
     write_order(after, work)
     measured, _ = best_classes(work[1:], start, costs)
     length, _ = best_classes(best[1:], start, costs)
