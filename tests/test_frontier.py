@@ -200,7 +200,7 @@ def test_nothing_that_is_ruled_out_is_in_the_optimum(seed):
 @given(st.integers(0, 10_000), st.integers(2, 7))
 def test_the_search_keeps_its_length_and_never_beats_brute_force(seed, goals):
     graph = random_graph(seed, goals=goals)
-    search = Search(Instance.of(graph), np.random.default_rng(seed))
+    search = Search(Instance.of_graph(graph), np.random.default_rng(seed))
     search.settle()
     settled = search.best_length
     search.run(50, Clock(None))

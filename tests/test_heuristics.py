@@ -83,7 +83,7 @@ def test_reduced_mip_is_optimal_over_the_classes_of_least_tether(seed):
 @given(st.integers(0, 1000), st.integers(1, 7), st.floats(0.01, 10.0))
 def test_the_annealed_length_is_that_of_the_tour(seed, goals, theta):
     g = random_graph(seed, goals=goals)
-    instance = Instance.of(g)
+    instance = Instance.of_graph(g)
     rng = np.random.default_rng(seed)
     tour = np.zeros(goals + 1, dtype=np.int64)
     for k, c in enumerate(rng.permutation(np.arange(1, goals + 1))):

@@ -81,7 +81,7 @@ def order_by_going_on(
     policy = policy or MissionPolicy()
     graph, points, start = waypoint_graph(mission, field, grid, clock, policy)
     given = [start.index(n) + 1 for n in range(len(mission.waypoints)) if n in start]
-    instance = Instance.of(graph)
+    instance = Instance.of_graph(graph)
     _, warm = best_classes(np.array(given), instance.start, instance.costs)
     result = solve_graph(
         graph,
