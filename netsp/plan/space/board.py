@@ -119,12 +119,12 @@ class StateGraph:
         """
         is_complete = True
         for v in range(len(self._out), len(self.states.entries)):
-            # one way to each waypoint there must be
+            # each waypoint needs one path, even if the time is up
             is_complete = is_complete and not clock.is_up
             is_first = self.states.at_place[self.states.entries[v].place][0] == v
             self._out.append(self._path_along_tether(v) if is_complete or is_first else None)
         if self.states.present is not None and self._out[self.states.present] is None:
-            # the robot is there, and may go back along its tether whatever the clearance
+            # the robot is at this state, and may go back along its tether whatever the clearance
             self._out[self.states.present] = np.vstack(
                 [self.context.start_tether.nodes[::-1], self.context.present_tether.nodes[1:]]
             )
@@ -279,7 +279,7 @@ class StateGraph:
         cluster = np.r_[0, 1 + np.unique(waypoint, return_inverse=True)[1]]
         try:
             graph = TravelGraph.from_costs(costs, cluster)
-        except InputError:  # some waypoint is joined to nothing any more
+        except InputError:  # a waypoint has no leg left
             return None
         if begin is not None:
             graph = from_state(graph, vertex[begin])
@@ -340,7 +340,7 @@ class StateGraph:
         """Drive a tour with the tether at its beginning, in the direction in which more of its legs
         were driven; if that fails, in the other. If both fail, return the first."""
         if self.states.present is not None:
-            return self._drive(tour)  # it begins elsewhere than it ends
+            return self._drive(tour)  # a tour that begins under way has one direction
         forward, backward = list(tour), list(tour)[::-1]
         if self._count_reversed_legs(forward) > self._count_reversed_legs(backward):
             forward, backward = backward, forward
@@ -377,8 +377,8 @@ class StateGraph:
             else:
                 word = context.words.multiply(word, leg_word)
             is_as_expected = word == (at_home if state < 0 else states.entries[state].word)
-            # first leg after which the tether lies otherwise than in its state, or in another
-            # class; no fault if the tether comes free in the end
+            # the first leg after which the tether differs from its state; it is no fault if the
+            # tether agrees with a later state
             if is_as_expected and hang_alike(tether, expected, delta):
                 first_deviation = None
             else:

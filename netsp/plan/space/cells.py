@@ -242,7 +242,7 @@ def mark_squares(marking: Marking) -> None:
 def is_covered(field: Field, centre: Floats, size: float, a: int, b: int, halvings: int) -> bool:
     """Return whether balls without solids cover an edge along axis a (b < 0) or a square along a
     and b."""
-    # (centre, half a side, halvings left) of the parts that are to be covered
+    # (centre, half a side, halvings left) of the parts still to cover
     parts, left = np.empty((4 * halvings + 8, 5)), 1
     parts[0, 0], parts[0, 1], parts[0, 2] = centre[0], centre[1], centre[2]
     parts[0, 3], parts[0, 4] = 0.5 * size, halvings

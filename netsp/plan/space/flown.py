@@ -103,7 +103,7 @@ def words_of_flight(
     )
     if run.scene is None or words.is_complete:
         return words
-    # where the map was wrong, the way may lead through what it shows
+    # if the map was wrong, the robot's path may lead through its solids
     at_end = _words_in_scene(
         run, PlanningContext.for_mission(mission, run.scene, run.scene.field())
     )
@@ -120,7 +120,7 @@ def _words_in_scene(run: Run, context: PlanningContext) -> FlownWords:
     for stop in run.summary["stops"]:
         k = int(stop["waypoint"])
         end = len(begin) + int(np.argmax(next_one > k))
-        # on to the waypoint itself: words of paths compare only where these end at the same place
+        # append the waypoint itself, because only words of paths with the same ends compare
         word, broken = words.try_word(np.vstack([places[: end + 1], mission.places[k]]))
         stops.append((k, None if broken is not None else word))
     word, broken = words.try_word(np.vstack([places, laid[::-1]]))

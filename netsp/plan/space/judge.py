@@ -152,7 +152,7 @@ class _Judge:
     def run(self) -> list[Check]:
         """Return all checks, in order."""
         within = self._check_extent()
-        if not within.passed:  # nothing is known of the water there
+        if not within.passed:  # there are no cells to judge by outside
             return [self._check_order(), within, self._check_length(), self._check_bounds()]
         return [
             self._check_order(),
@@ -306,7 +306,7 @@ class _Judge:
                 longest, longest_leg = longest_on_leg, k
             if k < len(self.tour.stops):
                 deviations += self._deviations(k, tether.length, longest_on_leg)
-        # as at the start, but to where the tour ends, which may be its reach away
+        # the tether at the start, led to the end of the tour, which may be `reach` away
         as_laid = model.update(laid, tether.robot)
         left = model.refine(tether).length - model.refine(as_laid).length
         limit = self.mission.tether_length

@@ -89,21 +89,21 @@ class _RemainingTour:
     ----------
     legs
         Path and tether length at its end of each leg, the path home last.
-    kept, lost
+    visited, blocked
         Numbers of the waypoints that it visits, and of waypoints with solids on them.
-    whole
+    is_complete
         Whether all legs are known.
-    old
-        Length as planned, metres.
+    planned_length
+        Length of the rest as planned, metres.
     reason
         Reason why the planned tour does not hold; None if it does.
     """
 
     legs: list[tuple[Floats, float]] = field(default_factory=list)
-    kept: list[int] = field(default_factory=list)
-    lost: list[int] = field(default_factory=list)
-    whole: bool = True
-    old: float = 0.0
+    visited: list[int] = field(default_factory=list)
+    blocked: list[int] = field(default_factory=list)
+    is_complete: bool = True
+    planned_length: float = 0.0
     reason: str | None = None
 
     @property
@@ -148,7 +148,7 @@ class RepairPlanner(PredictivePlanner):
             begin = time.process_time()
             try:
                 self._mend(robot, tether)
-            except Exception as error:  # a vehicle in the water must not be left without a command
+            except Exception as error:  # never leave a vehicle without a command
                 if interrupted(error):
                     raise KeyboardInterrupt from error
                 return self._hold(robot, error, time.process_time() - begin)
@@ -211,15 +211,15 @@ class RepairPlanner(PredictivePlanner):
         if rest.reason is None:
             self._note(KEPT, "the rest of the tour still holds", rest.length, begin)
             return
-        worth = rest.old + self.options.planning_limit * self.mission.speed
+        worth = rest.planned_length + self.options.planning_limit * self.mission.speed
         found, added = None, self._has_new_waypoint
         self._has_new_waypoint = False
-        if not self.is_homeward and (added or not rest.whole or rest.length > worth):
+        if not self.is_homeward and (added or not rest.is_complete or rest.length > worth):
             found = self._replan(robot, tether, rest, added)
         if found is not None:
             self._follow_plan(found)
             self._note(REPLANNED, f"{rest.reason}{_gaps_named(found)}", found.length, begin)
-        elif rest.whole:
+        elif rest.is_complete:
             self._follow_rest(rest)
             self._note(LOCAL, rest.reason, rest.length, begin)
         else:
@@ -236,16 +236,16 @@ class RepairPlanner(PredictivePlanner):
         tour = self.mission.tour
         assert tour is not None
         if self.index > len(tour.stops):
-            return None  # beyond the tour there are only waypoints that it does not reach
+            return None  # only waypoints that the tour leaves out remain
         rest, place = _RemainingTour(), robot
         for k in range(self.index, len(tour.stops) + 1):
             home = k == len(tour.stops)
             name = "the way home" if home else f"the way to waypoint #{k}"
             planned = np.array(tour.home if home else tour.stops[k].path)
-            rest.old += polylines.length(planned)
+            rest.planned_length += polylines.length(planned)
             if not home and self._is_lost(k):
                 rest.reason = rest.reason or f"a solid stands on waypoint #{k}"
-                rest.lost.append(k)
+                rest.blocked.append(k)
                 continue
             leg: Floats | None = np.vstack([place, planned])
             if k == self.index:
@@ -262,11 +262,11 @@ class RepairPlanner(PredictivePlanner):
                 if tether_after is not None and not self._is_free(tether_after):
                     tether_after = None
             if tether_after is None or leg is None:
-                rest.whole = False
+                rest.is_complete = False
                 break
             tether, place = tether_after, leg[-1]
             rest.legs.append((leg, tether.length))
-            rest.kept += [] if home else [k]
+            rest.visited += [] if home else [k]
         return rest
 
     def _path_around(self, begin: Floats, end: Floats) -> Floats | None:
@@ -303,8 +303,10 @@ class RepairPlanner(PredictivePlanner):
             found = self._plan_rest(robot, tether)
         except (InputError, LimitReachedError):
             return None
-        visits_more = added and len(found.order) > len(rest.kept)
-        return None if rest.whole and rest.length <= found.length and not visits_more else found
+        visits_more = added and len(found.order) > len(rest.visited)
+        return (
+            None if rest.is_complete and rest.length <= found.length and not visits_more else found
+        )
 
     def _plan_rest(self, robot: Floats, tether: Tether) -> SpacePlan:
         """Plan a tour from the robot's position through the remaining waypoints, by the map."""
@@ -360,10 +362,10 @@ class RepairPlanner(PredictivePlanner):
         assert tour is not None
         stops = tuple(
             tour.stops[k].model_copy(update={"path": thinned_path(path), "tether_length": length})
-            for k, (path, length) in zip(rest.kept, rest.legs, strict=False)
+            for k, (path, length) in zip(rest.visited, rest.legs, strict=False)
         )
         beyond = range(max(self.index, len(tour.stops)), len(self.mission.waypoints))
-        left = [*rest.kept, *rest.lost, *beyond]
+        left = [*rest.visited, *rest.blocked, *beyond]
         waypoints = tuple(self.mission.waypoints[k] for k in left)
         self._splice(tour, stops, thinned_path(rest.legs[-1][0]), waypoints, left)
 

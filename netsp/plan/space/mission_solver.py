@@ -143,10 +143,10 @@ class _Flights:
             nonlocal slower
             slower = row.time > cutoff_s
             if slower or clock.is_up:
-                raise KeyboardInterrupt  # it ends a flight
+                raise KeyboardInterrupt  # ends the simulation
 
         if all(w.heading is None for w in mission.waypoints):
-            # what is seen takes most of the time of a flight, and changes nothing else of it
+            # without headings the camera changes no path, but takes most of the time
             mission = mission.model_copy(update={"camera": None})
         try:
             run = self.clock.bounded(
@@ -268,7 +268,7 @@ class _Incumbents:
         seconds, mission = self._time_until_home_s(self.best), self.flights.mission
         if seconds is None:
             return found.tour.length < self.best.tour.length * self._max_ratio(found, self.best)
-        # a flight turns back within reach of each stop, and is faster by no more than that
+        # a flight turns back within reach of each waypoint, which saves this length at most
         saved = 2.0 * mission.reach * (1 + len(found.tour.stops))
         allowed = (1.0 + self.flights.policy.bound_worth) * seconds
         return (found.tour.length - saved) / mission.speed < allowed
@@ -511,7 +511,7 @@ def _search(found: _Incumbents, clock: Clock, options: _SolverOptions) -> _Searc
     def next_plan() -> SpacePlan | None:
         return clock.bounded("looking for tours", lambda: next(candidates, None), winds_down=True)
 
-    # where the order of the file cannot be driven, the first tour is found here
+    # if the order of the file cannot be driven, the first tour comes from this search
     needs_tour = found.best is None
     first_tour_s = flights.policy.first_tour_s if needs_tour else 0.0
     try:

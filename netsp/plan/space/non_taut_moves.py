@@ -244,7 +244,7 @@ class Detours:
         np.fill_diagonal(costs, 0.0)
         try:
             graph = TravelGraph.from_costs(costs, cluster)
-        except InputError:  # some waypoint is joined to nothing
+        except InputError:  # a waypoint has no leg
             return None
         first = 1
         if places.present is not None:

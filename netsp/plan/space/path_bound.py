@@ -170,7 +170,7 @@ class LegBounds:
         (`netsp.plan.space.planning_context.keeps_clearance`)."""
         mission, context = self.paths.context.mission, self.paths.context
         room = min(mission.clearance, float(self._clearance[u]), float(self._clearance[v]))
-        # between two samples of a path the distance from solids may be half a step less
+        # between two samples of a path, solids may be nearer by half a step
         room = max(room - 0.5 * mission.delta - 2.0 * CLEARANCE_TOLERANCE, -2.0 * DEPTH_TOLERANCE)
         bounds = np.array([[-np.inf] * 3, [np.inf] * 3])
         if context.bounds is not None:
@@ -208,7 +208,7 @@ def _bound_without_tether(legs: LegBounds, clock: Clock, seed: int) -> float | N
         graph = TravelGraph.from_costs(legs.costs, cluster)
         if begin is not None:
             graph = from_state(graph, begin)
-        # straight lengths alone give a bound, however little time there is
+        # straight lengths give a bound even if the time is up
         solving = Clock(legs.policy.min_solve_s) if clock.is_up else clock
         result = solve_graph(graph, "auto", time_limit=solving, seed=seed)
         best = max(best, result.lower_bound or 0.0)

@@ -119,7 +119,7 @@ def floor_plan(scene: Scene, mission: Mission) -> FloorPlan | None:
         if not isinstance(shape, Post | Prism):
             box = np.asarray(shape.box()) + scene.tether_radius * np.array([[-1.0], [1.0]])
             if (box[0] >= high).any() or (box[1] <= low).any():
-                continue  # no tour meets it
+                continue  # out of reach of all tours
         circle, polygon = _circle_of(shape, low[2], high[2]), _polygon_of(shape, low[2], high[2])
         if circle is not None:
             circles.append((circle[0], circle[1] + scene.tether_radius))

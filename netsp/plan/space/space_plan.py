@@ -174,7 +174,7 @@ class SpacePlan:
         """
         result = self.result
         if bound is not None:
-            # its legs are pulled taut more finely than those of the tour
+            # legs of the bound are pulled taut more finely than those of the tour
             bound = min(bound, self.length)
         tour = PlannedTour(
             stops=tuple(
@@ -749,7 +749,7 @@ def _best_driven(
         is_joined = board.forbid(driven.fault)
         if clock.is_up and not (is_joined and board.can_reach_all(tour)):
             return None  # no time is left, and this tour can no longer be driven
-        warm_start = None  # it may go along that leg
+        warm_start = None  # it may contain the forbidden leg
         n_solves += 1
         if not clock.is_up:
             found = None

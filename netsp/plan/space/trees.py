@@ -43,7 +43,7 @@ def _grow(
 ) -> None:
     """Grow one tree from the states with the shortest tethers, and drive the tether along it."""
     context = states.context
-    # (key, tie, how far from the start, state, waypoint, way); a way of -1 is straight to a root
+    # (key, tie, distance from the start, state, place, path); path -1 stands for a root itself
     waiting: list[tuple[float, int, float, int, int, int]] = []
     for s in roots:
         far = states.entries[s].tether.length

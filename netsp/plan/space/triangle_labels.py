@@ -232,7 +232,7 @@ def label_edges(
                 continue
             lower = lower_end(cell, axis, sign, ny, nz)
             edge = 3 * lower + axis
-            # a generator belongs where its farther end is met, in the order of distance
+            # the edge becomes a generator at the farther of its ends, in the order of distance
             other = lower if sign < 0 else upper_end(cell, axis, ny, nz)
             if labels[edge] != UNKNOWN or far[other] > far[cell]:
                 continue

@@ -50,9 +50,9 @@ def bound_by_upright_solids(
         place_numbers
     ):
         return None
-    # the judge lets a path dip into solids a little, and a tether between its nodes a little more:
-    # among obstacles shrunk by the larger depth both are free, and the taut tether is no longer
-    # than its model
+    # the judge accepts paths that dip into solids a little, and tethers that do so between their
+    # nodes: among obstacles shrunk by the larger depth, both are free, and the taut tether is no
+    # longer than its model
     dip = max(2.0 * DEPTH_TOLERANCE, DIP_RATIO * mission.delta)
     obstacles = upright_obstacles(context, dip)
     if not obstacles or clock.is_up:
