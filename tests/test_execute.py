@@ -14,6 +14,7 @@ from netsp.command.main import main
 from netsp.gtsp.travel.result import Result
 from netsp.model.solution import Status
 from netsp.online.execute import ExecutionOptions, Surprises, execute
+from netsp.online.execute.execute_policy import RepairPolicy
 from netsp.online.execute.tour_repair import plan_fault
 from netsp.plan.random_worlds import random_world
 from netsp.plan.tour_plan import HOME, legs_of
@@ -338,12 +339,14 @@ def test_a_resolution_that_obstacles_slip_through_is_refused():
 
 def test_a_repair_in_the_same_order_starts_at_the_robot(world):
     """The tether that is out is no part of the path to come: it is behind the robot."""
-    from netsp.online.execute.tour_repair import repair
+    from netsp.online.execute.tour_repair import RepairOptions, repair
 
     problem, solution = world
     robot = np.add(solution.path[0], (0.0, 0.5, 0.0))
     order = [v.goal for v in solution.tour]
-    made = repair(problem, robot, np.array([problem.base, robot]), order, 1e9, "a test")
+    made = repair(
+        problem, robot, np.array([problem.base, robot]), order, "a test", RepairOptions(1e9)
+    )
     assert made.kind == "local"
     assert [leg.goal for leg in made.legs] == [*order, HOME]
     assert np.allclose(made.legs[0].path[0], robot)
@@ -362,7 +365,8 @@ def test_only_a_bound_shows_that_no_new_order_would_save_enough(world, monkeypat
     found = Result(None, None, bound, Status.NO_SOLUTION_FOUND)
     monkeypatch.setattr(module, "solve_graph", lambda *args, **options: found)
     tether = np.array([problem.base, robot])
-    made = module.repair(problem, robot, tether, list(range(8)), 0.01, "a test", limit=60.0)
+    how = module.RepairOptions(0.01, policy=RepairPolicy(time_limit_s=60.0))
+    made = module.repair(problem, robot, tether, list(range(8)), "a test", how)
     assert made.kind == "local"
     assert words in made.reason
 

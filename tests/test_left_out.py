@@ -14,7 +14,7 @@ from netsp import Circle, Problem, solve
 from netsp.base.errors import InputError, LeftOutWarning, LimitReachedError
 from netsp.command.main import main
 from netsp.command.measures import describe_tethers
-from netsp.online.execute.tour_repair import repair
+from netsp.online.execute.tour_repair import RepairOptions, repair
 from netsp.plan.solve_problem import travel_graph
 from netsp.roadmap.paths import TautPaths, UnknownPathError
 from netsp.roadmap.turning import limit_turning, tether_turnings
@@ -119,7 +119,7 @@ def test_a_blind_tour_states_the_length_of_its_path_for_a_tether_not_found(fails
 def test_a_robot_goes_home_along_its_tether_as_it_lies_if_no_taut_path_is_found(fails):
     fails(lambda b, word: True)
     tether = np.array([(0.0, 0.0, 0.0), (4.0, 2.0, 0.0), (7.0, 2.0, 0.0)])
-    made = repair(PROBLEM, tether[-1], tether, [], 1.0, "told to")
+    made = repair(PROBLEM, tether[-1], tether, [], "told to", RepairOptions(1.0))
     assert made.kind == "home"
     assert "along the tether as it lies" in made.reason
     assert np.array_equal(made.legs[0].path, tether[::-1])

@@ -19,7 +19,7 @@ from netsp.online.execute.tether_limits import (
     overruns,
 )
 from netsp.online.execute.tether_reserve import ReservePolicy
-from netsp.online.execute.tour_repair import repair, reserved_limit
+from netsp.online.execute.tour_repair import RepairOptions, repair, reserved_limit
 from netsp.online.fly import tour_flight
 from netsp.online.fly.tour_flight import fly
 from netsp.plan.tour_plan import HOME
@@ -89,8 +89,8 @@ def test_a_repair_is_never_longer_than_the_limit_less_its_reserve(reserve, limit
     problem = SITE.model_copy(update={"tether_length": limit * SITE.tether_length})
     robot = np.array([1.0, 0.5, -0.5])
     tether = np.array([problem.base, robot])
-    made = repair(problem, robot, tether, list(left), 0.5, "a test", reserve=reserve)
-    bare = repair(problem, robot, tether, list(left), 0.5, "a test")
+    made = repair(problem, robot, tether, list(left), "a test", RepairOptions(0.5, reserve=reserve))
+    bare = repair(problem, robot, tether, list(left), "a test", RepairOptions(0.5))
     assert [g for g, _ in made.left_out] == [g for g, _ in bare.left_out]
     goals = [leg for leg in made.legs if leg.goal != HOME]
     if not goals:

@@ -147,13 +147,7 @@ def problem_after(
     if complaint := out.size_complaint():
         raise InputError(f"{event.kind}: {complaint}")
     if event.appear is not None and problem.origin is not None:
-        box = event.appear.shape(0.0).bounds
-        size = max(box[2] - box[0], box[3] - box[1])
-        if size < policy.min_obstacle_ratio * problem.tether_length:
-            raise InputError(
-                f"appear: is {size:.1g} {problem.units} across; "
-                "expected coordinates of the problem, from its base on, not degrees"
-            )
+        _check_size(event.appear, problem, policy)
     if event.add_goal is not None:
         away = float(np.abs(np.array(event.add_goal.position) - np.array(problem.base)).max())
         max_distance = MAX_EXTENT_RATIO * max(problem.tether_length, problem.scale)
@@ -167,6 +161,17 @@ def problem_after(
         if float(o.signed_distance(base)[0]) < out.clearance - out.tolerance:
             raise InputError(f"{event.kind}: {out.obstacle_label(i)} would stand on the base")
     return out
+
+
+def _check_size(obstacle: Circle | Polygon, problem: Problem, policy: ExecutePolicy) -> None:
+    """Raise InputError for an obstacle so small that its coordinates must be degrees."""
+    box = obstacle.shape(0.0).bounds
+    size = max(box[2] - box[0], box[3] - box[1])
+    if size < policy.min_obstacle_ratio * problem.tether_length:
+        raise InputError(
+            f"appear: is {size:.1g} {problem.units} across; expected coordinates of the problem, "
+            "from its base on, not degrees"
+        )
 
 
 def moved_obstacle(obstacle: Circle | Polygon, by: tuple[float, float]) -> Circle | Polygon:

@@ -12,7 +12,8 @@ from netsp.base.compiled.compile_policy import compiles, everything_compiled
 from netsp.base.compiled.kernel import runs_compiled
 from netsp.gtsp.dp.label_kernels import extend
 from netsp.model.problem import Circle, Goal, Problem, State
-from netsp.online.execute.tour_repair import repair
+from netsp.online.execute.execute_policy import RepairPolicy
+from netsp.online.execute.tour_repair import RepairOptions, repair
 from netsp.plan.random_worlds import random_world
 from netsp.plan.solve_problem import solve_graph
 from netsp.roadmap.from_state import graph_from_state
@@ -55,9 +56,8 @@ def warm_up_repair() -> None:
             np.array([4.0, 0.0, 0.0]),
             np.array([[0.0, 0, 0], [4, 0, 0]]),
             [0, 1],
-            1.0,
             "",
-            limit=math.inf,
+            RepairOptions(1.0, policy=RepairPolicy(time_limit_s=math.inf)),
         )
         graph = graph_from_state(world.model_copy(update={"state": begun}))
         for solver, iterations in _SOLVERS:

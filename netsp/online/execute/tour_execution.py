@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -34,6 +34,7 @@ from netsp.online.execute.tether_limits import TETHER_TOLERANCE
 from netsp.online.execute.tether_reserve import ReservedLimit
 from netsp.online.execute.tour_repair import (
     Repair,
+    RepairOptions,
     plan_fault,
     repair,
     reserved_limit,
@@ -111,21 +112,11 @@ class _Run:
         self._enter_problem(problem)
         if resume_point is not None:
             self.start = resume_point.tether[-1]
-            anchor = self.model.start(resume_point.tether[0], resume_point.tether[0])
-            self.tether = self.model.refine(self.model.drive(anchor, resume_point.tether[1:])[0])
-        elif problem.state is None:
-            self.tether = self.model.start(problem.base, problem.base)
-        else:
-            self.tether = self.model.lay(np.array(solution.start_tether))
+        self.tether = self._first_tether(solution, resume_point)
         self.live = live
         self.vehicle = live or make_vehicle(options.vehicle, self.start, options.speed)
         self.policy = options.policy
-        if live is not None:
-            self.step = self.policy.live_step_s
-        elif options.vehicle != "kinematic":
-            self.step = self.policy.dynamic_step_s
-        else:
-            self.step = self.delta / options.speed
+        self.step = self._step_s()
         self.water = Water(options.current, options.gusts, options.seed)
         self.mode, self.fresh, self.leg_s = "tour", True, 0.0
         self.shorten = False
@@ -137,6 +128,23 @@ class _Run:
         self.out.reserve = self.reserve
         self.unreachable: set[int] = set()
         self.path = self.legs[0].path if self.legs else np.array([self.vehicle.position])
+
+    def _first_tether(self, solution: Solution, resume_point: ResumePoint | None) -> Tether:
+        """Return the tether at the beginning."""
+        if resume_point is not None:
+            anchor = self.model.start(resume_point.tether[0], resume_point.tether[0])
+            return self.model.refine(self.model.drive(anchor, resume_point.tether[1:])[0])
+        if self.problem.state is None:
+            return self.model.start(self.problem.base, self.problem.base)
+        return self.model.lay(np.array(solution.start_tether))
+
+    def _step_s(self) -> float:
+        """Return the time of a step; a kinematic vehicle travels the tether's resolution in it."""
+        if self.live is not None:
+            return self.policy.live_step_s
+        if self.options.vehicle != "kinematic":
+            return self.policy.dynamic_step_s
+        return self.delta / self.options.speed
 
     def _enter_problem(self, problem: Problem) -> None:
         """Enter the scene of a problem."""
@@ -271,27 +279,7 @@ class _Run:
 
     def on_event(self, event: Event) -> None:
         """Let an event happen, and repair what it breaks."""
-        left, reason = self.left, None if self.retreat is None else self.retreat.why
-        if event.kind == "push":
-            assert event.push is not None
-            self._push(np.array(event.push))
-            reason = "pushed off its path"
-        else:
-            before = self.problem
-            self._enter_problem_after(event)
-            if event.kind == "add_goal":
-                new = len(before.goals)
-                left, reason = [*left, new], f"{self.problem.goal_label(new)} was added"
-            elif event.cancel_goal is not None:
-                gone = index_of(event.cancel_goal, list(before.goals), "cancel_goal")
-                if gone in left:
-                    left = [g for g in left if g != gone]
-                    reason = f"{before.goal_label(gone)} was cancelled"
-                if self.options.repair and (gone in self.left or gone in self.out.left_out):
-                    self.out.left_out.pop(gone, None)
-                    self.out.cancelled[gone] = self.now
-        if event.tether_length is not None and self.tether.length > event.tether_length:
-            self.shorten = True
+        left, reason = self._apply(event)
         restored = self._reachable_again() if self.options.repair else []
         if restored:
             names = ", ".join(map(self.problem.goal_label, restored))
@@ -317,6 +305,30 @@ class _Run:
                 self.out.left_out[goal] = "was added, and plans are not repaired"
         else:
             self._replan_within_limit(reason, left, event.kind)
+
+    def _apply(self, event: Event) -> tuple[list[int], str | None]:
+        """Change the world as an event says; return the goals to be visited, and the reason for a
+        new plan if there is one already."""
+        left, reason = self.left, None if self.retreat is None else self.retreat.why
+        if event.push is not None:
+            self._push(np.array(event.push))
+            return left, "pushed off its path"
+        before = self.problem
+        self._enter_problem_after(event)
+        if event.add_goal is not None:
+            new = len(before.goals)
+            left, reason = [*left, new], f"{self.problem.goal_label(new)} was added"
+        elif event.cancel_goal is not None:
+            gone = index_of(event.cancel_goal, list(before.goals), "cancel_goal")
+            if gone in left:
+                left = [g for g in left if g != gone]
+                reason = f"{before.goal_label(gone)} was cancelled"
+            if self.options.repair and (gone in self.left or gone in self.out.left_out):
+                self.out.left_out.pop(gone, None)
+                self.out.cancelled[gone] = self.now
+        if event.tether_length is not None and self.tether.length > event.tether_length:
+            self.shorten = True
+        return left, reason
 
     def on_request(self, event: Event) -> None:
         """Let an event happen that nobody could check before."""
@@ -431,33 +443,7 @@ class _Run:
             self.live.hold()
             line = np.array([self.tether.robot, self.vehicle.position])
             self._follow(polylines.dense(line, 0.5 * self.delta)[1:])
-        begin = time.perf_counter()
-        try:
-            options = self.options
-            made = repair(
-                self.problem,
-                self.vehicle.position,
-                self.tether.nodes,
-                left,
-                options.speed,
-                why,
-                options.seed,
-                options.planning_limit,
-                self.reserve,
-                self.policy.repair,
-            )
-        except Exception as error:
-            if interrupted(error):
-                raise KeyboardInterrupt from error
-            # The robot must come home whatever is wrong with us; that something is, is logged and
-            # counted, and the command says so by its exit code. What is always possible: back
-            # along the tether.
-            home = Leg(HOME, np.ascontiguousarray(self.tether.nodes[::-1]), (), 0.0)
-            what = f"{type(error).__name__}: {error}"
-            left_out = tuple((g, f"a defect of netsp ended planning ({what})") for g in left)
-            reason = f"{why}; a defect of netsp ended planning ({what})"
-            spent = time.perf_counter() - begin
-            made = Repair("defect", reason, [home], left_out, home.length, spent)
+        made = self._repair_or_return(why, left)
         self._log_event(event, made.kind, made.reason, made.planning_s)
         self._hold(self.options.planning_limit)
         self.legs = made.legs
@@ -466,6 +452,27 @@ class _Run:
         if made.kind != "defect":
             self.unreachable |= {goal for goal, _ in made.left_out}
         self._next()
+
+    def _repair_or_return(self, why: str, left: list[int]) -> Repair:
+        """Return a repaired plan; after an error in planning, one back along the tether.
+
+        The robot must come home whatever is wrong with netsp. The error is logged and counted, and
+        sets the exit code of the command.
+        """
+        begin, options = time.perf_counter(), self.options
+        policy = replace(self.policy.repair, time_limit_s=options.planning_limit)
+        how = RepairOptions(options.speed, options.seed, self.reserve, policy)
+        try:
+            return repair(self.problem, self.vehicle.position, self.tether.nodes, left, why, how)
+        except Exception as error:
+            if interrupted(error):
+                raise KeyboardInterrupt from error
+            home = Leg(HOME, np.ascontiguousarray(self.tether.nodes[::-1]), (), 0.0)
+            what = f"{type(error).__name__}: {error}"
+            left_out = tuple((g, f"a defect of netsp ended planning ({what})") for g in left)
+            reason = f"{why}; a defect of netsp ended planning ({what})"
+            spent = time.perf_counter() - begin
+            return Repair("defect", reason, [home], left_out, home.length, spent)
 
     def _hold(self, seconds: float) -> None:
         """Stay in place until a plan is due, however soon it was ready, so that a seed determines
@@ -479,6 +486,12 @@ class _Run:
             self.log_state()
             self.now = min(self.now + self.policy.hold_step_s, until)
         self.mode = mode
+
+    def finish(self) -> None:
+        """Log the last tether, and whether it is free."""
+        self.out.tethers.append((round(self.now, 6), self.tether.nodes.copy()))
+        # a corner may have held it back for the few rounds of an update
+        self.out.free = tether_is_free(self.model.refine(self.tether), self.delta)
 
     def _log_event(self, event: str, response: str, reason: str, spent: float) -> None:
         self.out.entries.append(Entry(round(self.now, 6), event, response, reason, spent))
@@ -525,43 +538,14 @@ def execute(
     """
     options = options or ExecutionOptions()
     surprises = surprises or Surprises(events=())
-    checked_instance("problem", problem, Problem)
-    checked_instance("solution", solution, Solution)
-    checked_instance("options", options, ExecutionOptions)
-    checked_instance("surprises", surprises, Surprises)
-    for name in ("planning_limit", "speed", "reach"):
-        if not checked_argument(name, getattr(options, name), 0.0):
-            raise InputError(f"{name}: expected a positive number, got 0")
-    checked_argument("gusts", options.gusts, 0.0)
-    if not isinstance(options.current, Sequence | np.ndarray) or len(options.current) != 3:
-        raise InputError(f"current: expected three numbers, got {options.current!r}"[:200])
-    for value in options.current:
-        checked_argument("current", value, -LARGEST)
-    if not isinstance(options.seed, int | np.integer) or options.seed < 0:
-        raise InputError(f"seed: expected a whole number from 0 on, got {options.seed!r}")
-    if solution.status is Status.INVALID or solution.length is None:
-        raise InputError(f"solution: has status {solution.status.value}; expected a tour that fits")
-    judged = verify(problem, solution) if resume_point is None else None
-    if judged is not None and not judged:
-        failed = next(c for c in judged.checks if not c.passed)
-        raise InputError(f"solution: fails its check {failed.name!r}: {failed.detail}")
-    surprises.check(problem)
-    coarsest = coarsest_delta(problem)
-    if (
-        options.delta is not None
-        and not 0.0 < checked_argument("delta", options.delta, 0.0) <= coarsest
-    ):
-        raise InputError(
-            f"delta: expected at most {coarsest:.4g}, or the tether would slip through the "
-            f"thinnest obstacle, got {options.delta!r}"
-        )
+    _check(problem, solution, options, surprises, resume_point is not None)
     is_live = incoming is not None or resume_point is not None
     if options.repair and (is_live or (surprises.events and should_warm_up_repair())):
         warm_up_repair()
     begin = time.perf_counter()
     run = _Run(problem, solution, options, vehicle, resume_point)
 
-    def note() -> ExecutionRow:
+    def log_row() -> ExecutionRow:
         row = run.log_state()
         if record is not None:
             record.write_row(row, run.problem, lambda: run.state)
@@ -576,28 +560,71 @@ def execute(
                 run.on_event(coming.pop(0))
             for event in incoming() if incoming is not None else ():
                 run.on_request(event)
-            row = note()
+            row = log_row()
             if on_step is not None:
                 on_step(row)
             run.go()
-        note()
+        log_row()
         for event in coming:
             run.on_late_event(event)
     except KeyboardInterrupt:
         run.out.interrupted = True
     except StopsFlightError as stop:
         run.out.stopped = stop.reason
-        note()
+        log_row()
     except Exception:
         if record is not None and run.out.rows:
             with contextlib.suppress(Exception):  # the first exception is raised, not a second one
                 record.write_state(run.problem, run.state)
         raise
-    run.out.tethers.append((round(run.now, 6), run.tether.nodes.copy()))
-    # a corner may have held it back for the few rounds of an update
-    run.out.free = tether_is_free(run.model.refine(run.tether), run.delta)
+    run.finish()
     run.out.wall_s = time.perf_counter() - begin
     return run.out
+
+
+def _check(
+    problem: Problem,
+    solution: Solution,
+    options: ExecutionOptions,
+    surprises: Surprises,
+    is_resumed: bool,
+) -> None:
+    """Raise InputError for bad options or surprises, or a solution that does not fit the problem;
+    the solution of a run that is resumed need not."""
+    checked_instance("problem", problem, Problem)
+    checked_instance("solution", solution, Solution)
+    checked_instance("options", options, ExecutionOptions)
+    checked_instance("surprises", surprises, Surprises)
+    _check_numbers(options)
+    if solution.status is Status.INVALID or solution.length is None:
+        raise InputError(f"solution: has status {solution.status.value}; expected a tour that fits")
+    judged = None if is_resumed else verify(problem, solution)
+    if judged is not None and not judged:
+        failed = next(c for c in judged.checks if not c.passed)
+        raise InputError(f"solution: fails its check {failed.name!r}: {failed.detail}")
+    surprises.check(problem)
+    coarsest = coarsest_delta(problem)
+    if (
+        options.delta is not None
+        and not 0.0 < checked_argument("delta", options.delta, 0.0) <= coarsest
+    ):
+        raise InputError(
+            f"delta: expected at most {coarsest:.4g}, or the tether would slip through the "
+            f"thinnest obstacle, got {options.delta!r}"
+        )
+
+
+def _check_numbers(options: ExecutionOptions) -> None:
+    for name in ("planning_limit", "speed", "reach"):
+        if not checked_argument(name, getattr(options, name), 0.0):
+            raise InputError(f"{name}: expected a positive number, got 0")
+    checked_argument("gusts", options.gusts, 0.0)
+    if not isinstance(options.current, Sequence | np.ndarray) or len(options.current) != 3:
+        raise InputError(f"current: expected three numbers, got {options.current!r}"[:200])
+    for value in options.current:
+        checked_argument("current", value, -LARGEST)
+    if not isinstance(options.seed, int | np.integer) or options.seed < 0:
+        raise InputError(f"seed: expected a whole number from 0 on, got {options.seed!r}")
 
 
 def tether_is_free(tether: Tether, delta: float) -> bool:

@@ -134,37 +134,48 @@ def _blocking_obstacle(problem: Problem, path: Floats) -> int | None:
     return None
 
 
+@dataclass(frozen=True)
+class RepairOptions:
+    """Options of a repair.
+
+    Attributes
+    ----------
+    speed
+        Speed of the vehicle, length units per second.
+    seed
+        Seed of the solver.
+    reserve
+        Length of tether to keep in reserve. No goal is left out for it: if one needs more, less is
+        kept.
+    policy
+        Limits of the repair.
+    """
+
+    speed: float
+    seed: int = 0
+    reserve: float = 0.0
+    policy: RepairPolicy = RepairPolicy()
+
+
 def repair(
     problem: Problem,
     robot: Floats,
     tether: Floats,
     left: list[int],
-    speed: float,
     why: str,
-    seed: int = 0,
-    limit: float = RepairPolicy.time_limit_s,
-    reserve: float = 0.0,
-    policy: RepairPolicy = RepairPolicy(),
+    options: RepairOptions,
 ) -> Repair:
     """Return a plan from the present state through the goals `left` (numbers in the problem, in
     order) and home. Goals that cannot be reached are left out, with the reason.
-
-    Parameters
-    ----------
-    limit
-        Time limit of the repair, s.
-    reserve
-        Length of tether to keep in reserve. No goal is left out for it: if one needs more, less is
-        kept.
 
     Raises
     ------
     KeyboardInterrupt
         Ctrl-C, which solvers alone would take for the wish to have what there is.
     """
-    with until_interrupt(limit) as clock:
+    with until_interrupt(options.policy.time_limit_s) as clock:
         try:
-            made = _repaired(problem, robot, tether, left, speed, why, seed, clock, reserve, policy)
+            made = _repaired(problem, robot, tether, left, why, options, clock)
         except NetspError:
             if clock.is_stopped:
                 raise KeyboardInterrupt from None
@@ -179,12 +190,9 @@ def _repaired(
     robot: Floats,
     tether: Floats,
     left: list[int],
-    speed: float,
     why: str,
-    seed: int,
+    options: RepairOptions,
     clock: Clock,
-    reserve: float,
-    policy: RepairPolicy,
 ) -> Repair:
     """Return a plan as `repair` does, with what the clock leaves time for."""
     word = signature(tether[:, :2], problem.representative_points)
@@ -193,47 +201,60 @@ def _repaired(
     if not order:
         home, reason = _home(problem, state, tether, why)
         return Repair("home", reason, [home], tuple(left_out), home.length, clock.elapsed)
-    reserved = reserved_limit(problem, order, reserve)
+    reserved = reserved_limit(problem, order, options.reserve)
     rest = _rest(problem, order, state, reserved.length)
     graph = graph_from_state(
-        rest, max_classes=policy.max_classes, time_limit=clock, limits_paths=False
+        rest, max_classes=options.policy.max_classes, time_limit=clock, limits_paths=False
     )
     with graph.within.on_clock(clock):
         local = _keeping_order(graph, len(order))
     assert local.length is not None
-    hurried = clock.left <= 0.0
-    # with a short time left a new plan has less of it to pay for itself
-    replan_s = max(clock.left, 0.0)
-    chosen, kind = local, "local"
-    reason = f"{why}; {local.length:.4g} {problem.units} to go in the same order"
-    saving = (local.length - _lower_bound_of_rest(graph, len(order), clock)) / speed
-    if saving > replan_s > 0.0:
-        found = solve_graph(graph, "auto", time_limit=clock, seed=seed, warm_start=local.tour)
-        worthwhile = local.length - speed * replan_s
-        if found.length is not None and found.length < worthwhile:
-            chosen, kind = found, "replan"
-            reason += f", {found.length:.4g} {problem.units} in a new one"
-        elif found.status is Status.OPTIMAL or (found.lower_bound or 0.0) >= worthwhile:
-            reason += ", a new order would not save enough"
-        else:
-            reason += (
-                ", no new order that saves enough was found within the time limit of planning; a "
-                "longer limit (--planning-limit) may find one"
-            )
-    elif hurried:
-        reason += (
-            ", as far as planning came within its time limit; no new order was tried, and a longer "
-            "limit (--planning-limit) may find a shorter way"
-        )
-    else:
-        reason += f", a new order could save at most {max(saving, 0.0):.1f} s"
+    new, words = _better_order(problem, graph, local, len(order), options, clock)
+    chosen, kind = (local, "local") if new is None else (new, "replan")
+    reason = f"{why}; {local.length:.4g} {problem.units} to go in the same order, {words}"
     if kept := reserved.describe(problem):
         reason += f"; {kept}"
-    solution = to_solution(rest, graph, chosen, "auto", seed)
+    solution = to_solution(rest, graph, chosen, "auto", options.seed)
     legs = legs_of(rest, solution, order)
     return Repair(
         kind, reason, legs, tuple(left_out), float(chosen.length or 0.0), clock.elapsed, reserved
     )
+
+
+def _better_order(
+    problem: Problem,
+    graph: GraphFromState,
+    local: Result,
+    goals: int,
+    options: RepairOptions,
+    clock: Clock,
+) -> tuple[Result | None, str]:
+    """Return a tour that saves more time than planning it takes, None if there is none, and words
+    for the log."""
+    assert local.length is not None
+    speed, hurried = options.speed, clock.left <= 0.0
+    # with a short time left a new plan has less of it to pay for itself
+    replan_s = max(clock.left, 0.0)
+    saving = (local.length - _lower_bound_of_rest(graph, goals, clock)) / speed
+    if saving > replan_s > 0.0:
+        found = solve_graph(
+            graph, "auto", time_limit=clock, seed=options.seed, warm_start=local.tour
+        )
+        worthwhile = local.length - speed * replan_s
+        if found.length is not None and found.length < worthwhile:
+            return found, f"{found.length:.4g} {problem.units} in a new one"
+        if found.status is Status.OPTIMAL or (found.lower_bound or 0.0) >= worthwhile:
+            return None, "a new order would not save enough"
+        return None, (
+            "no new order that saves enough was found within the time limit of planning; a "
+            "longer limit (--planning-limit) may find one"
+        )
+    if hurried:
+        return None, (
+            "as far as planning came within its time limit; no new order was tried, and a longer "
+            "limit (--planning-limit) may find a shorter way"
+        )
+    return None, f"a new order could save at most {max(saving, 0.0):.1f} s"
 
 
 def reserved_limit(problem: Problem, goals: list[int], reserve: float) -> ReservedLimit:
@@ -243,7 +264,7 @@ def reserved_limit(problem: Problem, goals: list[int], reserve: float) -> Reserv
     Parameters
     ----------
     goals
-        Goals to be visited; those that no tether reaches do not count.
+        Goals to be visited; unreachable ones do not count.
     """
     all_of_it = ReservedLimit(problem.tether_length, 0.0, reserve)
     if reserve <= 0.0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -154,11 +155,7 @@ def simulate(
     believed = None if tether == "geodesic" else make_tether(tether, field, mission.delta)
     chosen = make_planner(planner, mission, field, believed or tethers, grid, options)
     chosen.laid = laid
-    coverage = None
-    if mission.camera is not None:
-        size, places = mission.camera.patch, mission.every_place
-        patches = surface_patches(scene, field, size, places, mission.inspect, policy.coverage)
-        coverage = Coverage(patches, field, mission.camera)
+    coverage = _coverage(mission, scene, field, policy)
     water = Water(mission.current, mission.gusts, seed, policy.gusts)
     chosen.warm_up(robot.position, taut)
     positions = Positions(mission.sensor, field, robot.position, seed, policy)
@@ -168,60 +165,104 @@ def simulate(
     world.positions, world.track, world.policy = positions, track, policy
     if believed is not None:
         world.believed = present_tether(mission, field, believed, grid)
-    around = None
+    surroundings = None
     if surprises is not None:
         line = np.vstack([taut.nodes, robot.position])
-        around = Surroundings(mission, scene, field.voxels, surprises, line, seed, policy)
+        surroundings = Surroundings(mission, scene, field.voxels, surprises, line, seed, policy)
         world.model, world.believed, world.kept_tethers = tethers, taut, [(0, taut)]
-    since, stopped, stalls = (0.0, -1), False, Stalls()
-    begin = time.perf_counter()
-    try:
-        while True:
-            before, chosen.now = chosen.index, world.now
-            if around is not None:
-                around.update(world, chosen)
-            command = chosen.step(world.robot, world.believed or world.tether)
-            row = world.log_state(chosen, command)
-            if on_step is not None:
-                on_step(row, chosen)
-            if command.mode == DONE:
-                break
-            if chosen.reached and chosen.index > before and chosen.reached[-1] == before:
-                stay(world, chosen, chosen.mission.waypoints[before], on_step)
-                if chosen.is_anchor_moving and world.now > row.time:
-                    chosen.path = chosen.path[:0]  # it was planned for another moment
-                    continue
-            if since[1] != chosen.index or command.mode == WAIT:
-                since = (world.now, chosen.index)
-            elif world.now - since[0] > policy.max_waypoint_s:
-                chosen.leave_out(f"not reached in {policy.max_waypoint_s:g} s")
-                continue
-            if stalls.check(world, chosen, command):
-                chosen.leave_out(stalls.reason)
-                continue
-            fresh = before != chosen.index or command.replan_s > 0.0 or not world.now
-            passed, moved = world.step(command.path, fresh, chosen.is_homeward)
-            if moved:
-                chosen.drop_passed(passed)
-            else:
-                chosen.leave_out("the path to it leads through a solid")
-    except (KeyboardInterrupt, SystemError) as error:
-        if not interrupted(error):
-            raise
-        stopped = True
-    wall = time.perf_counter() - begin
-    summary = {**summarise(chosen.mission, chosen, world, wall, stopped), **chosen.summary_fields()}
-    summary["stalls"] = stalls.found
-    summary["surprises"] = None if around is None else around.summary_fields()
-    return Run(
-        chosen.flown,
-        planner if isinstance(planner, str) else chosen.name,
-        tuple(world.log),
-        world.tether,
-        summary,
-        None if around is None else around.scene_now,
-        tuple(world.kept_tethers),
-    )
+    name = planner if isinstance(planner, str) else chosen.name
+    return _MissionRun(world, chosen, surroundings, on_step).run(name)
+
+
+def _coverage(
+    mission: Mission, scene: Scene, field: DistanceField, policy: SimulationPolicy
+) -> Coverage | None:
+    """Return the coverage before the mission; None without a camera."""
+    if mission.camera is None:
+        return None
+    size, places = mission.camera.patch, mission.every_place
+    patches = surface_patches(scene, field, size, places, mission.inspect, policy.coverage)
+    return Coverage(patches, field, mission.camera)
+
+
+@dataclass
+class _MissionRun:
+    """Mission in progress.
+
+    Attributes
+    ----------
+    world, planner, surroundings
+        Robot, planner, and changes of the scene if there may be any.
+    on_step
+        See `simulate`.
+    """
+
+    world: Simulation
+    planner: Planner
+    surroundings: Surroundings | None
+    on_step: Callable[[LogRow, Planner], None] | None
+    stalls: Stalls = field(default_factory=Stalls)
+    _since: tuple[float, int] = (0.0, -1)
+
+    def run(self, name: str) -> Run:
+        """Simulate to the end, or to an interrupt; `name` is that of the planner."""
+        stopped, begin = False, time.perf_counter()
+        try:
+            while self._step():
+                pass
+        except (KeyboardInterrupt, SystemError) as error:
+            if not interrupted(error):
+                raise
+            stopped = True
+        wall = time.perf_counter() - begin
+        world, planner, surroundings = self.world, self.planner, self.surroundings
+        summary = summarise(planner.mission, planner, world, wall, stopped)
+        summary |= planner.summary_fields()
+        summary["stalls"] = self.stalls.found
+        summary["surprises"] = None if surroundings is None else surroundings.summary_fields()
+        return Run(
+            planner.flown,
+            name,
+            tuple(world.log),
+            world.tether,
+            summary,
+            None if surroundings is None else surroundings.scene_now,
+            tuple(world.kept_tethers),
+        )
+
+    def _step(self) -> bool:
+        """Take one step; return False at the end of the mission."""
+        world, planner = self.world, self.planner
+        before, planner.now = planner.index, world.now
+        if self.surroundings is not None:
+            self.surroundings.update(world, planner)
+        command = planner.step(world.robot, world.believed or world.tether)
+        row = world.log_state(planner, command)
+        if self.on_step is not None:
+            self.on_step(row, planner)
+        if command.mode == DONE:
+            return False
+        if planner.reached and planner.index > before and planner.reached[-1] == before:
+            stay(world, planner, planner.mission.waypoints[before], self.on_step)
+            if planner.is_anchor_moving and world.now > row.time:
+                planner.path = planner.path[:0]  # it was planned for another moment
+                return True
+        max_s = world.policy.max_waypoint_s
+        if self._since[1] != planner.index or command.mode == WAIT:
+            self._since = (world.now, planner.index)
+        elif world.now - self._since[0] > max_s:
+            planner.leave_out(f"not reached in {max_s:g} s")
+            return True
+        if self.stalls.check(world, planner, command):
+            planner.leave_out(self.stalls.reason)
+            return True
+        fresh = before != planner.index or command.replan_s > 0.0 or not world.now
+        passed, moved = world.step(command.path, fresh, planner.is_homeward)
+        if moved:
+            planner.drop_passed(passed)
+        else:
+            planner.leave_out("the path to it leads through a solid")
+        return True
 
 
 def stay(
