@@ -63,7 +63,7 @@ class DraftReading(ReactDraftPlanner):
                 neighbour = self.candidate(pivots, n + 3)
             if self.rule.accepts(self.candidate(pivots, n), neighbour, limit):
                 self.n_found += 1
-                return pivots.back(max(0, n - 2))
+                return pivots.path_back(max(0, n - 2))
             if self.compared == "round before":
                 neighbour = self.candidate(pivots, n + 3)
         onward = pivots.onward(0)

@@ -43,7 +43,7 @@ class PivotsOfLengths:
         self.asked.append(n)
         return self.lengths[n]
 
-    def back(self, n):
+    def path_back(self, n):
         return self.points[: n + 1]
 
     def onward(self, n):

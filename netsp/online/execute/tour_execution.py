@@ -345,9 +345,9 @@ class _Run:
     def _reachable_again(self) -> list[int]:
         """Return the goals that no tether reached, and one does now."""
         away = [g for g in self.unreachable if g in self.out.left_out]
-        back = split_reachable(self.problem, away)[0] if away else []
-        self.unreachable -= set(back)
-        return back
+        restored = split_reachable(self.problem, away)[0] if away else []
+        self.unreachable -= set(restored)
+        return restored
 
     def on_late_event(self, event: Event) -> None:
         """Log an event after the end."""
@@ -423,11 +423,11 @@ class _Run:
         # a vehicle with dynamics ends somewhere within its reach of where it is sent
         near = 0.0 if self.options.vehicle == "kinematic" else self.options.reach
         length = max(min(limit, self.problem.tether_length - near), 0.0)
-        way_back = np.ascontiguousarray(self.tether.nodes[::-1])
+        retreat_path = np.ascontiguousarray(self.tether.nodes[::-1])
         self.retreat = _Retreat(length, why, left, event)
         # the way to the base, left half-way: to a place nearby a vehicle slows down before it
-        self.legs = [Leg(HOME, way_back, (), 0.0)]
-        self.path, self.fresh, self.leg_s = way_back[1:], True, 0.0
+        self.legs = [Leg(HOME, retreat_path, (), 0.0)]
+        self.path, self.fresh, self.leg_s = retreat_path[1:], True, 0.0
         units = self.problem.units
         self._log_event(
             event,

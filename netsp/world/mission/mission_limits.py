@@ -10,7 +10,7 @@ from netsp.world.mission.anchor_track import AnchorTrack
 from netsp.world.mission.mission import Mission
 from netsp.world.planner import PLANNERS
 from netsp.world.scene.scene import Scene
-from netsp.world.simulator.simulation_policy import SimulationPolicy
+from netsp.world.simulator.simulation_policy import MissionLimits, SimulationPolicy
 from netsp.world.tether import TETHERS
 from netsp.world.vehicle import VEHICLES
 
@@ -58,46 +58,65 @@ def check_tether(mission: Mission, length: float) -> None:
 
 def check_size(mission: Mission, policy: SimulationPolicy = SimulationPolicy()) -> None:
     """Raise InputError for a mission that would take for ever, or whose numbers make no sense."""
-    limits, step_s = policy.limits, policy.step_s
     for name, value in (("delta", mission.delta), ("reach", mission.reach)):
         if value > mission.tether_length:
             raise InputError(
                 f"{name}: {value:g} is more than the tether_length {mission.tether_length:g}; "
                 "expected far less: mixed units?"
             )
-    places = mission.every_place[1:]
-    track = AnchorTrack.for_mission(mission)
-    if track is not None:
-        k = int(track.speeds.argmax())
-        if track.speed >= mission.speed:
-            raise InputError(
-                f"track[{k}]: the anchor moves at {track.speed:.3g} m/s, the robot at "
-                f"{mission.speed:g}: it would outrun the tether; expected a slower one"
-            )
-        if track.end / step_s > limits.max_steps:
-            raise InputError(
-                f"track: its {track.end:g} s take more than {limits.max_steps:g} steps of "
-                f"{step_s:g} s"
-            )
-    far = float(np.abs(places - np.array(mission.anchor)).max())
-    if far > limits.max_distance_ratio * mission.tether_length:
+    _check_track(mission, policy)
+    _check_waypoints(mission, policy)
+    _check_reserve(mission)
+    _check_water(mission, policy.limits)
+    nodes, max_nodes = mission.tether_length / mission.delta, policy.limits.max_tether_nodes
+    if nodes > max_nodes:
         raise InputError(
-            f"waypoints: one is {far:g} from the anchor; expected at most "
-            f"{limits.max_distance_ratio:g} times the tether_length {mission.tether_length:g}: "
-            "mixed units?"
+            f"delta: {mission.delta:g} makes {nodes:.2g} nodes of a tether; expected at most "
+            f"{max_nodes:g}"
+        )
+
+
+def _check_track(mission: Mission, policy: SimulationPolicy) -> None:
+    track = AnchorTrack.for_mission(mission)
+    if track is None:
+        return
+    max_steps, step_s = policy.limits.max_steps, policy.step_s
+    k = int(track.speeds.argmax())
+    if track.speed >= mission.speed:
+        raise InputError(
+            f"track[{k}]: the anchor moves at {track.speed:.3g} m/s, the robot at "
+            f"{mission.speed:g}: it would outrun the tether; expected a slower one"
+        )
+    if track.end / step_s > max_steps:
+        raise InputError(
+            f"track: its {track.end:g} s take more than {max_steps:g} steps of {step_s:g} s"
+        )
+
+
+def _check_waypoints(mission: Mission, policy: SimulationPolicy) -> None:
+    places, step_s = mission.every_place[1:], policy.step_s
+    max_ratio, max_steps = policy.limits.max_distance_ratio, policy.limits.max_steps
+    farthest = float(np.abs(places - np.array(mission.anchor)).max())
+    if farthest > max_ratio * mission.tether_length:
+        raise InputError(
+            f"waypoints: one is {farthest:g} from the anchor; expected at most {max_ratio:g} "
+            f"times the tether_length {mission.tether_length:g}: mixed units?"
         )
     steps = polylines.length(places[: len(mission.waypoints) + 1]) / (mission.speed * step_s)
-    if steps > limits.max_steps:
+    if steps > max_steps:
         raise InputError(
             f"speed: {mission.speed:g} takes {steps:.2g} steps of {step_s:g} s for the waypoints; "
-            f"expected at most {limits.max_steps:g}"
+            f"expected at most {max_steps:g}"
         )
     stays = sum(w.dwell for w in mission.waypoints) / step_s
-    if stays > limits.max_steps:
+    if stays > max_steps:
         raise InputError(
             f"waypoints: dwell takes {stays:.2g} steps of {step_s:g} s in all; expected at most "
-            f"{limits.max_steps:g}"
+            f"{max_steps:g}"
         )
+
+
+def _check_reserve(mission: Mission) -> None:
     sensor = mission.sensor
     reserve = sensor.reserve(mission.speed)
     if reserve > 0.5 * mission.tether_length:
@@ -106,6 +125,9 @@ def check_size(mission: Mission, policy: SimulationPolicy = SimulationPolicy()) 
             f"tether in reserve; expected at most half of the tether_length "
             f"{mission.tether_length:g}"
         )
+
+
+def _check_water(mission: Mission, limits: MissionLimits) -> None:
     load = mission.tether.load(np.array(mission.current))
     speed = float(np.linalg.norm(mission.current)) + 3.0 * mission.gusts
     if speed > limits.max_water_speed:
@@ -119,9 +141,4 @@ def check_size(mission: Mission, policy: SimulationPolicy = SimulationPolicy()) 
             f"current: {speed:g} m/s pulls on {mission.tether_length:g} m of tether with {sag:.3g} "
             f"times its tension of {load.tension:g} N; expected at most "
             f"{limits.max_drag_ratio:g}: mixed units?"
-        )
-    if mission.tether_length / mission.delta > limits.max_tether_nodes:
-        raise InputError(
-            f"delta: {mission.delta:g} makes {mission.tether_length / mission.delta:.2g} nodes of "
-            f"a tether; expected at most {limits.max_tether_nodes:g}"
         )

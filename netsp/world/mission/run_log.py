@@ -238,31 +238,71 @@ def _short(value: Any) -> Any:
 def describe_run(run: Run, units: str) -> str:
     """Return a run in a few lines."""
     s = run.summary
-    lines = [
-        f"mission  {s['mission']}, planner {s['planner']}: {s['status']}",
-        f"visited  {s['visited']} of {s['waypoints']} waypoints",
-        f"time     {s['inspection_s']:.1f} s{_way_home(s['home'])}",
-        f"home     {_home(s['home'], units)}",
+    return "\n".join(
+        [
+            f"mission  {s['mission']}, planner {s['planner']}: {s['status']}",
+            f"visited  {s['visited']} of {s['waypoints']} waypoints",
+            f"time     {s['inspection_s']:.1f} s{_time_home(s['home'])}",
+            f"home     {_home(s['home'], units)}",
+            *_tether_lines(s, units),
+            *_class_lines(s.get("words")),
+            *_event_lines(s),
+            *_left_out_lines(s),
+        ]
+    )
+
+
+def _tether_lines(s: dict[str, Any], units: str) -> list[str]:
+    """Return lines about tether, coverage and planning."""
+    tether = (
         f"tether   longest {s['longest_tether']:.3f} of {s['tether_length']:g} {units}, "
         f"over the limit for {s['exceedance_s']:.1f} s"
-        + (f", shortened for {s['shortening_s']:.1f} s to a new one" if s["shortening_s"] else ""),
-        f"planning {s['replans']} times, median {1e3 * s['replan_median_s']:.1f} ms, worst "
-        f"{1e3 * s['replan_worst_s']:.0f} ms",
-    ]
+    )
+    if s["shortening_s"]:
+        tether += f", shortened for {s['shortening_s']:.1f} s to a new one"
+    seen = []
+    if s["coverage"] is not None:
+        seen = [
+            f"seen     {100 * s['coverage']:.1f} % of the surface "
+            f"({100 * s['coverage_through']:.1f} % if nothing stood in between)"
+        ]
+    lines = [tether, *seen]
     if s["longest_payout"] > s["longest_tether"] * (1.0 + 1e-9):
-        lines.insert(4, f"payout   at most {s['longest_payout']:.3f} {units}, with slack and sag")
-    if (words := s.get("words")) is not None and words["as_planned"] is not None:
-        home = words["home"]
-        lines.append(
-            f"classes  as planned at {words['as_planned']} of {len(words['stops'])} stops; "
-            + (
-                "none told at home"
-                if home is None
-                else "empty at home"
-                if not home
-                else f"NOT empty at home: {home}"
-            )
-        )
+        payout = f"payout   at most {s['longest_payout']:.3f} {units}, with slack and sag"
+        lines = [payout, *seen, tether]
+    planning = (
+        f"planning {s['replans']} times, median {1e3 * s['replan_median_s']:.1f} ms, worst "
+        f"{1e3 * s['replan_worst_s']:.0f} ms"
+    )
+    return [*lines, planning]
+
+
+def _class_lines(words: dict[str, Any] | None) -> list[str]:
+    """Return a line about the classes of the tether, if they were compared with a plan."""
+    if words is None or words["as_planned"] is None:
+        return []
+    home = words["home"]
+    if home is None:
+        at_home = "none told at home"
+    else:
+        at_home = f"NOT empty at home: {home}" if home else "empty at home"
+    return [
+        f"classes  as planned at {words['as_planned']} of {len(words['stops'])} stops; {at_home}"
+    ]
+
+
+_RESPONSES = {
+    "kept": "kept",
+    "local": "mended",
+    "replan": "the rest planned anew",
+    "legs": "left to be found leg by leg",
+}
+"""Responses of a repair in words."""
+
+
+def _event_lines(s: dict[str, Any]) -> list[str]:
+    """Return lines about friction, surprises, repairs, contacts and errors."""
+    lines = []
     if s["friction"] is not None:
         lines.append(
             f"friction multiplies the tension by {s['friction']['most_tension_ratio']:.2f} at most "
@@ -276,36 +316,29 @@ def describe_run(run: Run, units: str) -> str:
             + (f", {found['held_back']} had no room" if found["held_back"] else "")
             + (f"; the sensor found {found['found']} solids" if found["found"] else "")
         )
-    for r in s.get("repairs", ()):
-        done = {
-            "kept": "kept",
-            "local": "mended",
-            "replan": "the rest planned anew",
-            "legs": "left to be found leg by leg",
-        }
-        lines.append(
-            f"repair   at {r['time']:.1f} s: {done[r['response']]} in {r['planning_s']:.2f} s, "
-            f"{r['reason']}"
-        )
+    lines += [
+        f"repair   at {r['time']:.1f} s: {_RESPONSES[r['response']]} in {r['planning_s']:.2f} s, "
+        f"{r['reason']}"
+        for r in s.get("repairs", ())
+    ]
     if s["contacts"]:
         lines.append(f"contact  with solids: {s['contacts']} times")
     if s["waited_s"]:
         lines.append(f"waited   {s['waited_s']:.1f} s for the anchor to come nearer")
     if s["defects"]:
         lines.append(f"defect   planning failed {s['defects']} times; please report the mission")
-    if s["coverage"] is not None:
-        lines.insert(
-            5,
-            f"seen     {100 * s['coverage']:.1f} % of the surface "
-            f"({100 * s['coverage_through']:.1f} % if nothing stood in between)",
-        )
     if s["control_worst_s"] > 0.0:
         lines.append(
             f"control  median {1e3 * s['control_median_s']:.1f} ms, worst "
             f"{1e3 * s['control_worst_s']:.0f} ms; "
             f"{s['inspection_s'] / s['wall_s']:.0f} x real time"
         )
-    lines += [
+    return lines
+
+
+def _left_out_lines(s: dict[str, Any]) -> list[str]:
+    """Return lines about the first stalls, and the first waypoints left out."""
+    lines = [
         f"stalled  at {stall['time']:.1f} s, on the way "
         + ("home" if stall["waypoint"] == s["waypoints"] else f"to waypoint #{stall['waypoint']}")
         for stall in s["stalls"][:5]
@@ -316,7 +349,7 @@ def describe_run(run: Run, units: str) -> str:
     ]
     if len(s["left_out"]) > 5:
         lines.append(f"         and {len(s['left_out']) - 5} more")
-    return "\n".join(lines)
+    return lines
 
 
 def _given(summary: dict[str, Any], waypoint: int) -> int:
@@ -325,7 +358,7 @@ def _given(summary: dict[str, Any], waypoint: int) -> int:
     return waypoint if given is None else int(given[waypoint])
 
 
-def _way_home(home: dict[str, Any]) -> str:
+def _time_home(home: dict[str, Any]) -> str:
     if not home["seconds"]:
         return ""
     return f", and {home['seconds']:.1f} s {'home' if home['reached'] else 'on the way home'}"

@@ -48,7 +48,7 @@ class PathPolicy:
         Number of cells above which such a grid gets larger cells, so that a plan takes about a
         second.
     max_cells
-        Number of cells that a grid may have at all; that many take about 0.3 GiB.
+        Number of cells that a grid may have at all; the default takes about 0.3 GiB.
     max_tree_bytes
         Memory for shortest-path trees that are kept, bytes; one per target, a byte per cell.
     pull_rounds
@@ -58,7 +58,7 @@ class PathPolicy:
     pull_stages
         Number of paths offered between an untouched and a taut one.
     rrtstar_iterations, bitstar_iterations
-        Iterations of these planners; counts, not times, so that a seed determines the path.
+        Iterations of these planners; counts instead of times: a seed determines the path.
     prmstar_milestones
         Milestones of PRM*.
     prmstar_neighbours

@@ -9,8 +9,8 @@ has (all in `RefineParams`), nor that moving points away from the path's centroi
 between centroid and structure *into* the structure. The ends are kept, or the path would not lead
 from the robot to the waypoint.
 
-The paper says two things about the perturbations that are kept: "only those that are collision-free
-are accepted", and in the next sentence that this is "to locally increase clearance". By the first
+The paper says two things about the perturbations that are kept: collision-free ones only
+"are accepted", and in the next sentence that this is "to locally increase clearance". By the first
 sentence any free move is kept (`RefineParams.keeps` "free"); by the second, one that takes the
 point farther from solids ("farther").
 """

@@ -540,8 +540,8 @@ def _relaxed(grown: DistanceField, line: Floats, delta: float, rounds: int) -> F
 
 @kernel
 def shortcut(field: Field, path: Floats, tolerance: float) -> Floats:
-    """Return a path without points that can be left out: from each point straight to the last of
-    those that it sees without a break.
+    """Return a path without points that can be left out: from each point straight to the last
+    point that it sees without a break.
 
     The triangles that are swept are as wide as the path's points are apart, so nothing wider is
     passed over.

@@ -36,7 +36,7 @@ class Pivots:
         """Return the shortest path (k, 3) from a pivot to the waypoint; None if there is none."""
         return self._paths.path(n)
 
-    def back(self, n: int) -> Floats:
+    def path_back(self, n: int) -> Floats:
         """Return the path (n + 1, 3) from the robot back along the tether to a pivot, pushed off
         the surfaces that the tether touches to the mission's clearance."""
         planner = self._planner

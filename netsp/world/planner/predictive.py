@@ -65,11 +65,11 @@ class PredictivePlanner(Planner):
             and not self._is_overtaken(robot, tether)
         ):
             return False
-        way_back = None if self.is_anchor_moving else self._path_to_shorten(tether)
-        if way_back is not None:
+        retreat = None if self.is_anchor_moving else self._path_to_shorten(tether)
+        if retreat is not None:
             is_gone = np.linalg.norm(self.path[-1:] - robot) <= self.mission.reach
             if not len(self.path) or is_gone:
-                self.path, self.mode = way_back[1:], RECOVERY
+                self.path, self.mode = retreat[1:], RECOVERY
                 return True
             return False
         first = self._planned != self.index
@@ -313,20 +313,20 @@ class PredictivePlanner(Planner):
         # the tether back from the robot, finely, off the surfaces; some of its points are pivots
         nodes = tether.nodes[::-1]
         along = polylines.along(nodes)
-        back = polylines.points_along(nodes, self.grid.cell)
-        places = np.linspace(0.0, along[-1], len(back))
-        back = move_off_surfaces(
-            self.scene, back, self.mission.clearance, self.policy.paths.standoff
+        retreat = polylines.points_along(nodes, self.grid.cell)
+        places = np.linspace(0.0, along[-1], len(retreat))
+        retreat = move_off_surfaces(
+            self.scene, retreat, self.mission.clearance, self.policy.paths.standoff
         )
-        pivots = np.linspace(0, len(back) - 1, self.predictive.max_pivots + 1)
+        pivots = np.linspace(0, len(retreat) - 1, self.predictive.max_pivots + 1)
         pivots = np.unique(pivots.round().astype(int))
-        tree = self.paths(back[pivots])
+        tree = self.paths(retreat[pivots])
         onward = {int(i): tree.path(n) for n, i in enumerate(pivots)}
 
         def taken_back(i: int) -> Floats:
             """Return the tether after the robot has followed it back to point i."""
             passed = int(np.searchsorted(along, places[i] - 1e-9, side="right"))
-            return np.vstack([tether.nodes[: max(1, len(nodes) - passed)], back[i]])
+            return np.vstack([tether.nodes[: max(1, len(nodes) - passed)], retreat[i]])
 
         self._preview_count, self._previewed_length, self._candidates = 0, 0.0, []
         if onward[0] is not None:
@@ -337,10 +337,10 @@ class PredictivePlanner(Planner):
             if not self._exceeds_at_end(direct, limit) and self._fits(tether, path, limit):
                 return path, NORMAL
         classes = []
-        for last in self._classes(back, onward):
+        for last in self._classes(retreat, onward):
             on = onward[last]
             assert on is not None
-            path = np.vstack([back[: last + 1], on[1:]])
+            path = np.vstack([retreat[: last + 1], on[1:]])
             end_tether = np.vstack([taken_back(last), on[1:]])
             classes.append(Candidate(end_tether, path, self._roughly_pulled(path)))
         self._candidates += classes

@@ -160,7 +160,7 @@ class TetherPreview:
 
     def _max_turning(self, tether: Tether) -> float:
         """Return the sum of turning angles that plans may use, rad: at least the present one."""
-        most = self.mission.tether.max_turning
-        if math.isinf(most):
-            return most
-        return max(most, turning(tether, self.mission.delta) + 1e-6)
+        limit = self.mission.tether.max_turning
+        if math.isinf(limit):
+            return limit
+        return max(limit, turning(tether, self.mission.delta) + 1e-6)

@@ -142,7 +142,7 @@ class ReactDraftPlanner(ReactPlanner):
         limit, neighbour = self.mission.tether_length, np.inf
         for n in range(2, len(pivots) - 3):
             if self.rule.accepts(pivots.length(n), neighbour, limit):
-                return pivots.back(n - 2)
+                return pivots.path_back(n - 2)
             neighbour = pivots.length(n + self.rule.neighbour)
         onward = pivots.onward(0)
         if onward is None:
@@ -171,5 +171,5 @@ class ReactThresholdsPlanner(ReactPlanner):
             further = n + self.rule.neighbour
             neighbour = pivots.length(further) if further < count else np.inf
             if self.rule.accepts(pivots.length(n), neighbour, limit):
-                return pivots.back(n)[1 : max(2, n - 1)]
+                return pivots.path_back(n)[1 : max(2, n - 1)]
         return self.fallback(pivots)

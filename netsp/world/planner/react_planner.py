@@ -76,7 +76,7 @@ class ReactPlanner(Planner):
             return self.fallback(pivots)
         onward = pivots.onward(n)
         assert onward is not None
-        return self.refined(np.vstack([pivots.back(n), self.pull_taut(onward)[1:]]))[1:]
+        return self.refined(np.vstack([pivots.path_back(n), self.pull_taut(onward)[1:]]))[1:]
 
     def fallback(self, pivots: Pivots) -> Floats:
         """Return the shortest path to the waypoint, the limit being a soft one."""
