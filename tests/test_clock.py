@@ -291,7 +291,7 @@ def test_work_of_a_first_result_gets_its_time_whatever_the_limit():
         return 7
 
     clock = Clock(0.02)
-    with clock.at_least(30.0):
+    with clock.with_min_cpu(30.0):
         assert clock.bounded("counting", counts) == 7
     with pytest.raises(LimitReachedError, match="while counting on"):
         clock.bounded("counting on", _never_ends)

@@ -190,7 +190,7 @@ def test_a_gap_is_the_share_of_the_tour_that_may_be_saved(length, share):
     assert bound.gap(length) == pytest.approx(share, abs=1e-12)
     assert bound.proves(length) == (length - bound.length <= 1e-6 * length)
     assert LowerBound(2.0 * length, Scope.ALL_TOURS).gap(length) == 0.0
-    assert bound.at_most(0.5 * length).length == min(bound.length, 0.5 * length)
+    assert bound.capped_at(0.5 * length).length == min(bound.length, 0.5 * length)
     assert relative_gap(length, bound.length) == bound.gap(length)
     assert proven(length, bound.length) == bound.proves(length)
     assert relative_gap(None, 1.0) is relative_gap(1.0, None) is None

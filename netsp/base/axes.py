@@ -820,16 +820,16 @@ def _meanings(
             found.setdefault(meaning.quantity, []).append((k, meaning))
     columns: dict[Quantity, tuple[int, Column]] = {}
     for quantity, places in found.items():
-        own = [p for p in places if _bare(head[p[0]].lower()) == quantity]
-        if len(places) > 1 and (quantity == "z" or len(own) != 1):
+        preferred = [p for p in places if _bare(head[p[0]].lower()) == quantity]
+        if len(places) > 1 and (quantity == "z" or len(preferred) != 1):
             if quantity in _TEXTS:
-                own = places[:1]
+                preferred = places[:1]
             else:
                 names = " and ".join(shown(head[k].strip()) for k, _ in places)
                 raise InputError(
                     f"{source}: columns {names} both hold {quantity}; expected one of them"
                 )
-        chosen = own[0] if own else places[0]
+        chosen = preferred[0] if preferred else places[0]
         columns[quantity] = chosen
         unused += [head[k].strip() for k, _ in places if k != chosen[0]]
     return columns, tuple(unused)

@@ -243,7 +243,9 @@ class Clock:
             return False
         family, now = self._family, time.process_time()
         if not self.is_stopped and _is_compiling():
-            family.up_at = None  # else what is compiled would be lost, and compiled again next time
+            family.up_at = (
+                None  # otherwise the compiled code would be lost, and compiled again next time
+            )
             return False
         if family.up_at is None:
             family.up_at = now
@@ -254,7 +256,7 @@ class Clock:
         return now - family.up_at > grace
 
     @contextmanager
-    def at_least(self, cpu_s: float) -> Iterator[None]:
+    def with_min_cpu(self, cpu_s: float) -> Iterator[None]:
         """Abandon no work of a block before it has had some CPU time, however short the limit is.
 
         Compiling does not count. Ctrl-C abandons work all the same.
@@ -407,7 +409,7 @@ class _Family:
     doing : str or None
         Name of the long compiled work under way, for messages.
     min_cpu_s : float
-        CPU seconds before which no work is abandoned (`Clock.at_least`).
+        CPU seconds before which no work is abandoned (`Clock.with_min_cpu`).
     compiling_s : float
         CPU seconds spent compiling, as far as it was seen.
     """
@@ -588,7 +590,7 @@ class _Stop:
         while not self._closed.is_set():
             try:
                 stop = self._should_stop()
-            except Exception as error:  # raised where the run ends: here nobody would hear it
+            except Exception as error:  # raised again by `close`, because this thread has no caller
                 self._error, stop = error, True
             if stop:
                 with self._lock:

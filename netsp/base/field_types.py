@@ -22,7 +22,7 @@ SMALLEST = 1e-100
 """Format limit of all files: smallest length or radius; squares of smaller ones underflow."""
 
 
-def checked_number(value: Any, most: float = LARGEST) -> Any:
+def checked_number(value: Any, max_magnitude: float = LARGEST) -> Any:
     """Return a number, also one of NumPy; ValueError for strings, booleans and numbers too
     large."""
     real = isinstance(value, int | float | np.integer | np.floating)
@@ -34,8 +34,8 @@ def checked_number(value: Any, most: float = LARGEST) -> Any:
         number = math.inf
     if not math.isfinite(number):
         raise ValueError(f"expected a finite number, got {shown(value)}")
-    if abs(number) > most:
-        raise ValueError(f"expected a magnitude of at most {most:g}, got {shown(value)}")
+    if abs(number) > max_magnitude:
+        raise ValueError(f"expected a magnitude of at most {max_magnitude:g}, got {shown(value)}")
     return number
 
 
@@ -91,17 +91,19 @@ def _name(value: Any) -> Any:
     return value
 
 
-def _coordinates(value: Any, sizes: tuple[int, ...], most: float = LARGEST) -> tuple[float, ...]:
+def _coordinates(
+    value: Any, sizes: tuple[int, ...], max_magnitude: float = LARGEST
+) -> tuple[float, ...]:
     text = " or ".join(("[x, y]" if k == 2 else "[x, y, z]") for k in sizes)
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if not isinstance(value, Sequence) or isinstance(value, str) or len(value) not in sizes:
         raise ValueError(f"expected {text}, got {shown(value)}")
-    return tuple(checked_number(v, most) for v in value)
+    return tuple(checked_number(v, max_magnitude) for v in value)
 
 
-def _point3(value: Any, most: float = LARGEST) -> tuple[float, ...]:
-    xyz = _coordinates(value, (2, 3), most)
+def _point3(value: Any, max_magnitude: float = LARGEST) -> tuple[float, ...]:
+    xyz = _coordinates(value, (2, 3), max_magnitude)
     return xyz if len(xyz) == 3 else (*xyz, 0.0)
 
 

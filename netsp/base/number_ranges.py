@@ -40,10 +40,10 @@ def check_shares(policy: Any, *names: str) -> None:
             raise InputError(f"{name}: expected a number from 0 to 1, got {value!r}")
 
 
-def _check(policy: Any, least: float, expected: str) -> None:
+def _check(policy: Any, minimum: float, expected: str) -> None:
     for field in fields(policy):
         if field.type in ("int", "float", int, float):
             value = getattr(policy, field.name)
             # also refuses NaN, for which every comparison is false
-            if not (isinstance(value, Real) and float(value) >= least):
+            if not (isinstance(value, Real) and float(value) >= minimum):
                 raise InputError(f"{field.name}: expected {expected}, got {value!r}")

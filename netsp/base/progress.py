@@ -16,7 +16,7 @@ Item = TypeVar("Item")
 
 
 @contextmanager
-def heard_by(listener: Listener) -> Iterator[None]:
+def reported_to(listener: Listener) -> Iterator[None]:
     """Report progress to a listener while the body runs."""
     token = _listener.set(listener)
     try:

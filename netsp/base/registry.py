@@ -38,7 +38,7 @@ class Registry(MutableMapping[str, R], Generic[R]):
         Term for a record in messages.
     group : str
         Name of the entry points of other packages.
-    own : dict
+    builtin : dict
         netsp's records by name.
     record : callable
         Function that makes the record of another package's entry point from its name and
@@ -46,32 +46,32 @@ class Registry(MutableMapping[str, R], Generic[R]):
     """
 
     def __init__(
-        self, kind: str, group: str, own: dict[str, R], record: Callable[[str, str], R]
+        self, kind: str, group: str, builtin: dict[str, R], record: Callable[[str, str], R]
     ) -> None:
-        self.kind, self.group, self._own, self._record = kind, group, own, record
+        self.kind, self.group, self._builtin, self._record = kind, group, builtin, record
 
     @cached_property
     def _foreign(self) -> dict[str, R]:
         """Records of other packages, which cannot replace netsp's."""
         found = importlib.metadata.entry_points(group=self.group)
-        return {e.name: self._record(e.name, e.value) for e in found if e.name not in self._own}
+        return {e.name: self._record(e.name, e.value) for e in found if e.name not in self._builtin}
 
     def __getitem__(self, name: str) -> R:
-        if name in self._own:
-            return self._own[name]
+        if name in self._builtin:
+            return self._builtin[name]
         return self._foreign[name]
 
     def __setitem__(self, name: str, record: R) -> None:
-        self._own[name] = record
+        self._builtin[name] = record
 
     def __delitem__(self, name: str) -> None:
-        del self._own[name]
+        del self._builtin[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter({**self._own, **self._foreign})
+        return iter({**self._builtin, **self._foreign})
 
     def __len__(self) -> int:
-        return len({**self._own, **self._foreign})
+        return len({**self._builtin, **self._foreign})
 
     def named(self, name: object) -> R:
         """Return the record of a name.
@@ -97,8 +97,8 @@ class Registry(MutableMapping[str, R], Generic[R]):
         The current folder is searched, too, where an installed command does not look for modules.
         """
         module, _, attribute = where.partition(":")
-        if (here := os.getcwd()) not in sys.path and "" not in sys.path:
-            sys.path.append(here)
+        if (folder := os.getcwd()) not in sys.path and "" not in sys.path:
+            sys.path.append(folder)
         with foreign(f"{self.kind}: {where}: cannot be loaded"):
             try:
                 _found(module, attribute)

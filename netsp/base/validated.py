@@ -116,9 +116,11 @@ def kind_of(data: Mapping[str, Any]) -> str | None:
 def _check_kind(model: type[BaseModel], data: dict[str, Any], source: str) -> None:
     """Raise InputError if a file is clearly of another kind than that of the model."""
     kind = kind_of(data)
-    own = next((k for k, marks in MARKS.items() if marks <= model.model_fields.keys()), None)
-    if kind and own and kind != own:
-        raise InputError(f"{source}: this is a {kind}; expected a {own}")
+    expected_kind = next(
+        (k for k, marks in MARKS.items() if marks <= model.model_fields.keys()), None
+    )
+    if kind and expected_kind and kind != expected_kind:
+        raise InputError(f"{source}: this is a {kind}; expected a {expected_kind}")
 
 
 def parse_json(text: str | bytes, source: str) -> Any:
@@ -184,7 +186,7 @@ def explain(error: ValidationError) -> str:
     for k, part in enumerate(first["loc"]):
         if isinstance(part, int):
             where += f"[{part}]"
-        elif not (k == 2 and first["loc"][0] == "obstacles"):  # there pydantic tells the kind
+        elif not (k == 2 and first["loc"][0] == "obstacles"):  # there pydantic inserts the kind
             where += f".{part}" if where else part
     kind, context = first["type"], first.get("ctx", {})
     got = f"got {shown(first['input'])}"
@@ -211,7 +213,7 @@ def explain(error: ValidationError) -> str:
     counted = [e for e in errors if e["loc"] not in short or not _has_wrong_item(e, errors)]
     extra = [e["loc"][-1] for e in errors if e["type"] == "extra_forbidden"]
     others = len(counted) - 1
-    if kind == "missing" and extra:  # as like as not the same field, misspelt
+    if kind == "missing" and extra:  # probably the same field, misspelt
         message, others = f"{message}; unknown field {shown(extra[0])}", others - 1
     more = f" (and {others} more)" if others else ""
     return f"{where}: {message}{more}" if where else f"{message}{more}"
@@ -231,6 +233,6 @@ def shown(value: Any) -> str:
     """Return a value as it is shown in messages, cut at 60 characters."""
     try:
         text = repr(value)
-    except Exception:  # of somebody else's class, or a number of more digits than Python writes
+    except Exception:  # a foreign class, or a number with too many digits for Python
         text = f"a {type(value).__name__} that cannot be shown"
     return text if len(text) <= 60 else text[:57] + "…"

@@ -7,7 +7,7 @@ import time
 from contextlib import ExitStack
 from typing import TextIO
 
-from netsp.base.progress import heard_by
+from netsp.base.progress import reported_to
 
 FIRST_LINE_S = 3.0
 """Time of silence before the first line, s."""
@@ -37,7 +37,7 @@ class Patience:
         self._thread = threading.Thread(target=self._watch, daemon=True)
 
     def __enter__(self) -> Patience:
-        self._open.enter_context(heard_by(self._step))
+        self._open.enter_context(reported_to(self._step))
         self._thread.start()
         return self
 

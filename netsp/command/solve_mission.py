@@ -101,7 +101,7 @@ def solve(
     with stages or contextlib.nullcontext():
         from netsp.command.plot_scene import note_scene, tell, warn_of_scene
 
-        with clock.at_least(MissionPolicy().first_tour_s):
+        with clock.with_min_cpu(MissionPolicy().first_tour_s):
             scene = clock.bounded("reading the scene", mission.load_scene)
             field = clock.bounded(
                 "measuring distances in the scene",

@@ -137,7 +137,7 @@ _COLUMN: Mapping[Scope, str] = MappingProxyType(
 
 
 def _of_limits(limits: frozenset[str]) -> Scope:
-    found = next((s for s, own in _LIMITS.items() if own == limits), None)
+    found = next((s for s, limits_of_scope in _LIMITS.items() if limits_of_scope == limits), None)
     if found is None:
         raise ValueError(f"scope: no tours limited by {', '.join(sorted(limits))}")
     return found
@@ -187,7 +187,7 @@ class LowerBound:
         """Return whether the gap of a tour is at most `OPTIMALITY_TOLERANCE`."""
         return length - self.length <= OPTIMALITY_TOLERANCE * max(length, 1e-300)
 
-    def at_most(self, length: float) -> LowerBound:
+    def capped_at(self, length: float) -> LowerBound:
         """Return the bound, reduced to the length of a tour of the scope if rounding lifted it
         above."""
         return LowerBound(min(self.length, length), self.scope, self.because)
@@ -214,7 +214,7 @@ class LowerBound:
             )
         return LowerBound(self.length, scope, because)
 
-    def or_elsewhere(self, least: float, scope: Scope, because: str) -> LowerBound:
+    def or_elsewhere(self, other_bound: float, scope: Scope, because: str) -> LowerBound:
         """Return a bound for a larger scope, the smaller of this one and a bound on its other
         tours.
 
@@ -225,7 +225,7 @@ class LowerBound:
         scope : Scope
             Larger scope.
         because : str
-            Reason why no other tour is shorter than `least`.
+            Reason why no other tour is shorter than `other_bound`.
 
         Raises
         ------
@@ -233,7 +233,7 @@ class LowerBound:
             The reason is empty.
         """
         _check_reason(because)
-        return LowerBound(min(self.length, max(least, 0.0)), scope, because)
+        return LowerBound(min(self.length, max(other_bound, 0.0)), scope, because)
 
     def above(self, length: float) -> str:
         """Return how far a tour may be above the shortest of the scope: "at most 3.8 % above the

@@ -448,14 +448,14 @@ class Problem(Drawn, FileModel):
                     f"{self._obstacle_field(i)}: reaches {far:.6g} from the base, and no goal is "
                     f"farther than {away:.6g}; expected at most {MAX_EXTENT_RATIO:g} times as far"
                 )
-        least = MIN_WIDTH_RATIO * self.scale
+        min_width = MIN_WIDTH_RATIO * self.scale
         for i, o in enumerate(self.obstacles):
             near, _ = self._span(o)
             width = 2.0 * self.clearance + _width(o)
-            if near <= reach and width < least:
+            if near <= reach and width < min_width:
                 return (
                     f"{self._obstacle_field(i)}: is {width:.3g} wide, too little for a problem of "
-                    f"size {self.scale:.6g}; expected at least {least:.3g}"
+                    f"size {self.scale:.6g}; expected at least {min_width:.3g}"
                 )
         return None
 
@@ -586,9 +586,9 @@ class Problem(Drawn, FileModel):
         more = checked_argument("margin", margin, 0.0)
         length = self.tether_length / (1.0 + checked_argument("slack", slack, 0.0, 1.0))
         try:
-            own = {name: getattr(self, name) for name in Problem.model_fields}
+            fields = {name: getattr(self, name) for name in Problem.model_fields}
             return Problem.model_validate(
-                {**own, "clearance": self.clearance + more, "tether_length": length}
+                {**fields, "clearance": self.clearance + more, "tether_length": length}
             )
         except ValidationError as error:
             raise InputError(f"margin {more:g}: {explain(error)}") from None
@@ -645,14 +645,14 @@ class Problem(Drawn, FileModel):
     def sha256(self) -> str:
         """Hash of all values that the answer depends on, without names."""
         data = self.model_dump(mode="json", exclude={"name", "units", "origin", "site"})
-        if data["state"] is None:  # problems had none before: their hashes stay
+        if data["state"] is None:  # older problems have no state, and their hashes must stay
             del data["state"]
-        for k, goal in enumerate(data["goals"]):  # nor had goals anything to say of each other
-            own = self.clusters[k]
-            if goal.pop("choice") is not None and (self.clusters == own).sum() > 1:
-                goal["cluster"] = int(own)
+        for k, goal in enumerate(data["goals"]):  # nor relations between goals
+            cluster = self.clusters[k]
+            if goal.pop("choice") is not None and (self.clusters == cluster).sum() > 1:
+                goal["cluster"] = int(cluster)
             if goal.pop("after"):
-                goal["after"] = np.flatnonzero(self.precedences[:, own]).tolist()
+                goal["after"] = np.flatnonzero(self.precedences[:, cluster]).tolist()
         for item in (*data["goals"], *data["obstacles"]):
             item.pop("name", None)
         text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)

@@ -145,7 +145,7 @@ def _with_goals(data: Mapping[str, Any]) -> Mapping[str, Any]:
         try:
             made = inspection.goals(obstacle)
         except (KeyError, TypeError, ValueError):
-            # the obstacle is not valid; its own complaint will follow, none about its goals
+            # the obstacle is not valid, and validation will report it instead of its goals
             made = [{"name": inspection.inspect, "position": [0.0, 0.0]}]
         inspected.setdefault(inspection.inspect, []).extend(g["name"] for g in made)
         out += made

@@ -152,7 +152,7 @@ class GraphFromState(TravelGraph):
             length=length,
             status=status,
             walk=walk[1:],
-            lower_bound=None if low is None else low.at_most(length).length,
+            lower_bound=None if low is None else low.capped_at(length).length,
         )
 
     def _path_bound(self, bound: LowerBound | None) -> LowerBound | None:

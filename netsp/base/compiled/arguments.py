@@ -87,8 +87,10 @@ def call_within(budget_s: float, kernel: Any, args: tuple[Any, ...]) -> Any:
         return call_interpreted(kernel, args)
     function = interpreted(kernel)
     names = kernel.py_func.__code__.co_varnames
-    own = [a for name, a in zip(names, args, strict=False) if name not in STOP_PARAMETERS]
-    before = [(a, a.copy()) for a in arrays_in(own) if a.flags.writeable]
+    named_arguments = [
+        a for name, a in zip(names, args, strict=False) if name not in STOP_PARAMETERS
+    ]
+    before = [(a, a.copy()) for a in arrays_in(named_arguments) if a.flags.writeable]
     try:
         # outside `within`, so that `Overtime` is never raised while this `with` exits
         with np.errstate(all="ignore"):

@@ -148,10 +148,10 @@ def is_on_disk(dispatcher: Any, types: tuple[Any, ...]) -> bool:
     types : tuple
         Numba's types of the arguments.
     """
-    own, file = dispatcher._cache, _file_of(dispatcher)
+    kept, file = dispatcher._cache, _file_of(dispatcher)
     if file is None:
         return False
-    return file.contains(own._index_key(types, dispatcher.targetctx.codegen()))
+    return file.contains(kept._index_key(types, dispatcher.targetctx.codegen()))
 
 
 def is_any_on_disk(dispatcher: Any) -> bool:

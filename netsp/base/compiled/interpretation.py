@@ -70,16 +70,17 @@ def interpreted(kernel: Any) -> Callable[..., Any]:
 
 
 @cache
-def _interpreted(own: Any) -> Callable[..., Any]:
-    if own in _in_numpy:
-        return _in_numpy[own]
-    code = _code_with_products(own)
-    names = {name: own.__globals__[name] for name in names_used(code) if name in own.__globals__}
+def _interpreted(function: Any) -> Callable[..., Any]:
+    if function in _in_numpy:
+        return _in_numpy[function]
+    code = _code_with_products(function)
+    known = function.__globals__
+    names = {name: known[name] for name in names_used(code) if name in known}
     used = {n: interpreted(v) if hasattr(v, "py_func") else v for n, v in names.items()}
     if used.get("math") is math:
         used["math"] = _c_math()
-    scope = {**own.__globals__, **used, _POWER: _power}
-    return FunctionType(code, scope, own.__name__, own.__defaults__)
+    scope = {**known, **used, _POWER: _power}
+    return FunctionType(code, scope, function.__name__, function.__defaults__)
 
 
 def names_used(code: CodeType) -> Iterator[str]:
@@ -120,12 +121,13 @@ class _Products(ast.NodeTransformer):
 
 def _code_with_products(function: Callable[..., Any]) -> CodeType:
     """Return the code of a function in which powers are products."""
-    own = function.__code__
-    last = max(line for _, _, line in own.co_lines() if line is not None)
+    original = function.__code__
+    last = max(line for _, _, line in original.co_lines() if line is not None)
     if not any(
-        "**" in line for line in linecache.getlines(own.co_filename)[own.co_firstlineno - 1 : last]
+        "**" in line
+        for line in linecache.getlines(original.co_filename)[original.co_firstlineno - 1 : last]
     ):
-        return own
+        return original
     tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
     (definition,) = tree.body
     assert isinstance(definition, ast.FunctionDef)
@@ -134,8 +136,8 @@ def _code_with_products(function: Callable[..., Any]) -> CodeType:
         if isinstance(argument, ast.arg):
             argument.annotation = None
     tree = ast.fix_missing_locations(_Products().visit(tree))
-    ast.increment_lineno(tree, own.co_firstlineno - 1)
-    whole = compile(tree, own.co_filename, "exec")
+    ast.increment_lineno(tree, original.co_firstlineno - 1)
+    whole = compile(tree, original.co_filename, "exec")
     (code,) = (c for c in whole.co_consts if isinstance(c, CodeType))
     return code
 

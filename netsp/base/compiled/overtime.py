@@ -59,14 +59,14 @@ class _Watch:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._wakes: queue.SimpleQueue[None] = queue.SimpleQueue()
-        self._under_way: set[_Call] = set()
+        self._running: set[_Call] = set()
         self._is_asleep = False
         self._thread: threading.Thread | None = None
 
     def begin(self, call: _Call) -> None:
         """Watch a call. Where no thread can be started, the call has no deadline."""
         with self._lock:
-            self._under_way.add(call)
+            self._running.add(call)
             if self._thread is None or not self._thread.is_alive():
                 self._thread = threading.Thread(
                     target=self._run, daemon=True, name="netsp-overtime"
@@ -79,7 +79,7 @@ class _Watch:
     def end(self, call: _Call) -> None:
         """Stop watching a call of this thread, and catch `Overtime` if it is pending."""
         with self._lock:
-            self._under_way.discard(call)
+            self._running.discard(call)
             was_ended = call.was_ended
         if was_ended:
             _catch_pending(call.thread)
@@ -89,10 +89,10 @@ class _Watch:
         while True:
             policy = current_policy()
             with self._lock:
-                idle = 0 if self._under_way else idle + 1
+                idle = 0 if self._running else idle + 1
                 self._is_asleep = idle > policy.max_idle_checks
-                for call in [c for c in self._under_way if c.now() > c.deadline]:
-                    self._under_way.discard(call)
+                for call in [c for c in self._running if c.now() > c.deadline]:
+                    self._running.discard(call)
                     call.was_ended = True
                     ctypes.pythonapi.PyThreadState_SetAsyncExc(
                         ctypes.c_ulong(call.thread), ctypes.py_object(Overtime)

@@ -168,7 +168,7 @@ def segment_blocked(ax: float, ay: float, bx: float, by: float, blockers: Blocke
         x0, y0, x1, y1 = box[node, 0], box[node, 1], box[node, 2], box[node, 3]
         apart = right < x0 or left > x1 or high < y0 or low > y1
         if not apart:
-            # the line of the segment passes the box by
+            # or the line of the segment misses the box
             side = dx * (0.5 * (y0 + y1) - ay) - dy * (0.5 * (x0 + x1) - ax)
             apart = 2.0 * abs(side) > abs(dx) * (y1 - y0) + abs(dy) * (x1 - x0)
         if apart:

@@ -27,7 +27,7 @@ def with_bound(result: Result, bound: LowerBound) -> Result:
     """
     if result.length is None:
         return dataclasses.replace(result, lower_bound=bound.length, lower_bound_of=bound.scope)
-    bound, status = bound.at_most(result.length), result.status
+    bound, status = bound.capped_at(result.length), result.status
     if bound.proves(result.length) and (status.is_optimal or status is Status.FEASIBLE):
         status = Status.optimal_of(bound.scope)
     elif status is Status.OPTIMAL:

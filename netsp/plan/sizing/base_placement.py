@@ -280,7 +280,7 @@ def _solve_candidates(
             continue
         bound = strongest(candidate.bound, found.bound) or candidate.bound
         if found.length is not None:
-            bound = bound.at_most(found.length)
+            bound = bound.capped_at(found.length)
         rated[k] = replace(
             candidate, length=found.length, lower_bound=bound.length, status=found.status
         )

@@ -360,7 +360,7 @@ def solve_mission(
     with until_interrupt(time_limit) as clock:
         check_plannable(mission, solver, params, seed)
         try:
-            with clock.at_least(policy.first_tour_s):
+            with clock.with_min_cpu(policy.first_tour_s):
                 scene = scene or clock.bounded("reading the scene", mission.load_scene)
                 context = prepare_context(
                     mission, clock, scene=scene, field=field, on_progress=report, policy=policy
@@ -515,7 +515,7 @@ def _search(found: _Incumbents, clock: Clock, options: _SolverOptions) -> _Searc
     needs_tour = found.best is None
     first_tour_s = flights.policy.first_tour_s if needs_tour else 0.0
     try:
-        with clock.at_least(first_tour_s):
+        with clock.with_min_cpu(first_tour_s):
             while (plan := next_plan()) is not None:
                 best = found.best
                 if plan.kind == PLANE and best is not None and best.tour.solver == PLANE:

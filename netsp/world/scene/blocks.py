@@ -65,9 +65,9 @@ def nearest_in_blocks(
         if stop[0] != 0:
             return
         for a in range(3):
-            least, most = extent(sites, s, a)
-            low[a] = max(0, math.floor((least - origin[a]) / size) - 2)
-            high[a] = min(SIDE * table.shape[a] - 1, math.ceil((most - origin[a]) / size) + 2)
+            lowest, highest = extent(sites, s, a)
+            low[a] = max(0, math.floor((lowest - origin[a]) / size) - 2)
+            high[a] = min(SIDE * table.shape[a] - 1, math.ceil((highest - origin[a]) / size) + 2)
         low[0] = max(low[0], SIDE * blocks[0, 0])
         high[0] = min(high[0], SIDE * blocks[-1, 0] + SIDE - 1)
         for bi in range(low[0] // SIDE, high[0] // SIDE + 1):
@@ -139,7 +139,7 @@ def sweep_blocks(
     owner: Owners,
     turn: int,
     changed: Ints,
-    asked: Ints,
+    last_checked: Ints,
     stop: Flag,
 ) -> None:
     """Sweep a slab's points in one of the eight diagonal directions, until `stop` is set.
@@ -152,7 +152,7 @@ def sweep_blocks(
         Index of the direction, from 0 to 7.
     changed : ndarray of int, shape (n,)
         Last turn, counted from 1, in which anything changed in each block.
-    asked : ndarray of int, shape (n, 6)
+    last_checked : ndarray of int, shape (n, 6)
         Last turn in which each block looked at its neighbour in each direction. A block is skipped
         where nothing has changed since.
     """
@@ -176,9 +176,9 @@ def sweep_blocks(
             (before_j, 2 + (dj + 1) // 2),
             (before_k, 4 + (dk + 1) // 2),
         ):
-            has_news = has_news or asked[b, side] < changed[b]
-            has_news = has_news or (before >= 0 and asked[b, side] < changed[before])
-            asked[b, side] = turn + 1
+            has_news = has_news or last_checked[b, side] < changed[b]
+            has_news = has_news or (before >= 0 and last_checked[b, side] < changed[before])
+            last_checked[b, side] = turn + 1
         if not has_news:
             continue
         for p in range(SIDE):
@@ -207,7 +207,7 @@ def sweep_blocks(
                         continue
                     z = origin[2] + size * (SIDE * bk + k)
                     best = distances[b, at]
-                    # a neighbour that is farther by a whole step has nothing nearer to hand on
+                    # a neighbour that is farther by a whole step has no nearer site
                     if u >= 0 and u != mine and distances[from_i, at + back_i] - size < best:
                         d = site_distance(sites, u, x, y, z)
                         if d < best:
@@ -252,7 +252,7 @@ def turn_inside(
     for line in range(ny * nz):
         if first[line + 1] - first[line] > 1:
             crossings[first[line] : first[line + 1]].sort()
-    most = 0
+    highest = 0
     for b in range(len(blocks)):
         for j in range(SIDE):
             for k in range(SIDE):
@@ -262,11 +262,11 @@ def turn_inside(
                     while c < first[line + 1] and crossings[c] >> 1 <= SIDE * blocks[b, 0] + i:
                         turns += 1 if crossings[c] & 1 else -1
                         c += 1
-                    most = max(most, abs(turns))
+                    highest = max(highest, abs(turns))
                     if turns != 0:
                         at = (i * SIDE + j) * SIDE + k
                         values[b, at] = -values[b, at]
-    return most
+    return highest
 
 
 @kernel
@@ -460,7 +460,7 @@ def _between(corners: Singles, bi: int, bj: int, bk: int, i: int, j: int, k: int
 
 
 @kernel
-def least_in_blocks(
+def minimum_in_blocks(
     corners: Singles, values: Singles, table: Table, points: Ints, reach: int
 ) -> Singles:
     """Return the least value (m,) at grid points up to `reach` voxels around m points (m, 3)."""

@@ -25,9 +25,9 @@ def nearest_sites(
     shape = (nx, ny, nz)
     for s in range(len(sites)):
         for a in range(3):
-            least, most = extent(sites, s, a)
-            low[a] = max(0, math.floor((least - origin[a]) / size) - 2)
-            high[a] = min(shape[a] - 1, math.ceil((most - origin[a]) / size) + 2)
+            lowest, highest = extent(sites, s, a)
+            low[a] = max(0, math.floor((lowest - origin[a]) / size) - 2)
+            high[a] = min(shape[a] - 1, math.ceil((highest - origin[a]) / size) + 2)
         for i in range(low[0], high[0] + 1):
             if stop[0] != 0:
                 return
@@ -78,7 +78,7 @@ def sweep(
                     s = owner[u, v, w]
                     if s < 0 or s in (mine, tried):
                         continue
-                    # no nearer than the neighbour's distance less a step
+                    # the site is no nearer than the neighbour's distance minus a step
                     if distances[u, v, w] - size >= best:
                         continue
                     tried = s

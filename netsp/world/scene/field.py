@@ -101,17 +101,17 @@ class DistanceField:
             Policy of fields.
         """
         policy = policy or FieldPolicy()
-        data = packing.of_solids(kinds, rows, outline)
+        data = packing.pack_solids(kinds, rows, outline)
         if len(kinds) > policy.max_solids_without_lookup and boxes:
             low = np.min([b[0] for b in boxes], axis=0)
             high = np.max([b[1] for b in boxes], axis=0)
             room = 0.25 * float((high - low).max()) + 1e-9
             low, high = low - room, high + room
             size = float((high - low).max()) / policy.lookup_cells
-            data = packing.with_lookup(data, low, high, size)
+            data = packing.add_lookup(data, low, high, size)
         voxels = np.empty(0, dtype=np.float32)
         if grid is not None:
-            data, voxels = packing.with_voxels(data, grid), grid.values
+            data, voxels = packing.add_voxels(data, grid), grid.values
         return cls(
             Field(data, voxels, float(offset)),
             grid.voxel if grid is not None else None,
@@ -244,7 +244,7 @@ class DistanceField:
                 return float(solid.any())
             far = distance_transform_edt(~deep) * size
             return float((far[solid] > reach).mean())
-        samples = packing.block_points(
+        samples = packing.sample_block_points(
             data, self.arrays.grid, self.arrays.offset, self.policy.max_thin_samples
         )
         if not len(samples):
@@ -273,7 +273,7 @@ class DistanceField:
     @property
     def voxels(self) -> VoxelGrid | None:
         """Voxels, for use in another field; None without voxels."""
-        return packing.voxels_of(self.arrays.data, self.arrays.grid, self.notes)
+        return packing.unpack_voxels(self.arrays.data, self.arrays.grid, self.notes)
 
     @property
     def box(self) -> Floats | None:

@@ -226,7 +226,9 @@ def _read(path: str | Path, policy: FloorPolicy) -> _Grid:
         raise InputError(f"{path}: cannot be read: no such file")
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of files without a place on the map, refused below
+            warnings.simplefilter(
+                "ignore"
+            )  # warnings about grids without a place on the map, which are refused below
             with _opened(rasterio, path) as grid:
                 if grid.width * grid.height > policy.max_cells:
                     raise InputError(
@@ -244,7 +246,7 @@ def _read(path: str | Path, policy: FloorPolicy) -> _Grid:
                 positive = {**grid.tags(), **grid.tags(band.number)}.get("positive", "")
     except InputError:
         raise
-    except Exception as error:  # GDAL's many readers raise what they like
+    except Exception as error:  # GDAL's readers raise many kinds of exceptions
         first = (str(error) or type(error).__name__).splitlines()[0][:120]
         raise InputError(f"{path}: cannot be read as a grid: {first}") from None
     metres, axis = 1.0, None

@@ -45,7 +45,7 @@ class Dense:
     counts: tuple[int, int, int]
 
     def closest(
-        self, sites: Floats, on_progress: OnStage = None, *, whose: bool = True
+        self, sites: Floats, on_progress: OnStage = None, *, with_owners: bool = True
     ) -> tuple[Singles, Owners]:
         """Return the distance of each point to the nearest site, and if wanted the index of that
         site."""
@@ -78,14 +78,14 @@ class Dense:
         at = np.argwhere(chosen.reshape(self.counts))
         return self.origin + self.size * at, np.flatnonzero(chosen)
 
-    def least_around(self, values: Singles, points: Floats, reach: int) -> Singles:
+    def minimum_nearby(self, values: Singles, points: Floats, reach: int) -> Singles:
         """Return the least value (m,) up to `reach` voxels around each of m places (m, 3)."""
         from scipy.ndimage import minimum_filter
 
         cell = np.rint((points - self.origin) / self.size).astype(int)
         cell = np.clip(cell, 0, np.array(self.counts) - 1)
-        least = minimum_filter(values.reshape(self.counts), size=2 * reach + 1)
-        return np.asarray(least[tuple(cell.T)])
+        lowest = minimum_filter(values.reshape(self.counts), size=2 * reach + 1)
+        return np.asarray(lowest[tuple(cell.T)])
 
     def grid(self, values: Singles, solid: Floats, notes: tuple[str, ...]) -> VoxelGrid:
         """Return the grid with the given values."""
@@ -134,13 +134,13 @@ class Sparse:
         return row[: self.first].reshape(self.counts), row[self.first :].reshape(shape)
 
     def closest(
-        self, sites: Floats, on_progress: OnStage = None, *, whose: bool = True
+        self, sites: Floats, on_progress: OnStage = None, *, with_owners: bool = True
     ) -> tuple[Singles, Owners]:
         """Return distances and sites as `Dense` does, slab by slab, to need little memory in
         between."""
         total = self.first + len(self.blocks) * SIDE**3
         distances = np.empty(total, dtype=np.float32)
-        owner = np.empty(total if whose else 0, dtype=np.int32)
+        owner = np.empty(total if with_owners else 0, dtype=np.int32)
         known, far, nearest = self.known
         if sites is not known:
             side = SIDE * self.size
@@ -148,13 +148,13 @@ class Sparse:
         distances[: self.first] = far.ravel()
         owner[: self.first] = nearest.ravel()[: len(owner)]
         reach = compiled.along_x(sites)
-        stop = abandoned()  # the threads of the pool have no context
+        stop = abandoned()  # threads of the pool have no context
 
         def fill(slab: tuple[int, int]) -> int:
             d, s, inner = self._slab(slab, sites, reach, nearest, stop)
             rows = slice(*np.searchsorted(self.blocks[:, 0], slab))
             self._parts(distances)[1][rows] = d[inner]
-            if whose:
+            if with_owners:
                 self._parts(owner)[1][rows] = s[inner]
             return len(d[inner])
 
@@ -163,7 +163,7 @@ class Sparse:
             for count in pool.map(fill, self._slabs()):
                 end_if_abandoned()
                 done += count
-                tell(on_progress, "distances", done / (len(self.blocks) + 1))
+                report_stage(on_progress, "distances", done / (len(self.blocks) + 1))
         finally:
             pool.shutdown(cancel_futures=True)
         end_if_abandoned()
@@ -202,12 +202,12 @@ class Sparse:
         compiled.nearest_to_corners(sites, place, blocks, corners, distances, owner)
         compiled.nearest_in_blocks(sites, which, place, blocks, self.table, distances, owner, stop)
         changed = np.zeros(len(blocks), dtype=np.int64)
-        asked = np.full((len(blocks), 6), -1)
+        last_checked = np.full((len(blocks), 6), -1)
         for turn in range(8):
             signs = [1 if turn // s % 2 == 0 else -1 for s in (1, 2, 4)]
             i, j, k = (sign * row for sign, row in zip(signs, blocks.T, strict=True))
             order = np.lexsort((k, j, i)).astype(np.int64)
-            state = (distances, owner, turn, changed, asked, stop)
+            state = (distances, owner, turn, changed, last_checked, stop)
             compiled.sweep_blocks(sites, place, blocks, self.table, order, *state)
         return distances, owner, slice(first - begin, last - begin)
 
@@ -238,11 +238,11 @@ class Sparse:
         places = self.origin + self.size * (SIDE * self.blocks[at[:, 0]] + at[:, 1:])
         return places, np.flatnonzero(fine) + self.first
 
-    def least_around(self, values: Singles, points: Floats, reach: int) -> Singles:
+    def minimum_nearby(self, values: Singles, points: Floats, reach: int) -> Singles:
         """Return least values as `Dense` does."""
         cell = np.rint((points - self.origin) / self.size).astype(np.int64)
         corners, fine = self._parts(values)
-        return np.asarray(compiled.least_in_blocks(corners, fine, self.table, cell, reach))
+        return np.asarray(compiled.minimum_in_blocks(corners, fine, self.table, cell, reach))
 
     def grid(self, values: Singles, solid: Floats, notes: tuple[str, ...]) -> VoxelGrid:
         """Return the grid as `Dense` does."""
@@ -308,7 +308,7 @@ Lattice = Dense | Sparse
 """Points at which a grid is built, in one row."""
 
 
-def tell(on_progress: OnStage, stage: str, fraction: float) -> None:
+def report_stage(on_progress: OnStage, stage: str, fraction: float) -> None:
     """Report the progress of a stage, from 0 to 1, if there is a listener."""
     if on_progress is not None:
         on_progress(stage, fraction)
@@ -319,7 +319,7 @@ def _closest(
 ) -> tuple[Singles, Owners]:
     """Return the distances of all points of a grid to the nearest site, and the index of that
     site."""
-    tell(on_progress, "distances", 0.0)
+    report_stage(on_progress, "distances", 0.0)
     distances = np.full(counts, np.float32(np.inf))
     owner = np.full(counts, -1, dtype=np.int32)
     stop = abandoned()
@@ -327,6 +327,6 @@ def _closest(
     for turn in range(8):
         end_if_abandoned()
         sweep(sites, origin, size, distances, owner, turn, stop)
-        tell(on_progress, "distances", (turn + 1) / 9)
+        report_stage(on_progress, "distances", (turn + 1) / 9)
     end_if_abandoned()
     return distances, owner

@@ -92,7 +92,7 @@ def _nodes_of(scene: dict[str, Any], nodes: list[dict[str, Any]]) -> list[int]:
         k = waiting.pop()
         found.append(k)
         if len(found) > len(nodes):
-            break  # a circle, which its reader refuses
+            break  # a cycle, which the reader refuses
         waiting += nodes[k].get("children", [])
     return found
 

@@ -55,7 +55,7 @@ ROW = 17
 """Format of a row: its length, of the kind and 16 numbers."""
 
 
-def of_solids(kinds: list[int], rows: list[list[float]], outline: npt.ArrayLike) -> Floats:
+def pack_solids(kinds: list[int], rows: list[list[float]], outline: npt.ArrayLike) -> Floats:
     """Return the vector of solids, without look-up.
 
     Rows of prisms state the range of their corners in the outline (m, 2).
@@ -74,7 +74,7 @@ def of_solids(kinds: list[int], rows: list[list[float]], outline: npt.ArrayLike)
     return data
 
 
-def with_lookup(data: Floats, low: Floats, high: Floats, size: float) -> Floats:
+def add_lookup(data: Floats, low: Floats, high: Floats, size: float) -> Floats:
     """Return a vector with a look-up whose cells have a size and cover a box."""
     counts = np.ceil((high - low) / size)
     data = data.copy()
@@ -85,7 +85,7 @@ def with_lookup(data: Floats, low: Floats, high: Floats, size: float) -> Floats:
     return np.concatenate([data, begin + len(cells) + cells, items])
 
 
-def with_voxels(data: Floats, grid: VoxelGrid) -> Floats:
+def add_voxels(data: Floats, grid: VoxelGrid) -> Floats:
     """Return the vector of a field with voxels."""
     data = data.copy()
     data[VOXELS] = 1.0
@@ -99,7 +99,7 @@ def with_voxels(data: Floats, grid: VoxelGrid) -> Floats:
     return np.concatenate([data, np.where(grid.table < 0, 0.0, begins).ravel()])
 
 
-def voxels_of(data: Floats, values: Singles, notes: tuple[str, ...]) -> VoxelGrid | None:
+def unpack_voxels(data: Floats, values: Singles, notes: tuple[str, ...]) -> VoxelGrid | None:
     """Return the grid of a vector; None without voxels."""
     if data[VOXELS] == 0.0:
         return None
@@ -115,8 +115,8 @@ def voxels_of(data: Floats, values: Singles, notes: tuple[str, ...]) -> VoxelGri
     return VoxelGrid(values, (nx, ny, nz), place, size, box, notes, table)
 
 
-def block_points(data: Floats, voxels: Singles, offset: float, most: int) -> Floats:
-    """Return at most `most` points (n, 3) in blocks whose distance is below an offset.
+def sample_block_points(data: Floats, voxels: Singles, offset: float, max_count: int) -> Floats:
+    """Return at most `max_count` points (n, 3) in blocks whose distance is below an offset.
 
     They are chosen evenly, as many from each of evenly chosen blocks.
     """
@@ -126,11 +126,11 @@ def block_points(data: Floats, voxels: Singles, offset: float, most: int) -> Flo
     cells = np.argwhere(table > 0.0)
     cells = cells[np.argsort(table[tuple(cells.T)])]
     values = voxels[int(np.prod(counts + 1)) :].reshape(-1, SIDE, SIDE, SIDE)
-    some = np.arange(0, len(cells), max(1, len(cells) // most))
-    at = np.argwhere(values[some] < offset)
-    at = at[:: max(1, len(at) // most)]
+    chosen = np.arange(0, len(cells), max(1, len(cells) // max_count))
+    at = np.argwhere(values[chosen] < offset)
+    at = at[:: max(1, len(at) // max_count)]
     return np.asarray(
-        data[PLACE : PLACE + 3] + data[FINE] * (SIDE * cells[some[at[:, 0]]] + at[:, 1:])
+        data[PLACE : PLACE + 3] + data[FINE] * (SIDE * cells[chosen[at[:, 0]]] + at[:, 1:])
     )
 
 
@@ -158,16 +158,16 @@ def candidates(data: Floats) -> tuple[Ints, Ints]:
                 x = near[0] + (i + 0.5) * near[3]
                 y = near[1] + (j + 0.5) * near[3]
                 z = near[2] + (k + 0.5) * near[3]
-                least = math.inf
+                smallest = math.inf
                 for n in range(count):
                     found[n] = solid_distance(data, ROWS + ROW * n, x, y, z)[0]
-                    least = min(least, found[n])
+                    smallest = min(smallest, found[n])
                 if size + count > len(items):
                     more = np.empty(2 * len(items) + count, dtype=np.int64)
                     write_ints(more, items, size)
                     items = more
                 for n in range(count):
-                    if found[n] <= least + reach:
+                    if found[n] <= smallest + reach:
                         items[size] = ROWS + ROW * n
                         size += 1
                 cells[(i * ny + j) * nz + k + 1] = size

@@ -173,7 +173,7 @@ def _from_columns(
     widths = [t.itemsize * c for t, c in zip(head.types, head.counts, strict=True)]
     stored = [0 if name == PADDING else w for name, w in zip(head.names, widths, strict=True)]
     if unpacked != head.points * sum(stored):
-        stored = widths  # of writers that keep padding
+        stored = widths  # some writers keep padding
     if unpacked != head.points * sum(stored):
         raise InputError(
             f"{path}: expected {head.points * sum(stored)} bytes of unpacked data for "

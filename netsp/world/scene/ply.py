@@ -197,8 +197,8 @@ class _Binary:
         for _ in range(element.count):
             row = []
             for name, kind, length in element.properties:
-                many = int(self._take(element, length, 1)[0]) if length else 1
-                values = self._take(element, kind, many)
+                many = int(self._read(element, length, 1)[0]) if length else 1
+                values = self._read(element, kind, many)
                 if length:
                     lists[name].append(values.astype(np.int64))
                 else:
@@ -206,7 +206,7 @@ class _Binary:
             scalars.append(row)
         return np.array(scalars, dtype=float).reshape(element.count, -1), lists
 
-    def _take(self, element: _Element, kind: str, many: int) -> npt.NDArray[np.generic]:
+    def _read(self, element: _Element, kind: str, many: int) -> npt.NDArray[np.generic]:
         known = np.dtype(self.order + kind)
         if many < 0 or len(self.data) - self.at < many * known.itemsize:
             raise self._cut_short(element)
@@ -224,8 +224,8 @@ class _Binary:
         if element.count == 0:
             return [1 for _ in element.properties]
         for _, _, length in element.properties:
-            out.append(int(self._take(element, length, 1)[0]) if length else 1)
-            self._take(element, element.properties[len(out) - 1][1], out[-1])
+            out.append(int(self._read(element, length, 1)[0]) if length else 1)
+            self._read(element, element.properties[len(out) - 1][1], out[-1])
         self.at = at
         kind = self._kind(element, out)
         if len(self.data) - at < element.count * kind.itemsize:

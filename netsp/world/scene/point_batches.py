@@ -56,16 +56,16 @@ def samples(data: Floats, offset: float, points: Floats) -> Floats:
         part = slice(first, first + chunk)
         x, y, z = (np.ascontiguousarray(points[part, axis]) for axis in range(3))
         p = (x, y, z)
-        own = np.empty((len(x), 5))
-        own[:] = 0.0, 0.0, 0.0, 1.0, -1.0
-        own[:, 0], rows = _nearest(data, p)
+        part_rows = np.empty((len(x), 5))
+        part_rows[:] = 0.0, 0.0, 0.0, 1.0, -1.0
+        part_rows[:, 0], rows = _nearest(data, p)
         found = np.flatnonzero(rows)
-        for kind, some in _by_kind(data, rows[found]):
-            n = found[some]
-            own[n, :4] = np.column_stack(_solids(data, kind, rows[n], _at(p, n)))
-        own[found, 4] = (rows[found] - ROWS) // ROW
-        own[:, 0] -= offset
-        out[part] = own
+        for kind, which in _by_kind(data, rows[found]):
+            n = found[which]
+            part_rows[n, :4] = np.column_stack(_solids(data, kind, rows[n], _at(p, n)))
+        part_rows[found, 4] = (rows[found] - ROWS) // ROW
+        part_rows[:, 0] -= offset
+        out[part] = part_rows
     return out
 
 
@@ -152,17 +152,17 @@ def _nearest_of_listed(data: Floats, p: Vectors, cell: Ints) -> tuple[Floats, In
     nth = np.arange(len(points)) - np.repeat(np.cumsum(listed) - listed, listed)
     solids = data[np.repeat(begin, listed) + nth].astype(np.int64)
     d = np.empty(len(points))
-    for kind, some in _by_kind(data, solids):
-        d[some] = _solids(data, kind, solids[some], _at(p, points[some]), has_gradient=False)[0]
+    for kind, which in _by_kind(data, solids):
+        d[which] = _solids(data, kind, solids[which], _at(p, points[which]), has_gradient=False)[0]
     np.minimum.at(out, points, d)
-    least = np.flatnonzero((d == out[points]) & (d < np.inf))
-    least = least[::-1]  # among equally near solids, the first one in the list is written last
-    out[points[least]], rows[points[least]] = d[least], solids[least]
+    nearest = np.flatnonzero((d == out[points]) & (d < np.inf))
+    nearest = nearest[::-1]  # among equally near solids, the first one in the list is written last
+    out[points[nearest]], rows[points[nearest]] = d[nearest], solids[nearest]
     return out, rows
 
 
-def _at(p: Vectors, some: Ints | Bools) -> Vectors:
-    return p[0][some], p[1][some], p[2][some]
+def _at(p: Vectors, which: Ints | Bools) -> Vectors:
+    return p[0][which], p[1][which], p[2][which]
 
 
 def _by_kind(data: Floats, rows: Ints) -> Iterator[tuple[int, Ints]]:
@@ -261,17 +261,20 @@ def _box(row: Row, p: Vectors, has_gradient: bool) -> Samples:
     gradient: tuple[Floats, ...] = (np.zeros(len(vx)),) * 3
     inward = gradient
     for k in range(3):
-        own = row[6 + 3 * k : 9 + 3 * k]
-        t = vx * own[0] + vy * own[1] + vz * own[2]
+        part_rows = row[6 + 3 * k : 9 + 3 * k]
+        t = vx * part_rows[0] + vy * part_rows[1] + vz * part_rows[2]
         out = abs(t) - row[3 + k]
         is_out, is_best = out > 0.0, out > best
         best = np.where(is_best, out, best)
         squares = np.where(is_out, squares + out * out, squares)
         if has_gradient:
             sign = np.where(t >= 0.0, 1.0, -1.0)
-            inward = tuple(np.where(is_best, sign * u, g) for g, u in zip(inward, own, strict=True))
+            inward = tuple(
+                np.where(is_best, sign * u, g) for g, u in zip(inward, part_rows, strict=True)
+            )
             gradient = tuple(
-                np.where(is_out, g + sign * out * u, g) for g, u in zip(gradient, own, strict=True)
+                np.where(is_out, g + sign * out * u, g)
+                for g, u in zip(gradient, part_rows, strict=True)
             )
     roots, is_outside = np.sqrt(squares), squares > 0.0
     d = np.where(is_outside, roots, best)
@@ -280,7 +283,7 @@ def _box(row: Row, p: Vectors, has_gradient: bool) -> Samples:
 
 
 def _torus(row: Row, p: Vectors, has_gradient: bool) -> Samples:
-    px, py, pz, ax, ay, az, sx, sy, sz, bend, radius, most = row
+    px, py, pz, ax, ay, az, sx, sy, sz, bend, radius, max_angle = row
     vx, vy, vz = p[0] - px, p[1] - py, p[2] - pz
     h = vx * ax + vy * ay + vz * az
     qx, qy, qz = vx - h * ax, vy - h * ay, vz - h * az
@@ -290,8 +293,8 @@ def _torus(row: Row, p: Vectors, has_gradient: bool) -> Samples:
     u, v = qx * sx + qy * sy + qz * sz, qx * tx + qy * ty + qz * tz
     angle = np.array(list(map(math.atan2, v.tolist(), u.tolist())), dtype=float)
     angle = np.where(angle < 0.0, angle + TWO_PI, angle)
-    ends = np.where(angle - most < TWO_PI - angle, most, 0.0)
-    angles = np.where(angle > most, ends, angle).tolist()
+    ends = np.where(angle - max_angle < TWO_PI - angle, max_angle, 0.0)
+    angles = np.where(angle > max_angle, ends, angle).tolist()
     c = bend * np.array(list(map(math.cos, angles)), dtype=float)
     s = bend * np.array(list(map(math.sin, angles)), dtype=float)
     return _round(vx - c * sx - s * tx, vy - c * sy - s * ty, vz - c * sz - s * tz, radius)

@@ -246,7 +246,7 @@ def _classes(table: Table) -> Floats | None:
     try:
         return table.numbers(("classification",))[:, 0]
     except InputError:
-        return None  # words, whose meaning is not known
+        return None  # classes in words, which have no known meaning
 
 
 def _withheld(table: Table) -> Bools | None:
@@ -360,5 +360,5 @@ def _system_of(header: Any) -> tuple[Any, dict[int, int]]:
             keys = {k.id: k.value_offset for k in getattr(record, "geo_keys", ())}
     try:
         return header.parse_crs(), keys
-    except Exception:  # pyproj is not installed, or the record is not one that it knows
+    except Exception:  # pyproj is not installed, or does not know the record
         return None, keys

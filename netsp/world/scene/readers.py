@@ -206,7 +206,7 @@ def read_mesh_file(path: str | Path, placement: Placement | None = None) -> Mesh
         raw = _mesh_parts(path, kind)
     except InputError:
         raise
-    except Exception as error:  # whatever the many readers raise
+    except Exception as error:  # trimesh's readers raise many kinds of exceptions
         raise InputError(f"{path}: cannot be read as a mesh: {_line(error)}") from None
     vertices, faces = np.asarray(raw.vertices, dtype=float), raw.faces
     if len(faces) == 0:

@@ -208,7 +208,7 @@ def _linear(grid: Singles, at: int, across: int, along: int, u: float, v: float,
 def _voxels(
     grid: Singles, data: Floats, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
-    # half a voxel to either side: a central difference does not jump at the cells' faces
+    # central differences over half a voxel, which have no jump at the faces of cells
     h = 0.5 * data[FINE]
     d = _voxel_distance(grid, data, x, y, z)
     gx = _voxel_distance(grid, data, x + h, y, z) - _voxel_distance(grid, data, x - h, y, z)

@@ -459,7 +459,7 @@ def _standing(problem: Problem) -> tuple[Solid, ...]:
 
 
 def encode(solids: tuple[Solid, ...]) -> tuple[list[int], list[list[float]], Floats]:
-    """Return kinds, rows and polygon corners for `netsp.world.scene.packing.of_solids`."""
+    """Return kinds, rows and polygon corners for `netsp.world.scene.packing.pack_solids`."""
     kind: list[int] = []
     rows: list[list[float]] = []
     outline: list[tuple[float, float]] = []

@@ -145,7 +145,7 @@ def _between(first: Face, second: Face, policy: SeamPolicy) -> Iterator[list[flo
     gap = float((second.corners.mean(0) - first.corners[0]) @ first.normal)
     if not -policy.max_overlap <= gap <= policy.max_gap:
         return
-    # each goes that much into both solids, measured from half way between the faces
+    # depth of each box in both solids, from half way between the faces
     thick = min(first.depth, second.depth, policy.max_depth) - 0.5 * abs(gap)
     normal, origin = first.normal, first.corners[0]
     u = max(np.roll(first.corners, -1, axis=0) - first.corners, key=np.linalg.norm)
@@ -231,7 +231,7 @@ def _in_strips(shared: Polygon, first: Floats, policy: SeamPolicy) -> Iterator[R
     cuts = np.linspace(x0, x1, strips + 1)[1:-1]
     # the lower side is convex and the upper concave: between two cuts they are narrowest at these
     sides = [turned.intersection(box(x, y0 - 1.0, x, y1 + 1.0)).bounds for x in cuts]
-    # none may only touch the next: boxes that do would leave a seam of their own
+    # successive boxes must overlap: boxes that only touch would leave another seam
     nested = {(k, strips - 2 - k) for k in range((strips - 2) // 2)}
     in_a_row = {(k, k + 4) for k in range(0, strips - 5, 2)} | {(strips - 6, strips - 2)}
     for i, j in sorted(nested | in_a_row):

@@ -133,7 +133,7 @@ def _cylinder(
     if rho > 0.0:
         qx, qy, qz = qx / rho, qy / rho, qz / rho
     else:
-        # on the axis every radial direction is as good: one perpendicular to the axis
+        # on the axis, any direction perpendicular to it will do
         if abs(ux) < 0.6:
             qx, qy, qz = 0.0, uz, -uy
         else:
@@ -186,7 +186,7 @@ def _torus(data: Floats, r: int, x: float, y: float, z: float) -> tuple[float, f
     px, py, pz = _three(data, r)
     ax, ay, az = _three(data, r + 3)
     sx, sy, sz = _three(data, r + 6)
-    bend, radius, most = data[r + 9], data[r + 10], data[r + 11]
+    bend, radius, max_angle = data[r + 9], data[r + 10], data[r + 11]
     vx, vy, vz = x - px, y - py, z - pz
     h = vx * ax + vy * ay + vz * az
     px, py, pz = vx - h * ax, vy - h * ay, vz - h * az
@@ -198,9 +198,9 @@ def _torus(data: Floats, r: int, x: float, y: float, z: float) -> tuple[float, f
     angle = math.atan2(v, u)
     if angle < 0.0:
         angle += TWO_PI
-    if angle > most:
-        # beyond the ends: the nearer one
-        angle = most if angle - most < TWO_PI - angle else 0.0
+    if angle > max_angle:
+        # beyond the ends, the nearer end counts
+        angle = max_angle if angle - max_angle < TWO_PI - angle else 0.0
     c, s = bend * math.cos(angle), bend * math.sin(angle)
     return _round(vx - c * sx - s * tx, vy - c * sy - s * ty, vz - c * sz - s * tz, radius)
 

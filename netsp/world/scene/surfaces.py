@@ -194,6 +194,6 @@ def drawn_points(scene: Scene, policy: SurfacePolicy | None = None) -> Floats:
     from netsp.world.scene.readers import load_cloud
 
     assert scene.cloud is not None
-    most = (policy or SurfacePolicy()).max_cloud_points
+    max_points = (policy or SurfacePolicy()).max_cloud_points
     points = load_cloud(scene.cloud.file, scene.cloud.placement)[0]
-    return np.asarray(points[:: -(-len(points) // most)])
+    return np.asarray(points[:: -(-len(points) // max_points)])

@@ -20,7 +20,7 @@ from netsp.base.arrays import Floats, Singles
 from netsp.base.clock import end_if_abandoned
 from netsp.base.errors import InputError
 from netsp.world.scene.grid import SIDE, VoxelGrid
-from netsp.world.scene.lattice import Dense, Lattice, OnStage, sparse_near, tell
+from netsp.world.scene.lattice import Dense, Lattice, OnStage, report_stage, sparse_near
 from netsp.world.scene.readers import Placement, load_cloud, load_mesh
 from netsp.world.scene.scene_policy import GridPolicy
 from netsp.world.scene.sites import point_sites, triangle_sites
@@ -106,7 +106,7 @@ def grid_of_triangles(
         raise InputError(f"{source}: a face has a corner that is none of the {len(v)} vertices")
     if not np.isfinite(v).all():
         raise InputError(f"{source}: a vertex is not finite")
-    mesh = _Triangles.of(v, f)
+    mesh = _Triangles.from_mesh(v, f)
     low, high = mesh.triangles.min((0, 1)), mesh.triangles.max((0, 1))
     policy = policy or GridPolicy()
     half = policy.sheet_voxels if mesh.open_edges else 0.0
@@ -115,7 +115,7 @@ def grid_of_triangles(
     lattice = _lattice(place, mesh.sites, policy, shell=half, triangles=triangles, region=region)
     values, notes = mesh.values(lattice, on_progress, source, policy.sheet_voxels)
     grow = half * lattice.size
-    tell(on_progress, "distances", 1.0)
+    report_stage(on_progress, "distances", 1.0)
     return lattice.grid(values, np.array([low - grow, high + grow]), tuple(notes))
 
 
@@ -130,7 +130,7 @@ class _Triangles:
     turned: int
 
     @classmethod
-    def of(cls, v: Floats, f: npt.NDArray[np.int64]) -> _Triangles:
+    def from_mesh(cls, v: Floats, f: npt.NDArray[np.int64]) -> _Triangles:
         open_edges, uneven = _edges(f, v)
         turned = 0
         if not open_edges:
@@ -144,7 +144,7 @@ class _Triangles:
     ) -> tuple[Singles, list[str]]:
         """Return the signed distances at the points of a lattice, and notes on what was assumed."""
         size, notes = lattice.size, []
-        values = lattice.closest(self.sites, on_progress, whose=False)[0]
+        values = lattice.closest(self.sites, on_progress, with_owners=False)[0]
         if self.open_edges:
             shell = sheet_voxels * size
             notes.append(
@@ -153,7 +153,7 @@ class _Triangles:
             )
             values -= np.float32(shell)
         else:
-            most = lattice.turn_inside(values, self.triangles)
+            max_winding = lattice.turn_inside(values, self.triangles)
             if self.uneven:
                 notes.append(
                     f"faces at {self.uneven} edges have opposite orientations: taken as solid "
@@ -161,7 +161,7 @@ class _Triangles:
                 )
             if self.turned:
                 notes.append(f"{self.turned} parts are inside out, or cavities: taken as solid")
-            elif most > 1:
+            elif max_winding > 1:
                 notes.append("parts of the mesh overlap: taken as their union")
         end_if_abandoned()
         enclosed = lattice.unreached(values)
@@ -227,7 +227,7 @@ def grid_of_cloud(
     values, notes, grow = _cloud_values(
         lattice, p, sites, ball, on_progress, source, policy.sheet_voxels
     )
-    tell(on_progress, "distances", 1.0)
+    report_stage(on_progress, "distances", 1.0)
     return lattice.grid(values, np.array([low - grow, high + grow]), tuple(notes))
 
 
@@ -263,7 +263,7 @@ def _cloud_values(
     box."""
     size = lattice.size
     distances, owner = lattice.closest(sites, on_progress)
-    tell(on_progress, "flood", 0.5)
+    report_stage(on_progress, "flood", 0.5)
     values = distances - np.float32(ball)
     end_if_abandoned()
     filled = lattice.unreached(values) | (values <= 0.0)
@@ -273,11 +273,11 @@ def _cloud_values(
         raise InputError(f"{source}: no solid at voxels of {size:.3g}; expected smaller voxels")
     at, which = lattice.positions(edge)
     weighted = point_sites(at, values[which])
-    to_water = lattice.closest(weighted, whose=False)[0]
+    to_water = lattice.closest(weighted, with_owners=False)[0]
     out = np.where(filled, ball - to_water, distances).astype(np.float32)
     notes = [f"gaps of up to {2 * ball:.3g} between points are closed"]
-    # points around which nothing is solid
-    loose = lattice.least_around(out, p, 2) > -size
+    # points with nothing solid around them
+    loose = lattice.minimum_nearby(out, p, 2) > -size
     grow = 0.0
     if loose.any():
         half = sheet_voxels * size
@@ -332,14 +332,14 @@ def grid_of_meshes_and_cloud(
     first = np.cumsum([0, *(len(v) for v, _ in parts)])
     v = np.vstack([v for v, _ in parts])
     f = np.vstack([f + n for (_, f), n in zip(parts, first, strict=False)])
-    mesh = _Triangles.of(v, f)
+    mesh = _Triangles.from_mesh(v, f)
     low = np.minimum(mesh.triangles.min((0, 1)), p.min(0))
     high = np.maximum(mesh.triangles.max((0, 1)), p.max(0))
     policy = policy or GridPolicy()
     half = policy.sheet_voxels if mesh.open_edges else 0.0
     size = _size(low, high, voxel, source, policy)
     extra = _spacing(p)
-    flat = triangle_sites(np.repeat(p[:, None], 3, axis=1))  # points, where blocks are placed
+    flat = triangle_sites(np.repeat(p[:, None], 3, axis=1))  # as triangles, to place blocks
     lattice = _lattice(
         _Place(low, high, size, memory_limit, source),
         np.vstack([mesh.sites, flat]),
@@ -354,7 +354,7 @@ def grid_of_meshes_and_cloud(
     )
     if mesh.open_edges:
         grow = max(grow, half * lattice.size)
-    tell(on_progress, "distances", 1.0)
+    report_stage(on_progress, "distances", 1.0)
     box = np.array([low - grow, high + grow])
     return lattice.grid(np.minimum(values, cloud), box, (*notes, *cloud_notes))
 
@@ -397,7 +397,7 @@ def _lattice(
     memory = place.memory_limit * 2**30
     pad = policy.border_voxels * size + 2.0 * extra
     counts = np.ceil((high - low + 2.0 * pad) / size) + 1
-    # off by an odd fraction of a voxel: no row of the grid runs along an edge of the mesh
+    # an odd fraction of a voxel, so that no row of the grid runs along an edge of the mesh
     off = size * np.array([0.0123457, 0.0271828, 0.0314159])
     points = np.prod(counts)
     if points <= policy.max_dense_points and points * policy.bytes_per_voxel <= memory:
@@ -482,6 +482,6 @@ def _spacing(points: Floats) -> float:
     """Return a rough distance between neighbours, for the room around a cloud, metres."""
     from scipy.spatial import cKDTree
 
-    some = points[:: max(1, len(points) // 2000)]
-    far, _ = cKDTree(points).query(some, k=min(7, len(points)))
+    samples = points[:: max(1, len(points) // 2000)]
+    far, _ = cKDTree(points).query(samples, k=min(7, len(points)))
     return float(np.quantile(far[:, -1], 0.95))

@@ -89,24 +89,24 @@ def strand_payout(strand: Floats, count: int, load: Load) -> float:
             strand[i, Z] - strand[first, Z],
             load,
         )
-        total += max(sagging, chord + over)  # bent over a surface, a piece does not sag as well
+        total += max(sagging, chord + over)  # a piece that is bent over a surface does not sag, too
         first, chord, over = i, 0.0, 0.0
     return (1.0 + load.slack) * total
 
 
 @kernel
-def strand_turning(strand: Floats, count: int, least: float) -> float:
+def strand_turning(strand: Floats, count: int, min_piece: float) -> float:
     """Return the sum of the angles by which a strand turns at its contacts, radians.
 
-    Pieces shorter than `least` do not count: two contacts that are not at rest yet can be so close
-    together that the piece between them points backwards.
+    Pieces shorter than `min_piece` do not count: two contacts that are not at rest yet can be so
+    close together that the piece between them points backwards.
     """
     total, begun = 0.0, False
     px, py, pz = strand[0, X], strand[0, Y], strand[0, Z]
     ax, ay, az = 0.0, 0.0, 0.0
     for i in range(1, count):
         bx, by, bz = strand[i, X] - px, strand[i, Y] - py, strand[i, Z] - pz
-        if bx * bx + by * by + bz * bz < least * least:
+        if bx * bx + by * by + bz * bz < min_piece * min_piece:
             continue
         if begun:
             cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

@@ -35,17 +35,17 @@ def corner_excess(field: Field, strand: Floats, count: int, settings: PullSettin
     if field.data[VOXELS] <= 0.0:
         return 0.0
     deep = settings.corner_depth * (SLIP * settings.delta)
-    length, least = strand_length(strand, count), math.inf
+    length, shortest = strand_length(strand, count), math.inf
     room = 4 * count + 64
     copy, n = np.zeros((count + 16, WIDTH)), count
     write_rows(copy, strand, count)
     vain_mends, min_gain = 0, settings.min_mend_gain * length
     for _ in range(settings.max_mends):
         copy, n = mend(field, copy, n, settings, room, deep)
-        before, least = least, min(least, strand_length(copy, n))
-        vain_mends = vain_mends + 1 if least > before - min_gain else 0
-        is_done = least <= length + min_gain or vain_mends > settings.max_vain_mends
-        if is_done or least > settings.max_crumpled_ratio * length:
+        before, shortest = shortest, min(shortest, strand_length(copy, n))
+        vain_mends = vain_mends + 1 if shortest > before - min_gain else 0
+        is_done = shortest <= length + min_gain or vain_mends > settings.max_vain_mends
+        if is_done or shortest > settings.max_crumpled_ratio * length:
             break
         copy, n, _ = pull(field, copy, n, settings, settings.passing_rounds, 0, 1)
-    return max(0.0, least - length) if least <= settings.max_crumpled_ratio * length else 0.0
+    return max(0.0, shortest - length) if shortest <= settings.max_crumpled_ratio * length else 0.0

@@ -32,7 +32,7 @@ def mend(
             if low < -deep and budget > 0:
                 mx, my, mz = exit_point(field, strand, i, where, settings)
                 if has_node_near(strand, count, i, mx, my, mz, 0.1 * slip):
-                    i += 1  # nothing is gained by a node upon another
+                    i += 1  # a node at the same place would not help
                     continue
                 strand, count = insert_node(strand, count, i + 1, mx, my, mz)
                 budget -= 1

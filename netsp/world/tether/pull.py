@@ -182,9 +182,9 @@ def pull(
         ):
             strand, count = mend(field, strand, count, settings, room, slip)
             # sidesteps again only if the last ones have shortened the strand
-            least, length = length, strand_length(strand, count)
+            last_length, length = length, strand_length(strand, count)
             came_off = False
-            if length < least - min_gain:
+            if length < last_length - min_gain:
                 strand, count, came_off = nudge(field, strand, count, settings, room, steps)
             if came_off:
                 rounds, vain_rounds = max(rounds, done + 2), 0
@@ -229,7 +229,7 @@ def refresh_frames(
 def drop_free_nodes(
     field: Field, strand: Floats, count: int, settings: PullSettings
 ) -> tuple[int, float]:
-    """Drop nodes that hold nothing: those that the strand would leave, and those on a line.
+    """Drop nodes that hold nothing: those on a line, and those that the strand leaves.
 
     A node that cannot move freely to the line between its neighbours is brought nearer to it.
     Returns the number of nodes and the largest motion.

@@ -44,7 +44,7 @@ def nudge(
     """
     stride, slip = STRIDE * settings.delta, SLIP * settings.delta
     min_gain = settings.min_gain * settings.precision
-    i = 1 if field.data[VOXELS] > 0.0 else count  # exact edges and corners need none of it
+    i = 1 if field.data[VOXELS] > 0.0 else count  # exact edges and corners need no sidesteps
     while i < count - 1:
         j = i
         while j + 1 < count - 1 and gap(strand, j, j + 1) <= settings.tip_strides * stride:
@@ -52,13 +52,13 @@ def nudge(
         wx, wy, wz, is_turning = sidestep_direction(strand, i, j, settings.max_tip_cosine)
         is_sharp = False
         for k in range(i, j + 1):
-            # voxels are uneven everywhere: round parts of them are left to strands that stand still
+            # voxels are uneven everywhere; only strands that stand still leave their round parts
             is_uneven = strand[k, PART] < 0.0 and steps > 1
             is_edge = strand[k, SHARP] + abs(strand[k, CONE]) > 0.0
             is_sharp = is_sharp or is_uneven or is_edge or not is_resting(strand, k)
         if is_turning and is_sharp and j < i + settings.max_tip_contacts:
             before, kept = strand_length(strand, count), strand[:count].copy()
-            # over an edge that it crosses at a slant, a strand slips along the edge
+            # a strand that crosses an edge at a slant slips along the edge
             along_edge = i == j and strand[i, SHARP] == 1.0
             for attempt in range(4 if along_edge else 2):
                 side, new_count = (1.0, -1.0)[attempt % 2], count
