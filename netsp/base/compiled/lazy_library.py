@@ -224,11 +224,18 @@ def is_supported() -> bool:
     """
     codegen = cpu_target.target_context.codegen()
     methods = {
-        "_raise_if_finalized", "_ensure_finalized", "_get_module_for_linking",
-        "_finalize_dynamic_globals", "_finalize_final_module", "_optimize_final_module",
-        "_optimize_functions", "_unserialize", "enable_object_caching", "get_pointer_to_function",
+        "_raise_if_finalized",
+        "_ensure_finalized",
+        "_get_module_for_linking",
+        "_finalize_dynamic_globals",
+        "_finalize_final_module",
+        "_optimize_final_module",
+        "_optimize_functions",
+        "_unserialize",
+        "enable_object_caching",
+        "get_pointer_to_function",
         "serialize_using_object_code",
-    }  # fmt: skip
+    }
     fields = {
         "_codegen",
         "_linking_libraries",

@@ -220,44 +220,63 @@ class _Band:
     meaning: Column | None
 
 
-def _read(path: str | Path, policy: FloorPolicy) -> _Grid:
+@dataclass(frozen=True)
+class _Raster:
+    """Band of a file with heights z (m, n), nan where it has none, and what the file states of it.
+
+    `system` is the map's system as WKT, `transform` the geotransform, `factors` scale and offset of
+    the values, `unit` that of the band, and `positive` the direction in which heights count.
+    """
+
+    z: Floats
+    band: _Band
+    others: list[_Band]
+    system: str | None
+    transform: Any
+    dtype: np.dtype[Any]
+    factors: tuple[float, float]
+    unit: str | None
+    driver: str
+    positive: str
+
+
+def _read_raster(path: str | Path, policy: FloorPolicy) -> _Raster:
     rasterio = _rasterio()
     if not Path(path).is_file():
         raise InputError(f"{path}: cannot be read: no such file")
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore"
-            )  # warnings about grids without a place on the map, which are refused below
+            # a grid without a place on the map is refused below
+            warnings.simplefilter("ignore")
             with _opened(rasterio, path) as grid:
                 if grid.width * grid.height > policy.max_cells:
                     raise InputError(
                         f"{path}: {grid.width} x {grid.height} cells; expected at most "
                         f"{policy.max_cells:,} in all"
                     )
-                system = grid.crs.to_wkt() if grid.crs is not None else None
-                t = grid.transform
                 band, others = _chosen_band(grid, path)
                 at = band.number - 1
-                z = grid.read(band.number, masked=True).astype(float).filled(np.nan)
-                kind = np.dtype(grid.dtypes[at])
-                factors = grid.scales[at], grid.offsets[at]
-                unit, driver = grid.units[at], grid.driver
-                positive = {**grid.tags(), **grid.tags(band.number)}.get("positive", "")
+                return _Raster(
+                    z=grid.read(band.number, masked=True).astype(float).filled(np.nan),
+                    band=band,
+                    others=others,
+                    system=grid.crs.to_wkt() if grid.crs is not None else None,
+                    transform=grid.transform,
+                    dtype=np.dtype(grid.dtypes[at]),
+                    factors=(grid.scales[at], grid.offsets[at]),
+                    unit=grid.units[at],
+                    driver=grid.driver,
+                    positive={**grid.tags(), **grid.tags(band.number)}.get("positive", ""),
+                )
     except InputError:
         raise
     except Exception as error:  # GDAL's readers raise many kinds of exceptions
         first = (str(error) or type(error).__name__).splitlines()[0][:120]
         raise InputError(f"{path}: cannot be read as a grid: {first}") from None
-    metres, axis = 1.0, None
-    if system is not None:
-        try:
-            horizontal, axis = map_unit(system), height_axis(system)
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from None
-        if horizontal is None:
-            raise InputError(f"{path}: in degrees; expected a grid in metres, such as UTM")
-        metres = horizontal
+
+
+def _check_place(t: Any, path: str | Path) -> None:
+    """Raise InputError unless a geotransform places a grid on the map with rows that run east."""
     if t.is_identity:
         raise InputError(
             f"{path}: the grid has no place on the map; add a geotransform "
@@ -265,30 +284,45 @@ def _read(path: str | Path, policy: FloorPolicy) -> _Grid:
         )
     if max(abs(t.b), abs(t.d)) > MAX_ROW_SLOPE * max(abs(t.a), abs(t.e)):
         raise InputError(f"{path}: the grid is turned; expected rows that run east")
+
+
+def _read(path: str | Path, policy: FloorPolicy) -> _Grid:
+    raster = _read_raster(path, policy)
+    metres, axis = 1.0, None
+    if raster.system is not None:
+        try:
+            horizontal, axis = map_unit(raster.system), height_axis(raster.system)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+        if horizontal is None:
+            raise InputError(f"{path}: in degrees; expected a grid in metres, such as UTM")
+        metres = horizontal
+    z, t, band = raster.z, raster.transform, raster.band
+    _check_place(t, path)
     rows, columns = z.shape
     if rows < 2 or columns < 2:
         raise InputError(f"{path}: expected at least 2 x 2 cells, got {columns} x {rows}")
     notes = []
-    if others:
-        names = ", ".join(b.title for b in others if b.title)
-        notes.append(
-            f"{counted(len(others), 'further band')} not used{f' ({names[:80]})' if names else ''}"
-        )
+    if raster.others:
+        names = ", ".join(b.title for b in raster.others if b.title)
+        unused = counted(len(raster.others), "further band")
+        notes.append(f"{unused} not used{f' ({names[:80]})' if names else ''}")
     z[~np.isfinite(z)] = np.nan
-    z, gaps = _without_gaps(z, path, notes, _extremes(kind))
-    if factors != (1.0, 0.0):
-        z = z * factors[0] + factors[1]
-        notes.append(f"values times {factors[0]:.7g} plus {factors[1]:.7g}, as its band says")
-    heights = _unit_of_band(unit, path)
+    z, gaps = _without_gaps(z, path, notes, _extremes(raster.dtype))
+    factor, offset = raster.factors
+    if (factor, offset) != (1.0, 0.0):
+        z = z * factor + offset
+        notes.append(f"values times {factor:.7g} plus {offset:.7g}, as its band says")
+    heights = _unit_of_band(raster.unit, path)
     if heights is None and band.meaning is not None and band.meaning.unit:
         heights = abs(band.meaning.factor)
     if heights is None and axis is not None and axis.is_stated:
         heights = axis.metres
-    down = axis is not None and axis.sign < 0.0 and driver not in UPWARD_FORMATS
-    down = down or positive.strip().lower() == "down"
+    down = axis is not None and axis.sign < 0.0 and raster.driver not in UPWARD_FORMATS
+    down = down or raster.positive.strip().lower() == "down"
     called_depth = band.meaning is not None and band.meaning.factor < 0.0
     x, y = t.c + t.a * (np.arange(columns) + 0.5), t.f + t.e * (np.arange(rows) + 0.5)
-    called_depth = called_depth and not positive
+    called_depth = called_depth and not raster.positive
     return _Grid(x, y, z, metres, heights, down, called_depth, tuple(notes), gaps)
 
 
