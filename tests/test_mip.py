@@ -345,7 +345,7 @@ def test_prices_are_the_same_to_the_bit_however_they_are_summed_and_from_either_
         dead[u, v] = dead[v, u] = False
         alone = Prices(costs_of(graph), DeadLegs(dead), graph.cluster, cuts, duals)
         assert row_prices(alone)[u, v] == row_prices(alone)[v, u] == all_of_them[u, v]
-        assert alone.of(np.array([[u, v]])) == all_of_them[u, v]
+        assert alone.reduced_costs(np.array([[u, v]])) == all_of_them[u, v]
         shared = sum(duals.cut[k] for k, c in enumerate(cuts) if c.inside[u] and c.inside[v])
         expected = graph.costs[u, v] - duals.degree[u] - duals.degree[v] - shared
         assert all_of_them[u, v] == pytest.approx(expected)

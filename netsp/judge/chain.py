@@ -1,10 +1,10 @@
-"""The exact length of a taut path, from the corners of one around polygons.
+"""Exact length of a taut path among disks, from the corners of a path around polygons.
 
-Around inscribed polygons a taut path has corners; those in a row on one disk, turning one way, are
-one contact with that disk. Through contacts with given senses there is one alternation of common
-tangents and arcs, and its length is in closed form. A contact whose arc would be run backwards was
-the polygon's doing and goes; a disk that a tangent still enters (by less than the polygon stood
-back from it) is a contact, too. What has neither is the taut path among the disks themselves.
+A taut path has corners at inscribed polygons. Consecutive corners on one disk that turn the same
+way are one contact with that disk. For contacts with given senses there is one alternation of
+common tangents and arcs, whose length has a closed form. A contact whose arc runs backwards is an
+artefact of the polygon and is removed; a disk that a tangent enters (by less than the polygon lies
+inside of it) becomes a contact. Without either, it is the taut path among the disks themselves.
 """
 
 from __future__ import annotations
@@ -16,21 +16,22 @@ from itertools import pairwise
 import numpy as np
 
 from netsp.base.arrays import Floats
+from netsp.judge.judge_policy import JudgePolicy
 
-ROUNDS = 60
-"""Contacts that may come or go before the path is given up."""
+TURN_TOLERANCE = 1e-9
+"""Tolerance of turning backwards at a contact, radians."""
 
 
 @dataclass(frozen=True)
 class Contact:
-    """A disk that a path bends around.
+    """Disk that a path bends around.
 
     Attributes
     ----------
     sense
-        1 with the disk on the left, -1 on the right.
+        1 if the disk is on the left, -1 if it is on the right.
     turn
-        About how far the path turns there, radians.
+        Approximate angle by which the path turns, radians.
     """
 
     x: float
@@ -41,7 +42,7 @@ class Contact:
 
 
 def contacts_of(corners: Floats, disk_of: list[tuple[float, float, float]]) -> list[Contact]:
-    """The contacts of a polyline whose inner corners stand on the given disks (x, y, radius)."""
+    """Return the contacts of a polyline whose inner corners lie on given disks (x, y, radius)."""
     out: list[Contact] = []
     d = np.diff(corners, axis=0)
     keep = np.hypot(*d.T) > 0.0
@@ -64,23 +65,33 @@ def contacts_of(corners: Floats, disk_of: list[tuple[float, float, float]]) -> l
 
 
 def exact_length(
-    a: Floats, b: Floats, contacts: list[Contact], disks: Floats, slack: float
+    a: Floats,
+    b: Floats,
+    contacts: list[Contact],
+    disks: Floats,
+    slack: float,
+    max_changes: int = JudgePolicy.max_contact_changes,
 ) -> tuple[float, float] | None:
-    """Length of the taut path from a to b by way of contacts, among disks (d, 3), and the angle by
-    which it turns; None if no consistent set of contacts is found.
+    """Return the length of the taut path from a to b among disks, and the angle of its turns.
+
+    Return None if no consistent set of contacts is found.
 
     Parameters
     ----------
+    contacts
+        Contacts to begin with.
+    disks
+        (d, 3) x, y, radius.
     slack
-        Depth in a disk that counts as none.
+        Depth in a disk that is ignored.
     """
     chain = list(contacts)
-    for _ in range(ROUNDS):
+    for _ in range(max_changes):
         nodes = [(a[0], a[1], 0.0, 0), *((c.x, c.y, c.radius, c.sense) for c in chain)]
         nodes.append((b[0], b[1], 0.0, 0))
         legs = [_tangent(p, q) for p, q in pairwise(nodes)]
         length = sum(leg[1] for leg in legs)
-        backward, worst = -1, -1e-9
+        backward, worst = -1, -TURN_TOLERANCE
         turns = []
         for k, c in enumerate(chain):
             raw = c.sense * (legs[k + 1][0] - legs[k][0])
@@ -104,7 +115,7 @@ def exact_length(
 def _tangent(
     p: tuple[float, float, float, int], q: tuple[float, float, float, int]
 ) -> tuple[float, float]:
-    """Heading and length of the common tangent of two oriented disks.
+    """Return the heading and length of the common tangent of two oriented disks.
 
     With n the left normal of the tangent, it touches disk i at c_i - s_i r_i n, so
     (c_2 - c_1) · n = s_2 r_2 - s_1 r_1.
@@ -125,7 +136,7 @@ def _entered(
     disks: Floats,
     slack: float,
 ) -> tuple[int, Contact] | None:
-    """The disk that a tangent enters deepest, as a contact, and its place in the chain."""
+    """Return the disk that a tangent enters deepest, as a contact, and its place in the chain."""
     if len(disks) == 0:
         return None
     deepest, found = slack, None
@@ -140,10 +151,10 @@ def _entered(
         along = dx * ux + dy * uy
         side = dy * ux - dx * uy  # > 0: the centre is on the left
         depth = np.where((along > 0.0) & (along < length), disks[:, 2] - np.abs(side), -np.inf)
-        for j in (k - 1, k):  # its own two disks
+        for j in (k - 1, k):  # the two disks that the tangent touches
             if 0 <= j < len(chain):
-                own = (disks[:, 0] == chain[j].x) & (disks[:, 1] == chain[j].y)
-                depth[own] = -np.inf
+                is_touched = (disks[:, 0] == chain[j].x) & (disks[:, 1] == chain[j].y)
+                depth[is_touched] = -np.inf
         i = int(np.argmax(depth))
         if depth[i] > deepest:
             deepest = float(depth[i])

@@ -18,10 +18,11 @@ from netsp.base.arrays import Floats, Ints
 Point = tuple[float, float]
 
 ERROR_BOUND = (3.0 + 16.0 * 2.0**-53) * 2.0**-53
-"""Largest rounding error of the cross product, relative to the sum of its two absolute products."""
+"""Tolerance of the cross product: its largest rounding error, relative to the sum of its two
+absolute products."""
 
-UNDERFLOW = 1e-280
-"""Sum of the two absolute products below which digits may be lost to underflow."""
+UNDERFLOW_BOUND = 1e-280
+"""Tolerance of the sum of the two products, below which digits may be lost to underflow."""
 
 
 def orientation(a: Point, b: Point, c: Point) -> int:
@@ -30,7 +31,7 @@ def orientation(a: Point, b: Point, c: Point) -> int:
     q = (a[1] - c[1]) * (b[0] - c[0])
     size = abs(p) + abs(q)
     cross = p - q
-    if abs(cross) > ERROR_BOUND * size and size > UNDERFLOW:
+    if abs(cross) > ERROR_BOUND * size and size > UNDERFLOW_BOUND:
         return 1 if cross > 0.0 else -1
     if a in (b, c) or b == c:
         return 0
@@ -38,24 +39,13 @@ def orientation(a: Point, b: Point, c: Point) -> int:
 
 
 def orientations(a: Floats, b: Floats, c: Floats) -> Ints:
-    """Return `orientation` of each row of three arrays of points.
-
-    Parameters
-    ----------
-    a, b, c
-        Points, shape (n, 2).
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        1, -1 or 0.
-    """
+    """Return the `orientation` (n,) of each row of three arrays (n, 2) of points."""
     p = (a[:, 0] - c[:, 0]) * (b[:, 1] - c[:, 1])
     q = (a[:, 1] - c[:, 1]) * (b[:, 0] - c[:, 0])
     size = np.abs(p) + np.abs(q)
     cross = p - q
     sign = np.sign(cross).astype(np.int64)
-    unsure = ~((np.abs(cross) > ERROR_BOUND * size) & (size > UNDERFLOW))
+    unsure = ~((np.abs(cross) > ERROR_BOUND * size) & (size > UNDERFLOW_BOUND))
     for k in np.flatnonzero(unsure).tolist():
         sign[k] = orientation(tuple(a[k].tolist()), tuple(b[k].tolist()), tuple(c[k].tolist()))
     return sign

@@ -1,4 +1,4 @@
-"""Check that the taut tether of a robot keeps its limit everywhere along a path.
+"""Check of the taut tether's limit everywhere along a path.
 
 Lemma. Let T(s) be the length of the taut tether at the point s of a path, in the class that the
 path gives it. Between two neighbouring vertices of the path T is at most the larger of its values
@@ -29,15 +29,7 @@ from netsp.judge.stringpull import StringPuller
 
 @dataclass(frozen=True)
 class Overstretch:
-    """Vertex of a path at which the tether exceeds its limit.
-
-    Attributes
-    ----------
-    vertex
-        Index in the path.
-    length
-        Length of the taut tether there.
-    """
+    """Vertex of a path at which the taut tether, of a given length, exceeds its limit."""
 
     vertex: int
     length: float
@@ -67,7 +59,7 @@ def first_overstretch(
     limit
         Length of the tether.
     known
-        Tether length at some vertices, the last vertex included; none exceeds the limit.
+        Tether lengths at some vertices, the last one included; none exceeds the limit.
     allowance
         Takes a point (3,) of the path and returns the allowed excess of the tether there.
     start
@@ -82,28 +74,28 @@ def first_overstretch(
         planar = puller.pull(path[0], path[k], sleeve).low
         return float(np.hypot(planar, path[k, 2] - path[0, 2]))
 
-    most = pulled(start)
-    ceiling = max(limit, most)
+    bound = pulled(start)
+    ceiling = max(limit, bound)
     homeward = _homeward(steps, known)
     for k in range(start + 1, len(path)):
         _carry(sleeve, pieces[k - 1])
         if k in known:
-            most = known[k]
+            bound = known[k]
             ceiling = limit
             continue
-        most = min(most + float(steps[k - 1]), float(homeward[k]))
-        if most <= limit:
+        bound = min(bound + float(steps[k - 1]), float(homeward[k]))
+        if bound <= limit:
             ceiling = limit
             continue
-        most = pulled(k)
-        if most > ceiling and most > ceiling + allowance(path[k]):
-            return Overstretch(k, most)
-        ceiling = max(limit, min(ceiling, most))
+        bound = pulled(k)
+        if bound > ceiling and bound > ceiling + allowance(path[k]):
+            return Overstretch(k, bound)
+        ceiling = max(limit, min(ceiling, bound))
     return None
 
 
 def _carry(sleeve: list[tuple[int, bool]], piece: list[tuple[int, bool]]) -> None:
-    """Append crossings to a reduced sequence, in place, and cancel edges crossed back at once."""
+    """Append crossings to a reduced sequence in place, and cancel edges that are crossed back."""
     for crossing in piece:
         if sleeve and sleeve[-1][0] == crossing[0]:
             sleeve.pop()

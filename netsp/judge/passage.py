@@ -12,20 +12,11 @@ from netsp.judge.solid_distances import Bridge
 
 
 def passes(bridge: Bridge, path: Floats, reach: float) -> bool:
-    """Return whether a path passes a bridge from one side to the other.
+    """Return whether a path (n, 2) passes a bridge from one side to the other.
 
     The path is cut where it crosses the bridge, and sides alternate from piece to piece. A piece
     that stays within `reach` of the contact is ignored: the robot stands there, or rounding put it
     on the other side.
-
-    Parameters
-    ----------
-    bridge
-        The line between two obstacles that touch.
-    path
-        Points (n, 2).
-    reach
-        Distance from the contact within which a piece is ignored.
     """
     cuts = _cuts(bridge.line, path)
     if not cuts:

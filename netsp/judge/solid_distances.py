@@ -1,11 +1,11 @@
-"""Obstacles as the judge sees them: a little smaller than they are, however thin they are.
+"""Obstacles as the judge draws them: slightly smaller than they are.
 
-A path may touch an obstacle, and rounding may put it a hair inside. So what must not be entered is
-an *inset* obstacle: each circle's radius, and each corner of a polygon, is drawn in by the judge's
-tolerance, or by a fifth of the room that there is at that place, if that is less. A wall thinner
-than the tolerance keeps three fifths of its thickness, so nothing passes through it. Where two
-obstacles touch, their insets do not, and a *bridge* closes the gap. A path may reach the contact of
-two obstacles and stop there, but not pass from one side of it to the other.
+A path may touch an obstacle, and rounding may put it slightly inside. So the judge forbids an
+*inset* obstacle: each circle's radius, and each corner of a polygon, is drawn in by the judge's
+tolerance, or by a fifth of the room at that place, if that is less. A wall thinner than the
+tolerance keeps three fifths of its thickness, so nothing passes through it. Where two obstacles
+touch, their insets do not, and a *bridge* closes the gap. A path may reach the contact of two
+obstacles and stop there, but not pass from one side of it to the other.
 """
 
 from __future__ import annotations
@@ -17,44 +17,33 @@ import shapely
 
 from netsp.base.arrays import Floats, Ints
 from netsp.base.geometry.polygons import counterclockwise
+from netsp.judge.judge_policy import JudgePolicy
 from netsp.model.problem import Circle, Polygon, Problem
 
-SHARE = 0.2
-"""Of the room at a corner, or of a radius, the part that an inset may take."""
-
-SIDES, SIDES_AT_CORNER = 64, 32
-"""Edges of the polygon that stands in for a circle, and for the whole circle that a clearance would
-draw around a corner. They decide which way a path goes round; lengths come from the disks."""
-
-NO_ROOM = 10.0
-"""In tolerances: with less clearance a polygon is not grown, for its rounded corners would be of
-rounding themselves."""
-
-PHASE = 0.2371
-"""Of a side: a phase no drawing has, so that symmetric worlds give no degenerate triangles."""
-
-
-TOUCHING = 2e-10
-"""Largest gap between two obstacles that touch, as a share of the problem's size. The free space of
-the theory is that among obstacles grown by half of this gap."""
+TOUCHING_TOLERANCE = 2e-10
+"""Tolerance of the gap between two obstacles that touch, as a share of the problem's size. The free
+space of the theory is that among obstacles grown by half of this gap."""
 
 Outline = tuple[shapely.Geometry, float]
-"""Polygon with radius 0, or centre of a circle with its radius."""
+"""Polygon and 0, or centre and radius of a circle."""
 
 
 @dataclass(frozen=True)
 class Inset:
-    """One obstacle, smaller by the tolerance, relative to an origin.
+    """Obstacle that is smaller by the tolerance, relative to an origin.
 
     Attributes
     ----------
     shape
-        What a path must not enter (of a circle, an inscribed polygon).
+        Polygon that a path must not enter; inscribed, if the obstacle is a circle.
     ring
-        (k, 2) its corners, each of which stands on the disk `owner` (k,) of `disks` (d, 3), x, y,
-        radius: the disks that a taut path may bend around.
+        (k, 2) corners of the polygon.
+    owner
+        (k,) row in `disks` of the disk that each corner lies on.
+    disks
+        (d, 3) x, y, radius of the disks that a taut path may bend around.
     depth
-        How far a path may reach into the obstacle.
+        Depth by which a path may enter the obstacle.
     """
 
     shape: shapely.Polygon
@@ -64,35 +53,41 @@ class Inset:
     depth: float
 
 
-def inset(problem: Problem, obstacle: Circle | Polygon, place: float, origin: Floats) -> Inset:
-    """An obstacle, grown by the clearance, drawn in by a tolerance."""
-    c = problem.clearance
+def inset(
+    problem: Problem,
+    obstacle: Circle | Polygon,
+    place: float,
+    origin: Floats,
+    policy: JudgePolicy = JudgePolicy(),
+) -> Inset:
+    """Return an obstacle that is grown by the clearance and drawn in by the tolerance `place`."""
+    c, share = problem.clearance, policy.max_inset_share
     if isinstance(obstacle, Circle):
         radius = obstacle.radius + c
-        by = min(place, SHARE * radius)
+        by = min(place, share * radius)
         centre = np.array(obstacle.center) - origin
-        ring = centre + (radius - by) * _unit_ring()
+        ring = centre + (radius - by) * _unit_ring(policy)
         disks = np.array([[*centre, radius]])
         owner = np.zeros(len(ring), dtype=np.int64)
         return Inset(shapely.Polygon(ring), ring, owner, disks, by)
     v = counterclockwise(np.array(obstacle.polygon) - origin)
     disks = np.column_stack([v, np.full(len(v), c)])
-    if c <= NO_ROOM * place:
-        back = np.minimum(place, SHARE * room(v, place / SHARE))
+    if c <= policy.min_clearance_ratio * place:
+        back = np.minimum(place, share * room(v, place / share))
         shape = shapely.Polygon(v + back[:, None] * _inward(v))
-        if not shape.is_valid:  # needles of rounding: better too strict than blind
+        if not shape.is_valid:  # needles from rounding: rather too strict
             shape = shapely.Polygon(v)
         ring = shapely.get_coordinates(shape)[:-1]
-        by = min(place, SHARE * c) if c else float(back.max())
+        by = min(place, share * c) if c else float(back.max())
         return Inset(shape, ring, np.arange(len(v)), disks, by)
-    by = min(place, SHARE * c)
-    shape = shapely.Polygon(v).buffer(c - by, quad_segs=SIDES_AT_CORNER // 4)
+    by = min(place, share * c)
+    shape = shapely.Polygon(v).buffer(c - by, quad_segs=policy.corner_sides // 4)
     ring = shapely.get_coordinates(shape.exterior)[:-1]
     return Inset(shapely.Polygon(ring), ring, _nearest(v, ring), disks, by)
 
 
 def _nearest(v: Floats, ring: Floats) -> Ints:
-    """Return for each point of a ring the nearest of some corners, the first of two as near."""
+    """Return the nearest corner of each point of a ring, the first of two at equal distance."""
     from scipy.spatial import cKDTree
 
     away, index = cKDTree(v).query(ring, k=2)
@@ -101,19 +96,12 @@ def _nearest(v: Floats, ring: Floats) -> Ints:
 
 
 def room(v: Floats, limit: float) -> Floats:
-    """Return how near the two edges at each corner of a polygon come to any other part of it.
+    """Return the distance (k,) from the edges at each corner (k, 2) to the rest of the polygon.
 
     Parameters
     ----------
-    v : ndarray, shape (k, 2)
-        Corners.
     limit : float
-        Larger distances are infinite, so that not all pairs need be looked at.
-
-    Returns
-    -------
-    ndarray, shape (k,)
-        Distances.
+        Distances above it are infinite, so that not all pairs need to be measured.
     """
     k = len(v)
     edges = shapely.linestrings(np.stack([v, np.roll(v, -1, axis=0)], axis=1))
@@ -122,20 +110,20 @@ def room(v: Floats, limit: float) -> Floats:
     other = (corner != edge) & (corner != (edge + 1) % k)  # the ends of an edge are its own
     edge, corner = edge[other], corner[other]
     far = shapely.distance(edges[edge], corners[corner])
-    of_edge, of_corner = np.full(k, np.inf), np.full(k, np.inf)
-    np.minimum.at(of_edge, edge, far)
-    np.minimum.at(of_corner, corner, far)
-    return np.asarray(np.minimum(np.minimum(of_edge, np.roll(of_edge, 1)), of_corner))
+    by_edge, by_corner = np.full(k, np.inf), np.full(k, np.inf)
+    np.minimum.at(by_edge, edge, far)
+    np.minimum.at(by_corner, corner, far)
+    return np.asarray(np.minimum(np.minimum(by_edge, np.roll(by_edge, 1)), by_corner))
 
 
 def _inward(v: Floats) -> Floats:
-    """(k, 2) unit vectors into a counter-clockwise polygon along the bisectors of its corners."""
+    """Return unit vectors (k, 2) into a counter-clockwise polygon along its corners' bisectors."""
     ahead = np.roll(v, -1, axis=0) - v
     ahead /= np.hypot(*ahead.T)[:, None]
     behind = np.roll(ahead, 1, axis=0)
     left = np.column_stack([-ahead[:, 1] - behind[:, 1], ahead[:, 0] + behind[:, 0]])
     size = np.hypot(*left.T)
-    # a corner that turns right back has no sum of normals: there it is behind the tip
+    # at a corner that turns by 180 degrees the normals cancel: there, point behind the tip
     out = np.where(size[:, None] > 1e-6, left / np.maximum(size, 1e-300)[:, None], ahead - behind)
     return np.asarray(out / np.maximum(np.hypot(*out.T), 1e-300)[:, None])
 
@@ -151,7 +139,7 @@ class Bridge:
     contact
         (2,) place where they touch.
     line
-        (k, 2) from inside one inset, through the contact, to inside the other.
+        (k, 2) polyline from inside one inset, through the contact, to inside the other.
     """
 
     first: int
@@ -169,7 +157,7 @@ def bridges(problem: Problem, insets: list[Inset], origin: Floats, place: float)
         return []
     outlines = [_outline(o, origin) for o in problem.obstacles]
     shapes = np.array([o if isinstance(o, shapely.Polygon) else o.buffer(r) for o, r in outlines])
-    reach = 2.0 * problem.clearance + TOUCHING * problem.scale + 2.0 * place
+    reach = 2.0 * problem.clearance + TOUCHING_TOLERANCE * problem.scale + 2.0 * place
     # the polygon in place of a circle lies inside of it by this distance
     back = max(r for _, r in outlines) * (1.0 - np.cos(np.pi / 32.0))
     pairs = shapely.STRtree(shapes).query(shapes, predicate="dwithin", distance=reach + 2.0 * back)
@@ -199,9 +187,8 @@ def _outline(obstacle: Circle | Polygon, origin: Floats) -> Outline:
 def _contacts(
     problem: Problem, a: Outline, b: Outline, inset_a: Inset, inset_b: Inset, place: float
 ) -> list[tuple[Floats, Floats]]:
-    """Return the contacts of two obstacles, each as a point (2,) of the one and one of the
-    other."""
-    gap = 2.0 * problem.clearance + TOUCHING * problem.scale
+    """Return the contacts of two obstacles, each as a point (2,) of both."""
+    gap = 2.0 * problem.clearance + TOUCHING_TOLERANCE * problem.scale
     (one, r), (other, q) = a, b
     if r and q:
         p, c = shapely.get_coordinates([one, other])
@@ -211,36 +198,56 @@ def _contacts(
         return [(p + r / far * (c - p), c + q / far * (p - c))]
     if r or q:
         circle, polygon, radius = (one, other, r) if r else (other, one, q)
-        centre = shapely.get_coordinates(circle)[0]
-        v = shapely.get_coordinates(polygon)
-        step = np.diff(v, axis=0)
-        along = ((centre - v[:-1]) * step).sum(1) / np.maximum((step * step).sum(1), 1e-300)
-        feet = v[:-1] + np.clip(along, 0.0, 1.0)[:, None] * step
-        far = np.hypot(*(feet - centre).T)
-        out = []
-        # deeper in the circle the insets overlap, too
-        touched = (far - radius <= gap) & (far - radius >= -4.0 * place)
-        for foot in np.unique(feet[touched], axis=0):
-            rim = centre + radius / np.hypot(*(foot - centre)) * (foot - centre)
-            out.append((rim, foot) if r else (foot, rim))
-        return out
+        pairs = _contacts_with_circle(circle, radius, polygon, gap, place)
+        return [(rim, foot) if r else (foot, rim) for rim, foot in pairs]
+    return _contacts_of_polygons(one, other, inset_a, inset_b, gap, place)
+
+
+def _contacts_with_circle(
+    circle: shapely.Geometry, radius: float, polygon: shapely.Geometry, gap: float, place: float
+) -> list[tuple[Floats, Floats]]:
+    """Return the contacts of a circle and a polygon, as points of both."""
+    centre = shapely.get_coordinates(circle)[0]
+    v = shapely.get_coordinates(polygon)
+    step = np.diff(v, axis=0)
+    along = ((centre - v[:-1]) * step).sum(1) / np.maximum((step * step).sum(1), 1e-300)
+    feet = v[:-1] + np.clip(along, 0.0, 1.0)[:, None] * step
+    far = np.hypot(*(feet - centre).T)
+    # deeper in the circle the insets overlap, too
+    touched = (far - radius <= gap) & (far - radius >= -4.0 * place)
+    out = []
+    for foot in np.unique(feet[touched], axis=0):
+        rim = centre + radius / np.hypot(*(foot - centre)) * (foot - centre)
+        out.append((rim, foot))
+    return out
+
+
+def _contacts_of_polygons(
+    one: shapely.Geometry,
+    other: shapely.Geometry,
+    inset_one: Inset,
+    inset_other: Inset,
+    gap: float,
+    place: float,
+) -> list[tuple[Floats, Floats]]:
+    """Return a contact of two polygons, as points of both, in each region that is near to both."""
     if one.distance(other) > gap:
         return []
-    # one contact in each part of the plane that is near to both
-    wide = 0.5 * gap + place
-    shut = inset_a.shape.intersection(inset_b.shape)
+    near = 0.5 * gap + place
+    closed = inset_one.shape.intersection(inset_other.shape)
     out = []
-    for part in shapely.get_parts(one.buffer(wide).intersection(other.buffer(wide))):
-        if part.intersects(shut):
+    for part in shapely.get_parts(one.buffer(near).intersection(other.buffer(near))):
+        if part.intersects(closed):
             continue
-        here = part.buffer(place)
-        p, c = one.intersection(here), other.intersection(here)
+        region = part.buffer(place)
+        p, c = one.intersection(region), other.intersection(region)
         if not p.is_empty and not c.is_empty and p.distance(c) <= gap:
             ends = shapely.get_coordinates(shapely.shortest_line(p, c))
             out.append((ends[0], ends[1]))
     return out
 
 
-def _unit_ring() -> Floats:
-    angle = 2.0 * np.pi * (np.arange(SIDES) + PHASE) / SIDES
+def _unit_ring(policy: JudgePolicy) -> Floats:
+    sides = policy.circle_sides
+    angle = 2.0 * np.pi * (np.arange(sides) + policy.phase) / sides
     return np.column_stack([np.cos(angle), np.sin(angle)])

@@ -1,11 +1,11 @@
-"""Pull a path taut within its homotopy class: constrained Delaunay triangles and the funnel.
+"""String pulling: taut lengths within a homotopy class, by triangulation and the funnel algorithm.
 
-An independent road to taut lengths. Circles become inscribed polygons; free space is triangulated;
-a path is the sequence of triangle edges it crosses; cancelling an edge crossed back at once gives
-the *reduced* sequence, which is the path's homotopy class; the shortest path through a sequence of
-edges is found with the funnel algorithm (Lee & Preparata 1984; Chazelle 1982; Hershberger &
-Snoeyink 1994). Its corners tell which disks the taut path touches, and with that its exact length
-(`netsp.judge.chain`).
+This is independent of the roadmaps. Circles become inscribed polygons, and free space is
+triangulated. A path is the sequence of triangle edges that it crosses; cancelling an edge that is
+crossed back at once gives the *reduced* sequence, which is the path's homotopy class. The funnel
+algorithm finds the shortest path through a sequence of edges (Lee & Preparata 1984; Chazelle 1982;
+Hershberger & Snoeyink 1994). Its corners show which disks the taut path touches, and so give its
+exact length (`netsp.judge.chain`).
 
 Degenerate positions need no special case. Every side is decided by exact orientation
 (`netsp.judge.orientation`). If a point of a path lies on the line of an edge, or a segment runs
@@ -29,20 +29,31 @@ import shapely
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.judge.chain import contacts_of, exact_length
+from netsp.judge.judge_policy import JudgePolicy
 from netsp.judge.orientation import Point, orientation, orientations
-from netsp.judge.solid_distances import SIDES, inset
+from netsp.judge.solid_distances import inset
 from netsp.model.problem import Problem
 
 PLACE_TOLERANCE = 1e-7
-"""How far, relative to the problem's size, a path may miss a point or enter an obstacle."""
+"""Tolerance of a path's points, as a share of the problem's size: by how much it may miss a goal or
+enter an obstacle."""
 
 
 @dataclass(frozen=True)
 class Pulled:
-    """A taut planar length between two bounds. They agree where the contacts with the disks
-    themselves were found; else `low` is among inscribed polygons, and `high` adds what the circles
-    stand proud of them along the bends (an estimate: it assumes no bend moves elsewhere). And the
-    angle (radians) by which it turns; at least, where contacts were not found."""
+    """Taut planar length, between two bounds.
+
+    The bounds agree if the contacts with the disks themselves were found.
+
+    Attributes
+    ----------
+    low
+        Lower bound: the length among inscribed polygons.
+    high
+        Estimated upper bound: adds by how much the circles exceed their polygons along the bends.
+    turning
+        Angle by which the path turns, radians; a lower bound if contacts were not found.
+    """
 
     low: float
     high: float
@@ -55,11 +66,13 @@ class StringPuller:
     Parameters
     ----------
     reach
-        How far from base, goals and obstacles a path may go.
+        Distance from base, goals and obstacles within which triangles cover free space.
     place
-        The judge's tolerance.
+        Tolerance of the judge.
     path
         Points (n, 2 or more) that the triangles must also cover.
+    policy
+        Polygons that stand for circles, and the search for contacts.
     """
 
     def __init__(
@@ -68,11 +81,14 @@ class StringPuller:
         reach: float,
         place: float | None = None,
         path: Floats | None = None,
+        policy: JudgePolicy = JudgePolicy(),
     ) -> None:
-        self.problem = problem
+        self.problem, self.policy = problem, policy
         self.place = PLACE_TOLERANCE * problem.scale if place is None else place
         self.origin = np.array(problem.base[:2])
-        self.solids = [inset(problem, o, self.place, self.origin) for o in problem.obstacles]
+        self.solids = [
+            inset(problem, o, self.place, self.origin, policy) for o in problem.obstacles
+        ]
         shapes = [s.shape for s in self.solids]
         disks = [s.disks for s in self.solids]
         self.disks: Floats = np.vstack(disks) if disks else np.zeros((0, 3))
@@ -81,14 +97,15 @@ class StringPuller:
             for s in self.solids
             for (x, y), k in zip(s.ring, s.owner, strict=True)
         }
-        self.proud = max(
-            (float(s.disks[:, 2].max()) * (1.0 - math.cos(math.pi / SIDES)) + s.depth
-             for s in self.solids), default=0.0,
-        )  # fmt: skip
+        sagitta = 1.0 - math.cos(math.pi / policy.circle_sides)
+        # largest distance by which a disk exceeds its polygon
+        self.max_excess = max(
+            (float(s.disks[:, 2].max()) * sagitta + s.depth for s in self.solids), default=0.0
+        )
         triangles = shapely.get_parts(
             shapely.constrained_delaunay_triangles(self._free(reach, path, shapes))
         )
-        self._edges, self._beside = _interior_edges(triangles)
+        self._edges, self._triangles = _interior_edges(triangles)
         self._ends: list[tuple[Point, Point]] = [
             ((a, b), (c, d)) for a, b, c, d in self._edges.tolist()
         ]
@@ -112,9 +129,10 @@ class StringPuller:
         return box.difference(shapely.union_all(shapes)) if shapes else box
 
     def crossings(self, path: npt.ArrayLike) -> list[list[tuple[int, bool]]]:
-        """Per segment of a polyline, the triangle edges crossed, in order, with the side come from.
+        """Return for each segment of a polyline the triangle edges crossed, in order.
 
-        The sequence of a whole path is the sequences of its parts put together.
+        Each crossing states whether it comes from the left. The sequence of a whole path is the
+        concatenation of the sequences of its parts.
         """
         xy = np.asarray(path, dtype=float)[:, :2] - self.origin
         out: list[list[tuple[int, bool]]] = [[] for _ in range(len(xy) - 1)]
@@ -131,7 +149,7 @@ class StringPuller:
         p, q, u, v = p[hit], q[hit], u[hit], v[hit]
         a, b = _cross(u, v, p), _cross(u, v, q)
         apart_by = np.where(a == b, 1.0, a - b)
-        # near the end of an edge rounding may swap crossings, and triangles tell their order
+        # near the end of an edge rounding may swap crossings, which triangles put in order
         order = np.lexsort((a / apart_by, seg))
         bounds = np.flatnonzero(np.diff(seg[order])) + 1
         for group in np.split(order, bounds) if len(order) else []:
@@ -140,8 +158,10 @@ class StringPuller:
         return out
 
     def _as_walk(self, hits: list[tuple[int, bool]]) -> list[tuple[int, bool]]:
-        """Return the crossings of a segment so that each leaves the triangle that the one before
-        it entered; a segment through an obstacle has several such runs, in the order given."""
+        """Return crossings in an order in which each leaves the triangle that the last one entered.
+
+        A segment through an obstacle has several such runs, in the order given.
+        """
         enters = {self._to(h) for h in hits}
         leaves = {self._from(h): h for h in hits}
         walk: list[tuple[int, bool]] = []
@@ -156,41 +176,46 @@ class StringPuller:
 
     def _from(self, crossing: tuple[int, bool]) -> int:
         edge, from_left = crossing
-        return int(self._beside[edge, 0 if from_left else 1])
+        return int(self._triangles[edge, 0 if from_left else 1])
 
     def _to(self, crossing: tuple[int, bool]) -> int:
         edge, from_left = crossing
-        return int(self._beside[edge, 1 if from_left else 0])
+        return int(self._triangles[edge, 1 if from_left else 0])
 
     def pull(
         self, start: npt.ArrayLike, end: npt.ArrayLike, sleeve: list[tuple[int, bool]]
     ) -> Pulled:
-        """Taut length from start to end through a reduced sequence of edges."""
+        """Return the taut length from start to end through a reduced sequence of edges."""
         a, b = (np.asarray(p, dtype=float)[:2] - self.origin for p in (start, end))
         portals = []
         for edge, from_left in sleeve:
             u, v = self._ends[edge]
-            # coming from the left of u→v, v lies on the left hand
+            # for who comes from the left of u→v, v is on the left
             portals.append((v, u) if from_left else (u, v))
         corners = _funnel((float(a[0]), float(a[1])), (float(b[0]), float(b[1])), portals)
-        own = [(float(x), float(y)) for x, y in corners[1:-1]]
-        contacts = contacts_of(corners, [self._disk_at.get(p, (*p, 0.0)) for p in own])
-        exact = exact_length(a, b, contacts, self.disks, 1e-3 * self.place)
+        inner = [(float(x), float(y)) for x, y in corners[1:-1]]
+        contacts = contacts_of(corners, [self._disk_at.get(p, (*p, 0.0)) for p in inner])
+        slack, max_changes = 1e-3 * self.place, self.policy.max_contact_changes
+        exact = exact_length(a, b, contacts, self.disks, slack, max_changes)
         if exact is not None:
             return Pulled(exact[0], exact[0], exact[1])
+        return self._estimated(corners)
+
+    def _estimated(self, corners: Floats) -> Pulled:
+        """Return bounds on the length of a taut path from its corners at polygons."""
         d = np.diff(corners, axis=0)
         low = float(np.hypot(d[:, 0], d[:, 1]).sum())
         heading = np.unwrap(np.arctan2(d[:, 1], d[:, 0])) if len(d) > 1 else np.zeros(1)
         turns = np.diff(heading)
         switches = int((np.sign(turns[1:]) != np.sign(turns[:-1])).sum()) if len(turns) > 1 else 0
         slack = np.abs(turns).sum() + 2.0 * (switches + 1) * (len(turns) > 0)
-        most = float(np.abs(turns).sum())
-        less = 2.0 * math.pi / SIDES * 2.0 * (switches + 1)
-        return Pulled(low, low + self.proud * float(slack), max(most - less, 0.0))
+        total = float(np.abs(turns).sum())
+        error = 2.0 * math.pi / self.policy.circle_sides * 2.0 * (switches + 1)
+        return Pulled(low, low + self.max_excess * float(slack), max(total - error, 0.0))
 
 
 def reduce_sleeve(crossings: list[tuple[int, bool]]) -> list[tuple[int, bool]]:
-    """Cancel edges crossed back at once."""
+    """Return a sequence of crossings without edges that are crossed back at once."""
     out: list[tuple[int, bool]] = []
     for edge, side in crossings:
         if out and out[-1][0] == edge:
@@ -201,8 +226,10 @@ def reduce_sleeve(crossings: list[tuple[int, bool]]) -> list[tuple[int, bool]]:
 
 
 def _interior_edges(triangles: npt.NDArray[np.object_]) -> tuple[Floats, Ints]:
-    """Return the edges (k, 4) shared by two triangles, from the end with the smaller x (then y) to
-    the other, and the triangles (k, 2) on their left and right."""
+    """Return the edges (k, 4) between two triangles, and the triangles (k, 2) left and right.
+
+    Edges go from the end with the smaller x (then y) to the other.
+    """
     ring = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
     turned = orientations(ring[:, 0], ring[:, 1], ring[:, 2])
     ring = np.where((turned < 0)[:, None, None], ring[:, ::-1], ring)

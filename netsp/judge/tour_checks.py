@@ -1,8 +1,8 @@
-"""The independent judge of a solution. Imports no roadmap and no solver.
+"""Independent judge of a solution, which imports no roadmap and no solver.
 
-Words come from the rays (`netsp.hsignature`); that the tour is contractible and each tether fits is
-found a second time over a triangulation (`netsp.judge.stringpull`); obstacles are kept clear of by
-plain distances (Shapely).
+Words come from the rays (`netsp.hsignature`). Whether the tour is contractible and each tether fits
+is checked a second time over a triangulation (`netsp.judge.stringpull`), and the clearance from
+obstacles by plain distances (Shapely).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ import shapely
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError, VerificationError
 from netsp.hsignature import Word, concatenate, crossings, entangled, reduce
+from netsp.judge.judge_policy import JudgePolicy
 from netsp.judge.overstretch import first_overstretch
 from netsp.judge.passage import passes
 from netsp.judge.solid_distances import Inset, bridges
@@ -28,35 +29,36 @@ from netsp.model.problem import Circle, Problem
 from netsp.model.solution import Solution, Status, solution_scope, tension_ratio
 
 STAND_OFF_ALLOWANCE = 3e-8
-"""As a share of the problem's size, what standing off from a boundary may add to a length."""
+"""Tolerance of lengths along boundaries, as a share of the problem's size: offline geometry stands
+off from what it touches."""
 
-MAX_GAP_ERROR = 1e-6
-"""Largest difference between a stated gap and the gap of the stated lengths; files round both."""
+GAP_TOLERANCE = 1e-6
+"""Tolerance between a stated gap and the gap of the stated lengths; files round both."""
 
-MAX_CLOSED_GAP = 1e-5
-"""Largest gap of a tour with an optimal status; tours from a robot's state are proven to this
-accuracy only."""
+CLOSED_GAP_TOLERANCE = 1e-5
+"""Tolerance of the gap of a tour with an optimal status; tours from a robot's state are proven to
+this accuracy only."""
 
 LENGTH_TOLERANCE = 1e-3
-"""How much longer than the stated length the drawn path may be (arcs are circumscribed)."""
+"""Tolerance, relative, of the length of the drawn path, which circumscribes arcs."""
 
 TAUT_TOLERANCE = 1e-7
-"""How far, as a share of the tether, a stated length may lie from the one found again: the offline
-geometry stands off from what it touches by some 1e-8 of the problem's size."""
+"""Tolerance of stated lengths, as a share of the tether: offline geometry stands off from what it
+touches by some 1e-8 of the problem's size."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """One question and its answer.
+    """Outcome of one check.
 
     Parameters
     ----------
     name : str
-        The question.
+        Condition that is checked, such as 'enters no obstacle'.
     passed : bool
         Whether it holds.
     detail : str
-        What was found.
+        Measured values, or the reason why it fails.
     """
 
     name: str
@@ -66,26 +68,20 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """All checks of a solution; truthy when every one passed.
-
-    Parameters
-    ----------
-    checks : tuple of Check
-        In order.
-    """
+    """Checks of a solution, in order; true if all passed."""
 
     checks: tuple[Check, ...]
 
     @property
     def passed(self) -> bool:
-        """Whether every check passed."""
+        """True if every check passed."""
         return all(c.passed for c in self.checks)
 
     def __bool__(self) -> bool:
         return self.passed
 
     def __repr__(self) -> str:
-        """In a line."""
+        """Return the outcome in one line."""
         failed = ", ".join(c.name for c in self.checks if not c.passed)
         return f"<Verification: {f'fails {failed}' if failed else f'all {len(self.checks)} pass'}>"
 
@@ -96,26 +92,16 @@ class Verification:
         )
 
 
-def verify(problem: Problem, solution: Solution) -> Verification:
+def verify(
+    problem: Problem, solution: Solution, policy: JudgePolicy = JudgePolicy()
+) -> Verification:
     """Judge a solution against its problem.
 
-    Checks that the files belong together; that the path is a closed polyline from the base through
+    Check that the files belong together; that the path is a closed polyline from the base through
     every goal in the order of the tour, clear of obstacles and within bounds; that its word at
     every goal is the stated one and its whole word is empty; that the tether, pulled taut again by
     another method, fits the tether length and has the stated length; and that length, bound, gap
     and status are consistent.
-
-    Parameters
-    ----------
-    problem : Problem
-        What was to be solved.
-    solution : Solution
-        What is judged.
-
-    Returns
-    -------
-    Verification
-        All checks, in order.
 
     Raises
     ------
@@ -127,25 +113,13 @@ def verify(problem: Problem, solution: Solution) -> Verification:
             raise InputError(f"{name}: expected a {kind.__name__}, got {value!r}")
     # copies of a model may hold what its validation would have turned into a status
     solution = solution.model_copy(update={"status": Status(solution.status)})
-    return Verification(tuple(_Judge(problem, solution).run()))
+    return Verification(tuple(_Judge(problem, solution, policy).run()))
 
 
 def checked(problem: Problem, solution: Solution) -> Solution:
     """Return a solution if it passes the judge, else raise.
 
     Solutions without a tour pass, as do solutions with the status `invalid`.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
-    solution : Solution
-        Its solution.
-
-    Returns
-    -------
-    Solution
-        The same solution.
 
     Raises
     ------
@@ -166,22 +140,51 @@ def checked(problem: Problem, solution: Solution) -> Solution:
 NOT_OF_PROBLEMS = frozenset({Scope.TRAVEL_GRAPH, Scope.PART, Scope.STATES, Scope.STATES_IN_ORDER})
 """Scopes of bounds on travel graphs, on parts of them and on missions in space."""
 
-TURNING_TOLERANCE = 1e-6
-"""Radians; contacts with obstacles are found exactly."""
+MAX_TURNING_ERROR = 1e-6
+"""Tolerance of the turning of a tether, radians; contacts with obstacles are found exactly."""
 
-AT_CONTACT = 8.0
-"""Distance, in place tolerances, by which a path may reach beyond a contact of two obstacles if it
-comes back."""
+CONTACT_REACH = 8.0
+"""Tolerance, in place tolerances, of the distance by which a path may pass a contact of two
+obstacles and come back."""
+
+
+@dataclass
+class _PulledTour:
+    """Taut lengths along a tour.
+
+    Attributes
+    ----------
+    pieces
+        Triangle edges that each segment of the path crosses.
+    sleeve
+        Reduced sequence of edges of the whole tour.
+    total
+        Sum of the legs.
+    lengths
+        Tether at the path vertex of each visit.
+    longest, turning, error
+        Largest tether, turning, and difference from a stated length beyond the tolerance, each with
+        the label of its goal.
+    """
+
+    pieces: list[list[tuple[int, bool]]]
+    sleeve: list[tuple[int, bool]] = field(default_factory=list)
+    total: float = 0.0
+    lengths: dict[int, float] = field(default_factory=dict)
+    longest: tuple[float, str] = (-np.inf, "")
+    turning: tuple[float, str] = (0.0, "")
+    error: tuple[float, str] = (-np.inf, "")
 
 
 class _Judge:
-    def __init__(self, problem: Problem, solution: Solution) -> None:
+    def __init__(self, problem: Problem, solution: Solution, policy: JudgePolicy) -> None:
+        self.policy = policy
         self.sha256 = problem.sha256
-        # planned with a margin: what is said holds among obstacles grown by it
+        # a solution that is planned with a margin is right among obstacles grown by it
         if solution.margin or solution.slack:
             problem = problem.grown(solution.margin, solution.slack)
         self.problem, self.solution = problem, solution
-        # a path that starts in the middle is judged with the tether that is out already before it
+        # before a path that starts on the way comes the tether that is out already
         before: Floats = np.array(solution.start_tether, dtype=float).reshape(-1, 3)
         walked: Floats = np.array(solution.path, dtype=float).reshape(-1, 3)
         self.path: Floats = np.vstack([before, walked])
@@ -198,7 +201,8 @@ class _Judge:
     @cached_property
     def puller(self) -> StringPuller:
         """Triangles of the free space, which cover the path."""
-        return StringPuller(self.problem, self.problem.tether_length, self.place, self.path)
+        problem = self.problem
+        return StringPuller(problem, problem.tether_length, self.place, self.path, self.policy)
 
     def run(self) -> list[Check]:
         checks = [self._belongs()]
@@ -246,7 +250,7 @@ class _Judge:
         )
 
     def _starts(self) -> Check:
-        """The path starts at the problem's state, with a tether of the state's word."""
+        """Check that the path starts at the problem's state, with a tether of the state's word."""
         name, state = "starts at the state", self.problem.state
         if state is None or self.out < 2 or len(self.path) < self.out + 1:
             return Check(name, False, "only one of problem and solution has a starting state")
@@ -279,13 +283,11 @@ class _Judge:
     def _every_goal(self) -> Check:
         order = [v.goal for v in self.solution.tour]
         goals = range(len(self.problem.goals))
-        own = self.problem.clusters
-        taken = {int(own[g]) for g in order if g in goals}
-        missing = [g for g in goals if int(own[g]) not in taken]
-        too_many = [
-            g for g in sorted(set(order) & set(goals))
-            if sum(own[h] == own[g] for h in set(order) & set(goals)) > 1
-        ]  # fmt: skip
+        cluster = self.problem.clusters
+        visited = {int(cluster[g]) for g in order if g in goals}
+        missing = [g for g in goals if int(cluster[g]) not in visited]
+        known = set(order) & set(goals)
+        too_many = [g for g in sorted(known) if sum(cluster[h] == cluster[g] for h in known) > 1]
         repeated = sorted({g for g in order if order.count(g) > 1})
         unknown = sorted(set(order) - set(goals))
         if missing or repeated or unknown or too_many:
@@ -302,31 +304,33 @@ class _Judge:
             return Check("names every goal once", False, "; ".join(parts))
         before = self.problem.precedences
         for i, j in itertools.combinations(range(len(order) if len(before) else 0), 2):
-            if before[own[order[j]], own[order[i]]]:
+            if before[cluster[order[j]], cluster[order[i]]]:
                 wrong = f"{self._goal(order[i])} before {self._goal(order[j])}"
                 return Check("names every goal once", False, f"the wrong way round: {wrong}")
-        if self.solution.kept_order and list(own[order]) != sorted(own[order]):
+        if self.solution.kept_order and list(cluster[order]) != sorted(cluster[order]):
             return Check("names every goal once", False, "not in the order of the problem")
         kept = ", in the order of the problem" if self.solution.kept_order else ""
         return Check("names every goal once", True, f"{len(order)} goals{kept}")
 
     def _goal(self, k: int) -> str:
-        """A goal that the solution names; the problem may have no such."""
+        """Return the label of a goal that the solution names, also if the problem lacks it."""
         return self.problem.goal_label(k) if k < len(self.problem.goals) else f"goal #{k}"
 
     def _visited(self) -> Check:
-        """Find for each visit the path vertex at its goal, in order; several may lie there, so the
-        first with the stated word is taken. From then on the path runs through the goal itself, so
-        that words and lengths are those of exact places."""
+        """Find the path vertex of each visit, in order, and put it on the goal.
+
+        Of several vertices at a goal, the first with the stated word counts. The path is moved to
+        the goal itself, so that words and lengths are those of exact places.
+        """
         name = "visits every goal in order"
         rays = self.problem.representative_points
         at = 0
         word: Word = ()
-        stops: list[tuple[int, Floats]] = []
-        if self.out:  # goals that the tether passes at the start are not visited by that
+        visits: list[tuple[int, Floats]] = []
+        if self.out:  # goals that the tether passes at the start do not count as visited
             at = self.out
             word = reduce(crossings(self.path[: at + 1], rays))
-        here = self.path[at]
+        place = self.path[at]
         for visit in self.solution.tour:
             label = self.problem.goal_label(visit.goal)
             target = self.problem.points[visit.goal + 1]
@@ -337,36 +341,35 @@ class _Judge:
             gaps = np.linalg.norm(self.path[at:] - target, axis=1)
             candidates = at + np.flatnonzero(gaps <= self.place)
             if len(candidates) == 0:
-                return Check(
-                    name, False,
-                    f"no path point at {label} after point {at}; nearest misses by "
-                    f"{gaps.min():.3g}",
-                )  # fmt: skip
+                detail = f"no path point at {label} after point {at}; nearest misses by "
+                return Check(name, False, f"{detail}{gaps.min():.3g}")
             words = [
-                concatenate(word, crossings(np.vstack([here, self.path[at + 1 : k], target]), rays))
+                concatenate(
+                    word, crossings(np.vstack([place, self.path[at + 1 : k], target]), rays)
+                )
                 for k in candidates
             ]
             pick = next((i for i, w in enumerate(words) if w == reduce(visit.signature)), 0)
-            at, word, here = int(candidates[pick]), words[pick], target
-            stops.append((at, target))
-        self._run_through(stops)
+            at, word, place = int(candidates[pick]), words[pick], target
+            visits.append((at, target))
+        self._run_through(visits)
         return Check(name, True, f"{len(self.path)} path points")
 
-    def _run_through(self, stops: list[tuple[int, Floats]]) -> None:
-        """Replace each path vertex within the tolerance of its goal by the goal."""
+    def _run_through(self, visits: list[tuple[int, Floats]]) -> None:
+        """Replace the path vertex of each visit by its goal."""
         ends = {0, len(self.path) - 1, self.out}
         rows: list[Floats] = []
-        waiting = deque(stops)
+        waiting = deque(visits)
         for k, point in enumerate(self.path):
-            here = [] if waiting and waiting[0][0] == k and k not in ends else [point]
+            points = [] if waiting and waiting[0][0] == k and k not in ends else [point]
             if k == len(self.path) - 1:
-                here = []
+                points = []
             while waiting and waiting[0][0] == k:
-                here.append(waiting.popleft()[1])
-                self.visits.append(len(rows) + len(here) - 1)
+                points.append(waiting.popleft()[1])
+                self.visits.append(len(rows) + len(points) - 1)
             if k == len(self.path) - 1:
-                here.append(point)
-            rows += here
+                points.append(point)
+            rows += points
         self.path = np.array(rows)
 
     def _clear(self) -> Check:
@@ -386,7 +389,7 @@ class _Judge:
                 nearest, where = room, label
         for bridge in bridges(self.problem, self.puller.solids, self.puller.origin, self.place):
             if line.dwithin(shapely.LineString(bridge.line), self.place) and passes(
-                bridge, self.path[:, :2] - self.puller.origin, AT_CONTACT * self.place
+                bridge, self.path[:, :2] - self.puller.origin, CONTACT_REACH * self.place
             ):
                 one, other = map(self.problem.obstacle_label, (bridge.first, bridge.second))
                 return Check(name, False, f"passes between {one} and {other}, which touch")
@@ -396,8 +399,10 @@ class _Judge:
         return Check(name, True, f"{near} {where}, the nearest")
 
     def _room(self, i: int, line: shapely.LineString) -> float:
-        """How far the path stays from an obstacle grown by the clearance; negative inside, and of a
-        polygon's own inside not told."""
+        """Return the distance from the path to an obstacle that is grown by the clearance.
+
+        It is negative inside, but not below minus the clearance inside a polygon.
+        """
         o, origin = self.problem.obstacles[i], self.puller.origin
         if isinstance(o, Circle):
             centre = shapely.Point(np.array(o.center) - origin)
@@ -406,8 +411,7 @@ class _Judge:
         return float(line.distance(shape)) - self.problem.clearance
 
     def _pierced(self, i: int, solid: Inset, line: shapely.LineString) -> bool:
-        """Whether the path meets a polygon drawn in by the tolerance or, if the polygon is thinner,
-        by a part of its thickness."""
+        """Return whether the path meets the inset of a polygon."""
         return not isinstance(self.problem.obstacles[i], Circle) and bool(
             line.intersects(solid.shape)
         )
@@ -426,9 +430,9 @@ class _Judge:
         rays = self.problem.representative_points
         word: Word = ()
         before = 0
-        for visit, stop in zip(self.solution.tour, self.visits, strict=True):
-            word = concatenate(word, crossings(self.path[before : stop + 1], rays))
-            before = stop
+        for visit, vertex in zip(self.solution.tour, self.visits, strict=True):
+            word = concatenate(word, crossings(self.path[before : vertex + 1], rays))
+            before = vertex
             if word != tuple(visit.signature):
                 return Check(
                     "tether word at every goal",
@@ -457,67 +461,70 @@ class _Judge:
         return Check("total word is empty", True, "nothing is wrapped")
 
     def _tethers(self) -> list[Check]:
-        """The second opinion: triangulate, pull each prefix and each leg taut."""
+        """Check tethers a second time: triangulate, and pull each prefix and each leg taut."""
         limit = self.problem.tether_length
-        puller = self.puller
+        pulled = self._pulled()
+        self.pulled_total = pulled.total
+        known = {len(self.path) - 1: 0.0, **pulled.lengths}
+        excess = pulled.longest[0] - limit
+        fit = excess <= 1e-9 * limit + self.tiny
+        longest = f"longest {pulled.longest[0]:.6g} of {limit:g}, at {pulled.longest[1]}"
+        error, at = pulled.error
+        return [
+            Check(
+                "contractible over triangles",
+                not pulled.sleeve,
+                f"{len(pulled.sleeve)} edges remain"
+                if pulled.sleeve
+                else "the tour shrinks to the base",
+            ),
+            self._along(pulled.pieces, known, longest)
+            if fit and not pulled.sleeve
+            else Check("taut tether fits", fit, longest),
+            Check(
+                "taut lengths as stated",
+                error <= 0.0,
+                f"within {TAUT_TOLERANCE:g} of the tether length"
+                if error <= 0.0
+                else f"off by {error + TAUT_TOLERANCE * limit + self.tiny:.6g} at {at}",
+            ),
+            *self._tension(*pulled.turning),
+        ]
+
+    def _pulled(self) -> _PulledTour:
+        """Pull the tether at each visit, and each leg, taut."""
+        problem, puller = self.problem, self.puller
         pieces = puller.crossings(self.path)
-        known: dict[int, float] = {len(self.path) - 1: 0.0}
-        points = self.problem.points
+        points = problem.points
         # the tether that is out at the start is no leg
-        sleeve: list[tuple[int, bool]] = reduce_sleeve(
-            [c for piece in pieces[: self.out] for c in piece]
-        )
+        sleeve = reduce_sleeve([c for piece in pieces[: self.out] for c in piece])
         before, place = self.out, 0
-        if self.problem.state is not None:
-            points = np.vstack([points, self.problem.state.position])
+        if problem.state is not None:
+            points = np.vstack([points, problem.state.position])
             place = len(points) - 1
-        pulled_total = 0.0
-        fits: tuple[float, str] = (-np.inf, "")
-        turns: tuple[float, str] = (0.0, "")
-        wrong: tuple[float, str] = (-np.inf, "")
-        stops = [*((v.goal + 1, s) for v, s in zip(self.solution.tour, self.visits, strict=True))]
-        stops.append((0, len(self.path) - 1))
-        for k, (point, stop) in enumerate(stops):
-            leg = [c for piece in pieces[before:stop] for c in piece]
+        out = _PulledTour(pieces)
+        slack = TAUT_TOLERANCE * problem.tether_length + self.tiny
+        goals = [v.goal + 1 for v in self.solution.tour]
+        visits = [*zip(goals, self.visits, strict=True), (0, len(self.path) - 1)]
+        for k, (point, vertex) in enumerate(visits):
+            leg = [c for piece in pieces[before:vertex] for c in piece]
             sleeve = reduce_sleeve(sleeve + leg)
-            pulled = puller.pull(points[place], points[point], reduce_sleeve(leg))
-            dz = points[point, 2] - points[place, 2]
-            pulled_total += float(np.hypot(pulled.low, dz))
-            before, place = stop, point
+            taut = puller.pull(points[place], points[point], reduce_sleeve(leg))
+            out.total += float(np.hypot(taut.low, points[point, 2] - points[place, 2]))
+            before, place = vertex, point
             if point == 0:
                 break
             tether = puller.pull(points[0], points[point], sleeve)
             dz = points[point, 2] - points[0, 2]
             low, high = np.hypot(tether.low, dz), np.hypot(tether.high, dz)
-            label = self.problem.goal_label(point - 1)
-            fits = max(fits, (float(low), label))
-            known[stop] = float(high)
-            turns = max(turns, (tether.turning, label))
+            label = problem.goal_label(point - 1)
             stated = self.solution.tour[k].tether_length
-            slack = TAUT_TOLERANCE * limit + self.tiny
-            wrong = max(wrong, (float(max(low - stated, stated - high) - slack), label))
-        self.pulled_total = pulled_total
-        excess = fits[0] - limit
-        fit = excess <= 1e-9 * limit + self.tiny
-        longest = f"longest {fits[0]:.6g} of {limit:g}, at {fits[1]}"
-        return [
-            Check(
-                "contractible over triangles",
-                not sleeve,
-                "the tour shrinks to the base" if not sleeve else f"{len(sleeve)} edges remain",
-            ),
-            self._along(pieces, known, longest)
-            if fit and not sleeve
-            else Check("taut tether fits", fit, longest),
-            Check(
-                "taut lengths as stated",
-                wrong[0] <= 0.0,
-                f"within {TAUT_TOLERANCE:g} of the tether length"
-                if wrong[0] <= 0.0
-                else f"off by {wrong[0] + TAUT_TOLERANCE * limit + self.tiny:.6g} at {wrong[1]}",
-            ),
-            *self._tension(*turns),
-        ]
+            out.lengths[vertex] = float(high)
+            out.longest = max(out.longest, (float(low), label))
+            out.turning = max(out.turning, (tether.turning, label))
+            out.error = max(out.error, (float(max(low - stated, stated - high) - slack), label))
+        out.sleeve = sleeve
+        return out
 
     def _along(
         self, pieces: list[list[tuple[int, bool]]], known: dict[int, float], longest: str
@@ -525,16 +532,21 @@ class _Judge:
         """Check that the tether, which fits at the goals, also fits between them."""
         name, limit = "taut tether fits", self.problem.tether_length
         found = first_overstretch(
-            self.puller, self.path, pieces, limit * (1.0 + 1e-9) + self.tiny, known,
-            self._proud, self.out,
-        )  # fmt: skip
+            self.puller,
+            self.path,
+            pieces,
+            limit * (1.0 + 1e-9) + self.tiny,
+            known,
+            self._arc_distance,
+            self.out,
+        )
         if found is None:
             return Check(name, True, longest)
         x, y, z = self.path[found.vertex]
         at = f"({x:.6g}, {y:.6g})" if z == self.problem.base[2] else f"({x:.6g}, {y:.6g}, {z:.6g})"
         return Check(name, False, f"{found.length:.6g} of {limit:g} on the way, at {at}")
 
-    def _proud(self, point: Floats) -> float:
+    def _arc_distance(self, point: Floats) -> float:
         """Return the distance of a point of a path from the arc around which it is circumscribed.
 
         The tether fits on the arc itself, which is part of a taut leg. A corner of the
@@ -553,7 +565,7 @@ class _Judge:
         return max(float(out[on_arc].max(initial=0.0)), 0.0)
 
     def _tension(self, turning: float, label: str) -> list[Check]:
-        """What friction does to the tension (capstan), where that has a limit."""
+        """Check the tension ratio by the capstan equation, if it has a limit."""
         s = self.solution
         if s.max_tension_ratio is None:
             return []
@@ -561,7 +573,7 @@ class _Judge:
         return [
             Check(
                 "tension ratio is kept",
-                turning <= s.max_turning + TURNING_TOLERANCE,
+                turning <= s.max_turning + MAX_TURNING_ERROR,
                 f"{ratio:.4g} of {s.max_tension_ratio:g}, at {label}" if label else "no turning",
             )
         ]
@@ -584,9 +596,9 @@ class _Judge:
     def _status(self) -> Check:
         s = self.solution
         fault = self._fault_of_bound()
-        said = "no bound" if s.bound is None else s.bound.says(s.length, self.problem.units)
+        bound = "no bound" if s.bound is None else s.bound.says(s.length, self.problem.units)
         return Check(
-            "bound, gap and status agree", fault is None, fault or f"{s.status.value}, {said}"
+            "bound, gap and status agree", fault is None, fault or f"{s.status.value}, {bound}"
         )
 
     def _fault_of_bound(self) -> str | None:
@@ -604,12 +616,12 @@ class _Judge:
             return f"a bound on {scope.tours}, which no solution of a problem has"
         if bound > length + 1e-9 * max(length, self.problem.scale):
             return f"bound {bound:g} above length {length:g}"
-        if gap is None or abs(gap - s.bound.gap(length)) > MAX_GAP_ERROR:
+        if gap is None or abs(gap - s.bound.gap(length)) > GAP_TOLERANCE:
             return f"the stated gap is not that of the bound, {s.bound.percent(length, 6)}"
         able = solution_scope(s.roadmap, s.classes, kept_order=s.kept_order)
         if not able.includes(scope) or scope.keeps_order != s.kept_order:
             return f"a bound on {scope.tours}, but a run like this can bound {able.tours}"
-        closed = gap <= MAX_CLOSED_GAP
+        closed = gap <= CLOSED_GAP_TOLERANCE
         if status.is_optimal and status is not Status.OPTIMAL_OF_KEPT and not closed:
             return f"{status.value}, but the gap is {s.bound.percent(length, 6)}"
         if status.is_optimal and closed and status is not Status.optimal_of(scope):

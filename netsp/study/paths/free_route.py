@@ -23,7 +23,7 @@ from netsp.hsignature.signature_measures import winding_numbers
 from netsp.judge.passage import passes
 from netsp.judge.solid_distances import bridges
 from netsp.judge.stringpull import StringPuller
-from netsp.judge.tour_checks import AT_CONTACT
+from netsp.judge.tour_checks import CONTACT_REACH
 from netsp.model.problem import Circle, Polygon
 
 INSET_SHARE = 0.25
@@ -302,7 +302,7 @@ class FreeSpace:
         for bridge in self._bridges:
             gate = shapely.LineString(bridge.line)
             near = line.dwithin(gate, self.place)
-            if not near or not passes(bridge, path, AT_CONTACT * self.place):
+            if not near or not passes(bridge, path, CONTACT_REACH * self.place):
                 continue
             at = shapely.Point(bridge.contact)
             s = float(np.interp(line.project(at), polylines.along(xy), along))
