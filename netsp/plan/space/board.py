@@ -386,17 +386,10 @@ class StateGraph:
             if fault is None and (longest > states.limit or word is None):
                 fault = first_deviation or pair
             if state >= 0:
-                entry = states.entries[state]
-                visits.append(
-                    TourVisit(
-                        int(places.waypoint[entry.place]),
-                        int(places.choice[entry.place]),
-                        () if word is None else context.words.letters(word),
-                        tether.length,
-                        path,
-                        longest,
-                    )
-                )
+                place = states.entries[state].place
+                waypoint, choice = int(places.waypoint[place]), int(places.choice[place])
+                letters = () if word is None else context.words.letters(word)
+                visits.append(TourVisit(waypoint, choice, letters, tether.length, path, longest))
             last = state
         free = word == at_home and hang_alike(tether, context.start_tether, delta)
         return DrivenTour(list(tour), visits, path, total, free, fault or first_deviation)

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.base.arrays import Floats
 from netsp.base.clock import Clock, TimeLimit, end_if_abandoned, until_interrupt
 from netsp.base.errors import InputError, LimitReachedError
 from netsp.base.geometry import polylines
@@ -672,22 +673,11 @@ def tour_of_flight(
     if not all(keeps_clearance(field, leg, mission) for leg in legs):
         return None
     context = context or PlanningContext.for_mission(mission, mission.load_scene(), field)
-    stops = []
-    for k, stop in enumerate(run.summary["stops"]):
-        walked = np.vstack([context.present_tether.nodes, *legs[: k + 1]])
-        word, broken = context.words.try_word(walked)
-        if broken is not None:
-            return None
-        planned_stop = PlannedVisit(
-            path=thinned_path(legs[k]),
-            signature=word,
-            tether_length=stop["tether"],
-            longest_tether=max(r.tether for r in parts[k]),
-            given_as=order[visited[k]],
-        )
-        stops.append(planned_stop)
+    stops = _planned_visits(run, order, parts, legs, context)
+    if stops is None:
+        return None
     tour = PlannedTour(
-        stops=tuple(stops),
+        stops=stops,
         home=thinned_path(legs[-1]),
         status=Status.FEASIBLE,
         solver=solver,
@@ -703,6 +693,31 @@ def tour_of_flight(
         update={"waypoints": tuple(mission.waypoints[k] for k in chosen), "tour": tour}
     )
     return SolvedMission(planned, tuple(order[k] for k in chosen), None, None, None)
+
+
+def _planned_visits(
+    run: Run,
+    order: tuple[int, ...],
+    parts: list[tuple[LogRow, ...]],
+    legs: list[Floats],
+    context: PlanningContext,
+) -> tuple[PlannedVisit, ...] | None:
+    """Return the visits of a flight with their words; None if the path to one has no word."""
+    visits = []
+    for k, stop in enumerate(run.summary["stops"]):
+        walked = np.vstack([context.present_tether.nodes, *legs[: k + 1]])
+        word, broken = context.words.try_word(walked)
+        if broken is not None:
+            return None
+        visit = PlannedVisit(
+            path=thinned_path(legs[k]),
+            signature=word,
+            tether_length=stop["tether"],
+            longest_tether=max(r.tether for r in parts[k]),
+            given_as=order[int(stop["waypoint"])],
+        )
+        visits.append(visit)
+    return tuple(visits)
 
 
 def _log_of_legs(log: tuple[LogRow, ...], visited: list[int]) -> list[tuple[LogRow, ...]]:

@@ -143,6 +143,21 @@ class Detours:
         if not found and best is None:
             return None
         current = orders[0] if not found else [leg.place for leg in found[-1][0].legs[:-1]]
+        found = self._move_pieces(current, found, shortest, cutoff, clock, on_progress)
+        return self._to_driven_tour(found[-1][0]) if found else None
+
+    def _move_pieces(
+        self,
+        current: list[int],
+        found: list[list[_PartialTour]],
+        shortest: Floats,
+        cutoff: float,
+        clock: Clock,
+        on_progress: Callable[[str], None],
+    ) -> list[list[_PartialTour]]:
+        """Move pieces of an order as long as that makes its tour shorter, and return the partial
+        tours of the best order; `found` if no order is better."""
+        worth = self.paths.context.policy.bound_worth
         seen: set[tuple[int, ...]] = set()
         has_moved = True
         while has_moved:
@@ -159,7 +174,7 @@ class Detours:
                     found, cutoff = stages, (1.0 - worth) * stages[-1][0].length
                     current, has_moved = order, True
                     break
-        return self._to_driven_tour(found[-1][0]) if found else None
+        return found
 
     def _paths_between(self, n: int, m: int) -> list[tuple[Floats, int]]:
         """Return the paths from a place to another and their words, shortest first."""

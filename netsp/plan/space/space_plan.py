@@ -408,14 +408,13 @@ def prepare_context(
     on_progress("gaps that the cells do not show")
     if grid is None:
         assert scene is not None
-        find_gaps = partial(
-            resolve_gaps, mission, scene, field, policy.gaps, clock, policy.words.min_room_ratio
-        )
+        find_gaps = partial(resolve_gaps, mission, scene, field)
     else:
-        find_gaps = partial(
-            find_gaps_on, mission, grid, policy.gaps, clock, policy.words.min_room_ratio
-        )
-    gaps = clock.bounded("searching for gaps that the cells do not show", find_gaps)
+        find_gaps = partial(find_gaps_on, mission, grid)
+    effort = (policy.gaps, clock, policy.words.min_room_ratio)
+    gaps = clock.bounded(
+        "searching for gaps that the cells do not show", lambda: find_gaps(*effort)
+    )
     mission = gaps.mission
     Places.for_mission(mission, field)  # refuse bad waypoints before the long search for words
     if grid is None:
