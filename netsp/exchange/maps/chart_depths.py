@@ -43,8 +43,10 @@ def shallow_areas(features: Sequence[Feature], draught: float) -> list[Feature]:
         layer = feature.layer.upper()
         if "Polygon" not in feature.shape.geom_type:
             continue
-        least, _ = depth_range(feature)
-        if layer == UNSURVEYED or (layer in DEPTH_AREAS and (least is None or least < draught)):
+        min_depth, _ = depth_range(feature)
+        if layer == UNSURVEYED or (
+            layer in DEPTH_AREAS and (min_depth is None or min_depth < draught)
+        ):
             out.append(feature)
     return out
 

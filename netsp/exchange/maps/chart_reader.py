@@ -183,18 +183,19 @@ def _refuse_containers(path: Path, policy: ReadPolicy) -> None:
     """Refuse folders, archives and catalogues of charts, and name the cells in them."""
     catalogue = False
     if path.is_dir():
-        cells, what = _cells_in(path), "a folder of charts"
+        cells, description = _cells_in(path), "a folder of charts"
     elif path.suffix.lower() == ".zip":
-        cells, what = _cells_in_archive(path), "an archive of charts; unpack it"
+        cells, description = _cells_in_archive(path), "an archive of charts; unpack it"
     else:
         head = _head(path, policy) if path.is_file() else b""
         catalogue = b"CATD" in head and b"DSID" not in head
-        cells, what = _cells_in(path.parent), "the catalogue of an exchange set"
+        cells, description = _cells_in(path.parent), "the catalogue of an exchange set"
         if not catalogue:
             return
-    some = ", ".join(cells[:MAX_NAMED]) + (", …" if len(cells) > MAX_NAMED else "")
+    examples = ", ".join(cells[:MAX_NAMED]) + (", …" if len(cells) > MAX_NAMED else "")
     raise InputError(
-        f"{path}: is {what}; expected one chart (….000)" + (f", such as {some}" if some else "")
+        f"{path}: is {description}; expected one chart (….000)"
+        + (f", such as {examples}" if examples else "")
     )
 
 
@@ -283,13 +284,13 @@ def _updates(file: Path, cell: CellIdentity, policy: ReadPolicy) -> tuple[list[P
     others: dict[str, list[str]] = {}
     expected = cell.update + 1
     for number, path in sorted(beside.items()):
-        own = _update_edition(path, policy)
+        edition = _update_edition(path, policy)
         if number <= cell.update:
             continue  # a reissued cell already contains this update
-        if own is None:
+        if edition is None:
             reason = "not an update of S-57"
-        elif own != cell.edition:
-            reason = f"of edition {own}, and the chart is of edition {cell.edition}"
+        elif edition != cell.edition:
+            reason = f"of edition {edition}, and the chart is of edition {cell.edition}"
         elif number != expected:
             reason = f"update {expected} is missing"
         else:
@@ -328,29 +329,31 @@ def _check_coordinates(file: str | Path, head: Mapping[str, Any]) -> None:
 
 
 def _units(
-    file: str | Path, head: Mapping[str, Any], found: Map, said: str | None
+    file: str | Path, head: Mapping[str, Any], found: Map, stated: str | None
 ) -> tuple[str, str]:
     """Return the units of depths and of lengths; refuse units that are unknown."""
-    wrong: list[str] = []
+    unknown: list[str] = []
 
-    def known(table: Mapping[int, str], ours: str, theirs: str, what: str) -> str:
+    def known(table: Mapping[int, str], ours: str, theirs: str, quantity: str) -> str:
         codes = {head.get(ours)} | {
             feature.get(theirs) for feature in found.features if feature.layer.upper() == "M_UNIT"
         } - {None}
         names = {table.get(_code(code) or 0) for code in codes}
         if len(names) == 1 and (name := names.pop()) is not None:
             return name
-        if said is not None:
-            return said
-        told = ", ".join(sorted(str(code) for code in codes))
+        if stated is not None:
+            return stated
+        listed = ", ".join(sorted(str(code) for code in codes))
         expected = ", ".join(f"{code} ({name})" for code, name in table.items())
-        wrong.append(f"unit of {what} {told} ({ours[5:]}); expected one of {expected} for all")
+        unknown.append(
+            f"unit of {quantity} {listed} ({ours[5:]}); expected one of {expected} for all"
+        )
         return "m"
 
-    depth = said or known(DEPTH_UNITS, "DSPM_DUNI", "dunits", "depths")
+    depth = stated or known(DEPTH_UNITS, "DSPM_DUNI", "dunits", "depths")
     length = known(HEIGHT_UNITS, "DSPM_HUNI", "hunits", "lengths")
-    if wrong:
-        plain = [f"{file}: {text}" for text in wrong]
+    if unknown:
+        plain = [f"{file}: {text}" for text in unknown]
         option = "; give the right one with --units"
         raise UnansweredError([text + option for text in plain], plain)
     return depth, length

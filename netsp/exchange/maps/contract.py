@@ -231,9 +231,9 @@ def kind_of(
         No kind fits, or a feature of this kind cannot have its shape.
     """
     shape = feature.shape.geom_type
-    said = feature.get("kind")
+    stated = feature.get("kind")
     names = [name.strip().lower() for name in (feature.layer, *feature.folders)]
-    asked = next((kinds[name] for name in names if name in kinds), None)
+    by_layer = next((kinds[name] for name in names if name in kinds), None)
     word = next((WORDS[w] for name in names for w in words_in(name) if w in WORDS), None)
     by_shape = next(
         (
@@ -243,13 +243,13 @@ def kind_of(
         ),
         None,
     )
-    if asked is not None:
-        decision = Decision(asked, "as asked for")
+    if by_layer is not None:
+        decision = Decision(by_layer, "as asked for")
     elif by_shape is not None:
         decision = Decision(by_shape, "as asked for")
-    elif said is not None:
+    elif stated is not None:
         why = str(feature.get("why") or "its kind is ignore")[: policy.max_reason_length]
-        decision = Decision(said if isinstance(said, str) else "", why)
+        decision = Decision(stated if isinstance(stated, str) else "", why)
     elif word is not None:
         decision = Decision(word, "its layer is named ignore")
     elif feature.kind:
@@ -265,7 +265,7 @@ def kind_of(
     if kind not in KINDS:
         raise InputError(
             f"{feature.where}: expected a kind of {', '.join(KINDS)}, got {shape!r} of kind "
-            f"{shown(said)}"
+            f"{shown(stated)}"
         )
     marked = shape if feature.marker is None else feature.marker.geom_type
     if shape not in SHAPES[kind] and marked not in SHAPES[kind]:

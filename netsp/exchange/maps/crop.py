@@ -132,27 +132,29 @@ def cropped(
     kept: list[dict[str, Any]] = []
     dropped: list[dict[str, Any]] = []
     cut_off: list[dict[str, Any]] = []
-    for thing in obstacles:
-        if "radius" in thing:
-            far = math.dist(thing["center"], window.center) - thing["radius"] > window.radius
-            (dropped if far else kept).append(thing)
+    for obstacle in obstacles:
+        if "radius" in obstacle:
+            is_far = (
+                math.dist(obstacle["center"], window.center) - obstacle["radius"] > window.radius
+            )
+            (dropped if is_far else kept).append(obstacle)
             continue
-        polygon = shapely.Polygon(thing["polygon"])
+        polygon = shapely.Polygon(obstacle["polygon"])
         if window.is_beyond(polygon):
-            dropped.append(thing)
+            dropped.append(obstacle)
             continue
         part, is_cut = window.cut(polygon)
         if not is_cut:
-            kept.append(thing)
+            kept.append(obstacle)
             continue
-        cut_off.append(thing)
+        cut_off.append(obstacle)
         parts = _polygons(part)
         for number, piece in enumerate(parts, 1):
             ring = shapely.get_coordinates(piece.exterior)[:-1]
-            more: dict[str, Any] = {"polygon": ring.tolist()}
-            if len(parts) > 1 and thing["name"] is not None:
-                more["name"] = f"{thing['name']} {number}"
-            kept.append({**thing, **more})
+            changes: dict[str, Any] = {"polygon": ring.tolist()}
+            if len(parts) > 1 and obstacle["name"] is not None:
+                changes["name"] = f"{obstacle['name']} {number}"
+            kept.append({**obstacle, **changes})
     return kept, dropped, cut_off
 
 

@@ -129,7 +129,7 @@ def read_dxf(
     return found if crs in (None, LOCAL) else in_degrees(found, str(crs), file)
 
 
-def _unit(file: str | Path, drawing: Drawing, asked: str | None) -> tuple[float | None, str]:
+def _unit(file: str | Path, drawing: Drawing, unit: str | None) -> tuple[float | None, str]:
     """Return the metres per unit that the header states, and a note on the unit.
 
     If the header could state a unit but states none, the user must give it. Releases before 2000
@@ -141,15 +141,19 @@ def _unit(file: str | Path, drawing: Drawing, asked: str | None) -> tuple[float 
     except (ValueError, OverflowError):
         number = -1
     name, metres = INSUNITS.get(number, ("", None))
-    said = f"the drawing's header says {name}" if name else "the drawing's header states no unit"
-    if asked is not None:
-        return metres, f"lengths are in {asked}, as asked for ({said})"
+    header_unit = (
+        f"the drawing's header says {name}" if name else "the drawing's header states no unit"
+    )
+    if unit is not None:
+        return metres, f"lengths are in {unit}, as asked for ({header_unit})"
     if metres is not None:
         return metres, f"lengths are in {name}, as the drawing's header says ($INSUNITS {number})"
     if not text and "$MEASUREMENT" not in drawing.header:
-        return None, f"{said}: lengths are taken as metres; --units says otherwise"
-    what = "states no unit" if number == 0 else f"has $INSUNITS {text}, which is no unit of a site"
-    plain = f"{file}: the drawing's header {what}"
+        return None, f"{header_unit}: lengths are taken as metres; --units says otherwise"
+    description = (
+        "states no unit" if number == 0 else f"has $INSUNITS {text}, which is no unit of a site"
+    )
+    plain = f"{file}: the drawing's header {description}"
     raise UnansweredError(
         [f"{plain}; give the unit with --units, as --units mm"], [plain], ["units"]
     )
@@ -287,9 +291,9 @@ class _Reader:
 
     def damage(self, record: Record) -> str:
         """Return what is wrong with an entity or the blocks in it; empty if nothing is."""
-        own = record.damage() or shape_damage(record)
-        if own or record.type != "INSERT":
-            return own
+        reason = record.damage() or shape_damage(record)
+        if reason or record.type != "INSERT":
+            return reason
         if self.holds_itself(record.get(2)):
             return f"its block {self.text(record.get(2))!r} holds itself"
         for block in self.blocks_in(record.get(2)):
@@ -411,9 +415,9 @@ class _Reader:
     def damaged(self, entities: list[tuple[str, _Entity]], error: InputError) -> str:
         """Return the message on the entity that makes GDAL fail, found by bisection."""
 
-        def is_read(some: list[tuple[str, _Entity]]) -> bool:
+        def is_read(tested: list[tuple[str, _Entity]]) -> bool:
             try:
-                self.from_gdal(dict(some))
+                self.from_gdal(dict(tested))
             except InputError:
                 return False
             return True
@@ -479,8 +483,8 @@ class _Reader:
         groups: dict[str, list[shapely.Geometry]] = {}
         split = not _has_kind(layer) and any(_has_kind(inner) for inner, _ in entity.pieces)
         for inner, piece in entity.pieces:
-            own = layer if inner == "0" else inner
-            groups.setdefault(own if split else layer, []).append(piece)
+            own_layer = layer if inner == "0" else inner
+            groups.setdefault(own_layer if split else layer, []).append(piece)
         self.layers[layer] += len(groups) - 1
         widths = set(_widths(record))
         if len(widths) > 1 and max(widths) > 0.0:
@@ -584,8 +588,10 @@ class _Reader:
         outlines = [area for areas in drawn for area in areas]
         out = []
         for feature in features:
-            own = _areas(feature.shape) if feature.where in hatches else []
-            if own and all(any(_alike(area, other) for other in outlines) for area in own):
+            areas_filled = _areas(feature.shape) if feature.where in hatches else []
+            if areas_filled and all(
+                any(_alike(area, other) for other in outlines) for area in areas_filled
+            ):
                 self.unread.append(
                     Unread(feature.where, feature.layer, "fills an outline that is read (HATCH)")
                 )
@@ -606,32 +612,32 @@ class _Reader:
                 places.setdefault(feature.layer, []).append(k)
         pairs = []
         for t, (_, layer, record) in enumerate(self.texts):
-            at = shapely.Point(record.number(10), record.number(20))
+            place = shapely.Point(record.number(10), record.number(20))
             reach = self.policy.max_label_distance * (record.number(40) or 1.0)
             for k in places.get(layer, []):
-                away = at.distance(shapely.force_2d(features[k].marker or features[k].shape))
-                if away <= reach:
-                    pairs.append((away, t, k))
+                distance = place.distance(shapely.force_2d(features[k].marker or features[k].shape))
+                if distance <= reach:
+                    pairs.append((distance, t, k))
         names: dict[int, int] = {}
-        taken: set[int] = set()
+        used: set[int] = set()
         for _, t, k in sorted(pairs):
-            if t not in taken and k not in names:
-                taken.add(t)
+            if t not in used and k not in names:
+                used.add(t)
                 names[k] = t
         labels = {
             t: _label(self.text(self.texts[t][2].all_text()), self.policy.max_label_length)
-            for t in taken
+            for t in used
         }
         count = Counter(labels.values())
         out = list(features)
         for k, t in names.items():
             if labels[t] and count[labels[t]] == 1:
-                own = features[k]
-                out[k] = replace(own, properties={**own.properties, "name": labels[t]})
+                feature = features[k]
+                out[k] = replace(feature, properties={**feature.properties, "name": labels[t]})
             else:
-                taken.discard(t)
+                used.discard(t)
         for t, (where, layer, record) in enumerate(self.texts):
-            reason = "the name of what it stands beside" if t in taken else "writing on the drawing"
+            reason = "the name of what it stands beside" if t in used else "writing on the drawing"
             self.unread.append(Unread(where, layer, f"{reason} ({record.type})"))
         return out
 

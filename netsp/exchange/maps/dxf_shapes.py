@@ -70,7 +70,7 @@ def _of_multiline(record: Record) -> list[Record]:
         )
     corner = np.array([places[11], places[21], places[31]]).T
     mitre = np.array([places[13], places[23], places[33]]).T
-    low, high = (corner + mitre * np.array([[pick(own)] for own in sides]) for pick in (min, max))
+    low, high = (corner + mitre * np.array([[pick(side)] for side in sides]) for pick in (min, max))
     ends = [*range(1, count), *([0] if int(record.number(71)) & CLOSED_MULTILINE else [])]
     shared = [(c, v) for c, v in record.tags if c in (5, 8, 60, 67)]
     out = []
@@ -128,11 +128,11 @@ def _of_mesh(record: Record) -> Record:
     count = int(record.number(93))
     items = [int(float(v)) for c, v in record.tags[start + 1 : start + 1 + count] if c == 90]
     faces: list[list[int]] = []
-    at = 0
-    while at < len(items):
-        faces.append(items[at + 1 : at + 1 + items[at]])
-        at += 1 + max(items[at], 0)
-    if at != count or len(items) != count:
+    position = 0
+    while position < len(items):
+        faces.append(items[position + 1 : position + 1 + items[position]])
+        position += 1 + max(items[position], 0)
+    if position != count or len(items) != count:
         raise ShapeDamageError(
             f"expected a list of {count} numbers for its faces, got {len(items)}"
         )

@@ -231,32 +231,32 @@ def _text_tags(file: str | Path, data: bytes) -> list[Tag]:
 
 def _binary_tags(file: str | Path, data: bytes) -> list[Tag]:
     """Return the group codes of a binary drawing, of two bytes (since Release 13) or of one."""
-    at = len(BINARY)
-    wide = data[at : at + 2] == b"\0\0"
+    position = len(BINARY)
+    wide = data[position : position + 2] == b"\0\0"
     out: list[Tag] = []
     try:
-        while at < len(data):
+        while position < len(data):
             if wide:
-                (code,) = struct.unpack_from("<h", data, at)
-                at += 2
+                (code,) = struct.unpack_from("<h", data, position)
+                position += 2
             else:
-                code = data[at]
-                at += 1
+                code = data[position]
+                position += 1
                 if code == 255:
-                    (code,) = struct.unpack_from("<h", data, at)
-                    at += 2
+                    (code,) = struct.unpack_from("<h", data, position)
+                    position += 2
             kind = next((kind for codes, kind in BINARY_TYPES if code in codes), "")
             if code in BINARY_CHUNKS:
-                at += 1 + data[at]
+                position += 1 + data[position]
                 continue
             if kind:
-                (value,) = struct.unpack_from(f"<{kind}", data, at)
-                at += struct.calcsize(f"<{kind}")
+                (value,) = struct.unpack_from(f"<{kind}", data, position)
+                position += struct.calcsize(f"<{kind}")
                 out.append((code, repr(value)))
                 continue
-            stop = data.index(b"\0", at)
-            out.append((code, data[at:stop].decode("latin-1")))
-            at = stop + 1
+            end = data.index(b"\0", position)
+            out.append((code, data[position:end].decode("latin-1")))
+            position = end + 1
             if out[-1] == (0, "EOF"):
                 break
     except (struct.error, IndexError, ValueError):

@@ -68,9 +68,9 @@ class Feature:
         *names : str
             Names in lower case; the case of the feature's own names does not matter.
         """
-        own = {str(k).lower(): v for k, v in self.properties.items()}
+        values = {str(k).lower(): v for k, v in self.properties.items()}
         for name in names:
-            value = own.get(name)
+            value = values.get(name)
             if value is None or value != value:  # GDAL's empty numbers are NaN
                 continue
             if isinstance(value, str) and value.strip().lower() in NO_NAMES:

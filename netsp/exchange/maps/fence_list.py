@@ -68,8 +68,8 @@ def read_rally_list(file: str | Path, policy: ImportPolicy = DEFAULT_IMPORT) -> 
         if cells[0].upper() != "RALLY":
             raise InputError(f"{where}: expected RALLY first, got {shown(cells[0])}")
         shape = _point(_lonlat(cells[1:], where))
-        own = {"kind": "ignore", "why": "a rally point, for emergencies"}
-        features.append(Feature(f"rally[{k}]", RALLY, "", own, shape))
+        properties = {"kind": "ignore", "why": "a rally point, for emergencies"}
+        features.append(Feature(f"rally[{k}]", RALLY, "", properties, shape))
     if not features:
         raise InputError(f"{file}: expected rally points, got nothing")
     return Map(tuple(features), True, {RALLY: len(features)})

@@ -83,9 +83,9 @@ def _checked_features(text: str, called: str, crs: str | None) -> list[Any]:
     features = _features_of(data)
     if features is None:
         raise InputError(f"{called}: expected a GeoJSON FeatureCollection, Feature or geometry")
-    own = data.get("crs")
-    if crs is None and own is not None and not _is_wgs84(own):
-        plain = f"{called}: crs: expected WGS 84 as RFC 7946 has it, got {json.dumps(own)[:120]}"
+    system = data.get("crs")
+    if crs is None and system is not None and not _is_wgs84(system):
+        plain = f"{called}: crs: expected WGS 84 as RFC 7946 has it, got {json.dumps(system)[:120]}"
         raise UnansweredError([f"{plain}; give another with --crs"], [plain], ["crs"])
     return features
 
@@ -208,8 +208,8 @@ def _check(coordinates: Any, depth: int, kind: str, where: str, *, degrees: bool
     """Check that lists are as deep as the kind has them, with positions at their ends."""
     if depth:
         if not isinstance(coordinates, list) or not coordinates:
-            what = "a polygon with an outer ring" if kind.endswith("Polygon") else f"a {kind}"
-            raise InputError(f"{where}: expected {what}, got {json.dumps(coordinates)[:60]}")
+            expected = "a polygon with an outer ring" if kind.endswith("Polygon") else f"a {kind}"
+            raise InputError(f"{where}: expected {expected}, got {json.dumps(coordinates)[:60]}")
         for part in coordinates:
             _check(part, depth - 1, kind, where, degrees=degrees)
         return

@@ -69,7 +69,7 @@ def read_gpx(
     InputError
         The file is not GPX, a point has no position, or no track or route has two points.
     """
-    say = on_note or (lambda _: None)
+    note = on_note or (lambda _: None)
     lines: list[GpxLine] = []
     count = {"trk": 0, "rte": 0, "wpt": 0}
     for element in _root(file):
@@ -84,13 +84,13 @@ def read_gpx(
         points = [p for part in parts for p in part]
         read = tuple(_point(p, f"{file}: {name}: point {k}", policy) for k, p in enumerate(points))
         if len(read) < 2:
-            say(f"{name} left out: has fewer than two points")
+            note(f"{name} left out: has fewer than two points")
             continue
         if len(parts) > 1:
-            say(f"{name}: its {len(parts)} segments are joined by straight lines")
+            note(f"{name}: its {len(parts)} segments are joined by straight lines")
         lines.append(GpxLine((_text(element, "name") or "").strip(), read))
     if lines and count["wpt"]:
-        say(f"{counted(count['wpt'], 'waypoint')} left out: no part of a path")
+        note(f"{counted(count['wpt'], 'waypoint')} left out: no part of a path")
     if not lines:
         raise InputError(
             f"{file}: expected a track or a route of two points or more, got {count['trk']} "
@@ -145,12 +145,12 @@ def read_gpx_map(file: str | Path, policy: ImportPolicy = DEFAULT_IMPORT) -> Map
         try:
             if kind == "wpt":
                 point = _point(element, where, policy.read)
-                at = shapely.Point(point.longitude, point.latitude, point.height or 0.0)
-                features.append(Feature(where, kind, "", _properties(element, "goal"), at))
+                place = shapely.Point(point.longitude, point.latitude, point.height or 0.0)
+                features.append(Feature(where, kind, "", _properties(element, "goal"), place))
                 continue
             lines = [
                 (name, [_point(p, f"{name}: point {k}", policy.read) for k, p in enumerate(part)])
-                for name, part in ((where + own, part) for own, part in _parts(element))
+                for name, part in ((where + segment, part) for segment, part in _parts(element))
             ]
         except InputError as error:
             complaints.append(f"{file}: {error}")
@@ -216,11 +216,11 @@ def _point(element: ElementTree.Element, where: str, policy: ReadPolicy) -> GpxP
     )
 
 
-def _number(text: str | None, most: float, where: str) -> float:
+def _number(text: str | None, max_value: float, where: str) -> float:
     try:
         value = float(text or "")
     except ValueError:
         value = math.nan
-    if not abs(value) <= most:
-        raise InputError(f"{where}: expected a number within {most:g}, got {shown(text)}")
+    if not abs(value) <= max_value:
+        raise InputError(f"{where}: expected a number within {max_value:g}, got {shown(text)}")
     return value

@@ -79,14 +79,14 @@ class Ledger:
         """
         out = []
         members: dict[str, list[str]] = {}
-        for where, own in self._layer_of.items():
-            members.setdefault(own, []).append(where)
+        for where, layer_name in self._layer_of.items():
+            members.setdefault(layer_name, []).append(where)
         for layer, size in self._layers.items():
-            mine = members.get(layer, [])
-            number = Counter(self._kind[where] for where in mine if where in self._kind)
+            places = members.get(layer, [])
+            number = Counter(self._kind[where] for where in places if where in self._kind)
             used = {kind: number[kind] for kind in KIND_COLUMNS if number[kind]}
             groups: dict[str, list[str]] = {}
-            for where in mine:
+            for where in places:
                 if where in self._reason:
                     groups.setdefault(self._reason[where], []).append(where)
             out.append(

@@ -71,9 +71,9 @@ def outlines(
         for part in getattr(whole, "geoms", [whole]):
             if part.is_empty:
                 continue
-            own = [k for k, line in kept if part.covers(line)]
-            used.update(own)
-            areas.append((part, own))
+            own_lines = [k for k, line in kept if part.covers(line)]
+            used.update(own_lines)
+            areas.append((part, own_lines))
         open_lines += [k for k in members if k not in used]
     return areas, sorted(open_lines)
 

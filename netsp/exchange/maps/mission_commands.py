@@ -179,9 +179,9 @@ def features_of_items(
         Longitude and latitude of home, degrees.
     """
     out = ItemFeatures(policy)
-    stops = [i for i in items if i.command in VISITED and i.lonlat is not None]
-    has_marks = any(i.mark is not None for i in stops)
-    is_passed = _passing_rule(stops, home, policy)
+    visits = [i for i in items if i.command in VISITED and i.lonlat is not None]
+    has_marks = any(i.mark is not None for i in visits)
+    is_passed = _passing_rule(visits, home, policy)
     terrain: list[str] = []
     above_sea = False
     fences = [i for i in items if i.command in (*POLYGONS, *CIRCLES)]
@@ -232,7 +232,7 @@ def features_of_items(
 
 
 def _passing_rule(
-    stops: Sequence[MissionItem], home: tuple[float, float] | None, policy: ImportPolicy
+    visits: Sequence[MissionItem], home: tuple[float, float] | None, policy: ImportPolicy
 ) -> Callable[[MissionItem], bool]:
     """Return the rule that tells bends from goals by the seconds for which the vehicle holds.
 
@@ -240,8 +240,8 @@ def _passing_rule(
     and never as long at a goal. In other missions the vehicle passes waypoints with a hold of at
     most `policy.max_pass_s`, if it holds longer anywhere.
     """
-    holds = [i.hold_s for i in stops]
-    last = stops[-1].lonlat if stops else None
+    holds = [i.hold_s for i in visits]
+    last = visits[-1].lonlat if visits else None
     if home is not None and last is not None and holds[-1] and holds[0] == holds[-1]:
         from netsp.exchange.maps.projection import Projection
 
@@ -282,20 +282,20 @@ def _reason(item: MissionItem) -> str:
 def _shape(item: MissionItem) -> shapely.Geometry | None:
     import shapely
 
-    at = item.lonlat
+    lonlat = item.lonlat
     with_place = item.command in VISITED or item.command in NOT_VISITED
-    if at is None or not with_place or not _is_geographic(item):
+    if lonlat is None or not with_place or not _is_geographic(item):
         return None
-    return shapely.Point(at) if abs(at[1]) <= 90.0 and abs(at[0]) <= 180.0 else None
+    return shapely.Point(lonlat) if abs(lonlat[1]) <= 90.0 and abs(lonlat[0]) <= 180.0 else None
 
 
 def _visited(
-    item: MissionItem, at: tuple[float, float], z: float | None, *, is_bend: bool, by_mark: bool
+    item: MissionItem, lonlat: tuple[float, float], z: float | None, *, is_bend: bool, by_mark: bool
 ) -> Feature:
     """Return the feature of a waypoint: a goal, or a bend that is passed."""
     import shapely
 
-    point = shapely.Point(*at, 0.0 if z is None else z)
+    point = shapely.Point(*lonlat, 0.0 if z is None else z)
     if is_bend:
         why = (
             "a bend of the tour, as netsp wrote it"
@@ -411,5 +411,5 @@ def add_home(
     elif abs(lonlat[1]) > 90.0 or abs(lonlat[0]) > 180.0:
         out.complaints.append(f"{where}: expected degrees, got {lonlat[1]:g}, {lonlat[0]:g}")
     else:
-        own = {"kind": "base", **{k: v for k, v in properties.items() if v is not None}}
-        out.features.append(Feature(where, HOME, "", own, shapely.Point(lonlat)))
+        base_properties = {"kind": "base", **{k: v for k, v in properties.items() if v is not None}}
+        out.features.append(Feature(where, HOME, "", base_properties, shapely.Point(lonlat)))

@@ -98,8 +98,8 @@ def read_occupancy(
     InputError
         The image cannot be read, is too large, or gives no valid problem.
     """
-    said, image = _opened(file, resolution)
-    cell = said.resolution
+    map_file, image = _opened(file, resolution)
+    cell = map_file.resolution
     slack = cell if tolerance is None else tolerance
     if not slack >= 0.1 * cell:
         raise InputError(
@@ -107,12 +107,12 @@ def read_occupancy(
         )
     values, alpha = _values(image, policy.read.max_image_cells)
     note = on_note or (lambda text: None)
-    occupied, unknown = _kinds(values, alpha, said)
+    occupied, unknown = _kinds(values, alpha, map_file)
     if alpha is not None:
         clear = counted(int((alpha < 255.0).sum()), "cell")
         note(
             f"{clear} not opaque: unknown, as map_server reads the mode scale"
-            if said.mode == "scale"
+            if map_file.mode == "scale"
             else f"its alpha channel is averaged in, as map_server reads the mode trinary; {clear} "
             "not opaque"
         )
@@ -122,13 +122,13 @@ def read_occupancy(
         if not unknown_is_free:
             occupied = occupied | unknown
     points = [base, *(_place(g) for g in goals)]
-    polygons, told = _polygons(occupied, said, slack, points, policy)
-    for text in told:
+    polygons, cell_notes = _polygons(occupied, map_file, slack, points, policy)
+    for text in cell_notes:
         note(text)
     rows, columns = values.shape
     corners = [(0.0, 0.0), (columns, 0.0), (columns, rows), (0.0, rows)]
-    outline = [_apply(_placing(said, 0), c, r) for c, r in corners]
-    straight = said.origin[2] == 0.0
+    outline = [_apply(_placing(map_file, 0), c, r) for c, r in corners]
+    straight = map_file.origin[2] == 0.0
     try:
         return Problem.model_validate(
             {
@@ -177,21 +177,21 @@ def _opened(file: str | Path, resolution: float | None) -> tuple[MapFile, Path]:
         raise InputError(f"{file}: mode: expected trinary or scale, got {shown(data['mode'])}")
     if data.get("mode") == "raw":
         raise InputError(f"{file}: mode: expected trinary or scale, got 'raw'")
-    own = {
+    fields = {
         k: v if k in ("image", "mode") else _numbers(v)
         for k, v in data.items()
         if k in MapFile.model_fields
     }
     try:
-        said = MapFile.model_validate(own)
+        map_file = MapFile.model_validate(fields)
     except ValidationError as error:
         raise InputError(f"{file}: {explain(error)}") from None
-    if not said.free_thresh < said.occupied_thresh:
+    if not map_file.free_thresh < map_file.occupied_thresh:
         raise InputError(
-            f"{file}: free_thresh: expected less than occupied_thresh {said.occupied_thresh:g}, "
-            f"got {said.free_thresh:g}"
+            f"{file}: free_thresh: expected less than occupied_thresh "
+            f"{map_file.occupied_thresh:g}, got {map_file.free_thresh:g}"
         )
-    return said, path.parent / said.image
+    return map_file, path.parent / map_file.image
 
 
 def _numbers(value: Any) -> Any:
@@ -260,25 +260,25 @@ def _values(image: Path, max_cells: int) -> tuple[Floats, Floats | None]:
     return np.asarray(values * (255.0 / largest)), alpha
 
 
-def _kinds(values: Floats, alpha: Floats | None, said: MapFile) -> tuple[Bools, Bools]:
+def _kinds(values: Floats, alpha: Floats | None, map_file: MapFile) -> tuple[Bools, Bools]:
     """Return which cells are occupied, and which unknown."""
-    if alpha is not None and said.mode == "trinary":
+    if alpha is not None and map_file.mode == "trinary":
         values = (3.0 * values + alpha) / 4.0  # a grey is three equal colours
-    p = values / 255.0 if said.negate else 1.0 - values / 255.0
-    occupied = p > said.occupied_thresh
-    unknown = ~occupied & (p >= said.free_thresh)
-    if alpha is not None and said.mode == "scale":
+    p = values / 255.0 if map_file.negate else 1.0 - values / 255.0
+    occupied = p > map_file.occupied_thresh
+    unknown = ~occupied & (p >= map_file.free_thresh)
+    if alpha is not None and map_file.mode == "scale":
         clear = alpha < 255.0
         occupied, unknown = occupied & ~clear, unknown | clear
     return occupied, unknown
 
 
-def _placing(said: MapFile, rows: int) -> tuple[float, ...]:
+def _placing(map_file: MapFile, rows: int) -> tuple[float, ...]:
     """Return the affine map (a, b, c, d, e, f): x = a column + b row + c, y = d column + e row + f.
 
     Rows count upwards from the lower left corner; if their number is given, downwards from the top.
     """
-    size, (x, y, turn) = said.resolution, said.origin
+    size, (x, y, turn) = map_file.resolution, map_file.origin
     right = size * np.array([math.cos(turn), math.sin(turn)])
     up = size * np.array([-math.sin(turn), math.cos(turn)])
     if not rows:
@@ -296,7 +296,7 @@ def _apply(m: tuple[float, ...], column: float, row: float) -> tuple[float, floa
 
 def _polygons(
     occupied: Bools,
-    said: MapFile,
+    map_file: MapFile,
     tolerance: float,
     points: Sequence[Any],
     policy: ImportPolicy,
@@ -311,7 +311,7 @@ def _polygons(
             occupied.astype(np.uint8),
             mask=occupied,
             connectivity=4,
-            transform=rasterio.Affine(*_placing(said, len(occupied))),
+            transform=rasterio.Affine(*_placing(map_file, len(occupied))),
         )
     ]
     if not cells:
@@ -319,7 +319,7 @@ def _polygons(
     max_pieces = policy.read.max_image_pieces
     if len(cells) > max_pieces:
         raise InputError(
-            f"{said.image}: {len(cells):,} separate pieces of obstacles; expected at most "
+            f"{map_file.image}: {len(cells):,} separate pieces of obstacles; expected at most "
             f"{max_pieces:,}: a map without noise"
         )
     exact = shapely.union_all(cells)
@@ -346,10 +346,10 @@ def _simplified(
     grown: shapely.Polygon, cells: shapely.Geometry, tolerance: float, shares: tuple[float, ...]
 ) -> shapely.Geometry:
     """Return an outline with fewer corners that holds its cells and stays within the tolerance."""
-    most = cells.buffer(tolerance, quad_segs=16)
+    limit = cells.buffer(tolerance, quad_segs=16)
     for share, whole in itertools.product(shares, (False, True)):
         out = grown.simplify(share * tolerance, preserve_topology=whole)
-        if out.geom_type == "Polygon" and out.is_valid and out.covers(cells) and most.covers(out):
+        if out.geom_type == "Polygon" and out.is_valid and out.covers(cells) and limit.covers(out):
             return out
     return grown
 

@@ -130,11 +130,11 @@ def _of_gpx(file: str | Path, problem: Problem, stem: str, policy: ReadPolicy) -
         stamps = [p.time_s for p in line.points]
         times = None if None in stamps else np.array(stamps, dtype=float)
         name = line.name or (stem if len(lines) == 1 else f"{stem} {k + 1}")
-        for what, values in (("heights", heights), ("times", stamps)):
+        for quantity, values in (("heights", heights), ("times", stamps)):
             if None in values and any(v is not None for v in values):
                 notes.append(
                     f"{file}: {name}: {values.count(None)} of {len(values)} points have no "
-                    f"{what}: {what} are not used"
+                    f"{quantity}: {quantity} are not used"
                 )
         out.append(FoundPath(name, points, times))
     return [replace(path, notes=tuple(notes)) for path in out]
@@ -149,11 +149,11 @@ def _of_table(file: str | Path, problem: Problem, stem: str, policy: ReadPolicy)
             raise InputError(f"{file}: expected {wanted}, got nothing") from None
         raise
     if not table.head:
-        said: list[str] = []
-        points = read_path(file, said.append)
+        notes: list[str] = []
+        points = read_path(file, notes.append)
         if points is None:
             raise InputError(f"{file}: expected {wanted}")
-        return FoundPath(stem, points, notes=tuple(said))
+        return FoundPath(stem, points, notes=tuple(notes))
     plane = table.pair((("x", "y"), ("longitude", "latitude")))
     if plane is None:
         raise table.wanted(wanted)
@@ -226,12 +226,12 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _number(text: str, where: str, most: float = LARGEST) -> float:
+def _number(text: str, where: str, max_value: float = LARGEST) -> float:
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not abs(value) <= most:
+    if not abs(value) <= max_value:
         raise InputError(f"{where}: expected a number, got {shown(text)}")
     return value
 
@@ -315,35 +315,39 @@ def _lines(
     data: Any, file: str, where: str, properties: Mapping[str, Any], max_depth: int
 ) -> Iterator[Line]:
     """Yield each line of GeoJSON: its place in the file, its positions and its properties."""
-    here = f"{file}: {where}" if where else file
+    place = f"{file}: {where}" if where else file
     if not isinstance(data, Mapping) or max_depth < 0:
-        raise InputError(f"{here}: expected a GeoJSON object, got {shown(data)}")
+        raise InputError(f"{place}: expected a GeoJSON object, got {shown(data)}")
     kind = data.get("type")
     if kind == "FeatureCollection":
         features = data.get("features")
         if not isinstance(features, list):
-            raise InputError(f"{here}: features: expected a list, got {shown(features)}")
+            raise InputError(f"{place}: features: expected a list, got {shown(features)}")
         for k, feature in enumerate(features):
             yield from _lines(feature, file, f"features[{k}]", {}, max_depth - 1)
     elif kind == "Feature":
         if data.get("geometry") is not None:
-            own = data.get("properties")
+            feature_properties = data.get("properties")
             yield from _lines(
-                data["geometry"], file, where, own if isinstance(own, dict) else {}, max_depth - 1
+                data["geometry"],
+                file,
+                where,
+                feature_properties if isinstance(feature_properties, dict) else {},
+                max_depth - 1,
             )
     elif kind == "GeometryCollection":
         parts = data.get("geometries")
         for part in parts if isinstance(parts, list) else []:
             yield from _lines(part, file, where, properties, max_depth - 1)
     elif kind == "LineString":
-        yield where, _positions(data.get("coordinates"), here), properties
+        yield where, _positions(data.get("coordinates"), place), properties
     elif kind == "MultiLineString":
         parts = data.get("coordinates")
         if not isinstance(parts, list) or not parts:
-            raise InputError(f"{here}: coordinates: expected a list of lines, got {shown(parts)}")
-        yield where, [p for part in parts for p in _positions(part, here)], properties
+            raise InputError(f"{place}: coordinates: expected a list of lines, got {shown(parts)}")
+        yield where, [p for part in parts for p in _positions(part, place)], properties
     elif not isinstance(kind, str):
-        raise InputError(f"{here}: type: expected a type of GeoJSON, got {shown(kind)}")
+        raise InputError(f"{place}: type: expected a type of GeoJSON, got {shown(kind)}")
 
 
 def _positions(coordinates: Any, where: str) -> list[list[float]]:

@@ -128,11 +128,11 @@ class ImportedSite:
         """
         import shapely
 
-        kept, staying, lost = 0, set(), {}
+        kept, staying, omitted = 0, set(), {}
         shapes: list[shapely.Geometry] = []
         for goal, feature in zip(self.problem.goals, self.goal_features, strict=True):
-            left = problem.goals[kept] if kept < len(problem.goals) else None
-            if left is not None and (left.name, left.position[:2]) == (
+            remaining = problem.goals[kept] if kept < len(problem.goals) else None
+            if remaining is not None and (remaining.name, remaining.position[:2]) == (
                 goal.name,
                 goal.position[:2],
             ):
@@ -141,11 +141,11 @@ class ImportedSite:
                 continue
             shapes.append(shapely.Point(goal.position[:2]))
             if feature is not None:
-                lost[feature.where] = feature.layer
+                omitted[feature.where] = feature.layer
         assert problem.site is not None
         layers = tuple(
             layer.without_goals(
-                [w for w in lost if w not in staying and lost[w] == layer.layer], reason
+                [w for w in omitted if w not in staying and omitted[w] == layer.layer], reason
             )
             for layer in problem.site.imported
         )
@@ -184,11 +184,11 @@ def import_site(
     InputError
         The file cannot be read or is no site; `SeveralErrors` if more than one thing is wrong.
     """
-    said = options or SiteOptions()
-    if said.units is not None and said.units not in UNITS:
-        raise InputError(f"units: expected one of {', '.join(UNITS)}, got {shown(said.units)}")
-    kinds, fields = words_of(said.maps)
-    found = read_map(file, said.crs, said.units, said.policy)
+    options = options or SiteOptions()
+    if options.units is not None and options.units not in UNITS:
+        raise InputError(f"units: expected one of {', '.join(UNITS)}, got {shown(options.units)}")
+    kinds, fields = words_of(options.maps)
+    found = read_map(file, options.crs, options.units, options.policy)
     for layer in kinds:
         if layer not in found.layer_names and layer not in SHAPE_LAYERS:
             raise InputError(
@@ -198,12 +198,12 @@ def import_site(
     properties = {str(name).lower() for feature in found.features for name in feature.properties}
     for ours, theirs in fields.items():
         if theirs not in properties:
-            listed = sorted(properties)[: said.policy.max_listed_properties]
+            listed = sorted(properties)[: options.policy.max_listed_properties]
             raise InputError(
                 f"--map: no feature of {file} has the property {theirs!r}, which is to be its "
                 f"{ours}; there are {', '.join(listed) or 'none'}"
             )
-    site = _Site(file, found, said, kinds, fields, projection)
+    site = _Site(file, found, options, kinds, fields, projection)
     problem = site.problem(name or Path(file).stem)
     assert problem.site is not None
     notes = (*found.notes, *site.notes, *problem.site.notes)
@@ -299,7 +299,7 @@ class _Site:
 
     file: str | Path
     map: Map
-    said: SiteOptions
+    options: SiteOptions
     kinds: dict[str, str]
     fields: dict[str, str]
     projection: Projection | None
@@ -313,8 +313,11 @@ class _Site:
     floor: SeaFloor | None = None
 
     def __post_init__(self) -> None:
-        self.is_chart, self.policy = self.map.is_chart, self.said.policy
-        for name, value in (("draught", self.said.draught), ("floor", self.said.floor or None)):
+        self.is_chart, self.policy = self.map.is_chart, self.options.policy
+        for name, value in (
+            ("draught", self.options.draught),
+            ("floor", self.options.floor or None),
+        ):
             if value is not None and not self.is_chart:
                 raise InputError(
                     f"{name}: expected a chart (S-57, .000), whose depths are known, got "
@@ -333,25 +336,27 @@ class _Site:
         if base is None:
             raise self._refused()
         anchor, own = base
-        tether = self._length(own, "tether_length", self.said.tether)
+        tether = self._length(own, "tether_length", self.options.tether)
         if tether is None:
             self._complain(
                 "has no tether length; expected tether_length of the base",
                 ", or --tether L",
                 "tether",
             )
-        clearance = self._length(own, "clearance", self.said.clearance) or 0.0
+        clearance = self._length(own, "clearance", self.options.clearance) or 0.0
         goals = self._goals(parts["goal"]) + self._table_goals()
-        candidates = [place for _, place in self._table_places("candidate", self.said.candidates)]
+        candidates = [
+            place for _, place in self._table_places("candidate", self.options.candidates)
+        ]
         reach = None
         if tether is not None:
             reach = CropWindow.about(
                 [anchor, *candidates],
                 tether + clearance,
-                self.said.crop_margin,
+                self.options.crop_margin,
                 self.policy.outlines,
             )
-        if self.is_chart if self.said.crop is None else self.said.crop:
+        if self.is_chart if self.options.crop is None else self.options.crop:
             self.window = reach
         if self.is_chart:
             places = {"base": anchor, **{_label(goal): goal["position"] for goal in goals}}
@@ -366,7 +371,7 @@ class _Site:
         self.viewpoints = [str(goal["name"]) for goal in goals if "layer" in goal]
         if not goals and not self.complaints:
             self._complain_of_no_goal()
-        elif not goals and self.said.looking is None:
+        elif not goals and self.options.looking is None:
             self.asks.append("inspect")  # so that all is answered at once
         if tether is not None:
             self._check_scale(goals, obstacles, anchor, tether)
@@ -402,11 +407,11 @@ class _Site:
         except ValidationError as error:
             wheres = {"goals": goals, "obstacles": obstacles}
 
-            def there(found: re.Match[str]) -> str:
-                things, k = wheres[found[1]], int(found[2])
-                return str(things[k]["where"]) if k < len(things) else found[0]
+            def own_name(found: re.Match[str]) -> str:
+                entries, k = wheres[found[1]], int(found[2])
+                return str(entries[k]["where"]) if k < len(entries) else found[0]
 
-            text = re.sub(r"\b(goals|obstacles)\[(\d+)\]", there, explain(error))
+            text = re.sub(r"\b(goals|obstacles)\[(\d+)\]", own_name, explain(error))
             raise InputError(f"{self.file}: {text}") from None
 
     # What is what
@@ -428,8 +433,8 @@ class _Site:
                     policy=self.policy,
                 )
             except InputError as error:
-                what = str(error).removeprefix(feature.where)
-                wrong.setdefault(what, []).append(feature.where)
+                complaint = str(error).removeprefix(feature.where)
+                wrong.setdefault(complaint, []).append(feature.where)
                 continue
             if decision.reason == EQUIPMENT and feature.where in lone:
                 decision = Decision("obstacle")
@@ -439,8 +444,8 @@ class _Site:
                 self.ledger.use(feature, kind)
             else:
                 self.ledger.leave_out(feature, decision.reason)
-        for what, places in wrong.items():  # as like as not the same slip in all of them
-            self._complain(f"{_first_of(places)}{what}")
+        for complaint, places in wrong.items():  # probably one slip in all of them
+            self._complain(f"{_first_of(places)}{complaint}")
         for layer, size in self.map.layers.items():
             if layer and not size:
                 self.notes.append(f"layer {layer!r} is empty")
@@ -454,7 +459,7 @@ class _Site:
         left_out = [
             f for f in free if self.ledger.is_left_out(f) and f.layer.lower() not in self.kinds
         ]
-        draught = self.said.draught
+        draught = self.options.draught
         if draught is not None:
             shallow = shallow_areas(left_out, draught)
             self._check_depth(shallow, places, draught)
@@ -473,10 +478,10 @@ class _Site:
                 uncharted_share(self.map.features, self._plane, reach),
                 "is not on this chart, and free of obstacles in the problem",
             )
-        if not self.said.floor or self.complaints:
+        if not self.options.floor or self.complaints:
             return
         self.floor, found = chart_floor(
-            free, self._plane, self.window, self.said.floor_cell, self.policy
+            free, self._plane, self.window, self.options.floor_cell, self.policy
         )
         for feature in found.used:  # a shallow area is an obstacle, too
             if self.ledger.is_left_out(feature):
@@ -500,16 +505,20 @@ class _Site:
             if not held:
                 continue
             area = shallow[min(held)]
-            least, _ = depth_range(area)
-            depth = "of unknown depth" if least is None else f"from {_metres(least)} of depth on"
+            min_depth, _ = depth_range(area)
+            depth = (
+                "of unknown depth"
+                if min_depth is None
+                else f"from {_metres(min_depth)} of depth on"
+            )
             self._complain(
                 f"{called}: lies in {self._called(area)}, {depth}, and the draught is "
                 f"{_metres(draught)}; expected a place in deeper water, or a smaller draught"
             )
 
-    def _note_share(self, share: float, what: str) -> None:
+    def _note_share(self, share: float, description: str) -> None:
         if share >= self.policy.min_noted_share:
-            self.notes.append(f"{100.0 * share:.2g} % of the tether's reach {what}")
+            self.notes.append(f"{100.0 * share:.2g} % of the tether's reach {description}")
 
     def _table_places(
         self, kind: UsedAs, file: str | Path | None
@@ -525,12 +534,12 @@ class _Site:
         out = []
         for k, (place, name) in enumerate(zip(places.tolist(), names, strict=True)):
             # as the map's own features have it, in degrees or in its unit
-            at = (
+            spot = (
                 tuple(self.projection.to_earth([place[:2]])[0][::-1])
                 if self.projection is not None
                 else (place[0] / self._unit, place[1] / self._unit)
             )
-            row = Feature(f"{layer}[{k}]", layer, "", {"name": name}, shapely.Point(at))
+            row = Feature(f"{layer}[{k}]", layer, "", {"name": name}, shapely.Point(spot))
             self.ledger.use(row, kind)
             out.append((row, (place[0], place[1], place[2])))
         return out
@@ -538,7 +547,7 @@ class _Site:
     def _table_goals(self) -> list[dict[str, Any]]:
         return [
             {"name": self._name(row), "position": place, "where": row.where, "source": row}
-            for row, place in self._table_places("goal", self.said.goals)
+            for row, place in self._table_places("goal", self.options.goals)
         ]
 
     def left_out(self) -> tuple[shapely.Geometry, ...]:
@@ -553,15 +562,15 @@ class _Site:
                 f"expected one base, got {len(bases)}: {', '.join(b.where for b in bases)[:100]}"
             )
             return None
-        own = bases[0] if bases else None
+        feature = bases[0] if bases else None
         if not self.map.geographic:
-            if own is None:
+            if feature is None:
                 if not self.complaints:  # a feature that is damaged may be it
                     self._complain("has no base; expected a Point of kind base")
                 return None
-            return self._place(own.shape, own), own
+            return self._place(feature.shape, feature), feature
         if self.projection is None:
-            if own is None:
+            if feature is None:
                 if not self.complaints:
                     self._complain(
                         "has no base; expected a Point of kind base",
@@ -569,23 +578,25 @@ class _Site:
                         "base",
                     )
                 return None
-            heading = self._number(own, "heading") or 0.0
+            heading = self._number(feature, "heading") or 0.0
             try:
-                self.projection = Projection(own.shape.y, own.shape.x, heading, name=own.where)
+                self.projection = Projection(
+                    feature.shape.y, feature.shape.x, heading, name=feature.where
+                )
             except InputError as error:
                 self._complain(str(error))
                 return None
         x, y = self.projection.base.tolist()
-        z = self._height(own) if own is not None else 0.0
-        if own is not None:
-            there = self._plane(own.shape)
-            away = float(np.hypot(there.x - x, there.y - y))
-            if away > self.policy.max_base_shift:
+        z = self._height(feature) if feature is not None else 0.0
+        if feature is not None:
+            place = self._plane(feature.shape)
+            shift = float(np.hypot(place.x - x, place.y - y))
+            if shift > self.policy.max_base_shift:
                 self.notes.append(
-                    f"{own.where}: the base is at the place that was given, {_metres(away)} away; "
-                    "only the properties of the file's base are used"
+                    f"{feature.where}: the base is at the place that was given, {_metres(shift)} "
+                    "away; only the properties of the file's base are used"
                 )
-        return (x, y, z), own
+        return (x, y, z), feature
 
     # Places and lengths
 
@@ -594,7 +605,7 @@ class _Site:
         """Metres per unit of the file; the unit of the options overrides the file's."""
         if self.is_chart:  # its reader converts them
             return 1.0
-        return UNITS[self.said.units] if self.said.units else self.map.metres or 1.0
+        return UNITS[self.options.units] if self.options.units else self.map.metres or 1.0
 
     def _plane(self, shape: shapely.Geometry) -> Any:
         """Return a shape in metres in the problem's plane."""
@@ -608,8 +619,8 @@ class _Site:
         return shapely.transform(flat, lambda c: projection.to_plane(c[:, ::-1]))
 
     def _place(self, point: Any, feature: Feature) -> tuple[float, float, float]:
-        at = self._plane(point)
-        return (float(at.x), float(at.y), self._height(feature, point))
+        place = self._plane(point)
+        return (float(place.x), float(place.y), self._height(feature, point))
 
     def _height(self, feature: Feature, point: Any = None) -> float:
         """Return z in metres, of a depth or else of the point itself.
@@ -617,14 +628,14 @@ class _Site:
         The height of a point on the earth is in metres by its format.
         """
         depth = self._depth(feature)
-        at = point if point is not None else feature.shape
+        place = point if point is not None else feature.shape
         if depth is not None:
             if depth < 0.0:
                 self._complain(
                     f"{self._called(feature)}: depth: counts downwards; expected 0 or more, got "
                     f"{depth:g} m; if it is a height, give it as the z of the point"
                 )
-            self._note_other_height(feature, at, depth)
+            self._note_other_height(feature, place, depth)
             return 0.0 - depth
         if feature.is_above_floor:
             self._complain(
@@ -632,14 +643,14 @@ class _Site:
                 "does not have; expected a height above the water, or a depth"
             )
             return 0.0
-        if at.geom_type != "Point" or not at.has_z or at.z != at.z:
+        if place.geom_type != "Point" or not place.has_z or place.z != place.z:
             self._note_unread(
                 feature,
                 [name for name in feature.properties if _is_height(str(name))],
                 "expected a depth (downwards), or the height as z of the point",
             )
             return 0.0
-        return float(at.z) * (1.0 if self.map.geographic else self._unit)
+        return float(place.z) * (1.0 if self.map.geographic else self._unit)
 
     def _depth(self, feature: Feature) -> float | None:
         """Return the depth in metres that a property of a feature states; None without one."""
@@ -679,9 +690,9 @@ class _Site:
             self._complain(f"{feature.where}: {ours}: {error}")
             return None
 
-    def _length(self, base: Feature | None, ours: str, said: float | None) -> float | None:
-        if said is not None or base is None:
-            return said
+    def _length(self, base: Feature | None, ours: str, given: float | None) -> float | None:
+        if given is not None or base is None:
+            return given
         value = self._number(base, ours)
         return None if value is None else value * self._unit
 
@@ -730,7 +741,7 @@ class _Site:
                         return []
             polygons, notes = simple_polygons(shape, lambda p: p.intersects(spots))
             self.notes += [f"{self._called(feature)}: {note}" for note in notes]
-            walls = spurs_of(shape, polygons, self.said.join_tolerance)
+            walls = spurs_of(shape, polygons, self.options.join_tolerance)
             drawn.setdefault(feature.layer, []).extend((feature, wall) for wall in walls)
             if not polygons and not walls:
                 self._complain(
@@ -770,8 +781,8 @@ class _Site:
                 pointlike.append(feature)
                 return out
             for point in getattr(shape, "geoms", [shape]):
-                at = self._plane(point)
-                out.append({"feature": feature, "center": (at.x, at.y), "radius": radius})
+                place = self._plane(point)
+                out.append({"feature": feature, "center": (place.x, place.y), "radius": radius})
         elif "Line" in kind:
             lines = lines_of(self._plane(shape))
             if not lines:
@@ -794,20 +805,20 @@ class _Site:
     ) -> list[dict[str, Any]]:
         """Return the obstacles of a layer's open lines: joined outlines, and lines with a width."""
         out: list[dict[str, Any]] = []
-        areas, rest = outlines([line for _, line in pieces], self.said.join_tolerance)
+        areas, rest = outlines([line for _, line in pieces], self.options.join_tolerance)
         for polygon, members in areas:
-            own = [pieces[k][0] for k in members]
-            coast = all(map(is_coastline, own))
+            features = [pieces[k][0] for k in members]
+            coast = all(map(is_coastline, features))
             if coast and not any(is_land(pieces[k][1], polygon) for k in members):
                 rest += members  # the water lies inside: its coast is a wall
                 continue
-            named = next((f for f in own if self._name(f) is not None), own[0])
+            named = next((f for f in features if self._name(f) is not None), features[0])
             found = area(named, self._with_rim(polygon, [pieces[k] for k in members]))
-            self.joined.setdefault(named.where, []).extend(own)
-            names = list(dict.fromkeys(n for f in own if (n := self._name(f)) is not None))
+            self.joined.setdefault(named.where, []).extend(features)
+            names = list(dict.fromkeys(n for f in features if (n := self._name(f)) is not None))
             if found and len(names) > 1:
                 self.notes.append(
-                    f"{_first_of([f.where for f in own])}: lines joined to one outline, named "
+                    f"{_first_of([f.where for f in features])}: lines joined to one outline, named "
                     f"{names[0]!r}; their other names: {', '.join(map(repr, names[1:MAX_NAMED]))}"
                     + (", …" if len(names) > MAX_NAMED else "")
                 )
@@ -860,31 +871,31 @@ class _Site:
         if width is None and self.is_chart:
             width = chart_width(feature)
         if width is None:
-            return self.said.line_width
+            return self.options.line_width
         if not width > 0.0:
             self._complain(f"{feature.where}: width_m: expected a positive width, got {width:g}")
         metres = "width" not in self.fields and feature.get(WIDTH[0]) is not None
         return abs(width) * (1.0 if metres else self._unit) or None
 
-    def _named(self, things: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    def _named(self, entries: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """Return obstacles named after their features, numbered if a feature has several."""
-        size = Counter(thing["feature"].where for thing in things)
+        size = Counter(entry["feature"].where for entry in entries)
         number: Counter[str] = Counter()
         out = []
-        for thing in things:
-            feature = thing["feature"]
+        for entry in entries:
+            feature = entry["feature"]
             number[feature.where] += 1
             name = self._name(feature)
             if name is not None and size[feature.where] > 1:
                 name = f"{name} {number[feature.where]}"
-            out.append({"name": name, **thing, "where": feature.where})
+            out.append({"name": name, **entry, "where": feature.where})
         return out
 
     @property
     def _beyond_reach(self) -> str:
         """Return the reason to leave out features beyond the window."""
         assert self.window is not None
-        about = "the base and the candidates" if self.said.candidates is not None else "the base"
+        about = "the base and the candidates" if self.options.candidates is not None else "the base"
         return f"beyond the reach of the tether ({_metres(self.window.radius)} about {about})"
 
     def _within_crop(self, obstacles: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -892,12 +903,12 @@ class _Site:
         if self.window is None:
             return obstacles
         kept, dropped, cut_off = cropped(obstacles, self.window)
-        self.beyond |= {thing["where"]: thing["feature"] for thing in (*dropped, *cut_off)}
-        self.cut_off |= {thing["where"] for thing in cut_off}
+        self.beyond |= {obstacle["where"]: obstacle["feature"] for obstacle in (*dropped, *cut_off)}
+        self.cut_off |= {obstacle["where"] for obstacle in cut_off}
         if not self.beyond and not self.cut_off:
             return kept
         self.cropped = CropCircle(center=self.window.center, radius=self.window.radius)
-        staying = {thing["where"] for thing in kept}
+        staying = {obstacle["where"] for obstacle in kept}
         for where, feature in self.beyond.items():
             if where not in staying:
                 for piece in (feature, *self.joined.get(where, ())):
@@ -925,14 +936,14 @@ class _Site:
             [n for n in feature.properties if str(n).lower().startswith(("radius", "diameter"))],
             "expected radius_m, in metres",
         )
-        own = chart_radius(feature) if self.is_chart else None
-        return own if own is not None else self.said.radius
+        charted = chart_radius(feature) if self.is_chart else None
+        return charted if charted is not None else self.options.radius
 
-    def _note_other_height(self, feature: Feature, at: Any, depth: float) -> None:
+    def _note_other_height(self, feature: Feature, point: Any, depth: float) -> None:
         """Add a note if the depth of a feature is used and its point has another height."""
-        if self.is_chart or at.geom_type != "Point" or not at.has_z:
+        if self.is_chart or point.geom_type != "Point" or not point.has_z:
             return
-        z = float(at.z) * (1.0 if self.map.geographic else self._unit)
+        z = float(point.z) * (1.0 if self.map.geographic else self._unit)
         # files write 0 where they have no height
         if z and abs(z + depth) > self.policy.max_height_gap:
             self.notes.append(
@@ -956,11 +967,11 @@ class _Site:
         for feature in features:
             by_layer.setdefault(feature.layer, []).append(feature.where)
         for layer, places in by_layer.items():
-            what = "an obstacle" if len(places) == 1 else "obstacles"
+            description = "an obstacle" if len(places) == 1 else "obstacles"
             ignore = f", or --map ignore={layer} to leave them out" if layer else ""
             self._complain(
-                f"{_first_of(places)}: {what} without radius_m; expected one, or a radius for all "
-                "that have none",
+                f"{_first_of(places)}: {description} without radius_m; expected one, or a radius "
+                "for all that have none",
                 f" (--radius R){ignore}",
                 "radius",
             )
@@ -981,32 +992,37 @@ class _Site:
 
         goals: list[dict[str, Any]] = []
         chosen = self._chosen(obstacles)
-        for k, o in enumerate(obstacles):
-            feature, look = o["feature"], self.said.looking if k in chosen else None
-            own = feature.get("viewpoints", "inspect")
-            if own is None and look is None:
+        for k, obstacle in enumerate(obstacles):
+            feature, inspection = obstacle["feature"], self.options.looking if k in chosen else None
+            stated = feature.get("viewpoints", "inspect")
+            if stated is None and inspection is None:
                 continue
             standoff = feature.get("standoff")
             heights = feature.get("depths")
             try:
-                asked = Inspection.model_validate(
+                parsed = Inspection.model_validate(
                     {
-                        "inspect": o["name"] or f"#{k}",
-                        "viewpoints": _whole(own) if own is not None else look and look.viewpoints,
-                        "standoff": look.standoff
-                        if standoff is None and look is not None
+                        "inspect": obstacle["name"] or f"#{k}",
+                        "viewpoints": _whole(stated)
+                        if stated is not None
+                        else inspection and inspection.viewpoints,
+                        "standoff": inspection.standoff
+                        if standoff is None and inspection is not None
                         else _real(standoff) * self._unit,
                         "depths": [h * self._unit for h in _list(heights)]
                         if heights is not None
-                        else (look.depths if look is not None else (0.0,)),
+                        else (inspection.depths if inspection is not None else (0.0,)),
                     }
                 )
             except (ValidationError, ValueError, TypeError) as error:
                 text = explain(error) if isinstance(error, ValidationError) else str(error)
                 self._complain(f"{feature.where}: {text}")
                 continue
-            goals += [{**g, "where": feature.where, "layer": feature.layer} for g in asked.goals(o)]
-        if self.said.looking is not None:
+            goals += [
+                {**g, "where": feature.where, "layer": feature.layer}
+                for g in parsed.goals(obstacle)
+            ]
+        if self.options.looking is not None:
             goals = self._free_viewpoints(goals, obstacles, anchor, tether, clearance)
         return goals
 
@@ -1014,10 +1030,10 @@ class _Site:
         """Return the indices of the obstacles that the user wants to inspect."""
         import shapely
 
-        look = self.said.looking
-        if look is None:
+        inspection = self.options.looking
+        if inspection is None:
             return set()
-        rule = look.chosen
+        rule = inspection.chosen
         areas = [shapely.box(*box) for box in rule.boxes]
         if rule.earth_boxes and self.projection is None:
             raise InputError(
@@ -1029,16 +1045,16 @@ class _Site:
             areas.append(shapely.Polygon(self.projection.to_plane(corners)))
         found = {
             k
-            for k, o in enumerate(obstacles)
-            if (rule.layers or not self._is_shallow(o["feature"]))
+            for k, obstacle in enumerate(obstacles)
+            if (rule.layers or not self._is_shallow(obstacle["feature"]))
             and any(
-                rule.takes(layer, self._name(o["feature"]) or o["name"])
-                for layer in (o["feature"].layer, *o["feature"].folders)
+                rule.takes(layer, self._name(obstacle["feature"]) or obstacle["name"])
+                for layer in (obstacle["feature"].layer, *obstacle["feature"].folders)
             )
-            and rule.holds(_shape(o), areas)
+            and rule.holds(_shape(obstacle), areas)
         }
         if not found and obstacles:
-            layers = dict.fromkeys(o["feature"].layer for o in obstacles)
+            layers = dict.fromkeys(obstacle["feature"].layer for obstacle in obstacles)
             self._complain(
                 "no obstacle within the tether's reach is among those chosen to be inspected; "
                 f"there are obstacles of the layers {', '.join(n or '(none)' for n in layers)}"
@@ -1061,8 +1077,12 @@ class _Site:
         if not goals:
             return goals
         places = np.array([g["position"] for g in goals])
-        away = np.linalg.norm(places - np.array(anchor), axis=1)
-        is_far = (away > tether) if self.window is not None and tether is not None else away < 0.0
+        distance = np.linalg.norm(places - np.array(anchor), axis=1)
+        is_far = (
+            (distance > tether)
+            if self.window is not None and tether is not None
+            else distance < 0.0
+        )
         is_in = _distance(places[:, :2], obstacles) < max(clearance, 1e-9)
         seen: set[tuple[float, ...]] = set()
         kept: list[dict[str, Any]] = []
@@ -1102,13 +1122,13 @@ class _Site:
         import shapely
 
         spot = shapely.Point(anchor[:2])
-        for thing in obstacles:
-            if self._is_shallow(thing["feature"]):
+        for obstacle in obstacles:
+            if self._is_shallow(obstacle["feature"]):
                 continue  # named with its depth already
-            if _shape(thing).contains(spot):
+            if _shape(obstacle).contains(spot):
                 self._complain(
-                    f"base: lies inside {self._called(thing['feature'])}; expected a place in the "
-                    "water"
+                    f"base: lies inside {self._called(obstacle['feature'])}; expected a place in "
+                    "the water"
                 )
                 return True
         return False
@@ -1121,7 +1141,7 @@ class _Site:
             return None, []
         shapes = [self._plane(f.shape) for f in features]
         lines = [line for shape in shapes if "Line" in shape.geom_type for line in lines_of(shape)]
-        areas, rest = outlines(lines, self.said.join_tolerance)
+        areas, rest = outlines(lines, self.options.join_tolerance)
         whole = [area for area, _ in areas] + [s for s in shapes if "Polygon" in s.geom_type]
         places = ", ".join(f.where for f in features)[:100]
         if rest:
@@ -1175,16 +1195,16 @@ class _Site:
 
     # What is checked of the whole
 
-    def _check_names(self, things: list[dict[str, Any]], what: str) -> None:
+    def _check_names(self, entries: list[dict[str, Any]], kind: str) -> None:
         """Number the names that several goals or obstacles share, and add a note."""
-        _number_parts(things)
-        numbered = _number_names(things)
+        _number_parts(entries)
+        numbered = _number_names(entries)
         if numbered:
             shown_names = ", ".join(
                 f"{old!r} is {new!r} ({where})" for old, new, where in numbered[:MAX_NAMED]
             )
             self.notes.append(
-                f"names that several {what} share are numbered: {shown_names}"
+                f"names that several {kind} share are numbered: {shown_names}"
                 + (f", and {len(numbered) - MAX_NAMED} more" if len(numbered) > MAX_NAMED else "")
             )
 
@@ -1217,33 +1237,36 @@ class _Site:
         near: list[dict[str, Any]] = []
         far: list[tuple[float, dict[str, Any]]] = []
         for goal in goals:
-            away = float(np.linalg.norm(np.array(goal["position"]) - np.array(anchor)))
-            if away <= tether:
+            distance = float(np.linalg.norm(np.array(goal["position"]) - np.array(anchor)))
+            if distance <= tether:
                 near.append(goal)
             else:
-                far.append((away, goal))
-        if self.said.skip_unreachable and near:
+                far.append((distance, goal))
+        if self.options.skip_unreachable and near:
             staying = {goal["where"] for goal in near}
-            for away, goal in far:
+            for distance, goal in far:
                 feature = goal.get("source")
                 if feature is None or goal["where"] in staying:  # one of several of its feature
-                    self.notes.append(f"{_label(goal)}: is {_metres(away)} from the base: left out")
+                    self.notes.append(
+                        f"{_label(goal)}: is {_metres(distance)} from the base: left out"
+                    )
                 else:
                     self.ledger.leave_out(
                         feature,
                         f"farther from the base than the tether is long ({_metres(tether)})",
                     )
         elif len(far) > self.policy.max_listed_goals:
-            away, goal = max(far, key=lambda f: f[0])
+            distance, goal = max(far, key=lambda f: f[0])
             self._complain(
                 f"{len(far)} goals are farther from the base than the tether is long "
-                f"({_metres(tether)}), {_label(goal)} {_metres(away)}{self._cause(goal, tether)}",
+                f"({_metres(tether)}), {_label(goal)} {_metres(distance)}"
+                f"{self._cause(goal, tether)}",
                 SKIP_OPTION,
             )
         else:
-            for away, goal in far:
+            for distance, goal in far:
                 self._complain(
-                    f"{_label(goal)}: is {_metres(away)} from the base, and the tether "
+                    f"{_label(goal)}: is {_metres(distance)} from the base, and the tether "
                     f"{_metres(tether)} long{self._cause(goal, tether)}",
                     SKIP_OPTION,
                 )
@@ -1293,19 +1316,19 @@ def _marked(feature: Feature) -> Feature:
     return replace(feature, shape=feature.marker)
 
 
-def _bare(thing: dict[str, Any]) -> dict[str, Any]:
+def _bare(entry: dict[str, Any]) -> dict[str, Any]:
     """Return the data of a goal or obstacle without its origin, and without a missing name."""
-    ours = ("where", "feature", "source", "layer")
-    return {k: v for k, v in thing.items() if k not in ours and v is not None}
+    internal = ("where", "feature", "source", "layer")
+    return {k: v for k, v in entry.items() if k not in internal and v is not None}
 
 
-def _shape(thing: dict[str, Any]) -> shapely.Geometry:
+def _shape(obstacle: dict[str, Any]) -> shapely.Geometry:
     """Return an obstacle of a problem file as an area."""
     import shapely
 
-    if "radius" in thing:
-        return shapely.Point(thing["center"]).buffer(thing["radius"])
-    return shapely.Polygon(thing["polygon"])
+    if "radius" in obstacle:
+        return shapely.Point(obstacle["center"]).buffer(obstacle["radius"])
+    return shapely.Polygon(obstacle["polygon"])
 
 
 def _distance(places: np.ndarray, obstacles: list[dict[str, Any]]) -> np.ndarray:
@@ -1313,15 +1336,19 @@ def _distance(places: np.ndarray, obstacles: list[dict[str, Any]]) -> np.ndarray
     import shapely
 
     out = np.full(len(places), np.inf)
-    circles = [(*o["center"], o["radius"]) for o in obstacles if "radius" in o]
+    circles = [
+        (*obstacle["center"], obstacle["radius"]) for obstacle in obstacles if "radius" in obstacle
+    ]
     for x, y, radius in circles:
         out = np.minimum(out, np.hypot(places[:, 0] - x, places[:, 1] - y) - radius)
-    polygons = [shapely.Polygon(o["polygon"]) for o in obstacles if "polygon" in o]
+    polygons = [
+        shapely.Polygon(obstacle["polygon"]) for obstacle in obstacles if "polygon" in obstacle
+    ]
     if polygons:
         tree = shapely.STRtree(polygons)
         points = shapely.points(places)
-        (own, _), away = tree.query_nearest(points, return_distance=True, all_matches=False)
-        out[own] = np.minimum(out[own], away)
+        (near, _), distances = tree.query_nearest(points, return_distance=True, all_matches=False)
+        out[near] = np.minimum(out[near], distances)
     return out
 
 
@@ -1339,43 +1366,43 @@ def _is_height(name: str) -> bool:
     return meaning is not None and meaning.quantity == "z"
 
 
-def _number_parts(things: list[dict[str, Any]]) -> None:
+def _number_parts(entries: list[dict[str, Any]]) -> None:
     """Number the names of things that are parts of one collection: "pier 1", "pier 2"."""
     groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    for thing in things:
-        whole, dot, _ = thing["where"].partition(".geometries[")
-        if thing["name"] is not None and dot:
-            groups.setdefault((whole, thing["name"]), []).append(thing)
+    for entry in entries:
+        whole, dot, _ = entry["where"].partition(".geometries[")
+        if entry["name"] is not None and dot:
+            groups.setdefault((whole, entry["name"]), []).append(entry)
     for (_, name), parts in groups.items():
         for number, part in enumerate(parts, 1):
             part["name"] = f"{name} {number}" if len(parts) > 1 else name
 
 
-def _number_names(things: list[dict[str, Any]]) -> list[tuple[str, str, str]]:
+def _number_names(entries: list[dict[str, Any]]) -> list[tuple[str, str, str]]:
     """Number names that occur more than once ("pier", "pier 2"); return old, new and place."""
-    taken = {thing["name"] for thing in things}
+    used = {entry["name"] for entry in entries}
     seen: Counter[str] = Counter()
     changed = []
-    for thing in things:
-        name = thing["name"]
+    for entry in entries:
+        name = entry["name"]
         if name is None:
             continue
         seen[name] += 1
         number = seen[name]
         while number > 1:
             other = f"{name} {number}"
-            if other not in taken:
-                thing["name"] = other
-                taken.add(other)
-                changed.append((name, other, str(thing["where"])))
+            if other not in used:
+                entry["name"] = other
+                used.add(other)
+                changed.append((name, other, str(entry["where"])))
                 break
             number += 1
         seen[name] = number
     return changed
 
 
-def _label(thing: dict[str, Any]) -> str:
-    return str(thing["where"]) + (f" ({thing['name']})" if thing["name"] else "")
+def _label(entry: dict[str, Any]) -> str:
+    return str(entry["where"]) + (f" ({entry['name']})" if entry["name"] else "")
 
 
 def _metres(length: float) -> str:

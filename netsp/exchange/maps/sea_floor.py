@@ -151,22 +151,23 @@ def sea_floor(
     spots = np.empty((0, 3)) if soundings is None else soundings
     x: Floats = west + cell * np.arange(0.5, columns)
     y: Floats = south + cell * np.arange(0.5, rows)
-    least = np.full((rows, columns), -np.inf)
-    greatest = np.full((rows, columns), np.inf)
+    min_depth = np.full((rows, columns), -np.inf)
+    max_depth = np.full((rows, columns), np.inf)
     has_area = np.zeros((rows, columns), dtype=bool)
     for area in areas:
         inside = _covered(area.shape, x, y)
         low = area.least if area.least is not None else -np.inf
         high = area.greatest if area.greatest is not None else np.inf
-        greatest[inside] = np.minimum(greatest[inside], high)
+        max_depth[inside] = np.minimum(max_depth[inside], high)
         first = inside & ~has_area
-        least[first] = low
+        min_depth[first] = low
         both = inside & has_area
-        least[both] = np.minimum(least[both], low)
+        min_depth[both] = np.minimum(min_depth[both], low)
         has_area |= inside
     between, by_shoal = _interpolated(contours, spots, _is_shoal(spots, areas), x, y)
-    depth = np.where(np.isfinite(between), between, least)  # beyond all soundings: the least depth
-    depth = np.minimum(np.maximum(depth, least), np.maximum(greatest, least))
+    # beyond all soundings: the least depth
+    depth = np.where(np.isfinite(between), between, min_depth)
+    depth = np.minimum(np.maximum(depth, min_depth), np.maximum(max_depth, min_depth))
     depth[by_shoal] = np.minimum(depth, between)[by_shoal]
     depth[~has_area] = np.nan
     for shape in land:
@@ -184,13 +185,13 @@ def _is_shoal(soundings: Floats, areas: Sequence[DepthArea]) -> np.ndarray:
     """Return a mask of soundings shallower than the least depth of every area around them."""
     import shapely
 
-    least = np.full(len(soundings), np.inf)
+    min_depth = np.full(len(soundings), np.inf)
     tree = shapely.STRtree([area.shape for area in areas])
     spots = shapely.points(soundings[:, :2])
     for spot, area in tree.query(spots, predicate="intersects").T.tolist():
         low = areas[area].least
-        least[spot] = min(least[spot], -np.inf if low is None else low)
-    return np.asarray(np.isfinite(least) & (soundings[:, 2] < least))
+        min_depth[spot] = min(min_depth[spot], -np.inf if low is None else low)
+    return np.asarray(np.isfinite(min_depth) & (soundings[:, 2] < min_depth))
 
 
 def _cap(depth: Floats, soundings: Floats, corner: tuple[float, float], cell: float) -> None:
@@ -227,9 +228,9 @@ def _covered(shape: shapely.Geometry, x: Floats, y: Floats) -> np.ndarray:
     inside = np.zeros((len(y), len(x)), dtype=bool)
     if len(columns) and len(rows):
         shapely.prepare(shape)
-        at = np.ix_(rows, columns)
+        block = np.ix_(rows, columns)
         gx, gy = np.meshgrid(x[columns], y[rows])
-        inside[at] = shapely.contains_xy(shape, gx, gy)
+        inside[block] = shapely.contains_xy(shape, gx, gy)
     return inside
 
 
@@ -256,8 +257,9 @@ def _interpolated(
         return none, np.isfinite(none)
     gx, gy = np.meshgrid(x, y)
     depths = np.asarray(LinearNDInterpolator(triangles, known[:, 2])(gx, gy), dtype=float)
-    own = triangles.find_simplex(np.stack([gx, gy], axis=-1))
-    by_shoal = marks[triangles.simplices].any(axis=1)[own] & (own >= 0) & np.isfinite(depths)
+    triangle_of_cell = triangles.find_simplex(np.stack([gx, gy], axis=-1))
+    is_inside = (triangle_of_cell >= 0) & np.isfinite(depths)
+    by_shoal = marks[triangles.simplices].any(axis=1)[triangle_of_cell] & is_inside
     return depths, by_shoal
 
 

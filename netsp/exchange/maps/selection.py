@@ -89,8 +89,8 @@ class Selection:
 
 
 def _fits(text: str, patterns: Sequence[str]) -> bool:
-    own = text.lower()
-    return any(own == pattern or fnmatchcase(own, pattern) for pattern in patterns)
+    name = text.lower()
+    return any(name == pattern or fnmatchcase(name, pattern) for pattern in patterns)
 
 
 def _box(word: str, text: str, expected: str) -> Box:

@@ -101,29 +101,29 @@ def read_plain(
         layer = read_layer(file, plain, name, found.notes, policy)
         if is_osm and not layer.shapes:
             continue  # GDAL has the same five layers for every file
-        own = crs if crs is not None else layer.crs
+        system = crs if crs is not None else layer.crs
         if crs is not None and layer.crs is not None and not _is_same_system(crs, layer.crs):
             found.notes.append(
                 f"layer {name!r}: its own system {_system_name(layer.crs)} is not used; it is read "
                 f"as {crs}"
             )
-        if own is not None and own.startswith(PLANE_SYSTEMS) and map_unit(own) == 1.0:
-            own = LOCAL  # a plan without a place on the earth says so itself
-        if own is None:
+        if system is not None and system.startswith(PLANE_SYSTEMS) and map_unit(system) == 1.0:
+            system = LOCAL  # a plan without a place on the earth says so itself
+        if system is None:
             plain = f"{file}: layer {name!r}: names no coordinate system"
             option = f"; give it with --crs EPSG:4326 (degrees), another EPSG code or --crs {LOCAL}"
             raise UnansweredError([plain + option], [plain], ["crs"])
-        places[name] = own != LOCAL
+        places[name] = system != LOCAL
         found.is_osm = is_osm
-        found.add_layer(name, layer, _mover(str(own), f"{file}: layer {name!r}"))
-        change = "" if own == LOCAL else height_axis(str(own)).change
+        found.add_layer(name, layer, _mover(str(system), f"{file}: layer {name!r}"))
+        change = "" if system == LOCAL else height_axis(str(system)).change
         if change and any(f.layer == name and f.shape.has_z for f in found.features):
             found.notes.append(f"layer {name!r}: {change}")
     if len(set(places.values())) > 1:
-        some = next(name for name, on in places.items() if not on)
+        local_layer = next(name for name, on in places.items() if not on)
         raise InputError(
-            f"{file}: layer {some!r} has no place on the earth and others have; expected one "
-            "system for all"
+            f"{file}: layer {local_layer!r} has no place on the earth and others have; expected "
+            "one system for all"
         )
     if not places:
         raise InputError(

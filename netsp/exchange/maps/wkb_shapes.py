@@ -195,8 +195,8 @@ def arc_points(start: Floats, middle: Floats, end: Floats, max_step: float) -> F
     first = math.atan2(*(a - centre)[::-1])
     steps = max(2, math.ceil(abs(turn) / max_step - 1e-9))
     share = np.linspace(0.0, 1.0, steps + 1)
-    at = first + turn * share
-    plane = centre + radius * np.column_stack([np.cos(at), np.sin(at)])
+    angle_at = first + turn * share
+    plane = centre + radius * np.column_stack([np.cos(angle_at), np.sin(angle_at)])
     plane[0], plane[-1] = a, c
     if len(start) == 2:
         return plane
@@ -262,14 +262,14 @@ class _Reader:
             return outline_of_faces(parts, self.changes) if parts else shapely.Polygon()
         return collected(parts)
 
-    def _point(self, at: Floats) -> shapely.Geometry:
+    def _point(self, coordinates: Floats) -> shapely.Geometry:
         import shapely
 
-        if np.isnan(at).all():  # ISO: an empty point
+        if np.isnan(coordinates).all():  # ISO: an empty point
             return shapely.Point()
-        if not np.isfinite(at[:, :2]).all():
+        if not np.isfinite(coordinates[:, :2]).all():
             raise NotFiniteError
-        return shapely.Point(at[0])
+        return shapely.Point(coordinates[0])
 
     def _head(self) -> tuple[int, str, bool, bool]:
         order = "<" if self.data[self.at] else ">"
@@ -294,11 +294,11 @@ class _Reader:
         return self._floats(self._count(order), size, order)
 
     def _floats(self, count: int, size: int, order: str) -> Floats:
-        stop = self.at + 8 * count * size
-        if stop > len(self.data):
+        end = self.at + 8 * count * size
+        if end > len(self.data):
             raise ShapeError("its geometry is damaged (cut short)")
         out = np.frombuffer(self.data, f"{order}f8", count * size, self.at).astype(float)
-        self.at = stop
+        self.at = end
         return out.reshape(count, size)
 
 

@@ -83,10 +83,10 @@ def fence_warnings(problem: Problem, fence: Fence) -> list[str]:
     """Return warnings about obstacles simplified or left out, and about zones on the tour."""
     lines = []
     if fence.simplified:
-        most = max(z.growth for z in fence.simplified)
+        max_growth = max(z.growth for z in fence.simplified)
         lines.append(
             f"{counted(len(fence.simplified), 'obstacle')} simplified in the fence, by up to "
-            f"{most:.2g} {problem.units}, to fit into the vehicle's storage; if your vehicle "
+            f"{max_growth:.2g} {problem.units}, to fit into the vehicle's storage; if your vehicle "
             "stores more, raise --fence-bytes"
         )
     if fence.left_out:
@@ -104,7 +104,7 @@ def fence_warnings(problem: Problem, fence: Fence) -> list[str]:
     return lines
 
 
-def _names(problem: Problem, obstacles: Sequence[int], most: int = 3) -> str:
+def _names(problem: Problem, obstacles: Sequence[int], max_named: int = 3) -> str:
     """Return the names of the first few obstacles."""
-    names = [problem.obstacle_name(k) for k in obstacles[:most]]
-    return ", ".join(names) + (", …" if len(obstacles) > most else "")
+    names = [problem.obstacle_name(k) for k in obstacles[:max_named]]
+    return ", ".join(names) + (", …" if len(obstacles) > max_named else "")

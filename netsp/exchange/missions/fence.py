@@ -166,9 +166,9 @@ def fence_of(
     policy = policy or FencePolicy()
     line = shapely.LineString(np.asarray(path, dtype=float)[:, :2])
     zones = _fitting_zones(problem, line, policy)
-    far = {z.obstacle: problem.obstacles[z.obstacle].shape().distance(line) for z in zones}
+    distance = {z.obstacle: problem.obstacles[z.obstacle].shape().distance(line) for z in zones}
     kept: list[Zone] = []
-    for zone in sorted(zones, key=lambda z: (far[z.obstacle], z.obstacle)):
+    for zone in sorted(zones, key=lambda z: (distance[z.obstacle], z.obstacle)):
         if not _is_large(zone, policy) and policy.size([*kept, zone]) <= policy.max_bytes:
             kept.append(zone)
     kept.sort(key=lambda z: z.obstacle)
@@ -182,8 +182,10 @@ def _fitting_zones(problem: Problem, line: shapely.LineString, policy: FencePoli
     """Return zones that grow as little as it takes to fit, or else as much as they may."""
 
     def grown(step: int) -> list[Zone]:
-        most = policy.max_growth * problem.clearance * step / policy.growth_steps
-        return [_simplified(z, problem.obstacles[z.obstacle], most, line, policy) for z in exact]
+        max_growth = policy.max_growth * problem.clearance * step / policy.growth_steps
+        return [
+            _simplified(z, problem.obstacles[z.obstacle], max_growth, line, policy) for z in exact
+        ]
 
     def fits(zones: list[Zone]) -> bool:
         return policy.size(zones) <= policy.max_bytes and not any(
@@ -221,26 +223,29 @@ def _is_large(zone: Zone, policy: FencePolicy) -> bool:
 def _simplified(
     zone: Zone,
     obstacle: Circle | Polygon,
-    most: float,
+    max_growth: float,
     line: shapely.LineString,
     policy: FencePolicy,
 ) -> Zone:
-    """Return the smallest zone found, in bytes, around an obstacle; it grows by `most` at most."""
-    if isinstance(obstacle, Circle) or most <= 0.0:
+    """Return the zone of the fewest bytes found around an obstacle, within a limit of growth."""
+    if isinstance(obstacle, Circle) or max_growth <= 0.0:
         return zone
     body = shapely.Polygon(obstacle.polygon)
-    limit = body.buffer(most, quad_segs=policy.quarter_segments)
+    limit = body.buffer(max_growth, quad_segs=policy.quarter_segments)
     best = zone
     for share in policy.offset_shares:
-        wide = body.buffer(share * most, join_style="mitre") if share else body
-        for shape in (wide.simplify((1.0 - share) * most), wide.convex_hull.simplify(0.5 * most)):
+        wide = body.buffer(share * max_growth, join_style="mitre") if share else body
+        for shape in (
+            wide.simplify((1.0 - share) * max_growth),
+            wide.convex_hull.simplify(0.5 * max_growth),
+        ):
             if shape.geom_type != "Polygon" or shape.interiors or len(shape.exterior.coords) < 4:
                 continue
             is_clear = shape.distance(line) > policy.touch_distance
             if not (is_clear and shape.covers(body) and limit.covers(shape)):
                 continue
             corners = tuple((float(x), float(y)) for x, y in shape.exterior.coords[:-1])
-            tried = Zone(zone.obstacle, Polygon(polygon=corners), most)
+            tried = Zone(zone.obstacle, Polygon(polygon=corners), max_growth)
             if policy.size_of(tried) < policy.size_of(best):
                 best = tried
     circle = _circle_about(obstacle)
@@ -248,7 +253,7 @@ def _simplified(
         np.pi / (4.0 * policy.quarter_segments)
     )  # of a polygon around it
     disc = shapely.Point(circle.center).buffer(outside, quad_segs=policy.quarter_segments)
-    round_zone = Zone(zone.obstacle, circle, most)
+    round_zone = Zone(zone.obstacle, circle, max_growth)
     if (
         limit.covers(disc)
         and _distance(circle, line) > policy.touch_distance

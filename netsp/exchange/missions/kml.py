@@ -64,17 +64,21 @@ def kml_of(
             "heading": projection.heading or None,
         },
     )
-    stops = {p.goal: (n, p) for n, p in enumerate((q for q in points if _is_stop(q)), 1)}
+    visits = {p.goal: (n, p) for n, p in enumerate((q for q in points if _is_stop(q)), 1)}
     goals = []
     for k, goal in enumerate(problem.goals):
-        said = f"depth {-goal.position[2]:g} {problem.units}"
+        description = f"depth {-goal.position[2]:g} {problem.units}"
         data: dict[str, Any] = {}
-        if k in stops:
-            number, stop = stops[k]
-            said = f"stop {number}, {said}, taut tether {stop.tether:.2f} {problem.units}"
-            data = {"visit": number, "taut_tether": round(stop.tether, 4)}
+        if k in visits:
+            number, visited = visits[k]
+            description = (
+                f"stop {number}, {description}, taut tether {visited.tether:.2f} {problem.units}"
+            )
+            data = {"visit": number, "taut_tether": round(visited.tether, 4)}
         goals.append(
-            page.placemark("goal", page.point(goal.position), name=goal.name, said=said, data=data)
+            page.placemark(
+                "goal", page.point(goal.position), name=goal.name, said=description, data=data
+            )
         )
     obstacles = [
         page.placemark("obstacle", page.polygon(_outline(o, policy.circle_corners)), name=o.name)
@@ -99,9 +103,9 @@ def kml_of(
         if line is not None
     ]
     missing = [problem.goal_name(goal) for _, goal, line in drawn if line is None]
-    said = f"no taut tether was found at {', '.join(missing)}" if missing else ""
+    description = f"no taut tether was found at {', '.join(missing)}" if missing else ""
     if drawn:
-        folders.append(page.folder("tethers", tethers, hidden=True, said=said))
+        folders.append(page.folder("tethers", tethers, hidden=True, said=description))
     styles = "".join(f'<Style id="{kind}">{style}</Style>\n' for kind, style in STYLES.items())
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2">\n'
@@ -142,18 +146,18 @@ def _tethers(
     """Yield number, goal and taut tether of each visit; nothing if the words belong to a scene."""
     from netsp.roadmap.paths import TautPaths
 
-    stops = [p for p in points if _is_stop(p)]
+    visits = [p for p in points if _is_stop(p)]
     n_solids = len(problem.obstacles)
-    if any(abs(letter) > n_solids for p in stops for letter in p.word):
+    if any(abs(letter) > n_solids for p in visits for letter in p.word):
         return  # a mission in space, whose words are those of its scene
     paths = TautPaths(problem)
-    for number, stop in enumerate(stops, 1):
-        assert stop.goal is not None
+    for number, visited in enumerate(visits, 1):
+        assert visited.goal is not None
         try:
-            line: Floats | None = paths.tether(stop.goal, stop.word)
+            line: Floats | None = paths.tether(visited.goal, visited.word)
         except InputError:
             line = None
-        yield number, stop.goal, line
+        yield number, visited.goal, line
 
 
 class _Page:

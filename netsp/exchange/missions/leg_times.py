@@ -176,19 +176,19 @@ class SmoothMove:
             return self.length - distance, speed
         if t >= self.rise_s:
             return self.top_speed * (t - 0.5 * self.rise_s), self.top_speed
-        ramp, most = self.ramp_s, self.acceleration
+        ramp, peak = self.ramp_s, self.acceleration
         if t < ramp:
-            return most / ramp * t**3 / 6.0, 0.5 * most / ramp * t * t
+            return peak / ramp * t**3 / 6.0, 0.5 * peak / ramp * t * t
         left = self.rise_s - t
         if left > ramp:
             past = t - ramp
             return (
-                most * (ramp * ramp / 6.0 + 0.5 * past * (ramp + past)),
-                most * (0.5 * ramp + past),
+                peak * (ramp * ramp / 6.0 + 0.5 * past * (ramp + past)),
+                peak * (0.5 * ramp + past),
             )
         return (
-            self.top_speed * (0.5 * self.rise_s - left) + most / ramp * left**3 / 6.0,
-            self.top_speed - 0.5 * most / ramp * left * left,
+            self.top_speed * (0.5 * self.rise_s - left) + peak / ramp * left**3 / 6.0,
+            self.top_speed - 0.5 * peak / ramp * left * left,
         )
 
 
@@ -207,9 +207,9 @@ class _Follower:
         run, rise = math.dist(origin[:2], goal[:2]), goal[2] - origin[2]
         self.origin, self.goal = origin, goal
         self.move = SmoothMove(run, rise, self.speed, self.motion)
-        far = self.move.length
+        length = self.move.length
         x, y, z = (b - a for a, b in zip(origin, goal, strict=True))
-        self.along = (x / far, y / far, z / far)
+        self.along = (x / length, y / length, z / length)
         self.track_s = self.leg_s = self.reference_speed = 0.0
         self.reference = origin
 
@@ -285,11 +285,11 @@ class _Follower:
         skipped = self.move.duration_s - self.move.rise_s - self.track_s
         if skipped <= 0.0:
             return
-        far = skipped * self.move.top_speed
+        distance = skipped * self.move.top_speed
         ux, uy, uz = self.along
         (x, y, z), (rx, ry, rz) = self.place, self.reference
-        self.place = (x + far * ux, y + far * uy, z + far * uz)
-        self.reference = (rx + far * ux, ry + far * uy, rz + far * uz)
+        self.place = (x + distance * ux, y + distance * uy, z + distance * uz)
+        self.reference = (rx + distance * ux, ry + distance * uy, rz + distance * uz)
         self.track_s += skipped
         steady = math.sqrt(self.motion.full_thrust / self.motion.drag) / self.move.top_speed
         self.clock_s += skipped / min(1.0, steady)

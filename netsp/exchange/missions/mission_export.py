@@ -114,9 +114,9 @@ def export_mission(
     line = np.array([p.position for p in points])
     longest = 0.0
     for share in settings.policy.corner_shares if acceptance else (0.0,):
-        way = pursued(line, share * acceptance) if share else line
-        _check_free(field, way, share * acceptance)
-        longest = max(longest, _checked(context, points, way, share == 0.0))
+        path = pursued(line, share * acceptance) if share else line
+        _check_free(field, path, share * acceptance)
+        longest = max(longest, _checked(context, points, path, share == 0.0))
     sunk = [_sunk(p, surface) for p in points]
     settings = told_apart(sunk, settings)
     write_page(file, kind, FORMATS[kind](_stand_in(mission, surface), sunk, projection, settings))
@@ -130,15 +130,15 @@ def _waypoints(mission: Mission, projection: Projection | None) -> list[Waypoint
     assert tour is not None
     north = 0.0 if projection is None else projection.heading
     out = [Waypoint(mission.begin, None, start=True)]
-    for k, stop in enumerate(tour.stops):
-        out += _bends(stop.path)
+    for k, visit in enumerate(tour.stops):
+        out += _bends(visit.path)
         heading = mission.waypoints[k].heading
         out.append(
             Waypoint(
-                stop.path[-1],
+                visit.path[-1],
                 k,
-                stop.signature,
-                stop.tether_length,
+                visit.signature,
+                visit.tether_length,
                 # from the x axis towards y, to clockwise from north
                 heading=None if heading is None else (north + 90.0 - heading) % 360.0,
                 stay=math.ceil(mission.waypoints[k].dwell),
@@ -172,11 +172,11 @@ def pursued(line: Floats, radius: float) -> Floats:
     """
     out = [line[0]]
     for k, target in enumerate(line[1:], 1):
-        here = out[-1]
-        far = float(np.linalg.norm(target - here))
+        position = out[-1]
+        distance = float(np.linalg.norm(target - position))
         short = radius if k < len(line) - 1 else 0.0
-        if far > short:
-            out.append(here + (target - here) * (1.0 - short / far))
+        if distance > short:
+            out.append(position + (target - position) * (1.0 - short / distance))
     return np.array(out)
 
 
@@ -206,8 +206,8 @@ def _checked(context: PlanningContext, points: list[Waypoint], line: Floats, exa
         for k, p in enumerate(points):
             if p.goal is None or p.goal == HOME:
                 continue
-            there = np.vstack([tether.nodes, line[: k + 1], context.mission.places[p.goal]])
-            word, broken = words.try_word(there)
+            path = np.vstack([tether.nodes, line[: k + 1], context.mission.places[p.goal]])
+            word, broken = words.try_word(path)
             if broken is not None or word != p.word:
                 raise InputError(
                     f"mission: at waypoint #{p.goal} the lines are not of the planned class"

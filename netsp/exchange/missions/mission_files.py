@@ -210,8 +210,8 @@ def predicted_s(
     """
     if settings.speed is None:
         return None
-    told = told_apart(points, settings)
-    holds = [_hold(p, told) for p in points]
+    distinct = told_apart(points, settings)
+    holds = [_hold(p, distinct) for p in points]
     places = [(*p.position[:2], altitude(p.position[2], settings.policy)) for p in points]
     return holds[0] + sum(leg_times(places, holds, settings.speed, motion))
 
@@ -558,7 +558,7 @@ EXTENSIONS = {
 """Format of a file by the extension of its name."""
 
 
-def format_of(file: str, asked: str | None) -> str:
+def format_of(file: str, requested: str | None) -> str:
     """Return the format that is asked for, or that of the file's extension.
 
     Raises
@@ -567,13 +567,15 @@ def format_of(file: str, asked: str | None) -> str:
         The two disagree, or neither states a format.
     """
     extension = os.path.splitext(file)[1].lower()
-    own = EXTENSIONS.get(extension)
-    if asked is not None and asked not in FORMATS:
-        raise InputError(f"format: expected {', '.join(FORMATS)}, got {asked!r}")
-    if asked is not None and own is not None and asked != own:
-        raise InputError(f"format: {asked!r}, but {file!r} ends like a file of format {own}")
-    if asked is None and own is None:
+    by_name = EXTENSIONS.get(extension)
+    if requested is not None and requested not in FORMATS:
+        raise InputError(f"format: expected {', '.join(FORMATS)}, got {requested!r}")
+    if requested is not None and by_name is not None and requested != by_name:
+        raise InputError(
+            f"format: {requested!r}, but {file!r} ends like a file of format {by_name}"
+        )
+    if requested is None and by_name is None:
         raise InputError(
             f"file: expected a name that ends in {', '.join(EXTENSIONS)}, got {file!r}; or a format"
         )
-    return asked or own or ""
+    return requested or by_name or ""

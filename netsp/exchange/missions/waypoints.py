@@ -92,13 +92,13 @@ def waypoints_of(
         kinds.append((leg.goal, leg.word, leg.tether))
     keep = [0]
     for k in range(1, len(points)):
-        here = points[keep[-1]]
-        if np.linalg.norm(points[k] - here) == 0.0 and kinds[k][0] is None:
+        previous = points[keep[-1]]
+        if np.linalg.norm(points[k] - previous) == 0.0 and kinds[k][0] is None:
             continue
         if (
             k + 1 < len(points)
             and kinds[k][0] is None
-            and turn(here, points[k], points[k + 1]) < TURN_TOLERANCE
+            and turn(previous, points[k], points[k + 1]) < TURN_TOLERANCE
         ):
             continue
         keep.append(k)
@@ -224,12 +224,12 @@ def _widened(
             continue
         middle = 0.5 * (out[k - 1, :2] + out[k + 1, :2])
         away = out[k, :2] - middle
-        far = float(np.linalg.norm(away))
-        if far == 0.0:
+        distance = float(np.linalg.norm(away))
+        if distance == 0.0:
             continue
         for times in shifts:
             tried = out.copy()
-            tried[k, :2] += away / far * times * radius
+            tried[k, :2] += away / distance * times * radius
             free = not any(
                 len(tree.query(shapely.LineString(tried[[i, i + 1], :2]), "intersects"))
                 for i in (k - 1, k)
