@@ -62,47 +62,40 @@ def cockpit_mission(
     """
     places = projection.to_earth([p.position[:2] for p in points])
     title = name or "netsp tour"
-    waypoints: list[dict[str, Any]] = []
-    for k, (p, hold, altitude, (lat, lon)) in enumerate(
-        zip(points, holds, altitudes, places, strict=True)
-    ):
-        waypoints.append(
-            {
-                "id": str(uuid.uuid5(NAMESPACE, f"{title} {k}")),
-                "coordinates": [round(float(lat), 9), round(float(lon), 9)],
-                "altitude": altitude,
-                "altitudeReferenceType": "Relative to home",
-                "commands": [_command("MAV_CMD_NAV_WAYPOINT", hold, 0, 0, p.heading or 0)],
-            }
+    waypoints: list[dict[str, Any]] = [
+        {
+            "id": str(uuid.uuid5(NAMESPACE, f"{title} {k}")),
+            "coordinates": [round(float(lat), 9), round(float(lon), 9)],
+            "altitude": altitude,
+            "altitudeReferenceType": "Relative to home",
+            "commands": [_command("MAV_CMD_NAV_WAYPOINT", hold, 0, 0, p.heading or 0)],
+        }
+        for k, (p, hold, altitude, (lat, lon)) in enumerate(
+            zip(points, holds, altitudes, places, strict=True)
         )
+    ]
     if speed is not None:  # older versions do not add it themselves
         waypoints[0]["commands"].append(_command("MAV_CMD_DO_CHANGE_SPEED", 1, speed, -1, 0))
     south, west = (min(float(c[k]) for c in places) for k in (0, 1))
     north, east = (max(float(c[k]) for c in places) for k in (0, 1))
-    return (
-        json.dumps(
-            {
-                "version": 0,
-                "name": title,
-                "description": DESCRIPTION,
-                "vehicleType": "MAV_TYPE_SUBMARINE",
-                "createdAt": 0,
-                "updatedAt": 0,
-                "settings": {
-                    "mapCenter": [round(0.5 * (south + north), 9), round(0.5 * (west + east), 9)],
-                    "zoom": _zoom(points, 0.5 * (south + north), policy.map_pixels),
-                    "currentWaypointAltitude": altitudes[0],
-                    "currentWaypointAltitudeRefType": "Relative to home",
-                    "defaultCruiseSpeed": 0 if speed is None else speed,
-                },
-                "waypoints": waypoints,
-                "surveys": [],
-            },
-            indent=1,
-            allow_nan=False,
-        )
-        + "\n"
-    )
+    mission = {
+        "version": 0,
+        "name": title,
+        "description": DESCRIPTION,
+        "vehicleType": "MAV_TYPE_SUBMARINE",
+        "createdAt": 0,
+        "updatedAt": 0,
+        "settings": {
+            "mapCenter": [round(0.5 * (south + north), 9), round(0.5 * (west + east), 9)],
+            "zoom": _zoom(points, 0.5 * (south + north), policy.map_pixels),
+            "currentWaypointAltitude": altitudes[0],
+            "currentWaypointAltitudeRefType": "Relative to home",
+            "defaultCruiseSpeed": 0 if speed is None else speed,
+        },
+        "waypoints": waypoints,
+        "surveys": [],
+    }
+    return json.dumps(mission, indent=1, allow_nan=False) + "\n"
 
 
 def _command(name: str, *params: float) -> dict[str, Any]:

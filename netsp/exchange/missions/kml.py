@@ -64,8 +64,29 @@ def kml_of(
             "heading": projection.heading or None,
         },
     )
-    visits = {p.goal: (n, p) for n, p in enumerate((q for q in points if _is_stop(q)), 1)}
-    goals = []
+    obstacles = [
+        page.placemark("obstacle", page.polygon(_outline(o, policy.circle_corners)), name=o.name)
+        for o in problem.obstacles
+    ]
+    path = page.placemark("path", page.line([p.position for p in points]), name="tour")
+    folders = [
+        page.folder("base", [base]),
+        page.folder("goals", _goal_placemarks(page, problem, points)),
+        page.folder("obstacles", obstacles),
+        page.folder("path", [path]),
+        _tether_folder(page, problem, points),
+    ]
+    styles = "".join(f'<Style id="{kind}">{style}</Style>\n' for kind, style in STYLES.items())
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2">\n'
+        f"<Document><name>{_text(problem.name or 'tour')}</name>\n{styles}{''.join(folders)}"
+        "</Document>\n</kml>\n"
+    )
+
+
+def _goal_placemarks(page: _Page, problem: Problem, points: Sequence[Waypoint]) -> list[str]:
+    visits = {p.goal: (n, p) for n, p in enumerate((q for q in points if _is_visit(q)), 1)}
+    placemarks = []
     for k, goal in enumerate(problem.goals):
         description = f"depth {-goal.position[2]:g} {problem.units}"
         data: dict[str, Any] = {}
@@ -75,23 +96,18 @@ def kml_of(
                 f"stop {number}, {description}, taut tether {visited.tether:.2f} {problem.units}"
             )
             data = {"visit": number, "taut_tether": round(visited.tether, 4)}
-        goals.append(
-            page.placemark(
-                "goal", page.point(goal.position), name=goal.name, said=description, data=data
-            )
+        shape = page.point(goal.position)
+        placemarks.append(
+            page.placemark("goal", shape, name=goal.name, description=description, data=data)
         )
-    obstacles = [
-        page.placemark("obstacle", page.polygon(_outline(o, policy.circle_corners)), name=o.name)
-        for o in problem.obstacles
-    ]
-    path = page.placemark("path", page.line([p.position for p in points]), name="tour")
-    folders = [
-        page.folder("base", [base]),
-        page.folder("goals", goals),
-        page.folder("obstacles", obstacles),
-        page.folder("path", [path]),
-    ]
+    return placemarks
+
+
+def _tether_folder(page: _Page, problem: Problem, points: Sequence[Waypoint]) -> str:
+    """Return a folder with the tether at each visit; an empty text without visits."""
     drawn = list(_tethers(problem, points))
+    if not drawn:
+        return ""
     tethers = [
         page.placemark(
             "tether",
@@ -104,14 +120,7 @@ def kml_of(
     ]
     missing = [problem.goal_name(goal) for _, goal, line in drawn if line is None]
     description = f"no taut tether was found at {', '.join(missing)}" if missing else ""
-    if drawn:
-        folders.append(page.folder("tethers", tethers, hidden=True, said=description))
-    styles = "".join(f'<Style id="{kind}">{style}</Style>\n' for kind, style in STYLES.items())
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2">\n'
-        f"<Document><name>{_text(problem.name or 'tour')}</name>\n{styles}{''.join(folders)}"
-        "</Document>\n</kml>\n"
-    )
+    return page.folder("tethers", tethers, hidden=True, description=description)
 
 
 def kmz_of(page: str) -> bytes:
@@ -124,7 +133,7 @@ def kmz_of(page: str) -> bytes:
     return out.getvalue()
 
 
-def _is_stop(point: Waypoint) -> bool:
+def _is_visit(point: Waypoint) -> bool:
     return point.goal is not None and point.goal != HOME
 
 
@@ -146,7 +155,7 @@ def _tethers(
     """Yield number, goal and taut tether of each visit; nothing if the words belong to a scene."""
     from netsp.roadmap.paths import TautPaths
 
-    visits = [p for p in points if _is_stop(p)]
+    visits = [p for p in points if _is_visit(p)]
     n_solids = len(problem.obstacles)
     if any(abs(letter) > n_solids for p in visits for letter in p.word):
         return  # a mission in space, whose words are those of its scene
@@ -200,7 +209,7 @@ class _Page:
         shape: str,
         *,
         name: str | None = None,
-        said: str = "",
+        description: str = "",
         data: dict[str, Any] | None = None,
         hidden: bool = False,
     ) -> str:
@@ -213,14 +222,14 @@ class _Page:
             "<Placemark>"
             + ("" if name is None else f"<name>{_text(name)}</name>")
             + ("<visibility>0</visibility>" if hidden else "")
-            + (f"<description>{_text(said)}</description>" if said else "")
+            + (f"<description>{_text(description)}</description>" if description else "")
             + f"<styleUrl>#{style}</styleUrl><ExtendedData>{fields}</ExtendedData>{shape}"
             "</Placemark>\n"
         )
 
     def folder(
-        self, name: str, placemarks: Sequence[str], *, hidden: bool = False, said: str = ""
+        self, name: str, placemarks: Sequence[str], *, hidden: bool = False, description: str = ""
     ) -> str:
         more = "<visibility>0</visibility>" if hidden else ""
-        more += f"<description>{_text(said)}</description>" if said else ""
+        more += f"<description>{_text(description)}</description>" if description else ""
         return f"<Folder><name>{name}</name>{more}\n{''.join(placemarks)}</Folder>\n"

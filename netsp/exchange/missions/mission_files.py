@@ -270,54 +270,7 @@ def _plan(
     settings: ExportSettings,
 ) -> str:
     assert projection is not None
-    places = projection.to_earth([p.position[:2] for p in points])
-    items: list[dict[str, Any]] = [
-        {
-            "type": "SimpleItem",
-            "command": NAV_WAYPOINT,
-            "frame": FRAME_RELATIVE_ALTITUDE,
-            "autoContinue": True,
-            "AltitudeMode": 1,
-            "Altitude": altitude(p.position[2], settings.policy),
-            "AMSLAltAboveTerrain": None,
-            "params": [
-                _hold(p, settings),
-                0,
-                0,
-                p.heading,
-                _degrees(lat),
-                _degrees(lon),
-                altitude(p.position[2], settings.policy),
-            ],
-        }
-        for p, (lat, lon) in zip(points, places, strict=True)
-    ]
-    for item, p in zip(items, points, strict=True):
-        item["netsp"] = _mark(problem, p)  # ground stations pass over what they do not know
-    if settings.speed is not None:
-        change: dict[str, Any] = {
-            "type": "SimpleItem",
-            "command": DO_CHANGE_SPEED,
-            "frame": FRAME_MISSION,
-            "autoContinue": True,
-            "params": [GROUND_SPEED, settings.speed, KEEP_THROTTLE, 0, 0, 0, 0],
-        }
-        items.insert(1, change)
-    for k, item in enumerate(items):
-        item["doJumpId"] = k + 1
-    circles: list[Any] = []
-    polygons: list[Any] = []
     fence = fence_of_points(problem, points, settings)
-    for zone in fence.zones:
-        o = zone.shape
-        if isinstance(o, Circle):
-            ((lat, lon),) = projection.to_earth([o.center])
-            radius = math.ceil(1000.0 * o.radius - 1e-3) / 1000.0  # no smaller than the obstacle
-            centre = {"center": [_degrees(lat), _degrees(lon)], "radius": radius}
-            circles.append({"version": 1, "inclusion": False, "circle": centre})
-        else:
-            corners = [[_degrees(a), _degrees(b)] for a, b in projection.to_earth(o.polygon)]
-            polygons.append({"version": 1, "inclusion": False, "polygon": corners})
     plan = {
         "fileType": "Plan",
         "version": 1,
@@ -331,7 +284,7 @@ def _plan(
                 "left_out": [problem.obstacle_name(k) for k in fence.left_out],
             },
         },
-        "geoFence": {"version": 2, "circles": circles, "polygons": polygons},
+        "geoFence": _plan_fence(fence, projection),
         "rallyPoints": {"version": 2, "points": []},
         "mission": {
             "version": 2,
@@ -341,10 +294,60 @@ def _plan(
             "cruiseSpeed": settings.speed or 0.5,
             "hoverSpeed": settings.speed or 0.5,
             "plannedHomePosition": [projection.latitude, projection.longitude, 0],
-            "items": items,
+            "items": _plan_items(problem, points, projection, settings),
         },
     }
     return json.dumps(plan, indent=1, allow_nan=False) + "\n"
+
+
+def _plan_items(
+    problem: Problem, points: list[Waypoint], projection: Projection, settings: ExportSettings
+) -> list[dict[str, Any]]:
+    places = projection.to_earth([p.position[:2] for p in points])
+    items: list[dict[str, Any]] = []
+    for p, (lat, lon) in zip(points, places, strict=True):
+        z = altitude(p.position[2], settings.policy)
+        hold_s = _hold(p, settings)
+        item = {
+            "type": "SimpleItem",
+            "command": NAV_WAYPOINT,
+            "frame": FRAME_RELATIVE_ALTITUDE,
+            "autoContinue": True,
+            "AltitudeMode": 1,
+            "Altitude": z,
+            "AMSLAltAboveTerrain": None,
+            "params": [hold_s, 0, 0, p.heading, _degrees(lat), _degrees(lon), z],
+            "netsp": _mark(problem, p),  # ground stations ignore what they do not know
+        }
+        items.append(item)
+    if settings.speed is not None:
+        change = {
+            "type": "SimpleItem",
+            "command": DO_CHANGE_SPEED,
+            "frame": FRAME_MISSION,
+            "autoContinue": True,
+            "params": [GROUND_SPEED, settings.speed, KEEP_THROTTLE, 0, 0, 0, 0],
+        }
+        items.insert(1, change)
+    for k, item in enumerate(items):
+        item["doJumpId"] = k + 1
+    return items
+
+
+def _plan_fence(fence: Fence, projection: Projection) -> dict[str, Any]:
+    circles: list[Any] = []
+    polygons: list[Any] = []
+    for zone in fence.zones:
+        o = zone.shape
+        if isinstance(o, Circle):
+            ((lat, lon),) = projection.to_earth([o.center])
+            radius = math.ceil(1000.0 * o.radius - 1e-3) / 1000.0  # no smaller than the obstacle
+            centre = {"center": [_degrees(lat), _degrees(lon)], "radius": radius}
+            circles.append({"version": 1, "inclusion": False, "circle": centre})
+        else:
+            corners = [[_degrees(a), _degrees(b)] for a, b in projection.to_earth(o.polygon)]
+            polygons.append({"version": 1, "inclusion": False, "polygon": corners})
+    return {"version": 2, "circles": circles, "polygons": polygons}
 
 
 def _mark(problem: Problem, point: Waypoint) -> dict[str, Any]:
@@ -372,39 +375,13 @@ def _wpl(
     ]
     places = projection.to_earth([p.position[:2] for p in points])
     for p, (lat, lon) in zip(points, places, strict=True):
-        rows.append(
-            [
-                len(rows),
-                0,
-                FRAME_RELATIVE_ALTITUDE,
-                NAV_WAYPOINT,
-                _hold(p, settings),
-                0,
-                0,
-                p.heading or 0,
-                _degrees(lat),
-                _degrees(lon),
-                altitude(p.position[2], settings.policy),
-                1,
-            ]
-        )
+        head = (len(rows), 0, FRAME_RELATIVE_ALTITUDE, NAV_WAYPOINT)
+        params = (_hold(p, settings), 0, 0, p.heading or 0)
+        z = altitude(p.position[2], settings.policy)
+        rows.append([*head, *params, _degrees(lat), _degrees(lon), z, 1])
         if len(rows) == 2 and settings.speed is not None:
-            rows.append(
-                [
-                    2,
-                    0,
-                    FRAME_MISSION,
-                    DO_CHANGE_SPEED,
-                    GROUND_SPEED,
-                    settings.speed,
-                    KEEP_THROTTLE,
-                    0,
-                    0,
-                    0,
-                    0,
-                    1,
-                ]
-            )
+            params = (GROUND_SPEED, settings.speed, KEEP_THROTTLE, 0)
+            rows.append([2, 0, FRAME_MISSION, DO_CHANGE_SPEED, *params, 0, 0, 0, 1])
     return "QGC WPL 110\n" + "".join("\t".join(map(_cell, r)) + "\n" for r in rows)
 
 
