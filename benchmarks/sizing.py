@@ -20,7 +20,7 @@ from table import head, heading, row
 
 from netsp import Problem, Status, solve, verify
 from netsp.exchange.maps import Projection, read_site
-from netsp.exchange.maps.options import Looking
+from netsp.exchange.maps.options import InspectionOptions
 from netsp.plan.random_worlds import reachable_world
 from netsp.plan.sizing import best_base, tether_curve, tether_margins
 from netsp.plan.sizing.candidates import over_grid
@@ -45,7 +45,7 @@ def farm(folder: Path, name: str, base: Projection | None, tether: float) -> tup
     notes: list[str] = []
     problem = read_site(
         folder / f"{name}.geojson", base, tether=tether, radius=4.0,
-        looking=Looking(1, 3.0, (-10.0,)), skip_unreachable=True, on_note=notes.append,
+        inspection=InspectionOptions(1, 3.0, (-10.0,)), skip_unreachable=True, on_note=notes.append,
     )  # fmt: skip
     return problem, sum("left out" in n for n in notes)
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError
-from netsp.exchange.maps.options import Looking, SiteOptions
+from netsp.exchange.maps.options import InspectionOptions, SiteOptions
 from netsp.exchange.maps.projection import Projection
 from netsp.exchange.maps.read_map import import_site, read_map
 from netsp.exchange.maps.sea_floor import Danger, DepthArea, sea_floor
@@ -73,7 +73,7 @@ def test_depths_and_lengths_are_in_metres_whatever_the_unit_of_the_chart(
     assert by_layer["HULKES"].get("horlen") == pytest.approx(8.0 * length)
     z = shapely.get_coordinates(by_layer["SOUNDG"].shape, include_z=True)[:, 2]
     assert z == pytest.approx([-3.5 * depth, -4.0 * depth])
-    options = SiteOptions(tether=90.0, radius=1.0, units=said, looking=Looking(1, 2.0))
+    options = SiteOptions(tether=90.0, radius=1.0, units=said, inspection=InspectionOptions(1, 2.0))
     problem = import_site(file, HERE, options=options).problem
     radii = sorted(o.radius for o in problem.obstacles)
     assert radii == pytest.approx([1.0, 1.0, 5.0 * length])
@@ -168,7 +168,12 @@ def test_every_feature_of_a_cell_is_used_or_left_out_with_a_reason(tmp_path):
         ("M_COVR", at(shapely.box(-500, -500, 500, 500)), {"CATCOV": 1}), pile(400, 0),
     ])  # fmt: skip
     options = SiteOptions(
-        tether=90.0, radius=1.0, line_width=1.0, looking=Looking(1, 2.0), floor=True, draught=1.0
+        tether=90.0,
+        radius=1.0,
+        line_width=1.0,
+        inspection=InspectionOptions(1, 2.0),
+        floor=True,
+        draught=1.0,
     )
     found = import_site(file, HERE, options=options)
     records = {layer.layer: layer for layer in found.problem.site.imported}
@@ -202,11 +207,15 @@ def test_soundings_shallower_than_the_draught_are_obstacles(tmp_path):
         water(10, -20, 40, 5.0, 10.0), soundings((20, 0, 1.5), (30, 0, 6.0), (-20, 5, 1.0)),
         water(-30, 0, 15, 0.0, 2.0), pile(0, 20),
     ])  # fmt: skip
-    options = SiteOptions(tether=90.0, looking=Looking(1, 2.0), radius=1.0, draught=2.0)
+    options = SiteOptions(
+        tether=90.0, inspection=InspectionOptions(1, 2.0), radius=1.0, draught=2.0
+    )
     circles = [o for o in import_site(file, HERE, options=options).problem.obstacles
                if hasattr(o, "radius")]  # fmt: skip
     assert sorted(o.center[0] for o in circles) == pytest.approx([0.0, 20.0], abs=0.01)
-    without = SiteOptions(tether=90.0, looking=Looking(1, 2.0), radius=1.0, draught=1.5)
+    without = SiteOptions(
+        tether=90.0, inspection=InspectionOptions(1, 2.0), radius=1.0, draught=1.5
+    )
     assert len(import_site(file, HERE, options=without).problem.obstacles) == 2
 
 
@@ -243,8 +252,8 @@ def test_shallow_water_is_inspected_only_where_its_layer_is_chosen(tmp_path):
     file = write_cell(tmp_path / "A.000", [pile(-20, 0), water(20, 0, 10, 0.0, 2.0)])
 
     def layers(*rules):
-        looking = Looking(1, 2.0, chosen=Selection.parse(rules))
-        options = SiteOptions(tether=90.0, radius=1.0, draught=2.0, looking=looking)
+        inspection = InspectionOptions(1, 2.0, chosen=Selection.parse(rules))
+        options = SiteOptions(tether=90.0, radius=1.0, draught=2.0, inspection=inspection)
         problem = import_site(file, HERE, options=options).problem
         return [g.position[0] > 0 for g in problem.goals], len(problem.obstacles)
 
@@ -254,7 +263,9 @@ def test_shallow_water_is_inspected_only_where_its_layer_is_chosen(tmp_path):
 
 def test_a_base_in_shallow_water_is_told_once(tmp_path):
     file = write_cell(tmp_path / "A.000", [water(-300, -300, 600, 0.0, 2.0), pile(0, 20)])
-    options = SiteOptions(tether=90.0, radius=1.0, draught=2.0, looking=Looking(1, 2.0))
+    options = SiteOptions(
+        tether=90.0, radius=1.0, draught=2.0, inspection=InspectionOptions(1, 2.0)
+    )
     with pytest.raises(InputError) as caught:
         import_site(file, HERE, options=options)
     assert sum("base: lies" in text for text in caught.value.complaints) == 1
@@ -263,8 +274,8 @@ def test_a_base_in_shallow_water_is_told_once(tmp_path):
 def test_reach_without_depths_and_beyond_the_chart_is_told(tmp_path):
     cover = ("M_COVR", at(shapely.box(-100, -100, 0, 100)), {"CATCOV": 1})
     file = write_cell(tmp_path / "A.000", [cover, pile(-30, 0), water(-200, -200, 200, 5.0, 9.0)])
-    looking = Looking(1, 2.0)
-    options = SiteOptions(tether=50.0, radius=1.0, looking=looking, draught=2.0)
+    inspection = InspectionOptions(1, 2.0)
+    options = SiteOptions(tether=50.0, radius=1.0, inspection=inspection, draught=2.0)
     notes = import_site(file, HERE, options=options).notes
     assert "50 % of the tether's reach is not on this chart, and free of obstacles in the " \
            "problem" in notes  # fmt: skip

@@ -17,7 +17,7 @@ from netsp.exchange.maps import read_map as read
 from netsp.exchange.maps.chart_classes import REASONS, chart_kind, chart_radius, chart_width
 from netsp.exchange.maps.crop import CropWindow, cropped
 from netsp.exchange.maps.feature import Feature, Map
-from netsp.exchange.maps.options import Looking, SiteOptions
+from netsp.exchange.maps.options import InspectionOptions, SiteOptions
 from netsp.exchange.maps.projection import Projection
 from netsp.exchange.maps.read_map import import_site
 from netsp.exchange.maps.sea_floor import DepthArea, sea_floor
@@ -114,7 +114,7 @@ def test_lights_that_nothing_carries_are_obstacles(monkeypatch):
         feature(2, "LIGHTS", at(0, 30)), feature(3, "DAYMAR", at(-30, 0)),
         feature(4, "BOYLAT", at(-30, 0)),
     )  # fmt: skip
-    options = SiteOptions(tether=60.0, radius=1.0, looking=Looking(1, 2.0))
+    options = SiteOptions(tether=60.0, radius=1.0, inspection=InspectionOptions(1, 2.0))
     found = import_site(file, HERE, options=options)
     used = {layer.layer: layer.used for layer in found.problem.site.imported}
     assert used == {"LIGHTS": {"obstacle": 1}, "BCNLAT": {"obstacle": 1}, "DAYMAR": {},
@@ -221,8 +221,8 @@ def test_a_base_is_sought_only_where_the_imported_map_holds_its_reach(monkeypatc
         monkeypatch, feature(0, "PILPNT", shapely.Point(5, 20)),
         feature(1, "LNDARE", square(500, 0, 9)), feature(2, "PILPNT", shapely.Point(0, 85)),
     )  # fmt: skip
-    looking = Looking(2, 1.0, chosen=Selection.parse([("box", "0,0,20,30")]))
-    options = SiteOptions(tether=50.0, radius=1.0, looking=looking)
+    inspection = InspectionOptions(2, 1.0, chosen=Selection.parse([("box", "0,0,20,30")]))
+    options = SiteOptions(tether=50.0, radius=1.0, inspection=inspection)
     alone = import_site(file, HERE, options=options)
     assert len(alone.problem.obstacles) == 1
     with pytest.raises(InputError, match="candidates: #0: the tether reaches beyond"):
@@ -248,8 +248,8 @@ def test_obstacles_to_inspect_are_chosen_by_layer_name_and_box(monkeypatch):
     )
 
     def goals(*rules):
-        looking = Looking(1, 2.0, chosen=Selection.parse(rules))
-        options = SiteOptions(tether=60.0, radius=1.0, line_width=1.0, looking=looking)
+        inspection = InspectionOptions(1, 2.0, chosen=Selection.parse(rules))
+        options = SiteOptions(tether=60.0, radius=1.0, line_width=1.0, inspection=inspection)
         return sorted(g.name for g in import_site(file, HERE, options=options).problem.goals)
 
     assert goals(("layer", "slcons")) == ["#3/1", "Pier 1 2/1"]
@@ -272,7 +272,9 @@ def test_viewpoints_without_room_are_told_and_left_out(monkeypatch):
         feature(1, "SLCONS", shapely.LineString([(5, 5), (5, 25)])),
         feature(2, "PILPNT", shapely.Point(0, 47)),
     )
-    options = SiteOptions(tether=50.0, radius=1.0, line_width=1.0, looking=Looking(4, 3.0))
+    options = SiteOptions(
+        tether=50.0, radius=1.0, line_width=1.0, inspection=InspectionOptions(4, 3.0)
+    )
     found = import_site(file, HERE, options=options)
     assert any("left out: within an obstacle" in note for note in found.notes)
     assert any("farther from the base" in note for note in found.notes)
@@ -281,7 +283,7 @@ def test_viewpoints_without_room_are_told_and_left_out(monkeypatch):
 
 def test_a_base_on_land_is_told_before_lost_viewpoints(monkeypatch):
     file = chart(monkeypatch, feature(0, "LNDARE", square(-900, -900, 1800), OBJNAM="Isle"))
-    options = SiteOptions(tether=50.0, looking=Looking(1, 2.0))
+    options = SiteOptions(tether=50.0, inspection=InspectionOptions(1, 2.0))
     with pytest.raises(InputError, match=r"base: lies inside LNDARE\[0\] \(Isle\)"):
         import_site(file, HERE, options=options)
 
@@ -308,7 +310,7 @@ def test_the_report_says_what_became_of_each_layer(monkeypatch):
         monkeypatch, feature(0, "PILPNT", shapely.Point(5, 0)),
         feature(1, "PILPNT", shapely.Point(500, 0)), feature(2, "M_COVR", square(0, 0, 900)),
     )  # fmt: skip
-    options = SiteOptions(tether=50.0, radius=1.0, looking=Looking(1, 2.0))
+    options = SiteOptions(tether=50.0, radius=1.0, inspection=InspectionOptions(1, 2.0))
     page = imported(import_site(file, HERE, options=options).problem.site)
     assert "Imported from harbour.000" in page
     for cell in ("PILPNT", "1: beyond the reach of the tether", "1: says how the chart was made"):

@@ -250,7 +250,7 @@ LINE = np.array([(-4.0, 0.0, 0.0), (-4.0, 3.0, -1.0), (0.0, 3.0, -2.0), (-4.0, 0
 
 
 def degrees():
-    return Projection.of(AT).to_earth(LINE[:, :2])
+    return Projection.for_problem(AT).to_earth(LINE[:, :2])
 
 
 def gpx_of(latlon, tag="trk"):

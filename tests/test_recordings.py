@@ -50,7 +50,7 @@ WAY = [(0.1 * k, 0.3 * k, 0.2 * k, -1.0) for k in range(20)]
 def degrees(x, y):
     from netsp.exchange.maps.projection import Projection
 
-    ((lat, lon),) = Projection.of(ON_EARTH).to_earth([(x, y)])
+    ((lat, lon),) = Projection.for_problem(ON_EARTH).to_earth([(x, y)])
     return f"{lat:.10f}", f"{lon:.10f}"
 
 

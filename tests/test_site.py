@@ -469,9 +469,11 @@ def test_whole_wind_farms_are_read(name):
     if not file.is_file():
         pytest.skip(f"{file} is not here")
     base = None if name == "dudgeon" else Projection(55.486, 7.84)
-    from netsp.exchange.maps.options import Looking
+    from netsp.exchange.maps.options import InspectionOptions
 
-    found = read_site(file, base, tether=9000.0, radius=4.0, looking=Looking(1, 3.0, (-10.0,)))
+    found = read_site(
+        file, base, tether=9000.0, radius=4.0, inspection=InspectionOptions(1, 3.0, (-10.0,))
+    )
     assert len(found.goals) == len(found.obstacles) == (67 if name == "dudgeon" else 80)
     assert found.goals[0].name == f"{found.obstacles[0].name}/1"
 

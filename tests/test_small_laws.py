@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from netsp import Circle, InputError, Polygon, Problem, solve, verify
 from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
-from netsp.exchange.maps.contract import kind_of, words_of
+from netsp.exchange.maps.contract import kind_of, parse_mappings
 from netsp.exchange.maps.drawn_shapes import circle_of, simple_polygons
 from netsp.exchange.maps.feature import Feature
 from netsp.exchange.maps.projection import Projection
@@ -834,11 +834,11 @@ def test_a_feature_of_an_impossible_kind_is_refused(what):
 
 
 def test_what_the_user_says_of_layers_and_columns_is_kept_apart():
-    assert words_of([("obstacle", "TURBINES"), ("name", "TURB_ID")]) == (
+    assert parse_mappings([("obstacle", "TURBINES"), ("name", "TURB_ID")]) == (
         {"turbines": "obstacle"}, {"name": "turb_id"},
     )  # fmt: skip
     with pytest.raises(InputError, match="before the ="):
-        words_of([("tree", "x")])
+        parse_mappings([("tree", "x")])
 
 
 def test_north_and_east_lie_where_the_heading_puts_them():

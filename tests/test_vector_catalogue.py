@@ -14,7 +14,7 @@ from netsp.app.served_files import ImportAnswers
 from netsp.app.served_files import imported as read_upload
 from netsp.base.errors import UnansweredError
 from netsp.exchange.maps.contract import words_in
-from netsp.exchange.maps.options import Looking, SiteOptions
+from netsp.exchange.maps.options import InspectionOptions, SiteOptions
 from netsp.exchange.maps.read_map import import_site
 from netsp.exchange.maps.selection import Selection
 
@@ -160,8 +160,8 @@ def test_goals_about_obstacles_are_chosen_by_any_folder(layer, count, tmp_path):
     text = kml(
         folder("site", START, piles, folder("Walls", mark("W", area(30, 0))), tag="Document")
     )
-    look = Looking(viewpoints=4, standoff=1.0, chosen=Selection.parse([("layer", layer)]))
-    found = imported(tmp_path / "s.kml", text, looking=look)
+    look = InspectionOptions(viewpoints=4, standoff=1.0, chosen=Selection.parse([("layer", layer)]))
+    found = imported(tmp_path / "s.kml", text, inspection=look)
     assert len(found.problem.goals) == 1 + count
 
 

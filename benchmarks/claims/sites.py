@@ -184,7 +184,7 @@ def spellings() -> tuple[str, bool]:
 def chart() -> tuple[str, bool]:
     """Import of the chart of docs/sites.md, and a proven tour of its piers."""
     from netsp import Status, solve, verify
-    from netsp.exchange.maps.options import Looking, SiteOptions
+    from netsp.exchange.maps.options import InspectionOptions, SiteOptions
     from netsp.exchange.maps.projection import Projection
     from netsp.exchange.maps.read_map import import_site
     from netsp.exchange.maps.selection import Selection
@@ -195,7 +195,7 @@ def chart() -> tuple[str, bool]:
         return ABSENT, True
     options = SiteOptions(
         tether=150.0, radius=1.0, line_width=1.0, floor=True,
-        looking=Looking(1, 3.0, chosen=Selection.parse([("layer", "SLCONS")])),
+        inspection=InspectionOptions(1, 3.0, chosen=Selection.parse([("layer", "SLCONS")])),
     )  # fmt: skip
     begin = time.process_time()
     found = import_site(file, Projection(25.77854, -80.18550), options=options)

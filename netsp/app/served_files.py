@@ -246,15 +246,17 @@ def imported(
 def _site(
     file: Path, notes: list[str], tether_length: float | None, answers: ImportAnswers
 ) -> Problem:
-    from netsp.exchange.maps.options import Looking, SiteOptions
+    from netsp.exchange.maps.options import InspectionOptions, SiteOptions
     from netsp.exchange.maps.projection import Projection
     from netsp.exchange.maps.read_map import import_site
     from netsp.roadmap.reachable_goals import UNREACHED, keep_reachable_goals, unreached_note
 
     about = Projection.parse(answers.base, name="base") if answers.base else None
     makes_viewpoints = answers.viewpoints is not None and answers.standoff is not None
-    looking = (
-        Looking(answers.viewpoints or 1, answers.standoff or 0.0) if makes_viewpoints else None
+    inspection = (
+        InspectionOptions(answers.viewpoints or 1, answers.standoff or 0.0)
+        if makes_viewpoints
+        else None
     )
     options = SiteOptions(
         tether=answers.tether,
@@ -262,7 +264,7 @@ def _site(
         line_width=answers.line_width,
         crs=answers.crs,
         units=answers.units,
-        looking=looking,
+        inspection=inspection,
     )
     try:
         found = import_site(file, about, options=options)

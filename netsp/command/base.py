@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     problem = clock.bounded("reading the problem", lambda: Problem.load(args.problem))
     names: list[str | None] | None = None
     if args.candidates:
-        places, names = from_table(args.candidates, Projection.of(problem), messages.note)
+        places, names = from_table(args.candidates, Projection.for_problem(problem), messages.note)
     elif args.line:
         places = along_line(args.line)
     else:

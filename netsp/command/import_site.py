@@ -15,7 +15,7 @@ from netsp.command.types import check_writable, depth, length, option, positive
 if TYPE_CHECKING:
     import shapely
 
-    from netsp.exchange.maps.options import Looking
+    from netsp.exchange.maps.options import InspectionOptions
     from netsp.exchange.maps.read_map import ImportedSite
     from netsp.exchange.maps.sea_floor import SeaFloor
     from netsp.model.problem import Problem
@@ -380,7 +380,7 @@ def _of_map(args: argparse.Namespace) -> ImportedSite:
         crs=args.crs,
         units=args.units,
         maps=args.map,
-        looking=_looking(args),
+        inspection=_inspection(args),
         skip_unreachable=args.skip_unreachable,
         line_width=args.line_width,
         crop=args.crop,
@@ -394,9 +394,9 @@ def _of_map(args: argparse.Namespace) -> ImportedSite:
     return import_site(args.site, projection, options=options)
 
 
-def _looking(args: argparse.Namespace) -> Looking | None:
+def _inspection(args: argparse.Namespace) -> InspectionOptions | None:
     """Return how to inspect obstacles; None without --inspect."""
-    from netsp.exchange.maps.options import Looking
+    from netsp.exchange.maps.options import InspectionOptions
     from netsp.exchange.maps.selection import Selection
 
     if args.inspect is None:
@@ -410,4 +410,4 @@ def _looking(args: argparse.Namespace) -> Looking | None:
         depths = tuple(0.0 - abs(float(d)) for d in args.depths.split(","))
     except ValueError:
         raise InputError(f"--depths: expected numbers with commas, got {args.depths!r}") from None
-    return Looking(args.inspect, args.standoff, depths, Selection.parse(args.of))
+    return InspectionOptions(args.inspect, args.standoff, depths, Selection.parse(args.of))

@@ -149,7 +149,7 @@ FIELDS = {
 """Properties of the contract with their names in files; `--map` adds other names."""
 
 
-def words_of(maps: Sequence[tuple[str, str]]) -> tuple[dict[str, str], dict[str, str]]:
+def parse_mappings(maps: Sequence[tuple[str, str]]) -> tuple[dict[str, str], dict[str, str]]:
     """Return the kinds of layers and the names of properties that the user states.
 
     Parameters

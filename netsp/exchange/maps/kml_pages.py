@@ -78,7 +78,7 @@ def read_kml(file: str | Path, crs: str | None = None, policy: ReadPolicy = DEFA
     reader = _Reader(file, degrees=crs is None, policy=policy)
     reader.seen.add(f"\n{Path(file).resolve()}")
     if zipfile.is_zipfile(file):
-        archive = _Archive.of(file)
+        archive = _Archive.open(file)
         reader.read_archive(archive, archive.main, (), folder=Path(file).parent)
     else:
         data = read_bytes(file)
@@ -98,7 +98,7 @@ class _Archive:
     main: str
 
     @classmethod
-    def of(cls, file: str | Path, data: bytes | None = None) -> _Archive:
+    def open(cls, file: str | Path, data: bytes | None = None) -> _Archive:
         raw = read_bytes(file) if data is None else data
         try:
             archive = zipfile.ZipFile(io.BytesIO(raw))
@@ -352,7 +352,7 @@ class _Reader:
         file = Path(path)
         data = read_bytes(file)
         if zipfile.is_zipfile(io.BytesIO(data)):
-            inner = _Archive.of(file, data)
+            inner = _Archive.open(file, data)
             self.read_archive(inner, inner.main, folders, file.parent)
         else:
             self.read_page(_Page(href, data, file.parent), folders, is_root=False)

@@ -13,7 +13,7 @@ from netsp.exchange.maps.selection import Selection
 
 
 @dataclass(frozen=True)
-class Looking:
+class InspectionOptions:
     """Inspection of every obstacle (`netsp.model.shorthand.Inspection`).
 
     Attributes
@@ -54,7 +54,7 @@ class SiteOptions:
         earth; None for the unit that the file states, or metres.
     maps
         Kinds of layers and names of properties: ``("obstacle", layer)``, ``("name", property)``.
-    looking
+    inspection
         Inspection of obstacles.
     skip_unreachable
         Whether goals farther from the base than the tether is long are left out.
@@ -86,7 +86,7 @@ class SiteOptions:
     crs: str | None = None
     units: str | None = None
     maps: Sequence[tuple[str, str]] = ()
-    looking: Looking | None = None
+    inspection: InspectionOptions | None = None
     skip_unreachable: bool = False
     line_width: float | None = None
     join_tolerance: float = 0.01

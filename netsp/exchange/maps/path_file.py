@@ -109,7 +109,7 @@ def read_paths(
 
 
 def _to_plane(problem: Problem, latlon: Sequence[tuple[float, float]], where: str) -> Floats:
-    projection = Projection.of(problem)
+    projection = Projection.for_problem(problem)
     if projection is None:
         raise InputError(
             f"{where}: positions are in degrees, and the problem has no origin; expected an origin "
@@ -380,7 +380,7 @@ def path_to_geojson(name: str, points: Floats, problem: Problem) -> str:
     str
         FeatureCollection with one LineString; its member "frame" is "local" without an origin.
     """
-    projection = Projection.of(problem)
+    projection = Projection.for_problem(problem)
     xy = np.asarray(points, dtype=float)
     rows = xy.copy()
     if projection is not None:

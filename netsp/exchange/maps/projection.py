@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Floats
+from netsp.base.deprecated import deprecated_method
 from netsp.base.errors import InputError
 from netsp.base.field_types import checked_argument
 from netsp.base.validated import shown
@@ -83,12 +84,14 @@ class Projection:
         return cls(numbers[0], numbers[1], numbers[2] if len(numbers) == 3 else 0.0, base, name)
 
     @classmethod
-    def of(cls, problem: Problem) -> Projection | None:
+    def for_problem(cls, problem: Problem) -> Projection | None:
         """Return the projection around the base of a problem; None if the problem has no origin."""
         if problem.origin is None:
             return None
         o = problem.origin
         return cls(o.latitude, o.longitude, o.heading, problem.base[:2])
+
+    of = deprecated_method("of", "for_problem")
 
     @cached_property
     def _transform(self) -> Any:

@@ -18,6 +18,7 @@ from pydantic import ValidationError
 
 from netsp.base import progress
 from netsp.base.axes import UNITS, column
+from netsp.base.deprecated import renamed_parameters
 from netsp.base.errors import InputError, UnansweredError, counted
 from netsp.base.field_types import checked_number
 from netsp.base.geometry.polygons import union
@@ -49,7 +50,7 @@ from netsp.exchange.maps.contract import (
     Decision,
     is_coastline,
     kind_of,
-    words_of,
+    parse_mappings,
 )
 from netsp.exchange.maps.crop import CropWindow, cropped
 from netsp.exchange.maps.csv_table import from_table
@@ -187,7 +188,7 @@ def import_site(
     options = options or SiteOptions()
     if options.units is not None and options.units not in UNITS:
         raise InputError(f"units: expected one of {', '.join(UNITS)}, got {shown(options.units)}")
-    kinds, fields = words_of(options.maps)
+    kinds, fields = parse_mappings(options.maps)
     found = read_map(file, options.crs, options.units, options.policy)
     for layer in kinds:
         if layer not in found.layer_names and layer not in SHAPE_LAYERS:
@@ -213,6 +214,7 @@ def import_site(
     )
 
 
+@renamed_parameters(looking="inspection")
 def read_site(
     file: str | Path,
     projection: Projection | None = None,
@@ -371,7 +373,7 @@ class _Site:
         self.viewpoints = [str(goal["name"]) for goal in goals if "layer" in goal]
         if not goals and not self.complaints:
             self._complain_of_no_goal()
-        elif not goals and self.options.looking is None:
+        elif not goals and self.options.inspection is None:
             self.asks.append("inspect")  # so that all is answered at once
         if tether is not None:
             self._check_scale(goals, obstacles, anchor, tether)
@@ -993,7 +995,10 @@ class _Site:
         goals: list[dict[str, Any]] = []
         chosen = self._chosen(obstacles)
         for k, obstacle in enumerate(obstacles):
-            feature, inspection = obstacle["feature"], self.options.looking if k in chosen else None
+            feature, inspection = (
+                obstacle["feature"],
+                self.options.inspection if k in chosen else None,
+            )
             stated = feature.get("viewpoints", "inspect")
             if stated is None and inspection is None:
                 continue
@@ -1022,7 +1027,7 @@ class _Site:
                 {**g, "where": feature.where, "layer": feature.layer}
                 for g in parsed.goals(obstacle)
             ]
-        if self.options.looking is not None:
+        if self.options.inspection is not None:
             goals = self._free_viewpoints(goals, obstacles, anchor, tether, clearance)
         return goals
 
@@ -1030,7 +1035,7 @@ class _Site:
         """Return the indices of the obstacles that the user wants to inspect."""
         import shapely
 
-        inspection = self.options.looking
+        inspection = self.options.inspection
         if inspection is None:
             return set()
         rule = inspection.chosen
@@ -1048,10 +1053,10 @@ class _Site:
             for k, obstacle in enumerate(obstacles)
             if (rule.layers or not self._is_shallow(obstacle["feature"]))
             and any(
-                rule.takes(layer, self._name(obstacle["feature"]) or obstacle["name"])
+                rule.matches(layer, self._name(obstacle["feature"]) or obstacle["name"])
                 for layer in (obstacle["feature"].layer, *obstacle["feature"].folders)
             )
-            and rule.holds(_shape(obstacle), areas)
+            and rule.is_in_boxes(_shape(obstacle), areas)
         }
         if not found and obstacles:
             layers = dict.fromkeys(obstacle["feature"].layer for obstacle in obstacles)

@@ -37,7 +37,7 @@ class Selection:
     Examples
     --------
     >>> chosen = Selection.parse([("layer", "SLCONS"), ("name", "Pier *")])
-    >>> chosen.takes("slcons", "Pier 3"), chosen.takes("slcons", None)
+    >>> chosen.matches("slcons", "Pier 3"), chosen.matches("slcons", None)
     (True, False)
     """
 
@@ -61,23 +61,23 @@ class Selection:
                     f"--of: expected one of {', '.join(WORDS)} before the =, got {shown(word)}"
                 )
 
-        def of(word: str) -> list[str]:
-            return [value for own, value in rules if own == word]
+        def values(word: str) -> list[str]:
+            return [value for rule, value in rules if rule == word]
 
         return cls(
-            tuple(v.lower() for v in of("layer")),
-            tuple(v.lower() for v in of("name")),
-            tuple(_box("box", v, "XMIN,YMIN,XMAX,YMAX") for v in of("box")),
-            tuple(_box("earth", v, "SOUTH,WEST,NORTH,EAST") for v in of("earth")),
+            tuple(v.lower() for v in values("layer")),
+            tuple(v.lower() for v in values("name")),
+            tuple(_box("box", v, "XMIN,YMIN,XMAX,YMAX") for v in values("box")),
+            tuple(_box("earth", v, "SOUTH,WEST,NORTH,EAST") for v in values("earth")),
         )
 
-    def takes(self, layer: str, name: str | None) -> bool:
+    def matches(self, layer: str, name: str | None) -> bool:
         """Return whether layer and name of a feature fit."""
         return (not self.layers or _fits(layer, self.layers)) and (
             not self.names or (name is not None and _fits(name, self.names))
         )
 
-    def holds(self, shape: shapely.Geometry, areas: Sequence[shapely.Geometry]) -> bool:
+    def is_in_boxes(self, shape: shapely.Geometry, areas: Sequence[shapely.Geometry]) -> bool:
         """Return whether a shape lies in or across one of the boxes; True without boxes.
 
         Parameters

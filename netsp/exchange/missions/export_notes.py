@@ -13,7 +13,7 @@ from netsp.exchange.missions.mission_files import (
     ExportSettings,
     fence_of_points,
     not_written,
-    told_apart,
+    with_distinct_holds,
 )
 from netsp.exchange.missions.waypoints import Waypoint
 from netsp.model.problem import Problem
@@ -69,7 +69,7 @@ def export_notes(
 
 def bend_note(points: list[Waypoint], settings: ExportSettings) -> str | None:
     """Return a note if the vehicle holds longer at bends than the settings state, else None."""
-    seconds = told_apart(points, settings).bend_hold_s
+    seconds = with_distinct_holds(points, settings).bend_hold_s
     if seconds <= settings.bend_hold_s:
         return None
     return (

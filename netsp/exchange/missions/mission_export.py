@@ -24,7 +24,7 @@ from netsp.exchange.missions.mission_files import (
     FORMATS,
     ExportSettings,
     check_settings,
-    told_apart,
+    with_distinct_holds,
     write_page,
 )
 from netsp.exchange.missions.waypoints import TURN_TOLERANCE, Waypoint, turn
@@ -118,8 +118,9 @@ def export_mission(
         _check_free(field, path, share * acceptance)
         longest = max(longest, _checked(context, points, path, share == 0.0))
     sunk = [_sunk(p, surface) for p in points]
-    settings = told_apart(sunk, settings)
-    write_page(file, kind, FORMATS[kind](_stand_in(mission, surface), sunk, projection, settings))
+    settings = with_distinct_holds(sunk, settings)
+    problem = _problem_of_mission(mission, surface)
+    write_page(file, kind, FORMATS[kind](problem, sunk, projection, settings))
     room = float(field.distance(polylines.dense(line, 0.05)).min())
     return Exported(sunk, longest, room)
 
@@ -227,7 +228,7 @@ def _sunk(p: Waypoint, surface: float) -> Waypoint:
     return replace(p, position=(x, y, z - surface))
 
 
-def _stand_in(mission: Mission, surface: float) -> Problem:
+def _problem_of_mission(mission: Mission, surface: float) -> Problem:
     """Return a problem with the mission's places, from which formats take names and the base."""
     x, y, z = mission.start
     goals = tuple(

@@ -73,7 +73,7 @@ class ExportSettings:
         Hold at goals, whole seconds; None for the waypoint's own, or the policy's.
     bend_hold_s
         Hold at bends, at the start and at the end, whole seconds, at least 1; longer if the vehicle
-        holds that long at a goal (`told_apart`).
+        holds that long at a goal (`with_distinct_holds`).
     speed
         Speed, m/s; None leaves it to the vehicle.
     max_waypoints
@@ -133,7 +133,7 @@ def export(
     acceptance = checked_argument("acceptance", acceptance, 0.0)
     settings = settings or ExportSettings()
     check_settings(kind, settings)
-    projection = projection or Projection.of(problem)
+    projection = projection or Projection.for_problem(problem)
     if projection is None and kind != "csv":
         raise InputError(
             f"origin: format {kind!r} needs latitude and longitude of the base; expected --origin "
@@ -141,7 +141,7 @@ def export(
         )
     path = waypoints_of(problem, solution, acceptance, settings.policy)
     points = [start_of(problem, solution), *path]
-    settings = told_apart(points, settings)
+    settings = with_distinct_holds(points, settings)
     if len(points) > settings.max_waypoints and kind in FOR_VEHICLES:
         raise InputError(
             f"solution: needs {len(points)} waypoints, and the vehicle takes "
@@ -210,7 +210,7 @@ def predicted_s(
     """
     if settings.speed is None:
         return None
-    distinct = told_apart(points, settings)
+    distinct = with_distinct_holds(points, settings)
     holds = [_hold(p, distinct) for p in points]
     places = [(*p.position[:2], altitude(p.position[2], settings.policy)) for p in points]
     return holds[0] + sum(leg_times(places, holds, settings.speed, motion))
@@ -240,7 +240,7 @@ def altitude(z: float, policy: ExportPolicy = DEFAULT_EXPORT) -> float:
     return round(min(z, -policy.min_depth), 3)
 
 
-def told_apart(points: Sequence[Waypoint], settings: ExportSettings) -> ExportSettings:
+def with_distinct_holds(points: Sequence[Waypoint], settings: ExportSettings) -> ExportSettings:
     """Return the settings with a hold at bends that differs from the hold at every goal.
 
     An import tells goals from bends by these times, because a ground station keeps no other mark of

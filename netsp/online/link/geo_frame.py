@@ -47,7 +47,7 @@ class Frame:
         if kind not in (None, "local", "global"):
             raise InputError(f"--frame: expected local or global, got {kind!r}")
         self.site, self.is_given = site, kind is not None
-        projection = Projection.of(site) if isinstance(site, Problem) else None
+        projection = Projection.for_problem(site) if isinstance(site, Problem) else None
         if kind == "global" and projection is None:
             raise InputError("--frame: global needs an origin, and the site has none")
         self.projection = None if kind == "local" else projection
