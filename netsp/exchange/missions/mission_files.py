@@ -376,11 +376,11 @@ def _wpl(
     places = projection.to_earth([p.position[:2] for p in points])
     for p, (lat, lon) in zip(points, places, strict=True):
         head = (len(rows), 0, FRAME_RELATIVE_ALTITUDE, NAV_WAYPOINT)
-        params = (_hold(p, settings), 0, 0, p.heading or 0)
+        params: list[Any] = [_hold(p, settings), 0, 0, p.heading or 0]
         z = altitude(p.position[2], settings.policy)
         rows.append([*head, *params, _degrees(lat), _degrees(lon), z, 1])
         if len(rows) == 2 and settings.speed is not None:
-            params = (GROUND_SPEED, settings.speed, KEEP_THROTTLE, 0)
+            params = [GROUND_SPEED, settings.speed, KEEP_THROTTLE, 0]
             rows.append([2, 0, FRAME_MISSION, DO_CHANGE_SPEED, *params, 0, 0, 0, 1])
     return "QGC WPL 110\n" + "".join("\t".join(map(_cell, r)) + "\n" for r in rows)
 
