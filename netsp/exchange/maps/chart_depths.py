@@ -170,59 +170,80 @@ def chart_floor(
     InputError
         The chart gives no depth within the window, or the floor would have too many cells.
     """
-    found = FloorFeatures()
-    areas: list[DepthArea] = []
-    contours: list[Floats] = [np.empty((0, 3))]
-    soundings: list[Floats] = [np.empty((0, 3))]
-    dangers: list[Danger] = []
-    land: list[Any] = []
+    parts = _FloorParts()
     for feature in features:
+        parts.add(feature, plane, window)
+    box = _box_of_window(window) if window is not None else parts.box()
+    side = cell if cell is not None else max(box[2] - box[0], box[3] - box[1]) / policy.floor_cells
+    floor = sea_floor(
+        parts.areas,
+        np.vstack(parts.contours),
+        parts.land,
+        box,
+        side,
+        soundings=np.vstack(parts.soundings),
+        dangers=parts.dangers,
+        policy=policy.read,
+    )
+    return floor, parts.found
+
+
+@dataclass
+class _FloorParts:
+    """Depths of a chart's features, in the problem's plane."""
+
+    found: FloorFeatures = field(default_factory=FloorFeatures)
+    areas: list[DepthArea] = field(default_factory=list)
+    contours: list[Floats] = field(default_factory=lambda: [np.empty((0, 3))])
+    soundings: list[Floats] = field(default_factory=lambda: [np.empty((0, 3))])
+    dangers: list[Danger] = field(default_factory=list)
+    land: list[Any] = field(default_factory=list)
+
+    def add(
+        self,
+        feature: Feature,
+        plane: Callable[[shapely.Geometry], Any],
+        window: CropWindow | None,
+    ) -> None:
+        """Add a feature that states depths or is land."""
         layer = feature.layer.upper()
         is_area = "Polygon" in feature.shape.geom_type
         top = sounding_depth(feature)
         is_depth = layer in (SOUNDINGS, CONTOURS) or (layer in DEPTH_AREAS and is_area)
         if not is_depth and top is None and not (layer == LAND and is_area):
-            continue
+            return
         shape = plane(feature.shape)
         if window is not None and window.is_beyond(shape):
             if is_depth or top is not None:
-                found.beyond.append(feature)
-            continue
+                self.found.beyond.append(feature)
+            return
         if layer == LAND:
-            land.append(shape)
-            continue
+            self.land.append(shape)
+            return
         if layer in DEPTH_AREAS:
-            areas.append(DepthArea(shape, *depth_range(feature)))
+            self.areas.append(DepthArea(shape, *depth_range(feature)))
         elif top is not None and not is_depth:
-            dangers.append(Danger(shape, top))
+            self.dangers.append(Danger(shape, top))
         else:
             places = _depths(feature, shape)
             if places is None:
-                found.depthless.append(feature)
-                continue
-            (soundings if layer == SOUNDINGS else contours).append(places)
-        found.used.append(feature)
-    if window is not None:
-        (x, y), r = window.center, window.radius
-        box = (x - r, y - r, x + r, y + r)
-    else:
-        if not areas:
+                self.found.depthless.append(feature)
+                return
+            (self.soundings if layer == SOUNDINGS else self.contours).append(places)
+        self.found.used.append(feature)
+
+    def box(self) -> tuple[float, float, float, float]:
+        """Return the extent of all depth areas."""
+        if not self.areas:
             raise InputError("floor: the chart has no area with depths")
-        corners = np.array([a.shape.bounds for a in areas])
+        corners = np.array([a.shape.bounds for a in self.areas])
         low, high = corners[:, :2].min(axis=0), corners[:, 2:].max(axis=0)
-        box = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
-    side = cell if cell is not None else max(box[2] - box[0], box[3] - box[1]) / policy.floor_cells
-    floor = sea_floor(
-        areas,
-        np.vstack(contours),
-        land,
-        box,
-        side,
-        soundings=np.vstack(soundings),
-        dangers=dangers,
-        policy=policy.read,
-    )
-    return floor, found
+        return (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+
+
+def _box_of_window(window: CropWindow) -> tuple[float, float, float, float]:
+    (x, y), r = window.center, window.radius
+    return (x - r, y - r, x + r, y + r)
 
 
 def _depths(feature: Feature, shape: shapely.Geometry) -> Floats | None:

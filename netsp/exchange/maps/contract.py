@@ -230,42 +230,14 @@ def kind_of(
     InputError
         No kind fits, or a feature of this kind cannot have its shape.
     """
-    shape = feature.shape.geom_type
-    stated = feature.get("kind")
-    names = [name.strip().lower() for name in (feature.layer, *feature.folders)]
-    by_layer = next((kinds[name] for name in names if name in kinds), None)
-    word = next((WORDS[w] for name in names for w in words_in(name) if w in WORDS), None)
-    by_shape = next(
-        (
-            kinds[w]
-            for w, s in SHAPE_LAYERS.items()
-            if w in kinds and w not in layers and s in shape
-        ),
-        None,
-    )
-    if by_layer is not None:
-        decision = Decision(by_layer, "as asked for")
-    elif by_shape is not None:
-        decision = Decision(by_shape, "as asked for")
-    elif stated is not None:
-        why = str(feature.get("why") or "its kind is ignore")[: policy.max_reason_length]
-        decision = Decision(stated if isinstance(stated, str) else "", why)
-    elif word is not None:
-        decision = Decision(word, "its layer is named ignore")
-    elif feature.kind:
-        decision = Decision(feature.kind)
-    elif chart:
-        of_chart = chart_kind(feature)
-        decision = Decision(of_chart.kind, of_chart.reason)
-    else:
-        decision = _by_tags(feature, shape) or _by_shape(feature, shape)
-    kind = decision.kind
+    decision = _decision(feature, kinds, chart=chart, layers=layers, policy=policy)
+    kind, shape = decision.kind, feature.shape.geom_type
     if kind == "ignore":
         return decision
     if kind not in KINDS:
         raise InputError(
             f"{feature.where}: expected a kind of {', '.join(KINDS)}, got {shape!r} of kind "
-            f"{shown(stated)}"
+            f"{shown(feature.get('kind'))}"
         )
     marked = shape if feature.marker is None else feature.marker.geom_type
     if shape not in SHAPES[kind] and marked not in SHAPES[kind]:
@@ -275,6 +247,39 @@ def kind_of(
             f"{' or '.join(SHAPES[kind])}"
         )
     return Decision(kind)
+
+
+def _decision(
+    feature: Feature,
+    kinds: Mapping[str, str],
+    *,
+    chart: bool,
+    layers: Container[str],
+    policy: ImportPolicy,
+) -> Decision:
+    """Return the decision of the first rule that matches, which may name an unknown kind."""
+    shape = feature.shape.geom_type
+    stated = feature.get("kind")
+    names = [name.strip().lower() for name in (feature.layer, *feature.folders)]
+    by_layer = next((kinds[name] for name in names if name in kinds), None)
+    if by_layer is not None:
+        return Decision(by_layer, "as asked for")
+    for word, part in SHAPE_LAYERS.items():
+        if word in kinds and word not in layers and part in shape:
+            return Decision(kinds[word], "as asked for")
+    if stated is not None:
+        why = str(feature.get("why") or "its kind is ignore")[: policy.max_reason_length]
+        return Decision(stated if isinstance(stated, str) else "", why)
+    for name in names:
+        for word in words_in(name):
+            if word in WORDS:
+                return Decision(WORDS[word], "its layer is named ignore")
+    if feature.kind:
+        return Decision(feature.kind)
+    if chart:
+        charted = chart_kind(feature)
+        return Decision(charted.kind, charted.reason)
+    return _by_tags(feature, shape) or _by_shape(feature, shape)
 
 
 def is_coastline(feature: Feature) -> bool:

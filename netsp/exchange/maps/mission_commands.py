@@ -182,11 +182,10 @@ def features_of_items(
     visits = [i for i in items if i.command in VISITED and i.lonlat is not None]
     has_marks = any(i.mark is not None for i in visits)
     is_passed = _passing_rule(visits, home, policy)
-    terrain: list[str] = []
-    above_sea = False
-    fences = [i for i in items if i.command in (*POLYGONS, *CIRCLES)]
+    goals: list[MissionItem] = []
+    is_fence = {**POLYGONS, **CIRCLES}
     for item in items:
-        if item.command in (*POLYGONS, *CIRCLES):
+        if item.command in is_fence:
             continue  # below, with the other corners of the polygon
         if item.command not in VISITED or item.lonlat is None or not _is_geographic(item):
             out.unread.append(Unread(item.where, _layer(item), _reason(item), _shape(item)))
@@ -203,32 +202,48 @@ def features_of_items(
             if has_marks
             else is_passed(item)
         )
-        z = item.place[2]
-        if item.frame in FRAMES_ABOVE_TERRAIN:
-            if not is_bend:
-                terrain.append(item.where)
-            z = None
-        elif item.frame in FRAMES_ABOVE_SEA and z is not None:
-            above_sea = above_sea or not is_bend
-            z -= home_altitude or 0.0
+        if not is_bend:
+            goals.append(item)
+        z = _height(item, home_altitude)
         out.features.append(_visited(item, (lon, lat), z, is_bend=is_bend, by_mark=has_marks))
-    passed = [f for f in out.features if f.layer == BENDS] if not has_marks else []
+    if not has_marks:
+        _note_bends(out)
+    _note_altitudes(goals, home_altitude, out)
+    _fences([i for i in items if i.command in is_fence], out)
+    return out
+
+
+def _height(item: MissionItem, home_altitude: float | None) -> float | None:
+    """Return the height of a waypoint above the water; None if it is unknown."""
+    z = item.place[2]
+    if item.frame in FRAMES_ABOVE_TERRAIN or z is None:
+        return None
+    return z - (home_altitude or 0.0) if item.frame in FRAMES_ABOVE_SEA else z
+
+
+def _note_bends(out: ItemFeatures) -> None:
+    passed = [f for f in out.features if f.layer == BENDS]
     if passed:
         out.notes.append(
             f"{counted(len(passed), 'waypoint')} passed by: taken as bends of the path; make goals "
             f"of them with --map goal={BENDS}"
         )
+
+
+def _note_altitudes(
+    goals: Sequence[MissionItem], home_altitude: float | None, out: ItemFeatures
+) -> None:
+    """Complain of altitudes above the terrain, and add a note on those above the sea."""
+    terrain = [item.where for item in goals if item.frame in FRAMES_ABOVE_TERRAIN]
     if terrain:
         out.complaints.append(
             f"{counted(len(terrain), 'waypoint')} ({terrain[0]}): altitudes above the terrain are "
             "not known without a sea floor; expected altitudes relative to home or above mean sea "
             "level"
         )
-    if above_sea:
+    if any(item.frame in FRAMES_ABOVE_SEA and item.place[2] is not None for item in goals):
         level = f"{home_altitude:g} m, the altitude of home" if home_altitude else "0"
         out.notes.append(f"altitudes above mean sea level: the water's surface is taken at {level}")
-    _fences(fences, out)
-    return out
 
 
 def _passing_rule(

@@ -149,11 +149,7 @@ def _of_table(file: str | Path, problem: Problem, stem: str, policy: ReadPolicy)
             raise InputError(f"{file}: expected {wanted}, got nothing") from None
         raise
     if not table.head:
-        notes: list[str] = []
-        points = read_path(file, notes.append)
-        if points is None:
-            raise InputError(f"{file}: expected {wanted}")
-        return FoundPath(stem, points, notes=tuple(notes))
+        return _untitled_table(file, stem, wanted)
     plane = table.pair((("x", "y"), ("longitude", "latitude")))
     if plane is None:
         raise table.wanted(wanted)
@@ -195,14 +191,28 @@ def _of_table(file: str | Path, problem: Problem, stem: str, policy: ReadPolicy)
     if up == "z":
         table.check_depths(points[:, 2])
     if is_global:
-        wrong = np.flatnonzero((np.abs(points[:, 0]) > 180.0) | (np.abs(points[:, 1]) > 90.0))
-        if len(wrong):
-            raise InputError(
-                f"{file}: point {wrong[0]}: expected degrees, lon within 180 and lat within 90, "
-                f"got {points[wrong[0], 0]:g}, {points[wrong[0], 1]:g}"
-            )
-        points[:, :2] = _to_plane(problem, [(b, a) for a, b in points[:, :2]], str(file))
+        _project(points, problem, file)
     return FoundPath(stem, points, np.array(times) if times else None, tuple(notes))
+
+
+def _untitled_table(file: str | Path, stem: str, wanted: str) -> FoundPath:
+    """Return the path of a table without titles of columns."""
+    notes: list[str] = []
+    points = read_path(file, notes.append)
+    if points is None:
+        raise InputError(f"{file}: expected {wanted}")
+    return FoundPath(stem, points, notes=tuple(notes))
+
+
+def _project(points: Floats, problem: Problem, file: str | Path) -> None:
+    """Replace longitude and latitude in the first two columns by x and y."""
+    wrong = np.flatnonzero((np.abs(points[:, 0]) > 180.0) | (np.abs(points[:, 1]) > 90.0))
+    if len(wrong):
+        raise InputError(
+            f"{file}: point {wrong[0]}: expected degrees, lon within 180 and lat within 90, "
+            f"got {points[wrong[0], 0]:g}, {points[wrong[0], 1]:g}"
+        )
+    points[:, :2] = _to_plane(problem, [(b, a) for a, b in points[:, :2]], str(file))
 
 
 def _is_gap(table: Table, row: int, quantities: list[Quantity], *, is_global: bool) -> bool:

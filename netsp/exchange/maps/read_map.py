@@ -1156,8 +1156,8 @@ class _Site:
             return None, []
         if len(whole) > 1 and all(f.get("fence") == "inclusion" for f in features):
             common = shapely.intersection_all(list(map(shapely.make_valid, whole)))
-            areas_in = [g for g in shapely.get_parts(common) if g.geom_type == "Polygon"]
-            whole = [shapely.MultiPolygon(areas_in)]
+            parts = [g for g in shapely.get_parts(common) if g.geom_type == "Polygon"]
+            whole = [shapely.MultiPolygon(parts)]
             self.notes.append(
                 f"{len(features)} inclusion fences ({places}): the bounds are where all of them "
                 "overlap, because the vehicle stays within each"
@@ -1172,8 +1172,15 @@ class _Site:
                 "; --map ignore=LAYER leaves out a layer",
             )
             return None, []
-        feature = features[0]
-        drawn = shapely.get_parts(whole[0])
+        return self._bounds_of(features[0], whole[0])
+
+    def _bounds_of(
+        self, feature: Feature, area: shapely.Geometry
+    ) -> tuple[list[list[float]] | None, list[Any]]:
+        """Return the outline of an area, and its holes as islands."""
+        import shapely
+
+        drawn = shapely.get_parts(area)
         holes = [shapely.Polygon(ring) for part in drawn for ring in part.interiors]
         filled = shapely.MultiPolygon([shapely.Polygon(part.exterior) for part in drawn])
         polygons, notes = simple_polygons(filled, lambda p: False)

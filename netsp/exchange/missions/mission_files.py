@@ -34,7 +34,7 @@ from netsp.exchange.missions.fence import Fence, FencePolicy, fence_of
 from netsp.exchange.missions.kml import kml_of, kmz_of
 from netsp.exchange.missions.leg_times import VehicleMotion, leg_times
 from netsp.exchange.missions.waypoints import Waypoint, waypoints_of
-from netsp.model.problem import Circle, Problem
+from netsp.model.problem import Circle, Polygon, Problem
 from netsp.model.solution import Solution
 from netsp.plan.tour_plan import HOME
 
@@ -417,53 +417,54 @@ def _geojson(
     del settings
     assert projection is not None
 
-    def lonlat(xy: Any, z: float | None = None) -> list[float]:
-        ((lat, lon),) = projection.to_earth([xy])
-        return [_degrees(lon), _degrees(lat)] + ([] if z is None else [z])
-
-    def feature(kind: str, shape: str, coordinates: Any, **more: Any) -> dict[str, Any]:
-        properties = {"kind": kind, **{k: v for k, v in more.items() if v is not None}}
-        return {
-            "type": "Feature",
-            "properties": properties,
-            "geometry": {"type": shape, "coordinates": coordinates},
-        }
-
-    visits = {p.goal: (n, p) for n, p in enumerate(q for q in points if q.goal not in (None, HOME))}
     features = [
-        feature(
+        _feature(
             "base",
             "Point",
-            lonlat(problem.base[:2], problem.base[2]),
+            _lonlat(projection, problem.base),
             tether_length=problem.tether_length,
             clearance=problem.clearance,
             heading=projection.heading or None,
         )
     ]
+    visits = {p.goal: (n, p) for n, p in enumerate(q for q in points if q.goal not in (None, HOME))}
     for k, goal in enumerate(problem.goals):
         visit, point = visits.get(k, (None, None))
         features.append(
-            feature(
+            _feature(
                 "goal",
                 "Point",
-                lonlat(goal.position[:2], goal.position[2]),
+                _lonlat(projection, goal.position),
                 name=goal.name,
                 visit=None if visit is None else visit + 1,
                 tether_length=None if point is None else point.tether,
                 signature=None if point is None else list(point.word),
             )
         )
-    for o in problem.obstacles:
-        if isinstance(o, Circle):
-            features.append(
-                feature("obstacle", "Point", lonlat(o.center), radius_m=o.radius, name=o.name)
-            )
-        else:
-            ring = [lonlat(c) for c in _counter_clockwise(o.polygon)]
-            features.append(feature("obstacle", "Polygon", [[*ring, ring[0]]], name=o.name))
-    line = [lonlat(p.position[:2], p.position[2]) for p in points]
-    features.append(feature("path", "LineString", line))
+    features += [_obstacle_feature(o, projection) for o in problem.obstacles]
+    line = [_lonlat(projection, p.position) for p in points]
+    features.append(_feature("path", "LineString", line))
     return json.dumps({"type": "FeatureCollection", "features": features}, allow_nan=False) + "\n"
+
+
+def _lonlat(projection: Projection, place: Sequence[float]) -> list[float]:
+    """Return longitude and latitude of (x, y), or of (x, y, z) with its height."""
+    ((lat, lon),) = projection.to_earth([place[:2]])
+    return [_degrees(lon), _degrees(lat), *place[2:]]
+
+
+def _feature(kind: str, shape: str, coordinates: Any, **properties: Any) -> dict[str, Any]:
+    known = {"kind": kind, **{k: v for k, v in properties.items() if v is not None}}
+    geometry = {"type": shape, "coordinates": coordinates}
+    return {"type": "Feature", "properties": known, "geometry": geometry}
+
+
+def _obstacle_feature(obstacle: Circle | Polygon, projection: Projection) -> dict[str, Any]:
+    if isinstance(obstacle, Circle):
+        center = _lonlat(projection, obstacle.center)
+        return _feature("obstacle", "Point", center, radius_m=obstacle.radius, name=obstacle.name)
+    ring = [_lonlat(projection, c) for c in _counter_clockwise(obstacle.polygon)]
+    return _feature("obstacle", "Polygon", [[*ring, ring[0]]], name=obstacle.name)
 
 
 def _counter_clockwise(corners: Any) -> Any:
