@@ -107,28 +107,11 @@ def read_occupancy(
         )
     values, alpha = _values(image, policy.read.max_image_cells)
     note = on_note or (lambda text: None)
-    occupied, unknown = _kinds(values, alpha, map_file)
-    if alpha is not None:
-        clear = counted(int((alpha < 255.0).sum()), "cell")
-        note(
-            f"{clear} not opaque: unknown, as map_server reads the mode scale"
-            if map_file.mode == "scale"
-            else f"its alpha channel is averaged in, as map_server reads the mode trinary; {clear} "
-            "not opaque"
-        )
-    if unknown.any():
-        taken = "free" if unknown_is_free else "obstacles"
-        note(f"{counted(int(unknown.sum()), 'cell')} that the map does not know: taken as {taken}")
-        if not unknown_is_free:
-            occupied = occupied | unknown
+    occupied = _occupied(values, alpha, map_file, note, unknown_is_free=unknown_is_free)
     points = [base, *(_place(g) for g in goals)]
     polygons, cell_notes = _polygons(occupied, map_file, slack, points, policy)
     for text in cell_notes:
         note(text)
-    rows, columns = values.shape
-    corners = [(0.0, 0.0), (columns, 0.0), (columns, rows), (0.0, rows)]
-    outline = [_apply(_placing(map_file, 0), c, r) for c, r in corners]
-    straight = map_file.origin[2] == 0.0
     try:
         return Problem.model_validate(
             {
@@ -141,11 +124,44 @@ def read_occupancy(
                 "obstacles": [
                     {"polygon": _corners(p), "name": f"W{k}"} for k, p in enumerate(polygons, 1)
                 ],
-                "bounds": [*outline[0], *outline[2]] if straight else outline,
+                "bounds": _bounds(map_file, values.shape),
             }
         )
     except ValidationError as error:
         raise InputError(f"{file}: {explain(error)}") from None
+
+
+def _occupied(
+    values: Floats,
+    alpha: Floats | None,
+    map_file: MapFile,
+    note: Callable[[str], None],
+    *,
+    unknown_is_free: bool,
+) -> Bools:
+    """Return a mask of the cells that are obstacles, and note assumptions."""
+    occupied, unknown = _kinds(values, alpha, map_file)
+    if alpha is not None:
+        clear = counted(int((alpha < 255.0).sum()), "cell")
+        note(
+            f"{clear} not opaque: unknown, as map_server reads the mode scale"
+            if map_file.mode == "scale"
+            else f"its alpha channel is averaged in, as map_server reads the mode trinary; {clear} "
+            "not opaque"
+        )
+    if not unknown.any():
+        return occupied
+    kind = "free" if unknown_is_free else "obstacles"
+    note(f"{counted(int(unknown.sum()), 'cell')} that the map does not know: taken as {kind}")
+    return occupied if unknown_is_free else occupied | unknown
+
+
+def _bounds(map_file: MapFile, shape: tuple[int, ...]) -> list[Any]:
+    """Return the edge of an image: two corners of a box, or four of a turned one."""
+    rows, columns = shape
+    corners = [(0.0, 0.0), (columns, 0.0), (columns, rows), (0.0, rows)]
+    outline = [_apply(_placing(map_file, 0), c, r) for c, r in corners]
+    return [*outline[0], *outline[2]] if map_file.origin[2] == 0.0 else outline
 
 
 def _place(goal: Any) -> Any:

@@ -350,16 +350,7 @@ class _Site:
         candidates = [
             place for _, place in self._table_places("candidate", self.options.candidates)
         ]
-        reach = None
-        if tether is not None:
-            reach = CropWindow.about(
-                [anchor, *candidates],
-                tether + clearance,
-                self.options.crop_margin,
-                self.policy.outlines,
-            )
-        if self.is_chart if self.options.crop is None else self.options.crop:
-            self.window = reach
+        reach = self._reach([anchor, *candidates], tether, clearance)
         if self.is_chart:
             places = {"base": anchor, **{_label(goal): goal["position"] for goal in goals}}
             self._chart_depths(parts, places, reach)
@@ -371,10 +362,8 @@ class _Site:
         goals += self._inspections(obstacles, anchor, tether, clearance)
         self._check_names(goals, "goals")
         self.viewpoints = [str(goal["name"]) for goal in goals if "layer" in goal]
-        if not goals and not self.complaints:
+        if not goals:
             self._complain_of_no_goal()
-        elif not goals and self.options.inspection is None:
-            self.asks.append("inspect")  # so that all is answered at once
         if tether is not None:
             self._check_scale(goals, obstacles, anchor, tether)
             goals = self._within_reach(goals, anchor, tether)
@@ -401,6 +390,16 @@ class _Site:
             goals,
             obstacles,
         )
+
+    def _reach(self, bases: list[Any], tether: float | None, clearance: float) -> CropWindow | None:
+        """Return the window of the tether's reach; the map is cropped to it if it should be."""
+        if tether is None:
+            return None
+        margin = self.options.crop_margin
+        reach = CropWindow.about(bases, tether + clearance, margin, self.policy.outlines)
+        if self.is_chart if self.options.crop is None else self.options.crop:
+            self.window = reach
+        return reach
 
     def _made(self, data: dict[str, Any], goals: list[Any], obstacles: list[Any]) -> Problem:
         """Return the problem of checked data; its errors name features of the map."""
@@ -979,6 +978,10 @@ class _Site:
             )
 
     def _complain_of_no_goal(self) -> None:
+        if self.complaints:
+            if self.options.inspection is None:
+                self.asks.append("inspect")  # so that all is answered at once
+            return
         self._complain(
             "has no goal; expected a point without radius_m, a layer of goals, a table of goals, "
             "or obstacles to inspect",
