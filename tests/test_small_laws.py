@@ -816,7 +816,7 @@ AREA = shapely.box(0, 0, 1, 1)
     ],
 )
 def test_the_first_rule_that_fits_decides_what_a_feature_is(what, kinds, chart, kind):
-    decision = kind_of(what, kinds, chart=chart)
+    decision = kind_of(what, kinds, is_chart=chart)
     assert decision.kind == kind
     assert bool(decision.reason) == (kind == "ignore")
 
@@ -830,7 +830,7 @@ def test_the_first_rule_that_fits_decides_what_a_feature_is(what, kinds, chart, 
 )  # fmt: skip
 def test_a_feature_of_an_impossible_kind_is_refused(what):
     with pytest.raises(InputError, match=r"features\[0\]"):
-        kind_of(what, {}, chart=False)
+        kind_of(what, {}, is_chart=False)
 
 
 def test_what_the_user_says_of_layers_and_columns_is_kept_apart():

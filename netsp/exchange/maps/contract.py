@@ -205,7 +205,7 @@ def kind_of(
     feature: Feature,
     kinds: Mapping[str, str],
     *,
-    chart: bool,
+    is_chart: bool,
     layers: Container[str] = (),
     policy: ImportPolicy = DEFAULT_IMPORT,
 ) -> Decision:
@@ -215,7 +215,7 @@ def kind_of(
     ----------
     kinds : mapping
         Kinds that the user states, by layer or word of `SHAPE_LAYERS`, in lower case.
-    chart : bool
+    is_chart : bool
         Whether the map is an S-57 chart, whose object classes decide.
     layers : container of str
         Names of the map's layers, in lower case; a word of `SHAPE_LAYERS` among them is a layer.
@@ -230,7 +230,7 @@ def kind_of(
     InputError
         No kind fits, or a feature of this kind cannot have its shape.
     """
-    decision = _decision(feature, kinds, chart=chart, layers=layers, policy=policy)
+    decision = _decision(feature, kinds, is_chart=is_chart, layers=layers, policy=policy)
     kind, shape = decision.kind, feature.shape.geom_type
     if kind == "ignore":
         return decision
@@ -253,7 +253,7 @@ def _decision(
     feature: Feature,
     kinds: Mapping[str, str],
     *,
-    chart: bool,
+    is_chart: bool,
     layers: Container[str],
     policy: ImportPolicy,
 ) -> Decision:
@@ -276,7 +276,7 @@ def _decision(
                 return Decision(WORDS[word], "its layer is named ignore")
     if feature.kind:
         return Decision(feature.kind)
-    if chart:
+    if is_chart:
         charted = chart_kind(feature)
         return Decision(charted.kind, charted.reason)
     return _by_tags(feature, shape) or _by_shape(feature, shape)

@@ -171,7 +171,7 @@ class Map:
     ----------
     features
         Features in the order of the file.
-    geographic
+    is_geographic
         Whether shapes are in degrees.
     layers
         Number of features of each layer, read or not.
@@ -188,7 +188,7 @@ class Map:
     """
 
     features: tuple[Feature, ...]
-    geographic: bool
+    is_geographic: bool
     layers: Mapping[str, int]
     complaints: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())

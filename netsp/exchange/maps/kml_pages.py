@@ -246,32 +246,35 @@ class _Reader:
         else:
             self.feature(root, position, page, called)
 
-    def feature(self, element: Element, at: _Position, page: _Page, called: str) -> None:
+    def feature(self, element: Element, position: _Position, page: _Page, called: str) -> None:
         """Read a feature: a container and its contents, a placemark, a link, or another element."""
         tag = element.tag
-        hidden = at.is_hidden or (_text(element, "visibility") or "").lower() in ("0", "false")
+        is_hidden = position.is_hidden or (_text(element, "visibility") or "").lower() in (
+            "0",
+            "false",
+        )
         if tag in CONTAINERS:
-            name = _text(element, "name") or (tag if at.folders else Path(self.file).stem)
-            inside = _Position((*at.folders, name), hidden)
+            name = _text(element, "name") or (tag if position.folders else Path(self.file).stem)
+            inside = _Position((*position.folders, name), is_hidden)
             if not len(element) or not any(c.tag in _FEATURES for c in element):
                 self.layers.setdefault(inside.layer, 0)
             for child in element:
                 self.feature(child, inside, page, called)
         elif tag == "Placemark":
-            self.placemark(element, at, called, hidden=hidden)
+            self.placemark(element, position, called, is_hidden=is_hidden)
         elif tag == "NetworkLink":
-            self.link(element, at, page)
+            self.link(element, position, page)
         elif tag in OVERLAYS:
-            self.leave_out(at, f"a {tag}, which is no shape", _box_of(element))
+            self.leave_out(position, f"a {tag}, which is no shape", _box_of(element))
         elif tag == "NetworkLinkControl":
             if element.find(".//Update") is not None:
-                self.leave_out(at, "an Update of other pages, which is not read")
+                self.leave_out(position, "an Update of other pages, which is not read")
         elif _holds(element, (*PLACES, *_FEATURES)):
-            self.leave_out(at, f"an element {tag} that KML does not have")
+            self.leave_out(position, f"an element {tag} that KML does not have")
 
-    def where(self, at: _Position) -> str:
+    def where(self, position: _Position) -> str:
         """Count a feature of a folder, and return its name in messages."""
-        layer = at.layer
+        layer = position.layer
         number = self.numbers.get(layer, 0)
         self.numbers[layer] = number + 1
         self.count += 1
@@ -282,22 +285,28 @@ class _Reader:
             )
         return f"{layer}[{number}]"
 
-    def leave_out(self, at: _Position, reason: str, shape: shapely.Geometry | None = None) -> None:
+    def leave_out(
+        self, position: _Position, reason: str, shape: shapely.Geometry | None = None
+    ) -> None:
         """Leave out a feature for a reason."""
-        self.layers[at.layer] = self.layers.get(at.layer, 0) + 1
-        self.unread.append(Unread(self.where(at), at.layer, reason, shape))
+        self.layers[position.layer] = self.layers.get(position.layer, 0) + 1
+        self.unread.append(Unread(self.where(position), position.layer, reason, shape))
 
-    def placemark(self, element: Element, at: _Position, called: str, *, hidden: bool) -> None:
+    def placemark(
+        self, element: Element, position: _Position, called: str, *, is_hidden: bool
+    ) -> None:
         """Read a placemark; the parts of a collection become features of their own."""
         geometries = [child for child in element if child.tag in GEOMETRIES]
         strays = list(_strays(element))
         for stray in strays:
-            self.leave_out(at, f"places in an element {stray.tag}, which is no geometry of KML")
+            self.leave_out(
+                position, f"places in an element {stray.tag}, which is no geometry of KML"
+            )
         if not geometries:
             if not strays:
-                self.leave_out(at, "has no geometry")
+                self.leave_out(position, "has no geometry")
             return
-        where, layer = self.where(at), at.layer
+        where, layer = self.where(position), position.layer
         properties = with_tags(_properties(element))
         several = len(geometries) > 1 or geometries[0].tag in ("MultiGeometry", "MultiTrack")
         parts = list(_parts(geometries, where if several else None))
@@ -307,7 +316,7 @@ class _Reader:
         for place, part in parts:
             name = place or where
             self.layers[layer] = self.layers.get(layer, 0) + 1
-            changes: list[str] = [HIDDEN] if hidden else []
+            changes: list[str] = [HIDDEN] if is_hidden else []
             try:
                 shape, is_above_floor = _shape(part, changes, degrees=self.degrees)
             except ShapeError as error:
@@ -324,28 +333,28 @@ class _Reader:
                     element.get("id") or "",
                     properties,
                     shape,
-                    folders=tuple(reversed(at.folders)),
+                    folders=tuple(reversed(position.folders)),
                     is_above_floor=is_above_floor,
                     kind="path" if part.tag == "Track" else "",
                 )
             )
 
-    def link(self, element: Element, at: _Position, page: _Page) -> None:
+    def link(self, element: Element, position: _Position, page: _Page) -> None:
         """Read the page of a link, or name a link that is not read."""
         holder = next((child for child in element if child.tag in ("Link", "Url")), None)
         href = (_text(holder, "href") or "").strip() if holder is not None else ""
         target = _target(href, page)
         name = _text(element, "name") or posixpath.basename(href)
         if isinstance(target, str):
-            self.leave_out(at, f"a link to {shown(href)}, {target}")
+            self.leave_out(position, f"a link to {shown(href)}, {target}")
             return
         archive, path, folder = target
         key = f"{archive.file if archive else ''}\n{path}"
         if key in self.seen:
-            self.leave_out(at, f"a link to {shown(href)}, which is read already")
+            self.leave_out(position, f"a link to {shown(href)}, which is read already")
             return
         self.seen.add(key)
-        folders = (*at.folders, name) if name else at.folders
+        folders = (*position.folders, name) if name else position.folders
         if archive is not None:
             self.read_archive(archive, str(path), folders, folder)
             return

@@ -429,7 +429,7 @@ class _Site:
                 decision = kind_of(
                     feature,
                     self.kinds,
-                    chart=self.is_chart,
+                    is_chart=self.is_chart,
                     layers=layers,
                     policy=self.policy,
                 )
@@ -564,7 +564,7 @@ class _Site:
             )
             return None
         feature = bases[0] if bases else None
-        if not self.map.geographic:
+        if not self.map.is_geographic:
             if feature is None:
                 if not self.complaints:  # a feature that is damaged may be it
                     self._complain("has no base; expected a Point of kind base")
@@ -613,7 +613,7 @@ class _Site:
         import shapely
 
         flat = shapely.force_2d(shape)
-        if not self.map.geographic:
+        if not self.map.is_geographic:
             return shapely.transform(flat, lambda c: c * self._unit)
         projection = self.projection
         assert projection is not None
@@ -651,7 +651,7 @@ class _Site:
                 "expected a depth (downwards), or the height as z of the point",
             )
             return 0.0
-        return float(place.z) * (1.0 if self.map.geographic else self._unit)
+        return float(place.z) * (1.0 if self.map.is_geographic else self._unit)
 
     def _depth(self, feature: Feature) -> float | None:
         """Return the depth in metres that a property of a feature states; None without one."""
@@ -944,7 +944,7 @@ class _Site:
         """Add a note if the depth of a feature is used and its point has another height."""
         if self.is_chart or point.geom_type != "Point" or not point.has_z:
             return
-        z = float(point.z) * (1.0 if self.map.geographic else self._unit)
+        z = float(point.z) * (1.0 if self.map.is_geographic else self._unit)
         # files write 0 where they have no height
         if z and abs(z + depth) > self.policy.max_height_gap:
             self.notes.append(
@@ -1231,7 +1231,7 @@ class _Site:
         tether: float,
     ) -> None:
         """Complain of coordinates in a plane that look like degrees, for the tether's length."""
-        if self.map.geographic or not goals:
+        if self.map.is_geographic or not goals:
             return
         places = np.array([anchor, *(g["position"] for g in goals)])[:, :2] / self._unit
         span = float(np.ptp(places * self._unit, axis=0).max())

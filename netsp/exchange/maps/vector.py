@@ -353,11 +353,11 @@ class _Found:
         self.changes += [Change(where, layer, text) for text in changes]
         return [(place, move(part)) for place, part in parts]
 
-    def map(self, geographic: bool) -> Map:
+    def map(self, is_geographic: bool) -> Map:
         """Return the map."""
         return Map(
             tuple(self.features),
-            geographic,
+            is_geographic,
             self.layers,
             tuple(self.complaints),
             notes=(*self.notes, *change_notes(self.changes)),
@@ -492,7 +492,7 @@ def in_degrees(map_: Map, crs: str, file: str | Path) -> Map:
     return replace(
         map_,
         features=tuple(features),
-        geographic=crs != LOCAL,
+        is_geographic=crs != LOCAL,
         complaints=(*map_.complaints, *complaints),
     )
 

@@ -215,7 +215,7 @@ class _Reader:
 
     data: bytes
     policy: ReadPolicy
-    at: int = 0
+    position: int = 0
 
     def __post_init__(self) -> None:
         self.changes: list[str] = []
@@ -272,20 +272,20 @@ class _Reader:
         return shapely.Point(coordinates[0])
 
     def _head(self) -> tuple[int, str, bool, bool]:
-        order = "<" if self.data[self.at] else ">"
-        (code,) = struct.unpack_from(f"{order}I", self.data, self.at + 1)
-        self.at += 5
+        order = "<" if self.data[self.position] else ">"
+        (code,) = struct.unpack_from(f"{order}I", self.data, self.position + 1)
+        self.position += 5
         has_z, has_m = bool(code & 0x80000000), bool(code & 0x40000000)
         if code & 0x20000000:  # extended: the system's number
-            self.at += 4
+            self.position += 4
         code &= 0x0FFFFFFF
         has_z |= code // 1000 in (1, 3)
         has_m |= code // 1000 in (2, 3)
         return code % 1000, order, has_z, has_m
 
     def _count(self, order: str) -> int:
-        (count,) = struct.unpack_from(f"{order}I", self.data, self.at)
-        self.at += 4
+        (count,) = struct.unpack_from(f"{order}I", self.data, self.position)
+        self.position += 4
         if count > len(self.data):
             raise ShapeError("its geometry is damaged (cut short)")
         return int(count)
@@ -294,11 +294,11 @@ class _Reader:
         return self._floats(self._count(order), size, order)
 
     def _floats(self, count: int, size: int, order: str) -> Floats:
-        end = self.at + 8 * count * size
+        end = self.position + 8 * count * size
         if end > len(self.data):
             raise ShapeError("its geometry is damaged (cut short)")
-        out = np.frombuffer(self.data, f"{order}f8", count * size, self.at).astype(float)
-        self.at = end
+        out = np.frombuffer(self.data, f"{order}f8", count * size, self.position).astype(float)
+        self.position = end
         return out.reshape(count, size)
 
 

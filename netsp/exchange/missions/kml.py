@@ -112,7 +112,7 @@ def _tether_folder(page: _Page, problem: Problem, points: Sequence[Waypoint]) ->
         page.placemark(
             "tether",
             page.line(line.tolist()),
-            hidden=True,
+            is_hidden=True,
             name=f"tether at stop {number}: {problem.goal_name(goal)}",
         )
         for number, goal, line in drawn
@@ -120,7 +120,7 @@ def _tether_folder(page: _Page, problem: Problem, points: Sequence[Waypoint]) ->
     ]
     missing = [problem.goal_name(goal) for _, goal, line in drawn if line is None]
     description = f"no taut tether was found at {', '.join(missing)}" if missing else ""
-    return page.folder("tethers", tethers, hidden=True, description=description)
+    return page.folder("tethers", tethers, is_hidden=True, description=description)
 
 
 def kmz_of(page: str) -> bytes:
@@ -211,7 +211,7 @@ class _Page:
         name: str | None = None,
         description: str = "",
         data: dict[str, Any] | None = None,
-        hidden: bool = False,
+        is_hidden: bool = False,
     ) -> str:
         kind = "path" if style == "tether" else style
         values = {"kind": kind, **{k: v for k, v in (data or {}).items() if v is not None}}
@@ -221,15 +221,20 @@ class _Page:
         return (
             "<Placemark>"
             + ("" if name is None else f"<name>{_text(name)}</name>")
-            + ("<visibility>0</visibility>" if hidden else "")
+            + ("<visibility>0</visibility>" if is_hidden else "")
             + (f"<description>{_text(description)}</description>" if description else "")
             + f"<styleUrl>#{style}</styleUrl><ExtendedData>{fields}</ExtendedData>{shape}"
             "</Placemark>\n"
         )
 
     def folder(
-        self, name: str, placemarks: Sequence[str], *, hidden: bool = False, description: str = ""
+        self,
+        name: str,
+        placemarks: Sequence[str],
+        *,
+        is_hidden: bool = False,
+        description: str = "",
     ) -> str:
-        more = "<visibility>0</visibility>" if hidden else ""
+        more = "<visibility>0</visibility>" if is_hidden else ""
         more += f"<description>{_text(description)}</description>" if description else ""
         return f"<Folder><name>{name}</name>{more}\n{''.join(placemarks)}</Folder>\n"
