@@ -169,7 +169,7 @@ def _in_metres(feature: Feature, depth: float, length: float) -> Feature:
         try:
             properties[name] = float(value) * metres
         except (TypeError, ValueError):
-            continue  # no number: the chart does not give it
+            continue  # the chart does not give it
     shape = feature.shape
     if feature.layer.upper() == SOUNDINGS and shape.has_z:
         shape = shapely.transform(shape, lambda c: c * (1.0, 1.0, -depth), include_z=True)

@@ -88,7 +88,7 @@ class CropWindow:
         west, south, east, north = shape.bounds
         x, y = self.center
         off = math.hypot(max(west - x, x - east, 0.0), max(south - y, y - north, 0.0))
-        if off - grown > self.radius:  # the box decides for most of a map
+        if off - grown > self.radius:  # decides for most features
             return True
         return bool(shape.distance(shapely.Point(self.center)) - grown > self.radius)
 

@@ -223,7 +223,7 @@ class _Reader:
             metres=metres,
         )
 
-    # What is no shape of the site
+    # Selection of entities
 
     def entity(self, record: Record) -> _Entity | None:
         """Return an entity that is to be read; others are added to the features left out."""
@@ -368,7 +368,7 @@ class _Reader:
             layer = self.from_gdal(by_handle)
         except InputError as error:
             raise InputError(self.damaged(list(by_handle.items()), error)) from None
-        # blocks of which nothing is read are named with what refers to them
+        # blocks of which nothing is read are reported with their references
         self.notes = [note for note in self.notes if not NO_LOSS.match(note)]
         handles = [str(properties["EntityHandle"]) for properties in layer.properties]
         found = Counter(handles)
@@ -382,7 +382,7 @@ class _Reader:
         for data, handle, properties in zip(layer.shapes, handles, layer.properties, strict=True):
             entity = by_handle[handle]
             if data is None:
-                continue  # it has no piece then, and is named below
+                continue  # reported later, because the entity gets no piece
             try:
                 shape, changes = shape_from_gdal(data, self.policy.read)
             except NotFiniteError as error:
@@ -422,7 +422,10 @@ class _Reader:
                 return False
             return True
 
-        low, high = 0, len(entities)  # the first `low` are read, the first `high` are not
+        low, high = (
+            0,
+            len(entities),
+        )  # GDAL reads the first `low` entities, but not the first `high`
         if not is_read([]):
             return str(error)
         while high - low > 1:
@@ -679,7 +682,7 @@ def _in_world(places: Floats, normal: Floats) -> Floats:
         Direction of extrusion of the entity, not zero.
     """
     up = normal / (float(np.linalg.norm(normal)) or 1.0)
-    # Autodesk's bound: normals nearer to the axis z take y for it
+    # Autodesk's bound: nearer to the z axis, y replaces z
     near = max(abs(up[0]), abs(up[1])) < 1.0 / 64.0
     x = np.cross([0.0, 1.0, 0.0] if near else [0.0, 0.0, 1.0], up)
     x /= float(np.linalg.norm(x)) or 1.0

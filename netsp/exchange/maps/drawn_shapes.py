@@ -148,7 +148,7 @@ def spurs_of(
     for line in lines:
         rest = shapely.line_merge(shapely.difference(shapely.node(line), inside))
         parts = getattr(rest, "geoms", [rest])
-        # a whole ring is left where a hole of the same outline takes all: it is no wall
+        # a closed rest is the ring of a hole, no wall
         out += [s for s in parts if s.length > tolerance and not s.is_closed]
     return out
 

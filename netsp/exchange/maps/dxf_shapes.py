@@ -40,7 +40,9 @@ def simple_entities(record: Record) -> list[Record]:
         return [_of_grid(record)]
     if record.type in ("SOLID", "TRACE", "3DFACE") and not record.get(13):
         third = ((code + 1, record.get(code, "0")) for code in (12, 22, 32))
-        return [Record(record.type, [*record.tags, *third])]  # GDAL takes the origin
+        return [
+            Record(record.type, [*record.tags, *third])
+        ]  # GDAL takes the origin for a missing corner
     return [record]
 
 

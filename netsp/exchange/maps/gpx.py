@@ -75,7 +75,7 @@ def read_gpx(
     for element in _root(file):
         kind = _tag(element)
         if kind not in count:
-            continue  # a description of the file, which says nothing of places
+            continue  # describes the file
         count[kind] += 1
         if kind == "wpt":
             continue
@@ -136,7 +136,7 @@ def read_gpx_map(file: str | Path, policy: ImportPolicy = DEFAULT_IMPORT) -> Map
     for element in _root(file):
         kind = _tag(element)
         if kind == "metadata" or (kind in HEADER and not len(element)):
-            continue  # says nothing of places
+            continue  # describes the file
         where = f"{kind}[{layers.get(kind, 0)}]"
         layers[kind] = layers.get(kind, 0) + 1
         if kind not in ("wpt", "trk", "rte"):
@@ -203,7 +203,7 @@ def _point(element: ElementTree.Element, where: str, policy: ReadPolicy) -> GpxP
     longitude = _number(element.get("lon"), 180.0, f"{where}: lon")
     height = _text(element, "ele")
     depth = next((e.text for e in element.iter() if _tag(e) == "depth" and e.text), None)
-    if depth is not None:  # of an extension, as dive computers write it
+    if depth is not None:  # dive computers write it into an extension
         height = str(0.0 - _number(depth, policy.max_height, f"{where}: depth"))
     time = _text(element, "time")
     return GpxPoint(

@@ -439,7 +439,7 @@ def _properties(element: Element) -> dict[str, Any]:
             out[tag] = value
     for holder in element:
         if holder.tag == "ExtendedData":
-            for child in holder:  # elements of other namespaces hold data, too
+            for child in holder:  # elements of other namespaces hold data as well
                 if child.tag not in ("Data", "SchemaData") and not len(child):
                     out.setdefault(child.tag, (child.text or "").strip() or None)
             for child in holder.iter():

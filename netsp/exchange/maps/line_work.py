@@ -122,7 +122,7 @@ def widened(
     points = shapely.get_coordinates(shapely.remove_repeated_points(line))
     ahead = np.diff(points, axis=0)
     ahead /= np.hypot(*ahead.T)[:, None]
-    # where a line turns back, buffers with mitred joins end flat: its parts overlap there instead
+    # a mitred buffer would end flat where the line turns back, so its parts overlap there
     turns_back = (ahead[1:] * ahead[:-1]).sum(axis=1) < -policy.reversal_cosine
     ends = [0, *(1 + np.flatnonzero(turns_back)).tolist(), len(points) - 1]
     parts = [part for a, b in itertools.pairwise(ends) for part in _simple_parts(points[a : b + 1])]

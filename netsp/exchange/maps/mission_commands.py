@@ -186,7 +186,7 @@ def features_of_items(
     is_fence = {**POLYGONS, **CIRCLES}
     for item in items:
         if item.command in is_fence:
-            continue  # below, with the other corners of the polygon
+            continue  # read below, with all corners of a polygon
         if item.command not in VISITED or item.lonlat is None or not _is_geographic(item):
             out.unread.append(Unread(item.where, _layer(item), _reason(item), _shape(item)))
             continue

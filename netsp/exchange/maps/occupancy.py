@@ -182,7 +182,7 @@ def _opened(file: str | Path, resolution: float | None) -> tuple[MapFile, Path]:
     except ImportError:
         raise InputError("maps in YAML need PyYAML: pip install 'netsp[geo]'") from None
     try:
-        # all scalars as text: what other fields hold does not matter, and 5e-2 is a number here
+        # all scalars as text, because other fields do not matter and 5e-2 is a number
         data = yaml.load(read_text(path), Loader=yaml.BaseLoader)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
@@ -266,10 +266,10 @@ def _values(image: Path, max_cells: int) -> tuple[Floats, Floats | None]:
         raise InputError(f"{image}: not a whole image: {shown(str(error))}") from None
     if values.dtype == bool:
         return np.where(values, 255.0, 0.0), None
-    # pictures of 16 bits are opened as whole numbers of 32
+    # Pillow opens images of 16 bits as integers of 32
     largest = 255.0 if values.dtype == np.uint8 else 65535.0
     alpha = None
-    if values.ndim == 3:  # the last of two or four channels is how opaque they are
+    if values.ndim == 3:  # the last of two or four channels is alpha
         if values.shape[2] in (2, 4):
             alpha = values[:, :, -1].astype(float)
         values = values[:, :, : 3 if values.shape[2] >= 3 else 1].mean(axis=2)
@@ -279,7 +279,7 @@ def _values(image: Path, max_cells: int) -> tuple[Floats, Floats | None]:
 def _kinds(values: Floats, alpha: Floats | None, map_file: MapFile) -> tuple[Bools, Bools]:
     """Return which cells are occupied, and which unknown."""
     if alpha is not None and map_file.mode == "trinary":
-        values = (3.0 * values + alpha) / 4.0  # a grey is three equal colours
+        values = (3.0 * values + alpha) / 4.0  # grey stands for three equal colours
     p = values / 255.0 if map_file.negate else 1.0 - values / 255.0
     occupied = p > map_file.occupied_thresh
     unknown = ~occupied & (p >= map_file.free_thresh)

@@ -328,7 +328,7 @@ class _Site:
         self.ledger = Ledger(self.map.layers)
         self.beyond: dict[str, Feature] = {}
         self.cut_off: set[str] = set()
-        self.joined: dict[str, list[Feature]] = {}  # pieces of outlines, by the feature that names
+        self.joined: dict[str, list[Feature]] = {}  # by the feature that names the outline
 
     def problem(self, name: str) -> Problem:
         """Return the problem, or raise all complaints."""
@@ -415,7 +415,7 @@ class _Site:
             text = re.sub(r"\b(goals|obstacles)\[(\d+)\]", own_name, explain(error))
             raise InputError(f"{self.file}: {text}") from None
 
-    # What is what
+    # Kinds of features
 
     def _parts(self) -> dict[str, list[Feature]]:
         parts: dict[str, list[Feature]] = {k: [] for k in KIND_COLUMNS}
@@ -484,7 +484,7 @@ class _Site:
         self.floor, found = chart_floor(
             free, self._plane, self.window, self.options.floor_cell, self.policy
         )
-        for feature in found.used:  # a shallow area is an obstacle, too
+        for feature in found.used:  # shallow areas stay obstacles
             if self.ledger.is_left_out(feature):
                 self.ledger.use(feature, "floor")
         for feature in found.beyond:
@@ -534,7 +534,7 @@ class _Site:
         layer = self.ledger.add_layer(Path(file).name, len(places))
         out = []
         for k, (place, name) in enumerate(zip(places.tolist(), names, strict=True)):
-            # as the map's own features have it, in degrees or in its unit
+            # as in the map: in degrees or in its unit
             spot = (
                 tuple(self.projection.to_earth([place[:2]])[0][::-1])
                 if self.projection is not None
@@ -566,7 +566,7 @@ class _Site:
         feature = bases[0] if bases else None
         if not self.map.is_geographic:
             if feature is None:
-                if not self.complaints:  # a feature that is damaged may be it
+                if not self.complaints:  # a damaged feature may be the base
                     self._complain("has no base; expected a Point of kind base")
                 return None
             return self._place(feature.shape, feature), feature
@@ -604,7 +604,7 @@ class _Site:
     @property
     def _unit(self) -> float:
         """Metres per unit of the file; the unit of the options overrides the file's."""
-        if self.is_chart:  # its reader converts them
+        if self.is_chart:  # its reader converts lengths
             return 1.0
         return UNITS[self.options.units] if self.options.units else self.map.metres or 1.0
 
@@ -679,7 +679,7 @@ class _Site:
         value = self._get(feature, ours) if name is None else feature.get(name)
         if value is None:
             return None
-        if isinstance(value, str):  # fields of KML and of tables are text
+        if isinstance(value, str):  # KML and tables hold text
             try:
                 value = float(value)
             except ValueError:
@@ -811,7 +811,7 @@ class _Site:
             features = [pieces[k][0] for k in members]
             coast = all(map(is_coastline, features))
             if coast and not any(is_land(pieces[k][1], polygon) for k in members):
-                rest += members  # the water lies inside: its coast is a wall
+                rest += members  # a shore around water is a wall
                 continue
             named = next((f for f in features if self._name(f) is not None), features[0])
             found = area(named, self._with_rim(polygon, [pieces[k] for k in members]))
@@ -980,7 +980,7 @@ class _Site:
     def _complain_of_no_goal(self) -> None:
         if self.complaints:
             if self.options.inspection is None:
-                self.asks.append("inspect")  # so that all is answered at once
+                self.asks.append("inspect")  # so that the user can answer all at once
             return
         self._complain(
             "has no goal; expected a point without radius_m, a layer of goals, a table of goals, "
@@ -1132,7 +1132,7 @@ class _Site:
         spot = shapely.Point(anchor[:2])
         for obstacle in obstacles:
             if self._is_shallow(obstacle["feature"]):
-                continue  # named with its depth already
+                continue  # reported with its depth already
             if _shape(obstacle).contains(spot):
                 self._complain(
                     f"base: lies inside {self._called(obstacle['feature'])}; expected a place in "
@@ -1208,7 +1208,7 @@ class _Site:
             )
         return ring, islands
 
-    # What is checked of the whole
+    # Checks of the whole map
 
     def _check_names(self, entries: list[dict[str, Any]], kind: str) -> None:
         """Number the names that several goals or obstacles share, and add a note."""
@@ -1261,7 +1261,7 @@ class _Site:
             staying = {goal["where"] for goal in near}
             for distance, goal in far:
                 feature = goal.get("source")
-                if feature is None or goal["where"] in staying:  # one of several of its feature
+                if feature is None or goal["where"] in staying:  # one of several goals of a feature
                     self.notes.append(
                         f"{_label(goal)}: is {_metres(distance)} from the base: left out"
                     )

@@ -213,7 +213,7 @@ def _cap_danger(
         places = shapely.get_coordinates(danger.shape)
         _cap(depth, np.column_stack([places, np.full(len(places), danger.depth)]), corner, cell)
         return
-    # the middles of cells about any of its points are at most a diagonal of 1.42 cells away
+    # centres of the cells around a point are at most a diagonal (1.42 cells) away
     held = _covered(danger.shape.buffer(1.5 * cell), x, y)
     depth[held] = np.fmin(depth[held], danger.depth)
 
@@ -245,7 +245,7 @@ def _interpolated(
     marks = np.concatenate([np.zeros(len(contours), dtype=bool), is_shoal])
     order = np.lexsort((points[:, 2], points[:, 1], points[:, 0]))
     points, marks = points[order], marks[order]
-    # one depth at one place: the least
+    # of several depths at one place, the least
     is_first = np.any(np.diff(points[:, :2], axis=0, prepend=np.nan) != 0.0, axis=1)
     known, marks = points[is_first], marks[is_first]
     none = np.full((len(y), len(x)), np.nan)
@@ -253,7 +253,7 @@ def _interpolated(
         return none, np.isfinite(none)
     try:
         triangles = Delaunay(known[:, :2])
-    except QhullError:  # all on one line
+    except QhullError:  # all points on one line
         return none, np.isfinite(none)
     gx, gy = np.meshgrid(x, y)
     depths = np.asarray(LinearNDInterpolator(triangles, known[:, 2])(gx, gy), dtype=float)
@@ -274,7 +274,7 @@ def _save_geotiff(
     except ImportError:
         raise InputError("GeoTIFF needs rasterio: pip install 'netsp[geo]'") from None
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a plane of its own has no place on the map
+        warnings.simplefilter("ignore")  # rasterio warns of a plane without a place on the earth
         try:
             with rasterio.open(
                 str(file),

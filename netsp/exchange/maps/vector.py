@@ -108,7 +108,7 @@ def read_plain(
                 f"as {crs}"
             )
         if system is not None and system.startswith(PLANE_SYSTEMS) and map_unit(system) == 1.0:
-            system = LOCAL  # a plan without a place on the earth says so itself
+            system = LOCAL  # the file states that it has no place on the earth
         if system is None:
             plain = f"{file}: layer {name!r}: names no coordinate system"
             option = f"; give it with --crs EPSG:4326 (degrees), another EPSG code or --crs {LOCAL}"
@@ -520,7 +520,7 @@ def _call(file: str | Path, notes: list[str], function: Any, *args: Any, **more:
     for warning in caught:
         text = f"GDAL: {_user_text(str(warning.message), file, args)[:160]}"
         if MIXED_TYPES in text:
-            continue  # its shapes are read all the same
+            continue  # no loss
         if issubclass(warning.category, RuntimeWarning) and text not in notes:
             notes.append(text)
     return out

@@ -237,7 +237,7 @@ class _Reader:
         if kind in (Wkb.POLYGON, Wkb.TRIANGLE):
             count = self._count(order)
             rings = [self._points(order, size)[:, : 2 + has_z] for _ in range(count)]
-            # faces that stand upright are lines from above, as they should be
+            # an upright face is a line from above, which is no change
             area = area_of(rings, [] if is_face else self.changes)
             return (
                 area if kind == Wkb.POLYGON or is_face else outline_of_faces([area], self.changes)

@@ -127,7 +127,7 @@ def kmz_of(page: str) -> bytes:
     """Return an archive (KMZ) with a KML page as ``doc.kml``; equal pages give equal archives."""
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
-        entry = zipfile.ZipInfo("doc.kml")  # dated 1980
+        entry = zipfile.ZipInfo("doc.kml")  # with a fixed date, 1980
         entry.compress_type = zipfile.ZIP_DEFLATED
         archive.writestr(entry, page.encode())
     return out.getvalue()
@@ -158,7 +158,7 @@ def _tethers(
     visits = [p for p in points if _is_visit(p)]
     n_solids = len(problem.obstacles)
     if any(abs(letter) > n_solids for p in visits for letter in p.word):
-        return  # a mission in space, whose words are those of its scene
+        return  # a mission in space: its words are those of the scene
     paths = TautPaths(problem)
     for number, visited in enumerate(visits, 1):
         assert visited.goal is not None

@@ -253,7 +253,7 @@ class _Follower:
         distance, pace = self.move.at(self.track_s)
         (ox, oy, oz), self.reference_speed = self.origin, pace
         rx, ry, rz = ox + ux * distance, oy + uy * distance, oz + uz * distance
-        # speeds that are missing, their integrals, and what is asked of the thrusters
+        # missing speeds, their integrals, and commands to the thrusters
         ex = ux * pace + m.position_gain * (rx - x) - vx
         ey = uy * pace + m.position_gain * (ry - y) - vy
         ez = uz * pace + m.position_gain_z * (rz - z) - vz
@@ -356,7 +356,7 @@ def target_times(
     times = []
     for place in places[1:]:
         begin = vehicle.clock_s
-        if math.dist(vehicle.place, place) > reach:  # else the target is passed over
+        if math.dist(vehicle.place, place) > reach:  # else the target is skipped
             vehicle.plan_anew(place)
             sent = vehicle.clock_s
             while not vehicle.is_at(place, reach):
