@@ -198,12 +198,9 @@ def metres_per_unit(name: str) -> float | None:
 
 
 def column(name: str) -> Column | None:
-    """Return what a column's name means; None for a name that means nothing here.
+    """Return the meaning of a column's name; None for a name without a known meaning.
 
-    Parameters
-    ----------
-    name : str
-        Name in any case, perhaps with a unit: ``depth``, ``Depth (ft)``, ``x_m``, ``lat [deg]``.
+    The name may be in any case, and have a unit: ``depth``, ``Depth (ft)``, ``x_m``, ``lat [deg]``.
 
     Raises
     ------
@@ -265,17 +262,10 @@ def _unit_factor(quantity: Quantity, unit: str) -> float | None:
 
 
 def height_meaning(names: Sequence[str]) -> Column | None:
-    """Return the meaning of a band or variable, from the first of its names that means heights.
+    """Return the meaning of a band or variable by the first of its names that means heights, or
+    None.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Names, such as a description or a standard name of the CF conventions.
-
-    Returns
-    -------
-    Column or None
-        Meaning, with a negative factor for depths; None if no name means heights or depths.
+    Names are descriptions, or standard names of the CF conventions. Depths have a negative factor.
 
     Raises
     ------
@@ -334,29 +324,9 @@ def marks_of_no_height(z: Floats, *more: float) -> list[tuple[float, Bools]]:
     return found
 
 
-def meanings(
-    names: Sequence[str], source: str
-) -> tuple[dict[Quantity, tuple[int, Column]], tuple[str, ...]]:
-    """Return the position and meaning of each known column by its quantity, and the other names.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Names of the columns in the order of the file.
-    source : str
-        Name of the file, for messages.
-
-    Raises
-    ------
-    InputError
-        Two columns for one quantity, or an unknown unit.
-    """
-    return _meanings(names, source)
-
-
 @dataclass(frozen=True)
 class Table:
-    """Table of a text file, its columns by the quantities that they hold.
+    """Table of a text file, with its columns by the quantities that they hold.
 
     Parameters
     ----------
@@ -365,7 +335,7 @@ class Table:
     head : tuple of str
         Names of the columns as they are written; empty for a table without a head.
     columns : mapping
-        Place and meaning of each column whose name is known, by quantity.
+        Position and meaning of each column with a known name, by quantity.
     unused : tuple of str
         Names of the other columns.
     rows : list of list of str
@@ -388,15 +358,7 @@ class Table:
         return quantity in self.columns
 
     def text(self, row: int, quantity: Quantity) -> str:
-        """Return a cell without blanks around it; empty where there is none.
-
-        Parameters
-        ----------
-        row : int
-            Index of the row.
-        quantity : str
-            Quantity of the column.
-        """
+        """Return a cell without blanks around it; empty if there is none."""
         if quantity not in self.columns:
             return ""
         k = self.columns[quantity][0]
@@ -404,32 +366,17 @@ class Table:
         return cells[k].strip() if k < len(cells) else ""
 
     def plain(self, row: int, quantity: Quantity) -> str:
-        """Return the text of a number with a decimal point.
-
-        Parameters
-        ----------
-        row : int
-            Index of the row.
-        quantity : str
-            Quantity of the column.
-        """
+        """Return the text of a number with a decimal point."""
         text = self.text(row, quantity)
         return text.replace(",", ".") if self.has_decimal_commas and _COMMA.match(text) else text
 
     def number(self, row: int, quantity: Quantity) -> float:
         """Return a number in metres, degrees or seconds, z upwards.
 
-        Parameters
-        ----------
-        row : int
-            Index of the row.
-        quantity : str
-            Quantity of the column.
-
         Raises
         ------
         InputError
-            Another cell than a finite number.
+            The cell is no finite number.
         """
         try:
             value = float(self.plain(row, quantity))
@@ -443,28 +390,13 @@ class Table:
         return value * self.columns[quantity][1].factor + 0.0
 
     def title(self, quantity: Quantity) -> str:
-        """Return the name of the column with a quantity as the file writes it.
-
-        Parameters
-        ----------
-        quantity : str
-            Quantity of the column.
-        """
+        """Return the name of the column with a quantity as the file writes it."""
         if quantity in self.columns and self.head:
             return self.head[self.columns[quantity][0]].strip()
         return str(quantity)
 
     def numbers(self, quantities: Sequence[Quantity]) -> Floats:
-        """Return columns of numbers in metres, degrees or seconds, z upwards.
-
-        Parameters
-        ----------
-        quantities : sequence of str
-            Quantities of k columns.
-
-        Returns
-        -------
-        ndarray, shape (n, k)
+        """Return columns of numbers (n, k) in metres, degrees or seconds, z upwards.
 
         Raises
         ------
@@ -477,12 +409,8 @@ class Table:
         return values
 
     def check_depths(self, z: Floats) -> None:
-        """Refuse a column of depths that holds heights: values of 0 or less only.
-
-        Parameters
-        ----------
-        z : ndarray, shape (n,)
-            Its values, metres upwards.
+        """Refuse a column of depths, given as metres upwards (n,), that holds heights: no value
+        below 0.
 
         Raises
         ------
@@ -514,13 +442,8 @@ class Table:
     def pair(
         self, pairs: Sequence[tuple[Quantity, Quantity]] = MAP_PAIRS
     ) -> tuple[Quantity, Quantity] | None:
-        """Return the first pair of quantities that the table holds; None if it holds none.
-
-        Parameters
-        ----------
-        pairs : sequence of (str, str)
-            Pairs, the preferred one first.
-        """
+        """Return the first pair of quantities that the table holds, the preferred one first, or
+        None."""
         return next((p for p in pairs if p[0] in self and p[1] in self), None)
 
     def height(self) -> Quantity | None:
@@ -530,36 +453,20 @@ class Table:
         return "altitude" if "altitude" in self else None
 
     def wanted(self, text: str) -> InputError:
-        """Return an error that says which columns were expected and which there are.
-
-        Parameters
-        ----------
-        text : str
-            Columns that were expected.
-        """
+        """Return an error that states which columns were expected and which there are."""
         got = ", ".join(name.strip() for name in self.head) if self.head else "no names of columns"
         return InputError(f"{self.source}: expected {text}, got {shown(got)}")
 
     def left_out(self, quantities: Sequence[Quantity]) -> tuple[str, ...]:
-        """Return the names of the columns that hold none of some quantities.
-
-        Parameters
-        ----------
-        quantities : sequence of str
-            Quantities that a reader uses.
-        """
+        """Return the names of the columns that hold none of the quantities that a reader uses."""
         known = [self.title(q) for q in self.columns if q not in quantities]
         return (*known, *self.unused)
 
     def notes(self, quantities: Sequence[Quantity], max_length: int = 200) -> list[str]:
-        """Return notes on how the table was read: decimal commas, and unused columns.
+        """Return notes on decimal commas, and on columns without the quantities that the reader
+        uses.
 
-        Parameters
-        ----------
-        quantities : sequence of str
-            Quantities that the reader uses.
-        max_length : int
-            Maximum number of characters for the names of unused columns.
+        `max_length` is the maximum number of characters for the names of unused columns.
         """
         out = ["numbers are read with decimal commas"] if self.has_decimal_commas else []
         names = [shown(name) if "," in name else name for name in self.left_out(quantities)]
@@ -574,13 +481,6 @@ _WHOLE = re.compile(r"[-+]?\d+$")
 def decode_text(data: bytes, source: str) -> str:
     """Return the text of a file in UTF-8, or in UTF-16 with a byte order mark, without the mark.
 
-    Parameters
-    ----------
-    data : bytes
-        Contents of the file.
-    source : str
-        Name of the file, for messages.
-
     Raises
     ------
     InputError
@@ -594,7 +494,10 @@ def decode_text(data: bytes, source: str) -> str:
 
 
 def read_path(file: str | Path, on_note: Callable[[str], None] | None = None) -> Floats | None:
-    """Read a polyline from a table or a JSON list of points.
+    """Read a polyline (k, 2) or (k, 3) from a table or a JSON list of points; None for a JSON
+    object.
+
+    A JSON object is taken for a solution.
 
     Parameters
     ----------
@@ -603,11 +506,6 @@ def read_path(file: str | Path, on_note: Callable[[str], None] | None = None) ->
         without names.
     on_note : callable, optional
         Called with one line each for decimal commas and for unused columns.
-
-    Returns
-    -------
-    ndarray, shape (k, 2) or (k, 3), or None
-        None for a JSON object, which is taken for a solution.
 
     Raises
     ------
@@ -705,7 +603,7 @@ def read_table(
         names = _comment_head(comment, separator)
         if len(names) >= len(rows[0]) or len(names) >= 3:
             head = names
-    columns, unused = _meanings(head, source) if head else ({}, ())
+    columns, unused = meanings(head, source) if head else ({}, ())
     if not head:
         columns = _by_position(rows, positional, source, sample_lines)
         unused = tuple(f"column {k + 1}" for k in range(len(positional), max(map(len, rows))))
@@ -802,10 +700,16 @@ def _comment_head(comment: str, separator: str) -> tuple[str, ...]:
     return ()
 
 
-def _meanings(
+def meanings(
     head: Sequence[str], source: str
 ) -> tuple[dict[Quantity, tuple[int, Column]], tuple[str, ...]]:
-    """Return the columns by quantity, and the names of those that are not used."""
+    """Return the position and meaning of each known column by its quantity, and the other names.
+
+    Raises
+    ------
+    InputError
+        Two columns for one quantity, or an unknown unit.
+    """
     found: dict[Quantity, list[tuple[int, Column]]] = {}
     unused = []
     for k, name in enumerate(head):
@@ -928,7 +832,7 @@ class HeightAxis:
 
     @property
     def change(self) -> str:
-        """Return the note on converted heights; empty for heights in metres upwards."""
+        """Note on converted heights; empty for heights in metres upwards."""
         parts = ["count downwards"] if self.sign < 0.0 else []
         parts += [f"are in units of {self.metres:.7g} m"] if self.metres != 1.0 else []
         return f"heights {' and '.join(parts)}: converted to metres upwards" if parts else ""
@@ -937,16 +841,13 @@ class HeightAxis:
 def height_axis(crs: Any) -> HeightAxis:
     """Return the direction and the unit of heights in a coordinate system.
 
+    Without a vertical system, heights count upwards, in the unit of a projected map, or in metres
+    for a system in degrees.
+
     Parameters
     ----------
     crs : pyproj.CRS or str
         Coordinate system, such as ``EPSG:25832+5715`` (depths in metres).
-
-    Returns
-    -------
-    HeightAxis
-        Axis of the vertical system. Without a vertical system, heights count upwards, in the unit
-        of a projected map, or in metres for a system in degrees.
 
     Raises
     ------
@@ -964,11 +865,6 @@ def height_axis(crs: Any) -> HeightAxis:
 
 def map_unit(crs: Any) -> float | None:
     """Return the metres per unit of a coordinate system's map; None if it is in angles.
-
-    Parameters
-    ----------
-    crs : pyproj.CRS or str
-        Coordinate system.
 
     Raises
     ------
@@ -990,12 +886,8 @@ def map_unit(crs: Any) -> float | None:
 
 
 def metres_per_unit_code(code: int) -> float | None:
-    """Return the metres in a unit of length, given its EPSG code; None if the code is unknown.
-
-    Parameters
-    ----------
-    code : int
-        EPSG code of the unit, as in GeoTIFF keys: 9001 is the metre.
+    """Return the metres in a unit of length by its EPSG code, as in GeoTIFF keys; None for unknown
+    codes.
 
     Examples
     --------
