@@ -31,12 +31,7 @@ def arrays_in(value: Any) -> list[np.ndarray[Any, Any]]:
 def can_be_interpreted(args: tuple[Any, ...], max_copied_bytes: int) -> bool:
     """Return whether a call with these arguments may run interpreted.
 
-    Parameters
-    ----------
-    args : tuple
-        Arguments of the call.
-    max_copied_bytes : int
-        Maximum size of all arrays together (`CompilePolicy`).
+    `max_copied_bytes` is the maximum size of all arrays together (`CompilePolicy`).
     """
     arrays = arrays_in(args)
     is_narrow = any(a.size and a.dtype.char in NARROW_DTYPES for a in arrays)
@@ -50,33 +45,16 @@ def is_in_pool() -> bool:
 
 
 def call_interpreted(kernel: Any, args: tuple[Any, ...]) -> Any:
-    """Return the result of a kernel that runs interpreted, with the types of compiled code.
-
-    Parameters
-    ----------
-    kernel : callable
-        Function that `netsp.base.compiled.kernel.kernel` decorates.
-    args : tuple
-        Arguments of the call.
-    """
+    """Return the result of a kernel that runs interpreted, with the types of compiled code."""
     with np.errstate(all="ignore"):  # compiled code does not warn either
         return _plain(interpreted(kernel)(*args))
 
 
 def call_within(budget_s: float, kernel: Any, args: tuple[Any, ...]) -> Any:
-    """Run a kernel interpreted within a budget; the result has the types of compiled code.
+    """Run a kernel interpreted within a budget of CPU seconds; return a result with compiled types.
 
     In a thread of a pool the call has no budget, because arrays that other threads write to cannot
     be restored.
-
-    Parameters
-    ----------
-    budget_s : float
-        CPU seconds that the call may take.
-    kernel : callable
-        Function that `netsp.base.compiled.kernel.kernel` decorates.
-    args : tuple
-        Arguments of the call.
 
     Raises
     ------

@@ -70,13 +70,7 @@ def _taken(file: Path, max_wait_s: float) -> tuple[int | None, bool]:
 
 
 def is_locked(file: Path | None) -> bool:
-    """Return whether another process or thread has locked a file.
-
-    Parameters
-    ----------
-    file : Path or None
-        The lock file; None for no lock.
-    """
+    """Return whether another process or thread has locked a file; False without a file."""
     if fcntl is None or file is None or not file.exists():
         return False
     with locked(file, max_wait_s=0.0) as is_held:

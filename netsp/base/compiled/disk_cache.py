@@ -117,16 +117,10 @@ def _keys(key: Any) -> list[Any]:
 
 
 def keep_on_disk(dispatcher: Any, function: Callable[..., Any]) -> None:
-    """Make a cached dispatcher save its compiled code in a `KernelFile`.
+    """Make the dispatcher that `cached` returned for a function save its compiled code in a
+    `KernelFile`.
 
     Where no folder is writable, the code stays in memory only.
-
-    Parameters
-    ----------
-    dispatcher : numba dispatcher
-        Dispatcher that `cached` returned for the function.
-    function : callable
-        The function.
     """
     kept = getattr(dispatcher._cache, "_cache_file", None)
     if kept is None:
@@ -139,15 +133,7 @@ def keep_on_disk(dispatcher: Any, function: Callable[..., Any]) -> None:
 
 
 def is_on_disk(dispatcher: Any, types: tuple[Any, ...]) -> bool:
-    """Return whether a kernel is on disk, compiled for given argument types.
-
-    Parameters
-    ----------
-    dispatcher : numba dispatcher
-        Dispatcher that `keep_on_disk` was called for.
-    types : tuple
-        Numba's types of the arguments.
-    """
+    """Return whether a kernel is on disk, compiled for Numba's types of the arguments."""
     kept, file = dispatcher._cache, _file_of(dispatcher)
     if file is None:
         return False
@@ -155,26 +141,14 @@ def is_on_disk(dispatcher: Any, types: tuple[Any, ...]) -> bool:
 
 
 def is_any_on_disk(dispatcher: Any) -> bool:
-    """Return whether a kernel that Python can call is on disk, for any argument types.
-
-    Parameters
-    ----------
-    dispatcher : numba dispatcher
-        Dispatcher that `keep_on_disk` was called for.
-    """
+    """Return whether a kernel that Python can call is on disk, for any argument types."""
     file = _file_of(dispatcher)
     return file is not None and file.contains_any()
 
 
 def lock_file(dispatcher: Any) -> Path | None:
     """Return the file that is locked while a kernel is compiled; None where nothing is saved on
-    disk.
-
-    Parameters
-    ----------
-    dispatcher : numba dispatcher
-        Dispatcher that `keep_on_disk` was called for.
-    """
+    disk."""
     file = _file_of(dispatcher)
     return None if file is None else file.lock
 

@@ -32,11 +32,6 @@ def interprets(kernel: Any) -> Callable[[F], F]:
 
     The vectorised form must return the same result as the kernel to the last bit, and write the
     same values to the same arrays.
-
-    Parameters
-    ----------
-    kernel : dispatcher
-        The kernel that the decorated function vectorises.
     """
 
     def register(function: F) -> F:
@@ -48,24 +43,12 @@ def interprets(kernel: Any) -> Callable[[F], F]:
 
 
 def is_in_numpy(kernel: Any) -> bool:
-    """Return whether a kernel has a vectorised form.
-
-    Parameters
-    ----------
-    kernel : dispatcher
-        Function that `netsp.base.compiled.kernel.kernel` decorates.
-    """
+    """Return whether a kernel has a vectorised form."""
     return getattr(kernel, "py_func", kernel) in _in_numpy
 
 
 def interpreted(kernel: Any) -> Callable[..., Any]:
-    """Return a kernel as a plain Python function that calls other kernels as plain Python too.
-
-    Parameters
-    ----------
-    kernel : dispatcher
-        Function that `netsp.base.compiled.kernel.kernel` decorates.
-    """
+    """Return a kernel as a plain Python function that calls other kernels as plain Python too."""
     return _interpreted(getattr(kernel, "py_func", kernel))
 
 
@@ -93,13 +76,7 @@ def names_used(code: CodeType) -> Iterator[str]:
 
 @cache
 def called_kernels(kernel: Any) -> frozenset[Any]:
-    """Return a kernel and all kernels that it calls, directly or indirectly.
-
-    Parameters
-    ----------
-    kernel : dispatcher
-        Function that `netsp.base.compiled.kernel.kernel` decorates.
-    """
+    """Return a kernel and all kernels that it calls, directly or indirectly."""
     found = {kernel}
     for name in names_used(kernel.py_func.__code__):
         other = kernel.py_func.__globals__.get(name)

@@ -35,14 +35,9 @@ F = TypeVar("F", bound=Callable[..., Any])
 def kernel(function: F) -> F:
     """Return a function that runs interpreted until compiling it pays.
 
-    Compiled code is kept on disk and releases the interpreter lock. The annotations are for callers
-    and the type checker; Numba infers types of its own. A parameter through which another thread
-    ends the function is named `stop`.
-
-    Parameters
-    ----------
-    function : callable
-        The function; its arguments are arrays, numbers and tuples of these.
+    Arguments are arrays, numbers and tuples of these. Compiled code is kept on disk and releases
+    the interpreter lock. The annotations are for callers and the type checker; Numba infers types
+    of its own. A parameter through which another thread ends the function is named `stop`.
     """
     if "numba" not in sys.modules and os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
         return Kernel(function)  # type: ignore[return-value]
@@ -50,26 +45,14 @@ def kernel(function: F) -> F:
 
 
 def is_kept(kernel: Any) -> bool:
-    """Return whether compiled code of a kernel is on disk, for any types; loads Numba.
-
-    Parameters
-    ----------
-    kernel : callable
-        Function that `kernel` decorates.
-    """
+    """Return whether compiled code of a kernel is on disk, for any types; loads Numba."""
     from netsp.base.compiled import disk_cache
 
     return disk_cache.is_supported() and disk_cache.is_any_on_disk(kernel)
 
 
 def runs_compiled(kernel: Any) -> bool:
-    """Return whether a kernel is compiled, or will be at its next call; loads Numba.
-
-    Parameters
-    ----------
-    kernel : callable
-        Function that `kernel` decorates.
-    """
+    """Return whether a kernel is compiled, or will be at its next call; loads Numba."""
     from netsp.base.compiled.compile_policy import compiles
 
     if not compiles():
@@ -104,13 +87,7 @@ def _imported_kernels() -> Iterator[Any]:
 
 
 class Kernel:
-    """Kernel that loads Numba only when a call needs it.
-
-    Parameters
-    ----------
-    function : callable
-        The function.
-    """
+    """Kernel that loads Numba only when a call needs it."""
 
     _total_s = 0.0
     """CPU seconds that all kernels together ran interpreted before Numba was loaded."""
@@ -182,11 +159,6 @@ class UncompiledKernel:
 
     It rounds as compiled code does, except for arrays of single precision; the bare function would
     not (`netsp.base.compiled.interpretation`).
-
-    Parameters
-    ----------
-    function : callable
-        The function.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:

@@ -194,25 +194,14 @@ def is_for_kernel() -> bool:
 
 
 def is_linkable(reduced: Any) -> bool:
-    """Return whether a function's saved code has no machine code and can only be linked.
-
-    Parameters
-    ----------
-    reduced : tuple
-        Content of the function's file, as Numba saves it.
-    """
+    """Return whether a function's file, as Numba saves it, has no machine code and can only be
+    linked."""
     library = reduced[0]  # see `CompileResult._reduce`
     return isinstance(library, tuple) and library[1] == LINKABLE
 
 
 def has_machine_code(result: Any) -> bool:
-    """Return whether Python can call a compiled function.
-
-    Parameters
-    ----------
-    result : numba CompileResult
-        Result of compiling or loading the function.
-    """
+    """Return whether Python can call a compiled function."""
     return getattr(result.library, "has_machine_code", True)
 
 

@@ -9,13 +9,7 @@ _waiting: list[Callable[[], None]] = []
 
 
 def when_numba_is_loaded(call: Callable[[], None]) -> None:
-    """Call a function once a kernel has loaded Numba, or at once if Numba is loaded already.
-
-    Parameters
-    ----------
-    call : callable
-        Function without arguments.
-    """
+    """Call a function once a kernel has loaded Numba, or at once if Numba is loaded already."""
     if "numba" in sys.modules:
         call()
     else:

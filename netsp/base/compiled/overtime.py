@@ -135,16 +135,9 @@ if hasattr(os, "register_at_fork"):
 
 
 def within(budget_s: float, function: Callable[..., T], args: tuple[Any, ...]) -> T:
-    """Call a function and end the call when its budget is used up.
+    """Call a function and end the call when its budget of CPU seconds is used up.
 
-    Parameters
-    ----------
-    budget_s : float
-        CPU seconds that the call may take.
-    function : callable
-        Python function. Code in other languages that it calls runs to its end.
-    args : tuple
-        Arguments of the function.
+    Code in other languages that the function calls runs to its end.
 
     Raises
     ------
