@@ -1,5 +1,6 @@
 """A tour flown by a vehicle over MAVLink, and what stops it."""
 
+import functools
 import io
 import json
 import random
@@ -17,11 +18,13 @@ from netsp.command.main import main
 from netsp.online.execute.events import Surprises
 from netsp.online.execute.execution_log import ExecutionOptions
 from netsp.online.execute.tour_execution import StopsFlightError
+from netsp.online.fly import standby, tour_flight
 from netsp.online.fly.flight_policy import FlightPolicy
 from netsp.online.fly.flight_rehearsal import rehearse
 from netsp.online.fly.flight_time import predicted_flight
 from netsp.online.fly.inputs import parse_event
 from netsp.online.fly.preflight_checks import make_ready
+from netsp.online.fly.standby import stand_by
 from netsp.online.fly.stopped import RefusedError
 from netsp.online.fly.tour_flight import fly
 from netsp.online.fly.vehicle import LinkedVehicle
@@ -42,6 +45,9 @@ SITE = Problem(
     obstacles=[Circle(center=(4, 0), radius=0.6, name="pile")], clearance=0.4,
 )  # fmt: skip
 OPTIONS = ExecutionOptions(speed=0.5, reach=0.3)
+PATIENT = FlightPolicy(max_silence_s=60.0, max_position_age_s=60.0, max_gps_age_s=60.0)
+"""At `PACE` two seconds of the vehicle are a quarter of one of ours, for which a busy machine holds
+either end up: only tests of lost links take that for one."""
 
 
 @pytest.fixture(scope="module")
@@ -52,10 +58,9 @@ def tour():
 
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
-    """At `PACE` two seconds of the vehicle are a quarter of one of ours, for which a busy machine
-    holds either end up: only what is about lost links takes that for one."""
-    patient = FlightPolicy(max_silence_s=60.0, max_position_age_s=60.0, max_gps_age_s=60.0)
-    monkeypatch.setattr(LinkedVehicle, "policy", patient)
+    """Give flights by command the patient policy, too."""
+    monkeypatch.setattr(tour_flight, "fly", functools.partial(fly, policy=PATIENT))
+    monkeypatch.setattr(standby, "stand_by", functools.partial(stand_by, policy=PATIENT))
 
 
 class Flown:
@@ -81,7 +86,7 @@ class Flown:
         self.autopilot.__exit__(*error)
 
     def fly(self, tour, **how):
-        return fly(SITE, tour, self.session, OPTIONS, **how)
+        return fly(SITE, tour, self.session, OPTIONS, **{"policy": PATIENT, **how})
 
     @property
     def targets(self):
@@ -126,7 +131,7 @@ def test_ardusub_s_own_simulator_flies_a_tour_and_is_stopped_by_what_stops_the_f
                     "disarmed": after(5.0, lambda s=session: s.command(400, 0, 21196)),
                     "mode": after(5.0, lambda s=session: s.command(176, 1, 19)),
                 }[stops]
-                summary = fly(SITE, tour, session, OPTIONS, on_step=what).summary
+                summary = fly(SITE, tour, session, OPTIONS, on_step=what, policy=PATIENT).summary
             finally:
                 session.close()
         if stops is None:
@@ -187,7 +192,7 @@ def test_a_clock_that_stands_still_ends_the_flight(monkeypatch):
             ours[0] = float(second)
             say(1000 * second)
             assert session.stalled_s == 0.0
-        vehicle = LinkedVehicle(session, 0.3)
+        vehicle = LinkedVehicle(session, 0.3, PATIENT)
         for second in range(4, 7):
             ours[0] = float(second)
             say(3000)
@@ -224,7 +229,7 @@ def test_a_link_with_nobody_at_the_other_end_is_told(tour):
     session = Session(UdpLink(Address(True, "127.0.0.1", 0)), Frame(SITE), 1, 20.0)
     try:
         with pytest.raises(RefusedError, match="no vehicle has been heard"):
-            fly(SITE, tour, session, OPTIONS)
+            fly(SITE, tour, session, OPTIONS, policy=PATIENT)
     finally:
         session.close()
 
@@ -236,7 +241,7 @@ def test_a_vehicle_with_another_system_id_is_named(tour):
             with pytest.raises(
                 RefusedError, match="heard from system 1, but nothing from system 2"
             ):
-                fly(SITE, tour, session, OPTIONS)
+                fly(SITE, tour, session, OPTIONS, policy=PATIENT)
         finally:
             session.close()
 
@@ -481,15 +486,14 @@ def test_disarming_that_nobody_looked_at_in_time_is_not_forgotten(tour):
         assert "disarmed" in str(done.stopped)
 
 
-def test_a_vehicle_that_tells_no_positions_any_more_is_stopped(tour, monkeypatch):
+def test_a_vehicle_that_tells_no_positions_any_more_is_stopped(tour):
     patient = FlightPolicy(max_silence_s=60.0, max_position_age_s=2.0)
-    monkeypatch.setattr(LinkedVehicle, "policy", patient)
 
     def deaf():
         flown.session._listener._local_position_ned = lambda message: None
 
     with Flown() as flown:
-        done = flown.fly(tour, on_step=after(6.0, deaf))
+        done = flown.fly(tour, on_step=after(6.0, deaf), policy=patient)
         assert "no position" in done.stopped
 
 

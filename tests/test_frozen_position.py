@@ -141,6 +141,7 @@ def test_a_slow_sensor_repeats_its_position_between_two_measurements():
 
 
 def test_a_policy_out_of_range_is_refused():
-    for wrong in ({"min_repeat_s": 0.0}, {"max_periods": 0.5}, {"min_said_m": float("nan")}):
+    nan = float("nan")
+    for wrong in ({"min_repeat_s": 0.0}, {"max_periods": 0.5}, {"min_reported_travel": nan}):
         with pytest.raises(InputError, match=next(iter(wrong))):
             FreezePolicy(**wrong)

@@ -150,8 +150,8 @@ class LinkedVehicle:
         return places
 
     def _is_at(self, vertex: Floats) -> bool:
-        there = np.array([*vertex[:2], altitude(float(vertex[2]))])
-        return float(np.linalg.norm(self._position - there)) <= self.reach
+        target = np.array([*vertex[:2], altitude(float(vertex[2]))])
+        return float(np.linalg.norm(self._position - target)) <= self.reach
 
     def hold(self) -> None:
         """Hold the vehicle's place, if the flight may go on."""

@@ -95,8 +95,8 @@ class Belief:
         words : dict of Word to float
             Cost of each class: the negative logarithm of its likelihood.
         """
-        least = min(words.values())
-        self._likely = {w: math.exp(least - cost) * self._prior for w, cost in words.items()}
+        min_cost = min(words.values())
+        self._likely = {w: math.exp(min_cost - cost) * self._prior for w, cost in words.items()}
         self._is_spread = False
         self._trim()
 

@@ -247,5 +247,5 @@ def _help(messages: Sequence[Any], counts: Counter[str], frame: Frame) -> str:
             "--frame global" if frame.has_origin else "a problem with an origin"
         )
     held = ", ".join(f"{n} {kind}" for kind, n in counts.most_common(6) if kind != "FMT")
-    said = f" in XKF1, NKF1 and POS; the log has {held or 'no messages'}"
-    return said + (f" ({len(pos)} POS without a GPS fix)" if pos else "")
+    text = f" in XKF1, NKF1 and POS; the log has {held or 'no messages'}"
+    return text + (f" ({len(pos)} POS without a GPS fix)" if pos else "")

@@ -139,7 +139,7 @@ class FrozenPosition:
         self._velocity = velocity
         late_s = p.max_periods * self._period
         since = self._repetition.since
-        if float(np.hypot(*self._travelled)) >= p.min_said_m and (
+        if float(np.hypot(*self._travelled)) >= p.min_reported_travel and (
             time - since["plan"] >= max(p.min_repeat_s, late_s)
         ):
             self.is_frozen, self.since = True, since["plan"]
@@ -155,7 +155,7 @@ class FrozenPosition:
         """Note that the position has changed in the plan, and learn the period of the sensor."""
         p = self.policy
         has_moved = speed > p.moving_share * self.speed or (
-            float(np.hypot(*self._travelled)) >= p.min_said_m
+            float(np.hypot(*self._travelled)) >= p.min_reported_travel
         )
         is_period = has_moved and lasted_s <= p.max_period_s
         self._period = max(p.memory * self._period, lasted_s if is_period else 0.0)

@@ -20,7 +20,7 @@ class FreezePolicy:
     ----------
     min_repeat_s
         Shortest time for which a position must repeat, s.
-    min_said_m
+    min_reported_travel
         Distance that the reported velocities must add up to meanwhile, m; at rest they add up to
         less, even with noise.
     dead_stop_s
@@ -53,7 +53,7 @@ class FreezePolicy:
     """
 
     min_repeat_s: float = 1.0
-    min_said_m: float = 0.25
+    min_reported_travel: float = 0.25
     dead_stop_s: float = 3.0
     moving_share: float = 0.1
     stopping_share: float = 0.3

@@ -81,7 +81,8 @@ def watch(
     where = Address.parse(address)
     _prepare(guard, state, note)
     link = UdpLink(where, GUARD_SYSTEM)
-    live = _Watch(guard, frame, link, on_report, note, system, publish, ask_rates)
+    live = _Watch(guard, frame, link, on_report, note, system, ask_rates)
+    live.publishes = publish
     if not where.listens:
         live.only_peer = link.peer
     saved = time.monotonic()
@@ -121,6 +122,8 @@ class _Watch:
     ----------
     only_peer
         Address of the vehicle, if it waits to be spoken to; others are not listened to.
+    publishes
+        Whether figures and alarms are sent to the link.
     """
 
     def __init__(
@@ -131,11 +134,10 @@ class _Watch:
         on_report: Callable[[Report], None],
         note: Callable[[str], None],
         system: int | None,
-        publishes: bool,
         ask_rates: bool,
     ) -> None:
         self.pace, self.link = guard.policy.pace, link
-        self.on_report, self.note, self.publishes = on_report, note, publishes
+        self.on_report, self.note, self.publishes = on_report, note, False
         self.only_peer: tuple[str, int] | None = None
         self.listener = Listener(frame, system, guard.policy.link)
         self.stream = Stream(guard, on_note=note)

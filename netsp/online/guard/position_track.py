@@ -197,7 +197,7 @@ class Track:
         course."""
         policy = self.policy
         span = policy.short_turn_span_s if self.velocities.is_believed else policy.turn_span_s
-        now, here = self._past[-1]
+        now, end = self._past[-1]
         times = np.array([t for t, _ in self._past])
         begin = int(np.searchsorted(times, now - 2.0 * span, side="right")) - 1
         start = self._past[max(begin, 0)]
@@ -205,7 +205,7 @@ class Track:
             return 0.0
         k = int(np.searchsorted(times, now - span))
         middle = self._past[k][1]
-        first, second = (middle - start[1])[:2], (here - middle)[:2]
+        first, second = (middle - start[1])[:2], (end - middle)[:2]
         min_travel = max(0.3, 2.0 * self.noise) * self.speed * span
         if min(np.hypot(*first), np.hypot(*second)) < min(min_travel, 0.5 * self.speed * span):
             return 0.0

@@ -63,11 +63,11 @@ def _reach_notes(
 
 
 def _time_notes(times: Floats, steps: Floats) -> Iterator[str]:
-    back = np.flatnonzero(steps < -ClockPolicy.max_late_s)
-    if len(back):
+    backward = np.flatnonzero(steps < -ClockPolicy.max_late_s)
+    if len(backward):
         yield (
-            f"the times go back at {counted(len(back), 'place')}, first from "
-            f"{times[back[0]]:.10g} to {times[back[0] + 1]:.10g} s: late messages are left "
+            f"the times go back at {counted(len(backward), 'place')}, first from "
+            f"{times[backward[0]]:.10g} to {times[backward[0] + 1]:.10g} s: late messages are left "
             "out; after a restart or a clock that was set, the track goes on"
         )
 

@@ -148,8 +148,8 @@ class Guard:
     def correct(self, side: str, obstacle: int | str) -> Report | None:
         """Keep the classes whose tether passes an obstacle on a side, as the operator says.
 
-        If no believed class does, those that differ least from a believed one take their
-        place.
+        If no believed class does, the classes that differ least from a believed one take
+        their place.
 
         Parameters
         ----------

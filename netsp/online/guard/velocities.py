@@ -72,11 +72,11 @@ class VelocityCheck:
             return
         first = [(p, g) for t, p, g in past if t <= past[0][0] + policy.averaging_s]
         last = [(p, g) for t, p, g in past if t >= time - policy.averaging_s]
-        went, said = np.mean(last, axis=0) - np.mean(first, axis=0)
-        off, travelled = float(np.linalg.norm(went - said)), float(np.linalg.norm(went))
+        went, reported = np.mean(last, axis=0) - np.mean(first, axis=0)
+        off, travelled = float(np.linalg.norm(went - reported)), float(np.linalg.norm(went))
         noise = self.noise * math.sqrt(1.0 / len(first) + 1.0 / len(last))
         max_off = 4.0 * noise + policy.max_error_share * self.speed * policy.span_s
-        longer = max(travelled, float(np.linalg.norm(said)))
+        longer = max(travelled, float(np.linalg.norm(reported)))
         min_distance = policy.min_noise_deviations * noise
         if off > max_off or off > max(policy.max_mismatch * longer, min_distance):
             self.is_believed = False
