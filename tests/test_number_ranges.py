@@ -1,12 +1,17 @@
 """Tests of the checks of the numbers in policies."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import pytest
 
 from netsp.base.errors import InputError
+from netsp.base.files import FilePolicy
 from netsp.base.number_ranges import check_not_negative, check_positive
+from netsp.base.ram import MemoryPolicy
+from netsp.world.scene.scene_policy import FieldPolicy, FloorPolicy, GridPolicy, SeamPolicy
+from netsp.world.scene.surfaces import SurfacePolicy
+from netsp.world.tether.tether_policy import TetherPolicy, pull_settings
 
 
 @dataclass(frozen=True)
@@ -46,3 +51,31 @@ def test_zero_is_not_negative_and_not_positive(value):
 def test_the_smallest_and_the_largest_numbers_are_positive():
     check_positive(Policy(wait_s=5e-324))
     check_positive(Policy(wait_s=math.inf))
+
+
+@pytest.mark.parametrize(
+    "policy",
+    [
+        FilePolicy,
+        MemoryPolicy,
+        TetherPolicy,
+        GridPolicy,
+        FieldPolicy,
+        SeamPolicy,
+        FloorPolicy,
+        SurfacePolicy,
+    ],
+)
+def test_policies_of_base_and_world_refuse_negative_numbers(policy):
+    for number in fields(policy):
+        with pytest.raises(InputError, match=f"{number.name}: expected"):
+            policy(**{number.name: -1})
+
+
+def test_kernels_get_every_number_of_the_tether_policy():
+    policy = TetherPolicy(max_sidesteps=3, min_gain=0.7)
+    settings = pull_settings(
+        policy, delta=0.1, spread=0.01, flat=1e-6, rounds=3, precision=5e-4
+    )._asdict()
+    assert settings["max_sidesteps"] == 3
+    assert {f.name: getattr(policy, f.name) for f in fields(policy)}.items() <= settings.items()
