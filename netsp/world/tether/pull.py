@@ -49,7 +49,7 @@ from netsp.world.tether.strand import (
     update_frame,
 )
 from netsp.world.tether.tether_policy import SLIP, STRIDE, PullSettings
-from netsp.world.tether.tips import nudge
+from netsp.world.tether.tips import sidestep_tips
 
 
 @kernel
@@ -185,7 +185,7 @@ def pull(
             last_length, length = length, strand_length(strand, count)
             came_off = False
             if length < last_length - min_gain:
-                strand, count, came_off = nudge(field, strand, count, settings, room, steps)
+                strand, count, came_off = sidestep_tips(field, strand, count, settings, room, steps)
             if came_off:
                 rounds, vain_rounds = max(rounds, done + 2), 0
                 continue

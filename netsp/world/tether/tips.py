@@ -30,10 +30,10 @@ from netsp.world.tether.tether_policy import SLIP, STRIDE, PullSettings
 
 
 @kernel
-def nudge(
+def sidestep_tips(
     field: Field, strand: Floats, count: int, settings: PullSettings, room: int, steps: int
 ) -> tuple[Floats, int, bool]:
-    """Move contacts at which the strand turns sharply sideways, where that makes it shorter.
+    """Move contacts sideways where the strand turns sharply, if that makes it shorter.
 
     Over the tip of a corner each contact by itself is held, and a strand that is taut on both sides
     of the tip lies on a saddle: only all contacts together, moved across the strand, leave it.
