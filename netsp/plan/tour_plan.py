@@ -63,7 +63,7 @@ def legs_of(problem: Problem, solution: Solution, numbers: list[int] | None = No
     for visit in solution.tour:
         target = np.array(problem.goals[visit.goal].position)
         near = at + np.flatnonzero(np.linalg.norm(path[at:] - target, axis=1) <= place)
-        # several points of the path may lie there: the one with the stated word is meant
+        # of several points of the path at the goal, take the one with the stated word
         words = (signature(np.vstack([before, path[: k + 1]])[:, :2], rays) for k in near)
         k = next((k for k, w in zip(near, words, strict=True) if w == visit.signature), None)
         if k is None:

@@ -24,7 +24,7 @@ def pushed_aside(problem: Problem, nodes: Floats, by: float) -> Floats:
         core, rim = solid.buffer(-by), solid.buffer(by)
         if core.is_empty or rim.covers(base):
             continue
-        # what was put aside for one obstacle may come into the core again only at its own ends
+        # a stretch around the rim enters the core again at most at its own ends
         for _ in range(20):
             flat = shapely.LineString(line[:, :2])
             inside = flat.intersection(core)

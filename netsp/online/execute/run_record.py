@@ -191,7 +191,7 @@ class RunRecord:
         """Write the state now, regardless of when the last one was written."""
         if problem is not self._problem:
             before, self._sha256 = self._sha256, problem.sha256
-            if self._state is not None:  # a run that is killed before the new state is written
+            if self._state is not None:  # in case the run is killed before the new state is written
                 self._write(self._state, before, self._sha256)
             write_text(self.folder / PROBLEM, problem.to_json())
             self._problem = problem

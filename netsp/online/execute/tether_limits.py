@@ -90,7 +90,7 @@ def overruns(t: Floats, tether: Floats, limit: Floats, shortening: Bools) -> lis
         Whether the limit was lowered below the tether, which is being shortened.
     """
     over = tether > limit * (1.0 + TETHER_TOLERANCE)
-    # a row tells how it is from then on, until the next
+    # a row holds until the next
     ends = np.append(t[1:], t[-1:])
     key = np.column_stack([np.where(over, limit, 0.0), over & shortening])
     found = []

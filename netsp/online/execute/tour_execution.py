@@ -239,7 +239,7 @@ class _Run:
 
     def _arrive(self) -> None:
         leg = self.legs.pop(0)
-        # a vehicle with dynamics stops near the goal: what counts is the class at the goal itself
+        # the class at the goal itself counts, although a vehicle with dynamics stops near it
         line = np.vstack([self.tether.nodes, leg.path[-1]])
         word = signature(line[:, :2], self.problem.representative_points)
         self.out.arrivals.append(
@@ -378,12 +378,12 @@ class _Run:
         anchor = self.model.start(line[0], line[0])
         self.tether = self.model.refine(self.model.drive(anchor, line[1:])[0])
         if self.tether.length > problem.tether_length:
-            self.shorten = True  # pushed aside it is longer, whoever is to blame
+            self.shorten = True  # the event has made it longer
 
     def _push(self, by: Floats) -> None:
         """Carry the robot off, as far as there is water."""
         start = self.vehicle.position
-        # farther than the tether goes there and back nothing is carried
+        # longer pushes than twice the tether have no effect
         far = 2.0 * max(self.problem.tether_length, self.tether.length) + self.delta
         by = by * min(1.0, far / max(float(np.linalg.norm(by)), 1e-300))
         points = polylines.dense(np.array([start, start + by]), 0.5 * self.delta)
@@ -412,7 +412,7 @@ class _Run:
         that leave the reserve, tethers get shorter by themselves.
         """
         if self.live is not None and self._is_over_limit:
-            self.live.hold()  # it would go on outward while we think
+            self.live.hold()  # otherwise it goes on outward during planning
         limit = self._reserved(left).length
         has_room = self.tether.length <= (limit if event == "tether_length" else np.inf)
         if has_room and not self._is_over_limit:
@@ -420,12 +420,12 @@ class _Run:
             self._replan(why, left, event)
             return
         out = self.tether.length
-        # a vehicle with dynamics ends somewhere within its reach of where it is sent
+        # a vehicle with dynamics stops anywhere within its reach of a target
         near = 0.0 if self.options.vehicle == "kinematic" else self.options.reach
         length = max(min(limit, self.problem.tether_length - near), 0.0)
         retreat_path = np.ascontiguousarray(self.tether.nodes[::-1])
         self.retreat = _Retreat(length, why, left, event)
-        # the way to the base, left half-way: to a place nearby a vehicle slows down before it
+        # lead to the base and stop on the way, because a vehicle slows down before the end of a path
         self.legs = [Leg(HOME, retreat_path, (), 0.0)]
         self.path, self.fresh, self.leg_s = retreat_path[1:], True, 0.0
         units = self.problem.units
@@ -439,7 +439,7 @@ class _Run:
 
     def _replan(self, why: str, left: list[int], event: str = "left out") -> None:
         if self.live is not None:
-            # it has gone on since its tether was last looked at, perhaps past an obstacle
+            # it has gone on since the last update of its tether, perhaps past an obstacle
             self.live.hold()
             line = np.array([self.tether.robot, self.vehicle.position])
             self._follow(polylines.dense(line, 0.5 * self.delta)[1:])
@@ -478,7 +478,7 @@ class _Run:
         """Stay in place until a plan is due, however soon it was ready, so that a seed determines
         the run."""
         if self.live is not None:
-            self.now = max(self.now, self.live.time)  # it has held its place meanwhile
+            self.now = max(self.now, self.live.time)  # it has held its place during planning
             return
         mode, self.mode = self.mode, "hold"
         until = self.now + seconds
@@ -490,7 +490,7 @@ class _Run:
     def finish(self) -> None:
         """Log the last tether, and whether it is free."""
         self.out.tethers.append((round(self.now, 6), self.tether.nodes.copy()))
-        # a corner may have held it back for the few rounds of an update
+        # the few rounds of an update may have left the tether at a corner
         self.out.free = tether_is_free(self.model.refine(self.tether), self.delta)
 
     def _log_event(self, event: str, response: str, reason: str, spent: float) -> None:
@@ -574,7 +574,7 @@ def execute(
         log_row()
     except Exception:
         if record is not None and run.out.rows:
-            with contextlib.suppress(Exception):  # the first exception is raised, not a second one
+            with contextlib.suppress(Exception):  # raise the first exception, not a second one
                 record.write_state(run.problem, run.state)
         raise
     run.finish()

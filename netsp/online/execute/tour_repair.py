@@ -233,7 +233,7 @@ def _better_order(
     for the log."""
     assert local.length is not None
     speed, hurried = options.speed, clock.left <= 0.0
-    # with a short time left a new plan has less of it to pay for itself
+    # a new order must save more time than its planning takes
     replan_s = max(clock.left, 0.0)
     saving = (local.length - _lower_bound_of_rest(graph, goals, clock)) / speed
     if saving > replan_s > 0.0:
@@ -322,7 +322,7 @@ def free_position(problem: Problem, robot: Floats) -> tuple[float, float, float]
         rim = obstacle.shape(problem.clearance).exterior
         nearest = np.array(rim.interpolate(rim.project(shapely.Point(xy))).coords[0])
         if isinstance(obstacle, Circle):
-            # a circle's rim is drawn as a polygon inside of it
+            # the rim of a circle is a polygon inside it
             direction = xy - obstacle.center
             size = float(np.hypot(*direction))
             reach = obstacle.radius + problem.clearance
@@ -412,7 +412,7 @@ def _keeping_order(graph: GraphFromState, goals: int) -> Result:
         tour.append(int(members[k]))
         k = int(best[k])
     full = (0, start, *reversed(tour))
-    # walked from the state on: the path to there is behind the robot
+    # the walk starts at the state, because the path to it is behind the robot
     return Result(full, length, None, Status.FEASIBLE, walk=(*full[1:], 0))
 
 

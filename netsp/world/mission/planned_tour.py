@@ -193,5 +193,5 @@ def thinned_path(path: Floats) -> tuple[Point3, ...]:
         a, b, c = path[keep[-1]], path[k], path[k + 1]
         if polylines.length(np.array([a, b, c])) > np.linalg.norm(c - a) + 1e-9:
             keep.append(k)
-    # a path that leads nowhere has both of its ends, too
+    # keep both ends, even if they are the same point
     return tuple((x, y, z) for x, y, z in path[[*keep, max(len(path) - 1, 0)]].tolist())

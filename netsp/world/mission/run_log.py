@@ -152,7 +152,7 @@ def write_run(run: Run, folder: str | Path) -> None:
         summary = json.dumps(run.summary, indent=1, allow_nan=False)
         (place / "summary.json").write_text(summary + "\n", encoding="utf-8")
         data = run.mission.model_dump(mode="json")
-        # a mission file names its scene from where it lies itself
+        # a mission file names its scene relative to its own folder
         data["scene"] = Path(os.path.relpath(data["scene"], place)).as_posix()
         mission = json.dumps(data, indent=1)
         (place / "mission.json").write_text(mission + "\n", encoding="utf-8")

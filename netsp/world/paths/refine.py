@@ -94,7 +94,7 @@ def refined(
         best = stepped(field, best, clearance, rng, params)
         if clear(field, best, 0.0):
             return best
-        # what went into something is brought out again, and the three steps are repeated
+        # move points out of solids, and repeat the three steps
         best = lifted(field, best, clearance)
     return path
 

@@ -55,7 +55,7 @@ class SampledPaths:
         ou.noOutputHandler()
         ou.RNG.setSeed(self.seed + 1)
         grid = self.grid
-        # where the ends are nearer to solids than the clearance, the path may be as near
+        # if the ends are nearer to solids than the clearance, the path may be as near
         ends = grid.field.distance(np.array([start, self.target]))
         room = max(0.0, min(grid.clearance, float(ends.min()) - 1e-3 * grid.cell))
         field = grid.field.grown(room).arrays

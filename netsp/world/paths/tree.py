@@ -100,7 +100,7 @@ class Grid:
                 for cell in wanted
             ):
                 return kept
-            del self._kept[tuple(root)]  # something stands in its way since
+            del self._kept[tuple(root)]  # a new solid blocks it
         return grow(self.states, root, wanted)
 
     def with_changed_box(self, field: DistanceField, box: Floats) -> Grid:
@@ -116,7 +116,7 @@ class Grid:
         )
         end_if_abandoned()
         if (new.free & ~self.free).any():
-            new._kept = {}  # there may be shorter paths now; else those that are still free are
+            new._kept = {}  # paths may be shorter now; if no cell became free, free paths stay the shortest
         else:
             new._kept = dict(self._kept)
         return new
@@ -444,7 +444,7 @@ _NEXT_STEPS[:26, : ONWARD.shape[1] - 1], _NEXT_STEPS[26] = ONWARD[:, 1:], np.ara
 def tree_path(toward: npt.NDArray[np.int8], start: Ints) -> Ints:
     """Return the cells (k, 3) from one in the tree to the root, both ends among them."""
     out, count = np.empty((64, 3), dtype=np.int64), 1
-    # axis by axis: assigning a row would compile NumPy's error messages, which takes seconds
+    # axis by axis, because assigning a row would compile NumPy's error messages
     for axis in range(3):
         out[0, axis] = start[axis]
     while True:
@@ -481,7 +481,7 @@ def pull_taut(
     than its ends are. Its points are dense enough that straight lines between them keep to it."""
     grown, room = _grown(field, path, clearance, delta)
     line = _shortcut(grown, path, max(room, delta))
-    # the grown solids are no thinner than twice the room: nothing is lost with a coarser delta
+    # grown solids are at least twice as thick as the room, so a coarser delta loses none
     for share in (1.0, 0.5):
         line = _relaxed(grown, line, max(delta, share * room), policy.pull_rounds)
     return line[np.r_[True, np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-9]]
@@ -547,7 +547,7 @@ def shortcut(field: Field, path: Floats, tolerance: float) -> Floats:
     passed over.
     """
     out = np.empty_like(path)
-    for axis in range(3):  # assigning a row would compile NumPy's error messages
+    for axis in range(3):  # see `tree_path`
         out[0, axis] = path[0, axis]
     count, i = 1, 0
     while i < len(path) - 1:

@@ -109,7 +109,7 @@ class PredictivePlanner(Planner):
             > tolerance * (self.mission.reach + self.mission.delta)
         ):
             return None
-        # it counts as there a bit before the waypoint, from where a corner may be cut too short
+        # the robot may start before the end of the leg before, and cut a corner from there
         for path in (np.vstack([robot, leg[1:]]), np.vstack([robot, leg])):
             if self.is_free(path[:2]) and self.is_clear_of_solids(path):
                 return path
@@ -310,7 +310,7 @@ class PredictivePlanner(Planner):
         its class is shorter. If the tether is over the limit on that path, as much as necessary of
         the part back along the tether stays as it is.
         """
-        # the tether back from the robot, finely, off the surfaces; some of its points are pivots
+        # the path back along the tether, finely divided and off surfaces; some points are pivots
         nodes = tether.nodes[::-1]
         along = polylines.along(nodes)
         retreat = polylines.points_along(nodes, self.grid.cell)
@@ -330,7 +330,7 @@ class PredictivePlanner(Planner):
 
         self._preview_count, self._previewed_length, self._candidates = 0, 0.0, []
         if onward[0] is not None:
-            # the shortest path of all: where the tether fits on it, nothing else need be tried
+            # if the tether fits on the shortest path of all, no other is tried
             path = self.pull_taut(onward[0])
             direct = Candidate(np.vstack([tether.nodes, path[1:]]), path, path)
             self._candidates.append(direct)

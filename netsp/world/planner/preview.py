@@ -152,7 +152,7 @@ class TetherPreview:
                 tether, _ = self.model.drive(tether, part[1:])
             elapsed, current = until, self._payout(tether)
             if current > max_payout or turning(tether, self.mission.delta) > max_turning:
-                return 0.0, tether  # nearer by, it would have to last as long: that was not asked
+                return 0.0, tether  # not tested for a shorter path
         return math.inf, tether
 
     def _payout(self, tether: Tether) -> float:

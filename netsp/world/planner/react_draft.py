@@ -30,9 +30,7 @@ These points are open in the listing, and are read as follows:
   the next waypoint "that has not yet been reached", so it counts.
 - Way home. The draft has none; it is that of `react`, back along the tether.
 
-`benchmarks/draft_readings.py` flies the other readings, too (docs/reproduction.md). In the basin
-most make no difference, because every search ends in the fallback. With moves away from solids
-only, as in earlier versions, the tether is over the limit for 94.7 s instead of 85.6.
+`benchmarks/draft_readings.py` flies the other readings, too (docs/reproduction.md).
 
 Nodes of a taut tether lie on surfaces. The path back is pushed off them, because the robot needs
 room.

@@ -84,7 +84,7 @@ def surface_patches(
         for s in solids
         if not isinstance(s.shape, HalfSpace) and (inspect is None or s.name in inspect)
     ]
-    chosen_meshes = ("mesh",) if inspect is None else inspect  # no floor unless it is asked for
+    chosen_meshes = ("mesh",) if inspect is None else inspect  # the floor only by name
     surfaces += [(triangles, field) for name, triangles in scene.meshes() if name in chosen_meshes]
     for (vertices, faces), own_field in surfaces:
         triangles = divided_triangles(vertices[faces], size, policy.max_patches)
@@ -93,7 +93,7 @@ def surface_patches(
         good = twice > 1e-12
         middle = triangles[good].mean(axis=1)
         if len(middle):
-            # facets of what is round lie a little inside of it
+            # facets of round solids lie a little inside
             outward = own_field.gradient(middle)
             centres.append(middle - own_field.distance(middle)[:, None] * outward)
             normals.append(outward)
@@ -125,7 +125,7 @@ def cloud_sides(field: DistanceField, points: Floats) -> tuple[Floats, Floats]:
     normals = field.gradient(points)
     out = []
     for sign in (1.0, -1.0):
-        # from a little beside the middle, where it is plain which side is nearer
+        # start beside the middle, where the nearer side is clear
         side = points + sign * 0.5 * (field.voxel or 0.0) * normals
         for _ in range(3):
             side = side - field.distance(side)[:, None] * field.gradient(side)
@@ -240,7 +240,7 @@ class Coverage:
 
     def _nearest(self, eye: Floats) -> Floats:
         """Return the vector from a place to the nearest patch."""
-        # kept, because `heading` and `look` ask for the same place in turn
+        # cached, because `heading` and `look` use the same place in turn
         if self._latest is None or not np.array_equal(self._latest[0], eye):
             at = nearest_point(self.patches.centres, eye)
             self._latest = (np.array(eye), np.asarray(self.patches.centres[at] - eye))

@@ -245,7 +245,7 @@ class _MissionRun:
         if planner.reached and planner.index > before and planner.reached[-1] == before:
             stay(world, planner, planner.mission.waypoints[before], self.on_step)
             if planner.is_anchor_moving and world.now > row.time:
-                planner.path = planner.path[:0]  # it was planned for another moment
+                planner.path = planner.path[:0]  # planned for an earlier position of the anchor
                 return True
         max_s = world.policy.max_waypoint_s
         if self._since[1] != planner.index or command.mode == WAIT:

@@ -203,7 +203,7 @@ class Simulation:
         assert self.model is not None
         assert self.believed is not None
         if isinstance(self.model, GeodesicTether):
-            # a map that is wrong may have a solid where the robot is
+            # a wrong map may have a solid at the robot
             point = pushed_out(self.model.field, point[None], 0.0)[0]
             return self.model.update(self.believed, point, anchor)
         return self.model.update(self.believed, point)

@@ -37,7 +37,7 @@ class Stalls:
         stall is recorded. A path that has been planned anew starts the time again."""
         position = world.vehicle.position
         left = polylines.length(np.vstack([position, command.path]))
-        # home may move away as fast as the robot comes after it
+        # home may move away as fast as the robot follows
         chasing = command.mode == WAIT or (planner.is_homeward and planner.is_anchor_moving)
         planned = planner.index != self._index or command.replan_s > 0.0
         if chasing or planned or left < self._min_left - world.policy.stall_progress:

@@ -41,7 +41,7 @@ def summarise(
         Wall-clock time of the run, s.
     """
     log = world.log
-    # the inspection ends with the row in which the last waypoint is behind the robot
+    # the inspection ends with the row after the last waypoint
     before = [
         n for n, r in enumerate(log) if r.waypoint < len(mission.waypoints) or r.mode == DWELL
     ]

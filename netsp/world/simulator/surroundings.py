@@ -219,7 +219,7 @@ class Surroundings:
 
     def _field(self, solids: tuple[Solid, ...]) -> DistanceField:
         if not solids and self.voxels is None:
-            solids = (FAR_OFF,)  # a field needs something
+            solids = (FAR_OFF,)  # a field needs a solid
         return self.scene.field_with(solids, self.voxels)
 
     def _look(self, world: Simulation, planner: Planner) -> bool:
@@ -257,7 +257,7 @@ class Surroundings:
             ).sum(0)
             before = sighting.mapped
             if sighting.update_map_place(self.policy.min_hits) and sighting.mapped is not None:
-                # whatever has a name is there once
+                # a name occurs once
                 name = solid.name
                 kept = tuple(
                     s for s in self.mapped if s is not before and (name is None or s.name != name)
@@ -317,7 +317,7 @@ class Surroundings:
         best, min_difference, tolerance = None, np.inf, self.policy.payout_tolerance
         for n, (nodes, count) in enumerate([(self.trail[:1], 1), *self.moments]):
             if count > len(self.trail):
-                continue  # gone back past it
+                continue  # the robot has gone back past it
             line = np.vstack([nodes, self.trail[count:], world.vehicle.position])
             line[1:-1] = pushed_out(model.field, line[1:-1], 1e-3)
             line = np.vstack([self._anchor_path_back(world, n), line])
