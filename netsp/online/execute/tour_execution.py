@@ -425,7 +425,7 @@ class _Run:
         length = max(min(limit, self.problem.tether_length - near), 0.0)
         retreat_path = np.ascontiguousarray(self.tether.nodes[::-1])
         self.retreat = _Retreat(length, why, left, event)
-        # lead to the base and stop on the way, because a vehicle slows down before the end of a path
+        # lead to the base and stop on the way: a vehicle slows down before the end of its path
         self.legs = [Leg(HOME, retreat_path, (), 0.0)]
         self.path, self.fresh, self.leg_s = retreat_path[1:], True, 0.0
         units = self.problem.units

@@ -14,7 +14,7 @@ from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
 from netsp.world.paths.path_policy import PathPolicy
 from netsp.world.paths.tree import Grid
-from netsp.world.scene.sampling import distance, lowest_along
+from netsp.world.scene.sampling import Field, distance, lowest_along
 
 OMPL_PLANNERS = {"rrtstar": "RRTstar", "bitstar": "BITstar", "prmstar": "PRMstar"}
 
@@ -59,17 +59,7 @@ class SampledPaths:
         ends = grid.field.distance(np.array([start, self.target]))
         room = max(0.0, min(grid.clearance, float(ends.min()) - 1e-3 * grid.cell))
         field = grid.field.grown(room).arrays
-        space = ob.RealVectorStateSpace(3)
-        bounds = ob.RealVectorBounds(3)
-        high = grid.low + np.array(grid.free.shape) * grid.cell
-        for k in range(3):
-            bounds.setLow(k, float(min(grid.low[k], start[k], self.target[k])))
-            bounds.setHigh(k, float(max(high[k], start[k], self.target[k])))
-        space.setBounds(bounds)
-        info = ob.SpaceInformation(space)
-        info.setStateValidityChecker(lambda s: bool(distance(field, s[0], s[1], s[2]) >= 0.0))
-        info.setStateValidityCheckingResolution(0.25 * grid.cell / space.getMaximumExtent())
-        info.setup()
+        space, info = self._space(ob, field, start)
         first, last = space.allocState(), space.allocState()
         for k in range(3):
             first[k], last[k] = float(start[k]), float(self.target[k])
@@ -107,6 +97,22 @@ class SampledPaths:
             for a, b in pairwise(path)
         )
         return path if free else None
+
+    def _space(self, ob: Any, field: Field, start: Floats) -> tuple[Any, Any]:
+        """Return OMPL's space, and its information with the solids."""
+        grid = self.grid
+        space = ob.RealVectorStateSpace(3)
+        bounds = ob.RealVectorBounds(3)
+        high = grid.low + np.array(grid.free.shape) * grid.cell
+        for k in range(3):
+            bounds.setLow(k, float(min(grid.low[k], start[k], self.target[k])))
+            bounds.setHigh(k, float(max(high[k], start[k], self.target[k])))
+        space.setBounds(bounds)
+        info = ob.SpaceInformation(space)
+        info.setStateValidityChecker(lambda s: bool(distance(field, s[0], s[1], s[2]) >= 0.0))
+        info.setStateValidityCheckingResolution(0.25 * grid.cell / space.getMaximumExtent())
+        info.setup()
+        return space, info
 
 
 def _through_roadmap(

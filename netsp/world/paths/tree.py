@@ -116,7 +116,8 @@ class Grid:
         )
         end_if_abandoned()
         if (new.free & ~self.free).any():
-            new._kept = {}  # paths may be shorter now; if no cell became free, free paths stay the shortest
+            # paths may be shorter now; otherwise, free paths stay the shortest
+            new._kept = {}
         else:
             new._kept = dict(self._kept)
         return new

@@ -70,23 +70,9 @@ def surface_patches(
     InputError
         `inspect` names no solid, or no surface is left to be seen.
     """
-    low, high = extent(scene, places)
-    solids = scene.all_solids()
-    named = {s.name for s in solids}
-    named |= {n for n in ("mesh", "cloud", "floor") if getattr(scene, n) is not None}
-    for name in inspect or ():
-        if name not in named:
-            raise InputError(f"inspect: expected names of solids, got {name!r}")
     centres, normals, areas = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0)]
     pairs = np.zeros((0, 2), dtype=np.int64)
-    surfaces = [
-        (surface_of(s.shape, low, high), Scene(solids=(s,)).field())
-        for s in solids
-        if not isinstance(s.shape, HalfSpace) and (inspect is None or s.name in inspect)
-    ]
-    chosen_meshes = ("mesh",) if inspect is None else inspect  # the floor only by name
-    surfaces += [(triangles, field) for name, triangles in scene.meshes() if name in chosen_meshes]
-    for (vertices, faces), own_field in surfaces:
+    for vertices, faces, own_field in _surfaces(scene, field, places, inspect):
         triangles = divided_triangles(vertices[faces], size, policy.max_patches)
         cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         twice = np.linalg.norm(cross, axis=1)
@@ -117,6 +103,26 @@ def surface_patches(
         )
     place = np.cumsum(bare) - 1
     return Patches(c[bare], n[bare], a[bare], place[pairs[bare[pairs].all(axis=1)]])
+
+
+def _surfaces(
+    scene: Scene, field: DistanceField, places: Floats, inspect: tuple[str, ...] | None
+) -> list[tuple[Floats, Ints, DistanceField]]:
+    """Return vertices, faces and own field of each surface to be seen, but for that of a cloud."""
+    low, high = extent(scene, places)
+    solids = scene.all_solids()
+    named = {s.name for s in solids}
+    named |= {n for n in ("mesh", "cloud", "floor") if getattr(scene, n) is not None}
+    for name in inspect or ():
+        if name not in named:
+            raise InputError(f"inspect: expected names of solids, got {name!r}")
+    found = [
+        (*surface_of(s.shape, low, high), Scene(solids=(s,)).field())
+        for s in solids
+        if not isinstance(s.shape, HalfSpace) and (inspect is None or s.name in inspect)
+    ]
+    chosen_meshes = ("mesh",) if inspect is None else inspect  # the floor only by name
+    return found + [(*mesh, field) for name, mesh in scene.meshes() if name in chosen_meshes]
 
 
 def cloud_sides(field: DistanceField, points: Floats) -> tuple[Floats, Floats]:
