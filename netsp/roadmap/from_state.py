@@ -24,7 +24,7 @@ from netsp.base.clock import Clock, TimeLimit
 from netsp.base.errors import InputError, NetspError
 from netsp.gtsp.travel.costs import rounded_down
 from netsp.gtsp.travel.graph import TravelGraph
-from netsp.gtsp.travel.parity_distances import BITS, WaysByParity
+from netsp.gtsp.travel.parity_distances import BITS_PER_WORD, WaysByParity
 from netsp.gtsp.travel.result import OnProgress, Progress, Result
 from netsp.hsignature import reduce
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE, LowerBound, Scope
@@ -108,7 +108,7 @@ class GraphFromState(TravelGraph):
         rest = ~(base & start)
         odd = np.zeros((1, ways.odd.shape[1]), dtype=np.uint64)
         for a in self.signatures[self.start]:
-            odd[0, (abs(a) - 1) // BITS] ^= np.uint64(1 << (abs(a) - 1) % BITS)
+            odd[0, (abs(a) - 1) // BITS_PER_WORD] ^= np.uint64(1 << (abs(a) - 1) % BITS_PER_WORD)
         return dataclasses.replace(
             ways,
             ends=np.vstack([ways.ends[rest], [[0, goal]]]),

@@ -22,7 +22,7 @@ from netsp.base.clock import Clock, TimeLimit
 from netsp.base.compiled.kernel import kernel
 from netsp.base.errors import InputError, LimitReachedError, counted, warn_left_out
 from netsp.base.geometry.kernels import Blockers, depth_in_obstacle, segment_blocked
-from netsp.gtsp.travel.graph import UNTIMED, TravelGraph
+from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.tether_blind_legs import Detours
 from netsp.hsignature import Word
 from netsp.model.problem import Circle, Problem
@@ -247,9 +247,8 @@ class PrmRoadmap:
         check = partial(
             (clock or Clock()).check, f"measuring legs over {len(self.augmented)} states"
         )
-        out = self.augmented.distances(
-            rows, rows, (lambda: None) if len(rows) <= UNTIMED else check
-        )
+        is_untimed = len(rows) <= self.policy.legs.untimed_vertices
+        out = self.augmented.distances(rows, rows, (lambda: None) if is_untimed else check)
         out = np.minimum(out, out.T)  # equal but for the order of summation
         cluster = self.cluster[vertices]
         out[cluster[:, None] == cluster[None, :]] = np.inf

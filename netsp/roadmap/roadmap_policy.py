@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from netsp.base.errors import InputError
 from netsp.base.number_ranges import check_not_negative, check_positive
+from netsp.gtsp.gtsp_policy import CostPolicy
 
 
 def _check_growth(policy: object, *names: str) -> None:
@@ -186,6 +187,9 @@ class LegPolicy:
     max_single_legs
         Maximum number of legs that are pulled one by one, which takes some hundredths of a second;
         also the number that a thread pulls at one time.
+    untimed_vertices
+        Number of vertices up to which legs among them are measured even if time is up; at least
+        `CostPolicy.untimed_vertices`, which solvers rely on.
     max_parted_classes
         Maximum number of classes for which it is soon known where all their tethers part. Among
         more, a few legs are pulled one by one.
@@ -197,6 +201,7 @@ class LegPolicy:
     bound_rows: int = 64
     max_block_legs: int = 64_000_000
     max_single_legs: int = 20_000
+    untimed_vertices: int = CostPolicy.untimed_vertices
     max_parted_classes: int = 1500
     min_joint_searches: int = 20
 

@@ -13,7 +13,6 @@ from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import NEVER, Clock, Flag
 from netsp.base.errors import LimitReachedError
 from netsp.base.ram import check_available
-from netsp.gtsp.travel.graph import UNTIMED
 from netsp.hsignature import Word, concatenate, invert
 from netsp.roadmap.branches import OPEN, Branches, Lengths, build_branches, fill, fill_parallel
 from netsp.roadmap.paths import TautPaths, UnknownPathError
@@ -61,12 +60,12 @@ class TautLegs:
         where `asked` is false.
 
         Raises LimitReachedError when the clock is up before all are found. Legs among up to
-        `UNTIMED` vertices are found whatever the clock says.
+        `untimed_vertices` are found whatever the clock says.
         """
         vertices = np.asarray(vertices, dtype=np.int64)
         if (
             asked is None
-            and len(vertices) <= UNTIMED
+            and len(vertices) <= self.policy.untimed_vertices
             and len(self.cluster) > self.policy.max_parted_classes
         ):
             # one by one, whatever the time: to know where all tethers part takes a while
@@ -130,7 +129,10 @@ class TautLegs:
             self._fill(vertices, share, out, stop, branches, branches.order)
 
         # what takes a fraction of a second is measured all the same, or there would be no tour
-        if n <= UNTIMED and len(self.cluster) <= self.policy.max_parted_classes:
+        if (
+            n <= self.policy.untimed_vertices
+            and len(self.cluster) <= self.policy.max_parted_classes
+        ):
             whole(NEVER)
         else:
             clock = clock or Clock()

@@ -1,4 +1,4 @@
-"""Travel graphs of given costs: checked, and as the legs of a graph."""
+"""Given costs: their checks, and the legs of a graph made from them."""
 
 from __future__ import annotations
 
@@ -8,13 +8,11 @@ import numpy.typing as npt
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError
-
-ROWS = 512
-"""Of a matrix that are worked on at a time, so that what is in between stays small."""
+from netsp.gtsp.gtsp_policy import CostPolicy
 
 
 def rounded_down(values: Floats) -> Floats:
-    """In single precision, and no larger."""
+    """Return values in single precision, rounded down."""
     out = values.astype(np.float32)
     np.nextafter(out, np.float32(-np.inf), out=out, where=out > values)
     return out  # type: ignore[return-value]
@@ -25,52 +23,54 @@ class CostTable:
 
     at_once = True
 
-    def __init__(self, costs: Floats, cluster: Ints) -> None:
-        self.costs, self.cluster = costs, cluster
+    def __init__(self, costs: Floats, cluster: Ints, policy: CostPolicy = CostPolicy()) -> None:
+        self.costs, self.cluster, self.policy = costs, cluster, policy
 
     def lengths(
         self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
-        """As `netsp.gtsp.travel.graph.Legs.lengths`; nothing has to be measured."""
+        """Return costs as `netsp.gtsp.travel.leg_provider.Legs.lengths`."""
         return self.costs[np.ix_(vertices, vertices)]
 
     def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
-        """As `netsp.gtsp.travel.leg_provider.LegsAtOnce.rounded`."""
+        """Return costs as `netsp.gtsp.travel.leg_provider.LegsAtOnce.rounded`."""
         out = np.empty((len(vertices), len(vertices)), dtype=np.float32)
-        for k in range(0, len(vertices), ROWS):
-            out[k : k + ROWS] = rounded_down(self.costs[np.ix_(vertices[k : k + ROWS], vertices)])
+        block = self.policy.block_rows
+        for k in range(0, len(vertices), block):
+            rows = slice(k, k + block)
+            out[rows] = rounded_down(self.costs[np.ix_(vertices[rows], vertices)])
         return out  # type: ignore[return-value]
 
     def to_base(self) -> Floats:
-        """(V,) costs from the base."""
+        """Return the costs (V,) of the legs from the base."""
         return np.asarray(self.costs[0])
 
     def lower_bounds(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
     ) -> Floats:
-        """The costs themselves."""
+        """Return the costs themselves."""
         return self.lengths(vertices) if rows is None else self.lengths(vertices)[rows]
 
     def path(self, u: int, v: int) -> Floats:
-        """There is none: InputError."""
+        """Raise InputError, because there are no paths."""
         raise InputError(f"no path from vertex {u} to {v}: this travel graph was made from costs")
 
 
-LARGEST_WHOLE = 2.0**40
-"""Costs are sums of whole numbers as long as none is larger than this."""
+MAX_WHOLE_COST = 2.0**40
+"""Tolerance of whole numbers: double precision adds up to 8192 costs of this size exactly."""
 
 
 def grain_of(costs: Floats) -> float:
-    """1 if all costs are whole numbers, so that lengths of tours are, too; else 0."""
+    """Return 1 if all costs are whole numbers, so that all lengths of tours are; else 0."""
     finite = costs[np.isfinite(costs)]
-    whole = bool((finite == np.rint(finite)).all()) and finite.max(initial=0.0) <= LARGEST_WHOLE
+    whole = bool((finite == np.rint(finite)).all()) and finite.max(initial=0.0) <= MAX_WHOLE_COST
     return 1.0 if whole else 0.0
 
 
 def checked_costs(
     costs: npt.ArrayLike, clusters: npt.ArrayLike, *, base: bool = True
 ) -> tuple[Floats, Ints]:
-    """The matrix with inf within clusters, and the clusters, or InputError with what is wrong.
+    """Return the matrix with inf within clusters, and the clusters; raise InputError if wrong.
 
     Parameters
     ----------

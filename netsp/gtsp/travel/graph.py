@@ -59,11 +59,6 @@ class Carrier(Protocol):
         the tether reaches, and that are looked at before the time is up."""
 
 
-UNTIMED = 50
-"""Legs among so few vertices, or as many single legs as there are among them, are measured whatever
-the time: the length of a tour, say."""
-
-
 class TravelGraph(Drawn):
     """Augmented goals with the costs of the legs between them.
 

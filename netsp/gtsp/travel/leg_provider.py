@@ -1,4 +1,4 @@
-"""What a roadmap gives a travel graph: the lengths of legs, bounds on them, and their paths."""
+"""Protocols of the legs of a travel graph: their lengths, bounds and paths."""
 
 from __future__ import annotations
 
@@ -10,42 +10,46 @@ from netsp.base.clock import Clock
 
 
 class Legs(Protocol):
-    """What a roadmap gives: lengths of legs between vertices, and their paths."""
+    """Legs between vertices."""
 
     def lengths(
         self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
-        """(k, k) symmetric leg lengths among the given vertices; inf within a cluster. Where
-        `asked` (k, k, symmetric) is given and false, anything. LimitReachedError when the clock is
-        up before many are measured."""
+        """Return symmetric lengths (k, k) among vertices; inf within a cluster, and anything where
+        `asked` (k, k, symmetric) is false.
+
+        Raises LimitReachedError if the clock is up before many are measured.
+        """
 
     def to_base(self) -> Floats:
-        """(V,) lengths of the legs from the base."""
+        """Return the lengths (V,) of the legs from the base."""
 
     def lower_bounds(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
     ) -> Floats:
-        """(k, k) lower bounds on the leg lengths, much cheaper than the lengths; with `rows`, only
-        those from so many of the vertices (positions among them)."""
+        """Return lower bounds (k, k), much cheaper than lengths; with `rows`, only those from some
+        vertices (positions among them)."""
 
     def path(self, u: int, v: int) -> Floats:
-        """(n, 3) polyline of the leg from vertex u to vertex v."""
+        """Return the leg from vertex u to vertex v as a polyline (n, 3)."""
 
 
 class LegsAtOnce(Legs, Protocol):
-    """Legs that are quickly found all together; `at_once` says so."""
+    """Legs that are found quickly all together, if `at_once`."""
 
     at_once: bool
 
     def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
-        """As `lengths`, in single precision and no larger."""
+        """Return `lengths` in single precision, rounded down."""
 
 
 class LegsInBlocks(LegsAtOnce, Protocol):
-    """Legs that are found some vertices at a time about as quickly as all together."""
+    """Legs that are found block by block about as quickly as all together."""
 
     def blocks(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
     ) -> Iterator[tuple[Ints, Floats]]:
-        """As `rounded`, row by row: some of the vertices (r,), as positions among them, and (r, k)
-        their legs, to be used before the next are asked for. If rows are given, of these only."""
+        """Yield blocks of `rounded`: positions (r,) of some vertices, and their legs (r, k).
+
+        A block is valid until the next. With `rows`, only those rows are yielded.
+        """

@@ -1,4 +1,4 @@
-"""Ways between goals, told apart by the rays that they cross an odd number of times."""
+"""Shortest paths between goals, by the rays that they cross an odd number of times."""
 
 from __future__ import annotations
 
@@ -9,26 +9,27 @@ import numpy.typing as npt
 
 from netsp.base.arrays import Bools, ComparesArrays, Floats, Ints
 
-BITS = 64
+BITS_PER_WORD = 64
+"""Format of sets of obstacles: bits of a word of uint64."""
 
 
 @dataclass(frozen=True, eq=False)
 class WaysByParity(ComparesArrays):
-    """The shortest way between two goals of each set of rays crossed an odd number of times, as
-    far as it is no longer than `reach`; from the base, than the tether.
+    """Lengths of the shortest paths between two goals, one for each set of rays crossed oddly.
 
     Attributes
     ----------
     ends : ndarray of int, shape (k, 2)
-        The goals, the smaller number first; 0 is the base.
+        Goals at the ends of each path, the smaller number first; 0 is the base.
     odd : ndarray of uint64, shape (k, w)
-        Bit i of word j tells of obstacle 64 j + i.
+        Obstacles whose rays the path crosses an odd number of times: bit i of word j stands for
+        obstacle 64 j + i.
     length : ndarray, shape (k,)
-        In 3D, or something less.
+        Length in 3D, or a lower bound.
     reach : float
-        All others are longer, in the plan.
+        Planar length above which paths are missing; from the base, paths above the tether are.
     obstacles : int
-        How many there are.
+        Number of obstacles.
     """
 
     ends: Ints
@@ -38,7 +39,9 @@ class WaysByParity(ComparesArrays):
     obstacles: int
 
     def odd_of(self, rows: Ints) -> Bools:
-        """(k, n) the same for some ways, spelt out."""
+        """Return which obstacles (k, n) some paths cross an odd number of times."""
         bits = np.arange(self.obstacles)
-        words = self.odd[rows][:, bits // BITS]
-        return np.asarray((words >> (bits % BITS).astype(np.uint64)) & np.uint64(1), dtype=bool)
+        words = self.odd[rows][:, bits // BITS_PER_WORD]
+        return np.asarray(
+            (words >> (bits % BITS_PER_WORD).astype(np.uint64)) & np.uint64(1), dtype=bool
+        )

@@ -1,4 +1,4 @@
-"""Detours between base and goals in any class: what planners need that are blind to the tether.
+"""Detours between base and goals in any class, for planners that ignore the tether.
 
 The 2016 workshop paper plans from goal to goal by the shortest path, whatever its homotopy class,
 and changes the class by planning again through a sub-goal on the far side of an obstacle. Those
@@ -16,7 +16,7 @@ from netsp.base.arrays import Floats, Ints
 from netsp.hsignature import Word, concatenate, invert
 
 DIRECT = -1
-"""Instead of a sub-goal: the shortest path of all."""
+"""Sentinel in place of a sub-goal: the shortest path in any class."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Detours:
     near
         (m + 1, P, n) distance of the detour from the middle of the obstacle.
     draw
-        Gives the (k, 2) polyline of the detour from a to p.
+        Returns the detour from a to p as a polyline (k, 2).
     """
 
     planar: Floats
@@ -50,18 +50,18 @@ class Detours:
     draw: Callable[[int, int], Floats]
 
     def length(self, a: int, b: int, via: int = DIRECT) -> float:
-        """3D length of the detour from a to b, through a sub-goal if `via` is one."""
+        """Return the 3D length of the detour from a to b, through a sub-goal if `via` is one."""
         planar = self.planar[a, b] if via < 0 else self.planar[a, via] + self.planar[b, via]
         return float(np.hypot(planar, self.height[b] - self.height[a]))
 
     def word(self, a: int, b: int, via: int = DIRECT) -> Word:
-        """Reduced word of the detour from a to b."""
+        """Return the reduced word of the detour from a to b."""
         if via < 0:
             return self._word(a, b)
         return concatenate(self._word(a, via), invert(self._word(b, via)))
 
     def path(self, a: int, b: int, via: int = DIRECT) -> Floats:
-        """(n, 3) polyline of the detour from a to b; depth changes evenly along it."""
+        """Return the detour from a to b as a polyline (n, 3); depth changes evenly along it."""
         if via < 0:
             xy = self.draw(a, b)
         else:
@@ -72,7 +72,7 @@ class Detours:
         return np.column_stack([xy, z])
 
     def far_side(self, a: int, b: int, via: int, obstacle: int) -> int:
-        """The sub-goal on the far side of an obstacle from the present detour, or -1."""
+        """Return the sub-goal on the far side of an obstacle from the detour, or -1."""
         if via < 0:
             return int(self.far[a, b, obstacle])
         nearer = a if self.near[a, via, obstacle] <= self.near[b, via, obstacle] else b
