@@ -253,7 +253,7 @@ def test_auto_gives_a_tour_and_a_true_bound_where_there_is_no_room_for_the_legs(
             raise MemoryLimitError(f"{what} would take {size} bytes; {advice}")
 
     mip = MipPolicy(gtsp=GtspPolicy(costs=CostPolicy(max_measured_vertices=0)))
-    monkeypatch.setattr("netsp.gtsp.cost_matrix.ask", none_left)
+    monkeypatch.setattr("netsp.gtsp.cost_matrix.check_available", none_left)
     with pytest.raises(MemoryLimitError, match="bounding every tour over"):
         solve(problem, "mip", params={"policy": mip})
     policy = SolvePolicy(subsets=NO_SUBSETS, mip=mip)
