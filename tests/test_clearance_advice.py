@@ -72,7 +72,7 @@ def test_other_units_of_length_are_converted(error, current, units):
 def test_following_the_advice_ends_it_or_the_advice_says_which_goal_is_too_near(margin, error):
     problem = site(0.2)
     policy, room = ClearancePolicy(position_error=error), clearance_room(problem)
-    assert room.most == pytest.approx(np.hypot(4, 0.2) - 1.0)
+    assert room.max_clearance == pytest.approx(np.hypot(4, 0.2) - 1.0)
     text = clearance_advice(0.2, "m", policy, margin=margin, room=room)
     if text is None:
         assert 0.2 + margin >= error + 0.1 - 1e-6

@@ -49,13 +49,13 @@ class Arcs(NamedTuple):
 
     Attributes
     ----------
-    of, row
-        Arcs of each obstacle: of[row[o]] … of[row[o + 1] - 1].
+    numbers, row
+        Arcs of each obstacle: numbers[row[o]] … numbers[row[o + 1] - 1].
     disk, span
         (nodes, 5) and (nodes, 3) columns CX … and LETTERS ….
     table
         (slots, 2) hash table of departures by `source * nodes + target`, -1 where empty.
-    real, whole
+    edge_floats, edge_ints
         (e, 5) and (e, 6) columns LENGTH … and FIRST … of the departures.
     letters
         Letters of segments and arcs.
@@ -69,13 +69,13 @@ class Arcs(NamedTuple):
         Those of `PathPolicy`.
     """
 
-    of: Ints
+    numbers: Ints
     row: Ints
     disk: Floats
     span: Ints
     table: Ints
-    real: Floats
-    whole: Ints
+    edge_floats: Floats
+    edge_ints: Ints
     letters: Ints
     solid: Floats
     edges: Floats
@@ -99,26 +99,28 @@ def build_arcs(
     disk[2 * arcs :, :2] = graph.points
     disk[: 2 * arcs, END][np.repeat(graph.full, 2)] = np.inf
     owner = np.full(nodes, -1, dtype=np.int64)
-    of, row = [np.zeros(0, dtype=np.int64)], [0]
-    at: dict[tuple[float, ...], list[int]] = {}
+    numbers, row = [np.zeros(0, dtype=np.int64)], [0]
+    arcs_of_disk: dict[tuple[float, ...], list[int]] = {}
     for k, (x, y, r) in enumerate(graph.arcs[:, :3].tolist()):
-        at.setdefault((x, y, r), []).append(k)
+        arcs_of_disk.setdefault((x, y, r), []).append(k)
     for o, obstacle in enumerate(problem.obstacles):
         if isinstance(obstacle, Circle):
             corners, radius = np.array([obstacle.center]), outline.blockers.circles[o, 2]
         else:
             corners, radius = np.array(obstacle.polygon), outline.blockers.grow[o]
         disks = dict.fromkeys((x, y, float(radius)) for x, y in (corners - outline.origin).tolist())
-        own = np.array([k for disk in disks for k in at.get(disk, [])], dtype=np.int64)
-        owner[2 * own] = owner[2 * own + 1] = o
-        of.append(own)
-        row.append(row[-1] + len(own))
+        members = np.array(
+            [k for disk in disks for k in arcs_of_disk.get(disk, [])], dtype=np.int64
+        )
+        owner[2 * members] = owner[2 * members + 1] = o
+        numbers.append(members)
+        row.append(row[-1] + len(members))
     source = np.repeat(np.arange(nodes), np.diff(graph.start))
     gap_letters, gaps, begin = _gap_letters(graph)
-    real = np.column_stack([graph.length, graph.angle, graph.turn, _angles_along(graph)])
+    edge_floats = np.column_stack([graph.length, graph.angle, graph.turn, _angles_along(graph)])
     table = np.full((1 << max(4, (3 * len(source)).bit_length()), 2), -1, dtype=np.int64)
     _fill_table(source * nodes + graph.target, table)
-    whole = np.column_stack([graph.first, graph.segment_row, graph.arrival_row, gaps])
+    edge_ints = np.column_stack([graph.first, graph.segment_row, graph.arrival_row, gaps])
     blockers = outline.blockers
     solid = np.column_stack(
         [
@@ -133,13 +135,13 @@ def build_arcs(
         ]
     )
     return Arcs(
-        np.concatenate(of),
+        np.concatenate(numbers),
         np.array(row),
         disk,
         np.column_stack([begin, owner]),
         table,
-        real,
-        whole,
+        edge_floats,
+        edge_ints,
         np.concatenate([graph.letters.astype(np.int64), gap_letters]),
         solid,
         blockers.edges,

@@ -219,11 +219,11 @@ def _fill_in_numpy(
     while i < len(order) and stop[0] == 0:
         u = order[i]
         if row[i] >= 0 and point[u] != 0:
-            own = out[row[i]]
-            is_asked = (own[order[j:]] == OPEN) & (place[j:] != point[u]) & (place[j:] != 0)
+            row_values = out[row[i]]
+            is_asked = (row_values[order[j:]] == OPEN) & (place[j:] != point[u]) & (place[j:] != 0)
             for k in (np.flatnonzero(is_asked) + j).tolist():
                 v = order[k]
-                if own[v] != OPEN:
+                if row_values[v] != OPEN:
                     continue  # filled together with an earlier leg
                 a, b = (u, v) if i < k else (v, u)
                 length, _, count = pull_one(a, b, ends, point, slits, arcs, room, path)
@@ -314,7 +314,10 @@ def _parallel_ranges(
         # around one arc from tether to tether: how far it slides is up to both ends, so those on
         # the side of u are to leave no earlier than u does
         if p_place == q_place:
-            i0, i1 = _first_place(p, p_least + path.real[p_place, SLID], branches), branches.end[p]
+            i0, i1 = (
+                _first_place(p, p_least + path.floats[p_place, SLID], branches),
+                branches.end[p],
+            )
             j0, j1 = _first_place(q, q_least, branches), branches.end[q]
     else:
         if p >= 0:
@@ -333,21 +336,21 @@ def _find_fork(
     Nodes are visited from `first` on by `step`. From its start a leg follows a tether backwards,
     and arcs in the other sense (flip 1)."""
     bend, slid = branches.last[v], branches.slid[v]
-    found, least, place = -1, 0.0, -1
+    found, min_angle, place = -1, 0.0, -1
     k = first
-    while 0 < k < count and bend > 0 and (path.whole[k, NODE] ^ flip) == branches.node[bend]:
-        found, least, place = bend, slid - path.real[k, SLID], k
-        if abs(least) > SAME_ANGLE:
+    while 0 < k < count and bend > 0 and (path.ints[k, NODE] ^ flip) == branches.node[bend]:
+        found, min_angle, place = bend, slid - path.floats[k, SLID], k
+        if abs(min_angle) > SAME_ANGLE:
             break
         k += step
         slid, bend = branches.turned[bend], branches.parent[bend]
-    return found, least, place
+    return found, min_angle, place
 
 
 @kernel
-def _first_place(bend: int, least: float, branches: Branches) -> int:
+def _first_place(bend: int, min_angle: float, branches: Branches) -> int:
     """Return the first place of what leaves a bend at an angle or later."""
     k, after = branches.row[bend], branches.row[bend + 1]
-    while k < after and branches.angle[k] < least - SLIDE_TOLERANCE:
+    while k < after and branches.angle[k] < min_angle - SLIDE_TOLERANCE:
         k += 1
     return int(branches.begin[k]) if k < after else int(branches.end[bend])

@@ -46,12 +46,12 @@ class Classes:
         return self.least_left_out == math.inf
 
 
-def find_classes(paths: TautPaths, rule: int, most: int, clock: Clock) -> Classes:
-    """Return the classes of every goal: about `most` in all, fewer when the time is up.
+def find_classes(paths: TautPaths, rule: int, max_classes: int, clock: Clock) -> Classes:
+    """Return the classes of every goal: about `max_classes` in all, fewer when the time is up.
 
     Raises InfeasibleError for a goal that no tether within the limit reaches.
     """
-    search = _Search(paths, rule, most, clock)
+    search = _Search(paths, rule, max_classes, clock)
     search.load_kernel()
     search.clock = Clock(search.policy.max_time_share * clock.left, within=clock)
     found = search.find_all()
@@ -62,8 +62,8 @@ def find_classes(paths: TautPaths, rule: int, most: int, clock: Clock) -> Classe
 
 
 class _Search:
-    def __init__(self, paths: TautPaths, rule: int, most: int, clock: Clock) -> None:
-        self.paths, self.rule, self.most, self.clock = paths, rule, most, clock
+    def __init__(self, paths: TautPaths, rule: int, max_classes: int, clock: Clock) -> None:
+        self.paths, self.rule, self.max_classes, self.clock = paths, rule, max_classes, clock
         self.whole = clock
         self.policy = paths.policy.classes
         self.problem = paths.problem
@@ -77,7 +77,9 @@ class _Search:
 
     def load_kernel(self) -> None:
         """Load the kernel, or compile it, so that this takes none of the share of time."""
-        run_explore(self.paths.tangents, 0, Trie.root(0.0), margin=self.paths.outline.margin, cap=0)
+        run_explore(
+            self.paths.tangents, 0, Trie.root(0.0), margin=self.paths.outline.margin, max_states=0
+        )
 
     def find_all(self) -> Classes | None:
         """Return all classes; None if there are too many, or the time is too short."""
@@ -89,14 +91,14 @@ class _Search:
                 trie,
                 margin=self.paths.outline.margin,
                 rule=self.rule,
-                cap=max(1_000_000, self.policy.states_per_class * self.most),
-                within=self.within,
-                most=4 * self.most + 1000,
+                max_states=max(1_000_000, self.policy.states_per_class * self.max_classes),
+                max_lengths=self.within,
+                max_hits=4 * self.max_classes + 1000,
                 stop=self.clock.flag,
             )
         )
         best = self._shortest_by_class(found)
-        if found.capped or len(best) > self.most:
+        if found.capped or len(best) > self.max_classes:
             return None
         missing = sorted(set(range(1, self.goals + 1)) - {g for g, _ in best})
         if missing:
@@ -109,7 +111,7 @@ class _Search:
     def find_shortest(self) -> Classes:
         """Return the shortest classes of every goal, about as many for each. Each goal has one at
         least, whatever the time."""
-        share = max(1, self.most // self.goals)
+        share = max(1, self.max_classes // self.goals)
         contacts = self.paths.contacts
         planar, before = contacts.tree(0)
         missing = [g for g in range(1, self.goals + 1) if planar[g] > self.within[g]]
@@ -123,11 +125,11 @@ class _Search:
         for g in range(1, self.goals + 1):
             word = signature(contacts.draw(0, g, before), rays)
             nearest = (float(planar[g]), word)
-            own, beyond = [nearest], nearest[0]
+            classes, beyond = [nearest], nearest[0]
             if not (self.clock.is_up or (self.rule == NON_LOOPING and is_looping(nearest[1]))):
-                own, beyond = self._shortest_of_goal(g, share)
-                own = own or [nearest]
-            rows += [(g, length, word) for length, word in own]
+                classes, beyond = self._shortest_of_goal(g, share)
+                classes = classes or [nearest]
+            rows += [(g, length, word) for length, word in classes]
             left_out = min(left_out, math.hypot(beyond, self.dz[g]))
         return _collect(rows, left_out)
 
@@ -135,13 +137,13 @@ class _Search:
         """Return the shortest classes of one goal, in order, and the planar length up to which none
         is missing (inf if all within the tether were found)."""
         rest = self.paths.contacts.remaining_lengths(g)
-        least, most = float(rest.source), float(self.within[g])
+        min_length, max_length = float(rest.source), float(self.within[g])
         known: list[tuple[float, Word]] = []
-        known_to = least
+        known_to = min_length
         low, high = 0.0, math.inf  # excesses known to give too few, too many
-        excess = self.policy.first_excess * max(most - least, 0.0)
+        excess = self.policy.first_excess * max(max_length - min_length, 0.0)
         for _ in range(self.policy.max_searches):
-            reach = min(least + excess + self.paths.margin, most)
+            reach = min(min_length + excess + self.paths.margin, max_length)
             found, words = self._classes_up_to(g, rest.to_end, reach, share)
             if found is None:
                 high = excess
@@ -150,13 +152,13 @@ class _Search:
                 excess = max(low + (high - low) / self.policy.shrink, 0.0)
                 continue
             known, known_to = words, reach
-            if reach >= most:
+            if reach >= max_length:
                 known_to = math.inf
                 break
             if len(words) >= share or self.clock.is_up:
                 break
             low = excess
-            excess = max(self.policy.growth * excess, 1e-6 * most)
+            excess = max(self.policy.growth * excess, 1e-6 * max_length)
             if excess >= high:
                 excess = low + 0.5 * (high - low)
         if len(known) > share:
@@ -178,10 +180,10 @@ class _Search:
                 trie,
                 margin=self.paths.outline.margin,
                 rule=self.rule,
-                cap=max(20_000, self.policy.states_per_class * share),
-                toward=(g, rest),
-                within=within,
-                most=8 * share + 64,
+                max_states=max(20_000, self.policy.states_per_class * share),
+                target=(g, rest),
+                max_lengths=within,
+                max_hits=8 * share + 64,
                 stop=self.clock.flag,
             )
         )

@@ -51,8 +51,10 @@ def shortest_tethers(
             outline = outline or build_outline(problem, clock)
             planar = ContactGraph(outline, clock=clock, policy=policy).lengths([0])[0, 1:]
             break
-        some = tuple(o for o, there in zip(problem.obstacles, near, strict=True) if there)
-        local = build_outline(problem.model_copy(update={"obstacles": some}), clock)
+        near_obstacles = tuple(
+            o for o, is_near in zip(problem.obstacles, near, strict=True) if is_near
+        )
+        local = build_outline(problem.model_copy(update={"obstacles": near_obstacles}), clock)
         planar = ContactGraph(local, clock=clock, policy=policy).lengths([0])[0, 1:]
         # a path no longer than that does not get to the others
         longest = float(planar[np.isfinite(planar)].max(initial=0.0))

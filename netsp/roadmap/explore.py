@@ -92,27 +92,27 @@ class SearchRequest(NamedTuple):
 
     Attributes
     ----------
-    keep
+    keeps_tree
         Whether the search tree is kept, so that paths can be written out.
-    cap
+    max_states
         Maximum number of departures expanded.
-    rest
+    min_remaining
         (e,) lower bound on the length from the end of each tangent to the target; 0 without a
         target.
-    aim
-        The target point; -1 for all points.
-    within
+    target
+        Target point; -1 for all points.
+    max_lengths
         (points,) length of the longest path that is reported.
-    most
+    max_hits
         Number of reports that ends the search.
     """
 
-    keep: bool
-    cap: int
-    rest: Floats
-    aim: int
-    within: Floats
-    most: int
+    keeps_tree: bool
+    max_states: int
+    min_remaining: Floats
+    target: int
+    max_lengths: Floats
+    max_hits: int
 
 
 NODE, NEXT, WORD, BEFORE, TAKEN = range(5)
@@ -226,7 +226,7 @@ def _is_new_arrival(code: int, mark: float, same: float, key: Ints, length: Floa
 def explore(
     net: TangentArrays,
     words: WordRules,
-    ask: SearchRequest,
+    request: SearchRequest,
     source: int,
     trie: Ints,
     limit: Floats,
@@ -254,7 +254,11 @@ def explore(
     start, target, length, ends = net.start, net.target, net.length, net.ends
     first, turn, gap, radius = net.first, net.turn, net.gap, net.radius
     segment_row, arrival_row, gap_row = net.segment_row, net.arrival_row, net.gap_row
-    arc_nodes, rest, within = net.arc_nodes, ask.rest, ask.within
+    arc_nodes, min_remaining, max_lengths = (
+        net.arc_nodes,
+        request.min_remaining,
+        request.max_lengths,
+    )
     state = np.empty((1024, 5), dtype=np.int64)
     real = np.empty((1024, 3))
     stack = np.empty((1024, 1), dtype=np.int64)
@@ -272,30 +276,30 @@ def explore(
     top, count, visited = 1, 1, 0
     while top > 0:
         top -= 1
-        own = stack[top, 0]
-        node, e, word = state[own, NODE], state[own, NEXT], state[own, WORD]
-        slid, so_far = real[own, TURN], real[own, REACHED]
-        if not ask.keep:
+        current = stack[top, 0]
+        node, e, word = state[current, NODE], state[current, NEXT], state[current, WORD]
+        slid, so_far = real[current, TURN], real[current, REACHED]
+        if not request.keeps_tree:
             count = top
         begin, end = start[node], start[node + 1]
         if begin == end:
             continue
         while True:
             visited += 1
-            if visited > ask.cap or hits >= ask.most or stop[0] != 0:
+            if visited > request.max_states or hits >= request.max_hits or stop[0] != 0:
                 # the state that is being looked at counts as kept
                 tree = state[: count + 1], real[: count + 1]
                 return (trie, limit, size), (hit[:hits], hit_real[:hits]), tree, True
-            here = so_far + radius[node] * slid
-            if here > limit[word]:
+            departed = so_far + radius[node] * slid
+            if departed > limit[word]:
                 break
             if size + net.longest >= len(trie):
                 trie = more_int_rows(trie)
                 limit = longer(limit)
-            reached = here + length[e]
-            least = reached + rest[e]
+            reached = departed + length[e]
+            min_total = reached + min_remaining[e]
             w = -1
-            if least <= limit[0]:  # no word may be longer
+            if min_total <= limit[0]:  # no word may be longer
                 w, size = _follow_letters(
                     word,
                     segment_row[e, 0],
@@ -307,17 +311,19 @@ def explore(
                     limit,
                     size,
                 )
-            if w >= 0 and least > limit[w]:
+            if w >= 0 and min_total > limit[w]:
                 w = -1
             goal = target[e]
             if w >= 0 and goal >= arc_nodes:
                 point = goal - arc_nodes
-                asked = (ask.aim < 0 or point == ask.aim) and reached <= within[point]
-                if trie[w, CORE] == 1 and asked:
+                is_wanted = (
+                    request.target < 0 or point == request.target
+                ) and reached <= max_lengths[point]
+                if trie[w, CORE] == 1 and is_wanted:
                     if hits == len(hit):
                         hit = more_int_rows(hit)
                         hit_real = more_rows(hit_real)
-                    hit[hits, 0], hit[hits, 1], hit[hits, 2], hit[hits, 3] = point, w, own, e
+                    hit[hits, 0], hit[hits, 1], hit[hits, 2], hit[hits, 3] = point, w, current, e
                     hit_real[hits, 0], hit_real[hits, 1] = reached, slid
                     hits += 1
             elif w >= 0 and first[e] >= 0:
@@ -347,7 +353,7 @@ def explore(
                         real = more_rows(real)
                         stack = more_int_rows(stack)
                     state[count, NODE], state[count, NEXT] = goal, f
-                    state[count, WORD], state[count, BEFORE] = w, own
+                    state[count, WORD], state[count, BEFORE] = w, current
                     state[count, TAKEN] = e
                     real[count, TURN], real[count, REACHED] = max(turn[e], 0.0), reached
                     real[count, SLID] = slid
@@ -419,27 +425,27 @@ def run_explore(
     *,
     margin: float,
     rule: int = GIVEN,
-    keep: bool = False,
-    cap: int | None = None,
-    toward: tuple[int, Floats] | None = None,
-    within: Floats | None = None,
-    most: int | None = None,
+    keeps_tree: bool = False,
+    max_states: int | None = None,
+    target: tuple[int, Floats] | None = None,
+    max_lengths: Floats | None = None,
+    max_hits: int | None = None,
     stop: Flag = NEVER,
 ) -> FoundPaths:
     """Run the kernel from point `source`; the trie is updated.
 
     Parameters
     ----------
-    toward
+    target
         A point, and for each tangent a lower bound on the length from its end to that point. Only
         paths to the point are sought.
-    within
+    max_lengths
         (points,) length of the longest path to each point that counts.
-    most
+    max_hits
         Approximate maximum number of hits.
     """
     no_limit = np.iinfo(np.int64).max
-    aim, rest = toward or (-1, np.zeros(len(graph.target)))
+    point, min_remaining = target or (-1, np.zeros(len(graph.target)))
     net = TangentArrays(
         graph.start,
         graph.target,
@@ -457,16 +463,16 @@ def run_explore(
     )
     wide = graph.pending + margin * np.array([-1.0, -1.0, 1.0, 1.0, 0.0])
     words = WordRules(graph.letters, wide, rule, ARRIVAL_TOLERANCE * margin)
-    ask = SearchRequest(
-        keep,
-        no_limit if cap is None else cap,
-        rest,
-        aim,
-        np.full(len(graph.points), np.inf) if within is None else within,
-        no_limit if most is None else most,
+    request = SearchRequest(
+        keeps_tree,
+        no_limit if max_states is None else max_states,
+        min_remaining,
+        point,
+        np.full(len(graph.points), np.inf) if max_lengths is None else max_lengths,
+        no_limit if max_hits is None else max_hits,
     )
     (trie.nodes, trie.limit, trie.size), (h_i, h_f), (s_i, s_f), capped = explore(
-        net, words, ask, graph.point_node(source), trie.nodes, trie.limit, trie.size, stop
+        net, words, request, graph.point_node(source), trie.nodes, trie.limit, trie.size, stop
     )
     return FoundPaths(
         h_i[:, 0],

@@ -118,7 +118,7 @@ class GraphFromState(TravelGraph):
 
     def as_asked(self, result: Result) -> Result:
         """Return a solver's result on this graph as a result for the path from the state."""
-        own = self._path_bound(result.bound)
+        kept_bound = self._path_bound(result.bound)
         low = self._path_bound(self.bound_as_asked(result.bound, anywhere=result.tour is not None))
         result = dataclasses.replace(
             result,
@@ -140,10 +140,12 @@ class GraphFromState(TravelGraph):
         if status.is_optimal:
             # the solver proves a millionth of the length with surcharge, several lengths of the
             # path
-            if own is not None and self.legs_left_out:
-                own = dataclasses.replace(own, scope=Scope.PART)
+            if kept_bound is not None and self.legs_left_out:
+                kept_bound = dataclasses.replace(kept_bound, scope=Scope.PART)
             closed = [
-                b for b in (low, own) if b is not None and b.gap(length) <= PATH_GAP_TOLERANCE
+                b
+                for b in (low, kept_bound)
+                if b is not None and b.gap(length) <= PATH_GAP_TOLERANCE
             ]
             status = Status.optimal_of(closed[0].scope) if closed else Status.FEASIBLE
         return dataclasses.replace(
@@ -241,8 +243,8 @@ class _SurchargedLegs:
         with self.within.on_clock(clock or self.within.clock):
             out = self.within.costs_rounded(vertices)
         for k in np.flatnonzero(np.isin(vertices, (0, self.start))).tolist():
-            own = self._charged(out[k : k + 1].astype(np.float64), vertices[k : k + 1], vertices)
-            out[k] = out[:, k] = rounded_down(own)[0]
+            row = self._charged(out[k : k + 1].astype(np.float64), vertices[k : k + 1], vertices)
+            out[k] = out[:, k] = rounded_down(row)[0]
         return out
 
     @property
@@ -254,15 +256,15 @@ class _SurchargedLegs:
     ) -> Iterator[tuple[Ints, Floats]]:
         ends = np.isin(vertices, (0, self.start))
         with self.within.on_clock(clock or self.within.clock):
-            for some, costs in self.within.costs_in_blocks(vertices, rows):
+            for block_rows, costs in self.within.costs_in_blocks(vertices, rows):
                 # row by row of these two, and what the others have to them
-                for k, columns in (ends[some], slice(None)), (~ends[some], ends):
-                    own, to = vertices[some[k]], vertices[columns]
+                for k, columns in (ends[block_rows], slice(None)), (~ends[block_rows], ends):
+                    sources, targets = vertices[block_rows[k]], vertices[columns]
                     part = costs[k][:, columns].astype(np.float64)
                     costs[np.ix_(k, np.arange(len(vertices))[columns])] = rounded_down(
-                        self._charged(part, own, to)
+                        self._charged(part, sources, targets)
                     )
-                yield some, costs
+                yield block_rows, costs
 
     def to_base(self) -> Floats:
         out = self.within.costs_to_base + self.surcharge
@@ -272,9 +274,9 @@ class _SurchargedLegs:
     def lower_bounds(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
     ) -> Floats:
-        some = vertices if rows is None else vertices[rows]
+        sources = vertices if rows is None else vertices[rows]
         with self.within.on_clock(clock or self.within.clock):
-            return self._charged(self.within.lower_bounds(vertices, rows), some, vertices)
+            return self._charged(self.within.lower_bounds(vertices, rows), sources, vertices)
 
     def path(self, u: int, v: int) -> Floats:
         return self.within.path(u, v)
@@ -368,8 +370,10 @@ def from_state(
         Taut tether at the state.
     """
     home = graph.costs_to_base
-    own = graph.cluster[start]
-    nearest = [home[graph.members(c)].min() for c in range(1, graph.goal_count + 1) if c != own]
+    state_cluster = graph.cluster[start]
+    nearest = [
+        home[graph.members(c)].min() for c in range(1, graph.goal_count + 1) if c != state_cluster
+    ]
     some_path = float(home[start] + 2.0 * sum(nearest))
     line = np.zeros((0, 3)) if start_tether is None else start_tether
     return GraphFromState(graph, start, 0.505 * some_path, line)

@@ -239,7 +239,7 @@ class TautPaths:
         for limit in self._limits(a, b, longest):
             trie = Trie.from_word(word, limit)
             found = run_explore(
-                self.tangents, a, trie, keep=True, margin=self.outline.margin, stop=stop
+                self.tangents, a, trie, keeps_tree=True, margin=self.outline.margin, stop=stop
             )
             best = _shortest_hit(found, b, len(word))
             if best is not None:
@@ -262,11 +262,11 @@ class TautPaths:
                 self.tangents,
                 a,
                 trie,
-                keep=True,
+                keeps_tree=True,
                 margin=self.outline.margin,
                 rule=ALL,
-                toward=(b, rest),
-                cap=self.policy.paths.max_states,
+                target=(b, rest),
+                max_states=self.policy.paths.max_states,
                 stop=stop,
             )
             for w in np.unique(found.word[found.goal == b]).tolist():
@@ -280,16 +280,16 @@ class TautPaths:
     def _limits(self, a: int, b: int, longest: float | None) -> Iterator[float]:
         """Yield growing limits of length for the search for a path. A search with a smaller limit
         is far cheaper, and a class has only one taut path."""
-        most = (self._longest if longest is None else longest) + self.margin
+        max_length = (self._longest if longest is None else longest) + self.margin
         apart = math.dist(self.outline.points[a], self.outline.points[b])
         policy = self.policy.paths
-        limit, step = min(policy.first_ratio * apart + self.margin, most), policy.first_ratio
+        limit, step = min(policy.first_ratio * apart + self.margin, max_length), policy.first_ratio
         while True:
             yield limit
-            if limit >= most:
+            if limit >= max_length:
                 return
             step = min(step**2, policy.max_growth)
-            limit = min(max(step * limit, policy.min_second_share * most), most)
+            limit = min(max(step * limit, policy.min_second_share * max_length), max_length)
 
     def tethers(
         self, goals: Sequence[int], words: Sequence[Word], longest: float, stop: Flag
@@ -300,15 +300,15 @@ class TautPaths:
         """
         trie, node = Trie.from_words(words, longest + self.margin)
         found = run_explore(
-            self.tangents, 0, trie, keep=True, margin=self.outline.margin, stop=stop
+            self.tangents, 0, trie, keeps_tree=True, margin=self.outline.margin, stop=stop
         )
         # of several spellings of one path the shortest comes last
         hit = {
             (int(found.goal[k]), int(found.word[k])): int(k)
             for k in np.argsort(-found.length, kind="stable").tolist()
         }
-        at = [hit.get((goal, at)) for goal, at in zip(goals, node, strict=True)]
-        return [None if k is None else found.pieces(k) for k in at]
+        hits = [hit.get((goal, hits)) for goal, hits in zip(goals, node, strict=True)]
+        return [None if k is None else found.pieces(k) for k in hits]
 
     def _has_obstacles_of(self, word: Word) -> bool:
         """Return whether there is an obstacle for every letter."""

@@ -104,9 +104,9 @@ class PrmRoadmap:
         self.complete = len(sampled[0]) >= samples
         local = np.vstack([fixed, sampled[0]])
         self.milestones: Floats = local + np.append(outline.origin, 0.0)
-        own = np.asarray(sampled[1], dtype=np.int64).reshape(-1, 2) + len(fixed)
+        sampled_edges = np.asarray(sampled[1], dtype=np.int64).reshape(-1, 2) + len(fixed)
         self.edges: Ints = _exactly_free(
-            np.unique(np.vstack([own, _nearest_edges(local, len(fixed))]), axis=0),
+            np.unique(np.vstack([sampled_edges, _nearest_edges(local, len(fixed))]), axis=0),
             local,
             outline,
         )
@@ -196,11 +196,11 @@ class PrmRoadmap:
         fixed = len(self.problem.points)
         local = self.milestones - np.append(outline.origin, 0.0)
         level = np.full((len(places), 1), local[0, 2])
-        every = np.vstack([np.hstack([places, level]), local])
-        new = _exactly_free(np.unique(_nearest_edges(every, len(places)), axis=0), every, outline)
+        points = np.vstack([np.hstack([places, level]), local])
+        new = _exactly_free(np.unique(_nearest_edges(points, len(places)), axis=0), points, outline)
         edges = np.vstack([new, self.edges + len(places)])
-        every[len(places) : len(places) + fixed, :2] = outline.places
-        graph = MilestoneGraph(every[:, :2], edges)
+        points[len(places) : len(places) + fixed, :2] = outline.places
+        graph = MilestoneGraph(points[:, :2], edges)
         terminals = np.concatenate([len(places) + np.arange(fixed), np.arange(len(places))])
         return tabulate_detours(self.problem, outline, graph, terminals, places, side, check)
 
@@ -323,8 +323,8 @@ def sampling_box(problem: Problem) -> tuple[Floats, Floats]:
                 xy.append(np.array(o.center) + np.array([[-1.0], [1.0]]) * o.radius)
             else:
                 xy.append(np.array(o.polygon))
-        every = np.vstack(xy)
-        low2, high2 = every.min(axis=0), every.max(axis=0)
+        corners = np.vstack(xy)
+        low2, high2 = corners.min(axis=0), corners.max(axis=0)
         spare = 0.1 * float((high2 - low2).max()) + 2.0 * problem.clearance
         low2, high2 = low2 - spare, high2 + spare
     reach = problem.tether_length

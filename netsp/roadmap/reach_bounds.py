@@ -78,7 +78,7 @@ def _paths_from(paths: TautPaths, a: int, reach: float) -> tuple[ParityRows, int
         trie,
         margin=paths.outline.margin,
         rule=ALL,
-        cap=paths.policy.parity.max_states,
+        max_states=paths.policy.parity.max_states,
     )
     if found.capped:
         return None

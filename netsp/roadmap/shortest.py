@@ -168,14 +168,14 @@ class ContactGraph:
                 break
         return before
 
-    def tree_to_nearest(self, source: int, most: int) -> tuple[Floats, Ints]:
-        """Return `tree`, limited so that it holds at least `most` points, the source among them."""
-        if most >= self.points:
+    def tree_to_nearest(self, source: int, count: int) -> tuple[Floats, Ints]:
+        """Return `tree`, limited so that it holds at least `count` points with the source."""
+        if count >= self.points:
             return self.tree(source)
         straight = np.sort(np.hypot(*(self.outline.points - self.outline.points[source]).T))
-        for limit in self._limits(float(straight[most - 1])):
+        for limit in self._limits(float(straight[count - 1])):
             length, before = self.tree(source, limit)
-            if np.isfinite(length[: self.points]).sum() >= most:
+            if np.isfinite(length[: self.points]).sum() >= count:
                 break
         return length, before
 

@@ -144,15 +144,16 @@ def slit_lengths(
     n = len(cluster)
     letters, row = flatten_words(signatures)
     whole = rows is None
-    asked: Ints = np.arange(n) if rows is None else rows
-    out = np.zeros((len(asked), n))
+    vertices: Ints = np.arange(n) if rows is None else rows
+    out = np.zeros((len(vertices), n))
     ends = Ends(places[cluster], slits.cells(places[:, 0])[cluster], letters, row)
-    args = (asked, whole, cluster, ends, slits, out, stop)
+    args = (vertices, whole, cluster, ends, slits, out, stop)
     blocks = [
-        (k, min(k + policy.bound_rows, len(asked))) for k in range(0, len(asked), policy.bound_rows)
+        (k, min(k + policy.bound_rows, len(vertices)))
+        for k in range(0, len(vertices), policy.bound_rows)
     ]
     if len(blocks) < 4:
-        _fill_rows(0, len(asked), *args)
+        _fill_rows(0, len(vertices), *args)
     else:
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             list(pool.map(lambda b: _fill_rows(b[0], b[1], *args), blocks))
@@ -170,7 +171,7 @@ def flatten_words(signatures: Sequence[Word]) -> tuple[Ints, Ints]:
 def _fill_rows(
     first: int,
     last: int,
-    asked: Ints,
+    vertices: Ints,
     whole: bool,
     cluster: Ints,
     ends: Ends,
@@ -178,13 +179,13 @@ def _fill_rows(
     out: Floats,
     stop: Ints,
 ) -> None:
-    """Fill rows first … last - 1, those of the vertices `asked`. Of the whole matrix only the part
+    """Fill rows first … last - 1, those of `vertices`. Of the whole matrix only the part
     beyond the diagonal is computed, and mirrored."""
     room = empty_workspace(max_word_length(ends.row), slits)
     for k in range(first, last):
         if stop[0] != 0:
             return
-        u = asked[k]
+        u = vertices[k]
         for v in range(u + 1 if whole else 0, len(cluster)):
             if cluster[u] == cluster[v]:
                 continue
@@ -220,38 +221,38 @@ def string(u: int, v: int, ends: Ends, slits: Slits, room: Workspace) -> tuple[f
     shared = 0
     while a + shared < a_end and b + shared < b_end and letters[a + shared] == letters[b + shared]:
         shared += 1
-    back = a_end - a - shared
-    count = back + b_end - b - shared
-    at, s, before = ends.cell[u], 0.0, ends.place[u, 0]
+    n_inverse = a_end - a - shared
+    count = n_inverse + b_end - b - shared
+    strip, s, before = ends.cell[u], 0.0, ends.place[u, 0]
     k = 0
     for i in range(count + 1):
         letter = 0
-        if i < back:
+        if i < n_inverse:
             letter = -letters[a_end - 1 - i]
         elif i < count:
-            letter = letters[b + shared + i - back]
+            letter = letters[b + shared + i - n_inverse]
         if letter > 0:
             target = rank[letter - 1]
         elif letter < 0:
             target = rank[-letter - 1] + 1
         else:
             target = ends.cell[v]
-        while at != target:
-            line = at if target > at else at - 1
+        while strip != target:
+            line = strip if target > strip else strip - 1
             s += abs(x[line] - before)
             before = x[line]
             gate[k, PLACE], gate[k, LOW], gate[k, HIGH] = s, -np.inf, bottom[line]
-            gate[k, LINE] = line + 1 if target > at else -line - 1
+            gate[k, LINE] = line + 1 if target > strip else -line - 1
             k += 1
-            at += 1 if target > at else -1
+            strip += 1 if target > strip else -1
         if letter != 0:
-            line = at if letter > 0 else at - 1
+            line = strip if letter > 0 else strip - 1
             s += abs(x[line] - before)
             before = x[line]
             gate[k, PLACE], gate[k, LOW], gate[k, HIGH] = s, top[line], np.inf
             gate[k, LINE] = line + 1 if letter > 0 else -line - 1
             k += 1
-            at += 1 if letter > 0 else -1
+            strip += 1 if letter > 0 else -1
     s += abs(ends.place[v, 0] - before)
     gate[k, PLACE], gate[k, LOW], gate[k, HIGH] = s, ends.place[v, 1], ends.place[v, 1]
     return _taut_string(ends.place[u, 1], gate, k + 1, room.corner)

@@ -133,8 +133,8 @@ class TautRoadmap:
         """Return what `netsp.gtsp.travel.graph.Carrier.carried` does."""
         contacts = self.paths.contacts
         line = contacts.draw(start, goal, contacts.tree_to(start, goal))
-        there = concatenate(word, signature(line, self.outline.rays))
-        return None if self._tether_length(goal, there) is None else there
+        arrived = concatenate(word, signature(line, self.outline.rays))
+        return None if self._tether_length(goal, arrived) is None else arrived
 
     def with_classes(
         self, wanted: Iterable[tuple[int, Word]], up: Callable[[], bool]
@@ -142,17 +142,17 @@ class TautRoadmap:
         """Return what `netsp.gtsp.travel.graph.Carrier.with_classes` does. The classes are then
         part of this roadmap."""
         known = set(zip(self.cluster.tolist(), self.signatures, strict=True))
-        more = [
+        added = [
             (goal, word, length)
             for goal, word in dict.fromkeys(wanted)
             if not up()
             and (goal, word) not in known
             and (length := self._tether_length(goal, word)) is not None
         ]
-        cluster = np.array([*self.cluster, *(g for g, _, _ in more)], dtype=np.int64)
+        cluster = np.array([*self.cluster, *(g for g, _, _ in added)], dtype=np.int64)
         order = np.argsort(cluster, kind="stable")
-        signatures = [*self.signatures, *(w for _, w, _ in more)]
-        planar = np.array([*self.planar, *(length for _, _, length in more)])
+        signatures = [*self.signatures, *(w for _, w, _ in added)]
+        planar = np.array([*self.planar, *(length for _, _, length in added)])
         self.cluster, self.planar = cluster[order], planar[order]
         self.signatures = [signatures[k] for k in order.tolist()]
         self.tethers = np.asarray(np.hypot(self.planar, self._z[self.cluster] - self._z[0]))

@@ -102,14 +102,14 @@ class Path(NamedTuple):
 
     Attributes
     ----------
-    real, whole
+    floats, ints
         (k, 8) and (k, 2) columns ARRIVING … and NODE ….
     word
         (w,) letters written, reduced as they come, from index 1 on.
     """
 
-    real: Floats
-    whole: Ints
+    floats: Floats
+    ints: Ints
     word: Ints
 
 
@@ -138,10 +138,10 @@ def path_from_pieces(a: int, pieces: Sequence[tuple[int, float]], target: Ints, 
         np.zeros((len(pieces) + 1, 2), dtype=np.int64),
         np.zeros(0, dtype=np.int64),
     )
-    path.whole[0, NODE] = arcs.points + a
+    path.ints[0, NODE] = arcs.points + a
     for k, (e, slid) in enumerate(pieces):
-        path.whole[k, EDGE], path.real[k, SLID] = e, slid
-        path.whole[k + 1, NODE] = target[e]
+        path.ints[k, EDGE], path.floats[k, SLID] = e, slid
+        path.ints[k + 1, NODE] = target[e]
     return path
 
 
@@ -187,81 +187,87 @@ def pull_one(ends: Ends, point: Ints, slits: Slits, arcs: Arcs) -> tuple[float, 
     longest = max_word_length(ends.row)
     path = empty_path(longest, arcs.max_bends)
     length, _, count = pull(0, 1, ends, point, slits, arcs, empty_workspace(longest, slits), path)
-    return length, path.whole[:count, EDGE].copy(), path.real[:count, SLID].copy()
+    return length, path.ints[:count, EDGE].copy(), path.floats[:count, SLID].copy()
 
 
 @kernel
 def _tighten(count: int, arcs: Arcs, path: Path) -> int:
     """Pull a path taut and return its number of nodes; 0 if that is not possible."""
-    disk, real, table = arcs.disk, arcs.real, arcs.table
-    at, on = path.real, path.whole
+    disk, edge_floats, table = arcs.disk, arcs.edge_floats, arcs.table
+    floats, ints = path.floats, path.ints
     nodes = len(disk)
-    at[0, SLID] = 0.0
+    floats[0, SLID] = 0.0
     i, left = 0, 16 + 8 * count
     while i + 1 < count:
         left -= 1
-        if left < 0 or count + 1 >= len(at):
+        if left < 0 or count + 1 >= len(floats):
             return 0
-        a, b = on[i, NODE], on[i + 1, NODE]
+        a, b = ints[i, NODE], ints[i + 1, NODE]
         if a == b:
             # on along the arc, from where it was left to where it was met again
             sense = 1.0 - 2.0 * (a % 2)
-            on_by = sense * (at[i + 1, ARRIVING] - at[i, LEAVING])
+            on_by = sense * (floats[i + 1, ARRIVING] - floats[i, LEAVING])
             turns = math.floor((on_by + arcs.max_backward_turn) / TWO_PI)
-            at[i, LEAVING] = at[i + 1, LEAVING] - sense * turns * TWO_PI
-            at[i, X_OUT], at[i, Y_OUT] = at[i + 1, X_OUT], at[i + 1, Y_OUT]
-            _delete_node(i + 1, count, at, on)
+            floats[i, LEAVING] = floats[i + 1, LEAVING] - sense * turns * TWO_PI
+            floats[i, X_OUT], floats[i, Y_OUT] = floats[i + 1, X_OUT], floats[i + 1, Y_OUT]
+            _delete_node(i + 1, count, floats, ints)
             count -= 1
             continue
         e = find_tangent(a * nodes + b, table)
         if e < 0:
-            new, angle = _arc_between(a, b, i, arcs, at)
+            new, angle = _arc_between(a, b, i, arcs, floats)
             if new < 0 or new in (a, b):
                 return 0
             for k in range(count, i + 1, -1):
-                _copy_node(k - 1, k, at, on)
-            on[i + 1, NODE], at[i + 1, ARRIVING], at[i + 1, LEAVING] = new, angle, angle
+                _copy_node(k - 1, k, floats, ints)
+            ints[i + 1, NODE], floats[i + 1, ARRIVING], floats[i + 1, LEAVING] = new, angle, angle
             _set_position(
                 i + 1,
                 disk[new, CX] + disk[new, RADIUS] * math.cos(angle),
                 disk[new, CY] + disk[new, RADIUS] * math.sin(angle),
-                at[i, STRIP],
-                at,
+                floats[i, STRIP],
+                floats,
             )
             count += 1
             continue
         if i > 0:
-            arrival = _unwrapped(real[on[i - 1, EDGE], ARRIVES], at[i, ARRIVING])
-            departure = _unwrapped(real[e, LEAVES], at[i, LEAVING])
+            arrival = _unwrapped(edge_floats[ints[i - 1, EDGE], ARRIVES], floats[i, ARRIVING])
+            departure = _unwrapped(edge_floats[e, LEAVES], floats[i, LEAVING])
             by = departure - arrival if a % 2 == 0 else arrival - departure
             if by < -SAME_ANGLE:
-                _delete_node(i, count, at, on)
+                _delete_node(i, count, floats, ints)
                 count -= 1
                 i -= 1
                 continue
-            at[i, SLID] = by
-        on[i, EDGE] = e
+            floats[i, SLID] = by
+        ints[i, EDGE] = e
         i += 1
     return count
 
 
 @kernel
-def _delete_node(i: int, count: int, at: Floats, on: Ints) -> None:
+def _delete_node(i: int, count: int, floats: Floats, ints: Ints) -> None:
     """Delete node i."""
     for k in range(i, count - 1):
-        _copy_node(k + 1, k, at, on)
+        _copy_node(k + 1, k, floats, ints)
 
 
 @kernel
-def _copy_node(k: int, to: int, at: Floats, on: Ints) -> None:
-    on[to, NODE] = on[k, NODE]
+def _copy_node(k: int, to: int, floats: Floats, ints: Ints) -> None:
+    ints[to, NODE] = ints[k, NODE]
     for c in range(SLID):
-        at[to, c] = at[k, c]
+        floats[to, c] = floats[k, c]
 
 
 @kernel
-def _set_position(i: int, x: float, y: float, strip: float, at: Floats) -> None:
-    at[i, X_IN], at[i, Y_IN], at[i, X_OUT], at[i, Y_OUT], at[i, STRIP] = x, y, x, y, strip
+def _set_position(i: int, x: float, y: float, strip: float, floats: Floats) -> None:
+    floats[i, X_IN], floats[i, Y_IN], floats[i, X_OUT], floats[i, Y_OUT], floats[i, STRIP] = (
+        x,
+        y,
+        x,
+        y,
+        strip,
+    )
 
 
 @kernel
@@ -292,13 +298,13 @@ def _initial_arcs(
     Return the number of nodes; 0 if an arc is not known."""
     place, cell, obstacle, line_x = ends.place, ends.cell, slits.obstacle, slits.x
     gate, corner = room.gate, room.corner
-    of, row, disk = arcs.of, arcs.row, arcs.disk
-    at, on = path.real, path.whole
+    numbers, row, disk = arcs.numbers, arcs.row, arcs.disk
+    floats, ints = path.floats, path.ints
     if bends and gate[corner[bends - 1, 0], LOW] == gate[corner[bends - 1, 0], HIGH]:
         bends -= 1  # that is its end
-    on[0, NODE] = arcs.points + point[u]
+    ints[0, NODE] = arcs.points + point[u]
     x, y = place[u, 0], place[u, 1]
-    _set_position(0, x, y, float(cell[u]), at)
+    _set_position(0, x, y, float(cell[u]), floats)
     count = 1
     before = -1
     for c in range(bends):
@@ -309,12 +315,12 @@ def _initial_arcs(
         ccw = rightward == (high == 1)
         if row[o + 1] == row[o]:
             return 0
-        new = 2 * of[row[o]] + (0 if ccw else 1)
+        new = 2 * numbers[row[o]] + (0 if ccw else 1)
         here_x, here_y = line_x[line], gate[k, LOW + high]
         if disk[new, END] == np.inf:
             if new == before:  # on, to the other end of the slit
-                at[count - 1, LEAVING] += math.pi if ccw else -math.pi
-                at[count - 1, X_OUT], at[count - 1, Y_OUT] = here_x, here_y
+                floats[count - 1, LEAVING] += math.pi if ccw else -math.pi
+                floats[count - 1, X_OUT], floats[count - 1, Y_OUT] = here_x, here_y
                 x, y = here_x, here_y
                 continue
             angle = -0.5 * math.pi if high == 1 else 0.5 * math.pi
@@ -329,17 +335,17 @@ def _initial_arcs(
             ux, uy = 1.0 if rightward else -1.0, 0.0
             if far > 0.0:
                 ux, uy = (to_x - x) / far, (to_y - y) / far
-            new, _ = _farthest_arc(o, not ccw, x, y, ux, uy, -1, -1, of, row, disk)
+            new, _ = _farthest_arc(o, not ccw, x, y, ux, uy, -1, -1, numbers, row, disk)
             angle = _contact_angle(new, ux, uy)
-        on[count, NODE], at[count, ARRIVING], at[count, LEAVING] = new, angle, angle
-        _set_position(count, here_x, here_y, line + (0.0 if rightward else 1.0), at)
+        ints[count, NODE], floats[count, ARRIVING], floats[count, LEAVING] = new, angle, angle
+        _set_position(count, here_x, here_y, line + (0.0 if rightward else 1.0), floats)
         count += 1
         before = new
         x, y = here_x, here_y
-        if count + 2 >= len(at):
+        if count + 2 >= len(floats):
             return 0
-    on[count, NODE] = arcs.points + point[v]
-    _set_position(count, place[v, 0], place[v, 1], float(cell[v]), at)
+    ints[count, NODE] = arcs.points + point[v]
+    _set_position(count, place[v, 0], place[v, 1], float(cell[v]), floats)
     return count + 1
 
 
@@ -353,7 +359,7 @@ def _farthest_arc(
     uy: float,
     a: int,
     b: int,
-    of: Ints,
+    numbers: Ints,
     row: Ints,
     disk: Floats,
 ) -> tuple[int, float]:
@@ -363,7 +369,7 @@ def _farthest_arc(
     nx, ny = -side * uy, side * ux
     best, farthest = -1, -np.inf
     for k in range(row[o], row[o + 1]):
-        n = 2 * of[k]
+        n = 2 * numbers[k]
         if n <= a <= n + 1 or n <= b <= n + 1:
             continue
         middle = nx * (disk[n, CX] - x) + ny * (disk[n, CY] - y)
@@ -379,11 +385,11 @@ def _farthest_arc(
 
 
 @kernel
-def _arc_between(a: int, b: int, i: int, arcs: Arcs, at: Floats) -> tuple[int, float]:
+def _arc_between(a: int, b: int, i: int, arcs: Arcs, floats: Floats) -> tuple[int, float]:
     """Return the directed arc that a path has to pass between node a, number i of the path, and the
     next node b, and the angle at which it stands out; -1 if it is not known."""
     disk, span, solid, edges = arcs.disk, arcs.span, arcs.solid, arcs.edges
-    of, row = arcs.of, arcs.row
+    numbers, row = arcs.numbers, arcs.row
     ra = 0.0 if span[a, OWNER] < 0 else disk[a, RADIUS] * (1.0 - 2.0 * (a % 2))
     rb = 0.0 if span[b, OWNER] < 0 else disk[b, RADIUS] * (1.0 - 2.0 * (b % 2))
     dx, dy = disk[b, CX] - disk[a, CX], disk[b, CY] - disk[a, CY]
@@ -425,12 +431,12 @@ def _arc_between(a: int, b: int, i: int, arcs: Arcs, at: Floats) -> tuple[int, f
         else:
             # past the side on which the string has not its representative point; where it runs
             # straight along its line, the strip that it is in tells
-            sx, sy = at[i + 1, X_IN] - at[i, X_OUT], at[i + 1, Y_IN] - at[i, Y_OUT]
+            sx, sy = floats[i + 1, X_IN] - floats[i, X_OUT], floats[i + 1, Y_IN] - floats[i, Y_OUT]
             shift = SLIT_LINE_TOLERANCE * (abs(sx) + abs(sy))
-            shift = shift if solid[o, RANK] < at[i + 1, STRIP] else -shift
-            rx, ry = solid[o, RAY_X] - at[i, X_OUT] - shift, solid[o, RAY_Y] - at[i, Y_OUT]
+            shift = shift if solid[o, RANK] < floats[i + 1, STRIP] else -shift
+            rx, ry = solid[o, RAY_X] - floats[i, X_OUT] - shift, solid[o, RAY_Y] - floats[i, Y_OUT]
             left = sx * ry - sy * rx < 0.0
-        new, out = _farthest_arc(o, left, px, py, ux, uy, a, b, of, row, disk)
+        new, out = _farthest_arc(o, left, px, py, ux, uy, a, b, numbers, row, disk)
         if new >= 0 and out > farthest:
             best, farthest = new, out
     return best, 0.0 if best < 0 else _contact_angle(best, ux, uy)
@@ -441,39 +447,45 @@ def _verified_length(u: int, v: int, count: int, ends: Ends, arcs: Arcs, path: P
     """Return the length of a path if it is taut and has the word of the leg from u to v; otherwise
     `NOT_PULLED`."""
     letters, row = ends.letters, ends.row
-    disk, span, real, whole, written = arcs.disk, arcs.span, arcs.real, arcs.whole, arcs.letters
-    at, on, word = path.real, path.whole, path.word
+    disk, span, edge_floats, edge_ints, written = (
+        arcs.disk,
+        arcs.span,
+        arcs.edge_floats,
+        arcs.edge_ints,
+        arcs.letters,
+    )
+    floats, ints, word = path.floats, path.ints, path.word
     if count < 2:
         return NOT_PULLED
     n, total = 0, 0.0
     for i in range(count - 1):
-        e = on[i, EDGE]
-        first, last = whole[e, SEGMENT], whole[e, AFTER_SEGMENT]
+        e = ints[i, EDGE]
+        first, last = edge_ints[e, SEGMENT], edge_ints[e, AFTER_SEGMENT]
         if i > 0:
-            arrived, node = on[i - 1, EDGE], on[i, NODE]
-            f = whole[arrived, FIRST]
+            arrived, node = ints[i - 1, EDGE], ints[i, NODE]
+            f = edge_ints[arrived, FIRST]
             if f < 0:
                 return NOT_PULLED
-            by = real[arrived, TURN] + real[e, ALONG] - real[f, ALONG]
-            turns = round((at[i, SLID] - by) / TWO_PI)
+            by = edge_floats[arrived, TURN] + edge_floats[e, ALONG] - edge_floats[f, ALONG]
+            turns = round((floats[i, SLID] - by) / TWO_PI)
             by += turns * TWO_PI
             whole_circle = disk[node, END] == np.inf
             if turns < 0 or by < -ANGLE_TOLERANCE:
                 return NOT_PULLED
             if (turns and not whole_circle) or (turns == 0 and e < f):
                 return NOT_PULLED
-            at[i, SLID] = max(by, 0.0)
-            total += disk[node, RADIUS] * at[i, SLID]
+            floats[i, SLID] = max(by, 0.0)
+            total += disk[node, RADIUS] * floats[i, SLID]
             n = _append_letters(
-                whole[arrived, ARRIVAL], whole[arrived, AFTER_ARRIVAL], written, word, n
+                edge_ints[arrived, ARRIVAL], edge_ints[arrived, AFTER_ARRIVAL], written, word, n
             )
-            begin = whole[f, GAPS]
+            begin = edge_ints[f, GAPS]
             for _ in range(turns):
                 n = _append_letters(begin, span[node, AFTER_LETTERS], written, word, n)
                 begin = span[node, LETTERS]
-            n = _append_letters(begin, whole[e, GAPS], written, word, n)
+            n = _append_letters(begin, edge_ints[e, GAPS], written, word, n)
         n = _append_letters(first, last, written, word, n)
-        total += real[e, LENGTH]
+        total += edge_floats[e, LENGTH]
         if n < 0:
             return NOT_PULLED
     # inverse(word of u) times (word of v)
@@ -481,13 +493,13 @@ def _verified_length(u: int, v: int, count: int, ends: Ends, arcs: Arcs, path: P
     while a < a_end and b < b_end and letters[a] == letters[b]:
         a += 1
         b += 1
-    back, ahead = a_end - a, b_end - b
-    same = n == back + ahead
+    n_inverse, n_after = a_end - a, b_end - b
+    same = n == n_inverse + n_after
     if same:
-        for k in range(back):
+        for k in range(n_inverse):
             same = same and word[1 + k] == -letters[a_end - 1 - k]
-        for k in range(ahead):
-            same = same and word[1 + back + k] == letters[b + k]
+        for k in range(n_after):
+            same = same and word[1 + n_inverse + k] == letters[b + k]
     return total if same else NOT_PULLED
 
 

@@ -100,17 +100,17 @@ class TautLegs:
         places = np.arange(n) if rows is None else np.sort(branches.rank[rows])
         out: Floats = np.empty((min(size, len(places)), n), dtype=np.float32)  # type: ignore[assignment]
         for first in range(0, len(places), size):
-            at = places[first : first + size]
-            block, own = out[: len(at)], branches.order[at]
+            block_places = places[first : first + size]
+            block, positions = out[: len(block_places)], branches.order[block_places]
             row = np.full(n, -1, dtype=np.int64)
-            row[at] = np.arange(len(at))
+            row[block_places] = np.arange(len(block_places))
 
-            def some(row: Ints = row, block: Floats = block) -> None:
+            def fill_block(row: Ints = row, block: Floats = block) -> None:
                 self._fill(vertices, ROUNDED_DOWN, block, clock.flag, branches, row)
 
-            _measure_in_time(clock, some, n)
-            self._set_non_legs(vertices, own, ROUNDED_DOWN, block)
-            yield own, block
+            _measure_in_time(clock, fill_block, n)
+            self._set_non_legs(vertices, positions, ROUNDED_DOWN, block)
+            yield positions, block
 
     def _matrix(
         self, vertices: Ints, kind: type[np.floating], share: float, clock: Clock | None
@@ -178,7 +178,7 @@ class TautLegs:
                         out[row[branches.rank[x]], y] = around
                 continue
             length, path = found
-            fill_parallel(u, v, length, len(path.whole) - 1, path, branches, lengths)
+            fill_parallel(u, v, length, len(path.ints) - 1, path, branches, lengths)
 
     def _search_leg(self, u: int, v: int, stop: Flag) -> tuple[float, Path] | None:
         """Search for a leg that could not be pulled. Return its planar length and its path, or None
@@ -265,9 +265,9 @@ class TautLegs:
         """
         vertices = np.asarray(vertices, dtype=np.int64)
         cluster, planar, z = self.cluster[vertices], self.planar[vertices], self._z
-        own = np.arange(len(vertices)) if rows is None else np.asarray(rows, dtype=np.int64)
+        positions = np.arange(len(vertices)) if rows is None else np.asarray(rows, dtype=np.int64)
         check_available(
-            3.0 * 8.0 * len(own) * len(vertices),
+            3.0 * 8.0 * len(positions) * len(vertices),
             f"bounds on the legs between {len(vertices)} homotopy classes",
             "lower tether_length or max_classes",
         )
@@ -282,8 +282,8 @@ class TautLegs:
                 "classes; lower tether_length or raise the limit"
             )
         size = self.policy.block_rows
-        for first in range(0, len(own), size):
-            part, block = own[first : first + size], low[first : first + size]
+        for first in range(0, len(positions), size):
+            part, block = positions[first : first + size], low[first : first + size]
             np.maximum(block, np.abs(planar[part][:, None] - planar[None, :]), out=block)
             # rounding must not lift a bound above the length
             block -= self.paths.margin
@@ -356,15 +356,15 @@ class TautLegs:
 
         count = self.policy.max_single_legs
 
-        def some(first: int) -> None:
+        def pull_part(first: int) -> None:
             k = slice(first, first + count)
             pull_each(us[k], vs[k], ends, point, paths.slits, paths.arcs, out[k])
 
         if len(us) <= count:
-            some(0)
+            pull_part(0)
         else:
             with ThreadPoolExecutor(os.cpu_count()) as pool:
-                list(pool.map(some, range(0, len(us), count)))
+                list(pool.map(pull_part, range(0, len(us), count)))
         return out
 
     @cached_property

@@ -153,7 +153,7 @@ class Tethers:
             points=np.vstack([self._outline.points, free]),
             places=np.vstack([self._outline.places, xy]),
         )
-        own = tangent_rows(
+        new_rows = tangent_rows(
             outline,
             self._arcs,
             self._full,
@@ -161,7 +161,7 @@ class Tethers:
             since=1,
             policy=self.policy.sight,
         )
-        tangents = assemble(outline, self._arcs, self._full, np.vstack([self._rows, own]))
+        tangents = assemble(outline, self._arcs, self._full, np.vstack([self._rows, new_rows]))
         goal = Goal.model_construct(position=(px, py, pz), name=None, choice=None, after=())
         return _PlacePaths(
             problem.model_copy(update={"goals": (goal,)}), outline, tangents, self.policy
@@ -194,9 +194,9 @@ class _PlacePaths(TautPaths):
             self._trie,
             margin=self.outline.margin,
             rule=ALL,
-            keep=True,
-            toward=(0, nowhere),
-            cap=self.policy.tethers.max_states,
+            keeps_tree=True,
+            target=(0, nowhere),
+            max_states=self.policy.tethers.max_states,
         )
 
     def tether_along(self, found: FoundPaths, hit: int) -> TautTether:

@@ -62,14 +62,14 @@ class Growth(NamedTuple):
 
     Attributes
     ----------
-    whole, real
+    ints, floats
         (capacity, 4) and (capacity, 2) columns AT … and TURNED ….
     last, slid
         (V,) arrays of `TetherTree`; -1 for a tether that could not be pulled.
     """
 
-    whole: Ints
-    real: Floats
+    ints: Ints
+    floats: Floats
     last: Ints
     slid: Floats
 
@@ -103,18 +103,18 @@ class GrowingTree:
 
     def add(self, vertex: int, path: Path, arcs: Arcs) -> None:
         """Add the tether of a vertex, given as a path."""
-        count = len(path.whole) - 1
+        count = len(path.ints) - 1
         self._growth, self._size = _graft(vertex, count, path, arcs, self._growth, self._size)
 
     def tree(self) -> TetherTree:
         """Return the tree as it is."""
         growth = self._growth
-        whole, real = growth.whole[: self._size], growth.real[: self._size]
+        ints, floats = growth.ints[: self._size], growth.floats[: self._size]
         return TetherTree(
-            whole[:, AT].copy(),
-            whole[:, PARENT].copy(),
-            real[:, TURNED].copy(),
-            real[:, REACHED].copy(),
+            ints[:, AT].copy(),
+            ints[:, PARENT].copy(),
+            floats[:, TURNED].copy(),
+            floats[:, REACHED].copy(),
             growth.last,
             growth.slid,
         )
@@ -142,25 +142,25 @@ def _graft(
     v: int, count: int, path: Path, arcs: Arcs, growth: Growth, size: int
 ) -> tuple[Growth, int]:
     """Add the tether of vertex v, a path of `count` tangents, and return the tree with its size."""
-    whole, real, on, at = growth.whole, growth.real, path.whole, path.real
-    disk, edge = arcs.disk, arcs.real
+    ints, floats, path_ints, path_floats = growth.ints, growth.floats, path.ints, path.floats
+    disk, edge = arcs.disk, arcs.edge_floats
     bend, by, reached = 0, 0.0, 0.0
     for k in range(1, count):
-        reached += by * disk[on[k - 1, NODE], RADIUS] + edge[on[k - 1, EDGE], LENGTH]
-        child = whole[bend, CHILD]
+        reached += by * disk[path_ints[k - 1, NODE], RADIUS] + edge[path_ints[k - 1, EDGE], LENGTH]
+        child = ints[bend, CHILD]
         while child >= 0 and not (
-            whole[child, AT] == on[k, NODE] and abs(real[child, TURNED] - by) <= SAME_ANGLE
+            ints[child, AT] == path_ints[k, NODE] and abs(floats[child, TURNED] - by) <= SAME_ANGLE
         ):
-            child = whole[child, SIBLING]
+            child = ints[child, SIBLING]
         if child < 0:
-            if size == len(whole):
-                whole, real = more_int_rows(whole), more_rows(real)
+            if size == len(ints):
+                ints, floats = more_int_rows(ints), more_rows(floats)
             child = size
             size += 1
-            whole[child, AT], whole[child, PARENT] = on[k, NODE], bend
-            whole[child, CHILD], whole[child, SIBLING] = -1, whole[bend, CHILD]
-            whole[bend, CHILD] = child
-            real[child, TURNED], real[child, REACHED] = by, reached
-        bend, by = child, at[k, SLID]
+            ints[child, AT], ints[child, PARENT] = path_ints[k, NODE], bend
+            ints[child, CHILD], ints[child, SIBLING] = -1, ints[bend, CHILD]
+            ints[bend, CHILD] = child
+            floats[child, TURNED], floats[child, REACHED] = by, reached
+        bend, by = child, path_floats[k, SLID]
     growth.last[v], growth.slid[v] = bend, by
-    return Growth(whole, real, growth.last, growth.slid), size
+    return Growth(ints, floats, growth.last, growth.slid), size

@@ -54,14 +54,14 @@ def tether_turnings(problem: Problem, graph: TravelGraph) -> Floats:
     return out
 
 
-def limit_turning(problem: Problem, graph: TravelGraph, most: float) -> TravelGraph:
+def limit_turning(problem: Problem, graph: TravelGraph, max_turning: float) -> TravelGraph:
     """Return the travel graph without the classes in which the tether turns farther than allowed.
 
     Parameters
     ----------
     graph : TravelGraph
         Graph from the base.
-    most : float
+    max_turning : float
         Largest sum of angles, radians; inf returns the same graph. Classes of unknown turning are
         left out.
 
@@ -72,10 +72,10 @@ def limit_turning(problem: Problem, graph: TravelGraph, most: float) -> TravelGr
     LimitReachedError
         The clock was up, or the turning is unknown in all classes of a goal that are left.
     """
-    if math.isinf(most):
+    if math.isinf(max_turning):
         return graph
     turning = tether_turnings(problem, graph)
-    part = graph.subgraph(np.flatnonzero(turning <= most + TURNING_TOLERANCE))
+    part = graph.subgraph(np.flatnonzero(turning <= max_turning + TURNING_TOLERANCE))
     # the limit is the problem's: no class that breaks it is in an admissible tour
     part.declared_scope = graph.scope
     part.classes, part.least_left_out = graph.classes, graph.least_left_out
@@ -98,7 +98,7 @@ def limit_turning(problem: Problem, graph: TravelGraph, most: float) -> TravelGr
         best = int(members[np.argmin(turning[members])])
         raise InfeasibleError(
             f"{problem.goal_label(int(graph.goal[best]) - 1)} is reached in no class in which the "
-            f"tether turns by at most {math.degrees(most):.4g} degrees; the least is "
+            f"tether turns by at most {math.degrees(max_turning):.4g} degrees; the least is "
             f"{math.degrees(turning[best]):.4g}",
             goal=int(graph.goal[best]) - 1,
         )

@@ -71,11 +71,11 @@ def choose(
 def merge_patches(sees: Bools, areas: Floats) -> tuple[Bools, Floats]:
     """Merge the patches that the same viewpoints see, and drop those that none sees. Return the (n,
     k) matrix of what each viewpoint sees, and (k,) areas."""
-    some = sees.any(axis=0) & (areas > 0.0)
-    packed = np.packbits(sees[:, some], axis=0)
+    is_seen = sees.any(axis=0) & (areas > 0.0)
+    packed = np.packbits(sees[:, is_seen], axis=0)
     _, first, which = np.unique(packed, axis=1, return_index=True, return_inverse=True)
-    weights: Floats = np.bincount(which.ravel(), areas[some], len(first)).astype(float)
-    return sees[:, some][:, first], weights
+    weights: Floats = np.bincount(which.ravel(), areas[is_seen], len(first)).astype(float)
+    return sees[:, is_seen][:, first], weights
 
 
 def choose_greedily(matrix: Bools, weights: Floats, needed: float) -> Ints:
@@ -101,11 +101,11 @@ def prune(matrix: Bools, weights: Floats, taken: Ints, needed: float) -> Ints:
     seen = float(weights[times > 0].sum())
     while kept:
         alone = [float(weights[matrix[k] & (times == 1)].sum()) for k in kept]
-        least = int(np.argmin(alone))
-        if seen - alone[least] < needed * (1.0 - 1e-12):
+        weakest = int(np.argmin(alone))
+        if seen - alone[weakest] < needed * (1.0 - 1e-12):
             break
-        seen -= alone[least]
-        times = times - matrix[kept.pop(least)]
+        seen -= alone[weakest]
+        times = times - matrix[kept.pop(weakest)]
     return np.array(kept, dtype=np.int64)
 
 

@@ -138,7 +138,7 @@ def cover(
         Values out of their ranges; an anchor in a solid; nothing that can be seen.
     """
     policy, camera = policy or CoverPolicy(), camera or Camera()
-    tell = on_progress or (lambda _: None)
+    report = on_progress or (lambda _: None)
     with until_interrupt(time_limit) as clock:
         standoff = 0.5 * camera.range if standoff is None else standoff
         farthest = camera.range if farthest is None else min(farthest, camera.range)
@@ -156,7 +156,7 @@ def cover(
         field = clock.bounded("measuring distances in the scene", scene.field)
         base = field.free_point(anchor, "anchor")
         first = base if start is None else field.free_point(start, "start")
-        tell("surface of the scene")
+        report("surface of the scene")
         fine = clock.bounded(
             "covering the surface with patches",
             lambda: surface_patches(scene, field, camera.patch, np.array([anchor]), inspect),
@@ -175,7 +175,7 @@ def cover(
         )
         reach = clock.bounded(
             "finding where the robot gets to",
-            lambda: _Reach.of(mission, scene, field, patches, standoff, policy),
+            lambda: _Reach.build(mission, scene, field, patches, standoff, policy),
         )
         viewer = Viewer(
             field,
@@ -189,13 +189,13 @@ def cover(
             policy,
         )
         looking = clock.part(policy.search_time_share)
-        found = find_viewpoints(viewer, np.random.default_rng(seed), looking, tell)
+        found = find_viewpoints(viewer, np.random.default_rng(seed), looking, report)
         if not len(found) or not found.sees.any():
             raise InputError(
                 "inspect: nothing of the surface can be seen from where the robot gets to; "
                 "expected a shorter stand-off or clearance, or a longer tether"
             )
-        tell(f"choosing among {len(found)} viewpoints")
+        report(f"choosing among {len(found)} viewpoints")
         choice = choose(found.sees, patches.areas, share, clock, policy)
         return _build_cover(mission, scene, patches, found, choice, reach, share)
 
@@ -242,7 +242,7 @@ class _Reach:
     policy: CoverPolicy
 
     @classmethod
-    def of(
+    def build(
         cls,
         mission: Mission,
         scene: Scene,
@@ -253,9 +253,9 @@ class _Reach:
     ) -> _Reach:
         """Return the region, with a grid about all places where viewpoints may be."""
         low, high = extent(scene, np.vstack([patches.centres, mission.every_place]))
-        room = 2.0 * standoff
-        corners = np.array([low - room, high + room])
-        there = mission.model_copy(
+        spare = 2.0 * standoff
+        corners = np.array([low - spare, high + spare])
+        corner_mission = mission.model_copy(
             update={
                 "waypoints": tuple(
                     MissionWaypoint(position=(x, y, z)) for x, y, z in corners.tolist()
@@ -265,7 +265,7 @@ class _Reach:
         bounds = None
         if scene.bounds is not None:
             bounds = np.array(scene.bounds[:3]), np.array(scene.bounds[3:])
-        return cls(mission, field, mission_grid(there, scene, field), bounds, policy)
+        return cls(mission, field, mission_grid(corner_mission, scene, field), bounds, policy)
 
     def allowed(self, places: Floats) -> Bools:
         """Return which of places (n, 3) the robot gets to, within the bounds."""
@@ -304,21 +304,21 @@ def _build_cover(
     reach: _Reach,
     share: float,
 ) -> Cover:
-    chosen, policy = found.only(choice.chosen), reach.policy
+    chosen, policy = found.subset(choice.chosen), reach.policy
     length = mission.tether_length
     if length == UNKNOWN_TETHER_LENGTH:
         longest = float(reach.tethers(chosen.places).max())
         length = round(policy.tether_ratio * longest + policy.tether_spare, 2)
     needed = share * float(patches.areas[found.sees.any(axis=0)].sum())
     others_of = find_alternatives(found, choice.chosen, patches.areas, needed, policy)
-    own = [_viewpoint(found, k) for k in choice.chosen]
+    viewpoints = [_viewpoint(found, k) for k in choice.chosen]
     waypoints = tuple(
         MissionWaypoint(
             position=v.position,
             heading=v.heading,
             alternatives=tuple(_viewpoint(found, k) for k in others),
         )
-        for v, others in zip(own, others_of, strict=True)
+        for v, others in zip(viewpoints, others_of, strict=True)
     )
     areas = patches.areas
     visible: Bools = np.asarray(found.sees.any(axis=0))

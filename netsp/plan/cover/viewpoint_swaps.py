@@ -32,22 +32,22 @@ def find_alternatives(
     """
     out: list[list[int]] = [[] for _ in chosen]
     policy = policy or CoverPolicy()
-    most = min(policy.max_alternatives, policy.max_places // max(len(chosen), 1) - 1)
-    if most <= 0 or len(chosen) < 2:
+    max_count = min(policy.max_alternatives, policy.max_places // max(len(chosen), 1) - 1)
+    if max_count <= 0 or len(chosen) < 2:
         return out
     sees = found.sees[chosen]
     spare = float(areas[sees.any(axis=0)].sum()) - needed
     owner = _owners(sees)
     pairs = []
-    for k, own in enumerate(chosen):
+    for k, number in enumerate(chosen):
         others = found.places[np.delete(chosen, k)]
         apart = np.linalg.norm(found.places[:, None] - others[None], axis=2).min(axis=1)
         lost = ~found.sees[:, owner == k] @ areas[owner == k]
-        able = np.flatnonzero((lost <= spare) & (apart < apart[own]))
+        able = np.flatnonzero((lost <= spare) & (apart < apart[number]))
         pairs += [(float(lost[c]), float(apart[c]), k, int(c)) for c in able if c not in chosen]
     given = np.zeros(len(chosen))
     for lost, _, k, c in sorted(pairs):
-        if len(out[k]) < most and lost - given[k] <= spare:
+        if len(out[k]) < max_count and lost - given[k] <= spare:
             spare -= max(0.0, lost - given[k])
             given[k] = max(given[k], lost)
             out[k].append(c)

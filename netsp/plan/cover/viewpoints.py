@@ -44,7 +44,7 @@ class Viewpoints(ComparesArrays):
     def __len__(self) -> int:
         return len(self.places)
 
-    def only(self, chosen: Ints | Bools) -> Viewpoints:
+    def subset(self, chosen: Ints | Bools) -> Viewpoints:
         """Return the viewpoints of given numbers, or where a mask is true."""
         return Viewpoints(self.places[chosen], self.headings[chosen], self.sees[chosen])
 
@@ -84,20 +84,20 @@ class Viewer:
         patches = self.patches
         look = Coverage(patches, self.field, self.camera)
         look.look(place, heading)
-        there = np.flatnonzero(look.seen)
-        sight = place - patches.centres[there]
-        far = np.linalg.norm(sight, axis=1)
-        square = np.einsum("ij,ij->i", sight, patches.normals[there])
-        good = (far <= self.farthest) & (square >= math.cos(self.incidence) * far - 1e-12)
+        in_view = np.flatnonzero(look.seen)
+        sight = place - patches.centres[in_view]
+        distance = np.linalg.norm(sight, axis=1)
+        square = np.einsum("ij,ij->i", sight, patches.normals[in_view])
+        good = (distance <= self.farthest) & (square >= math.cos(self.incidence) * distance - 1e-12)
         seen = np.zeros(len(patches.areas), dtype=bool)
-        seen[there[good]] = True
+        seen[in_view[good]] = True
         if len(patches.sides):
             # either side of a sheet shows it, from wherever it is looked at
             a, b = patches.sides.T
             seen[a] = seen[b] = seen[a] | seen[b]
         return seen
 
-    def before(self, targets: Ints, offsets: Floats, far: Floats) -> tuple[Floats, Ints]:
+    def places_before(self, targets: Ints, offsets: Floats, far: Floats) -> tuple[Floats, Ints]:
         """Return the free places before patches, and the patch of each.
 
         Parameters
@@ -117,7 +117,7 @@ class Viewer:
             places, targets = places[good], targets[good]
         return places, targets
 
-    def looks(self, places: Floats, targets: Ints) -> Viewpoints:
+    def viewpoints_at(self, places: Floats, targets: Ints) -> Viewpoints:
         """Return a viewpoint at each place, looking at the patch of the same number."""
         toward = self.patches.centres[targets] - places
         headings = np.arctan2(toward[:, 1], toward[:, 0])
@@ -132,7 +132,7 @@ class Viewer:
 
 
 def find_viewpoints(
-    viewer: Viewer, rng: np.random.Generator, clock: Clock, tell: Callable[[str], None]
+    viewer: Viewer, rng: np.random.Generator, clock: Clock, on_progress: Callable[[str], None]
 ) -> Viewpoints:
     """Return viewpoints before the whole structure, many more than are needed.
 
@@ -141,16 +141,18 @@ def find_viewpoints(
 
     Parameters
     ----------
-    tell : callable
+    on_progress : callable
         Called with a line of text now and then.
     """
     patches, camera = viewer.patches, viewer.camera
     width = 2.0 * viewer.standoff * math.tan(math.radians(0.5 * camera.field_of_view))
     targets = spread_out(patches.centres, viewer.policy.patch_spacing * width)
-    tell(f"looking at the structure from before {len(targets)} of {len(patches.areas)} patches")
+    on_progress(
+        f"looking at the structure from before {len(targets)} of {len(patches.areas)} patches"
+    )
     straight = np.zeros((len(targets), 3))
-    places, before = viewer.before(targets, straight, np.full(len(targets), viewer.standoff))
-    found = [viewer.looks(places, before)]
+    places, before = viewer.places_before(targets, straight, np.full(len(targets), viewer.standoff))
+    found = [viewer.viewpoints_at(places, before)]
     seen: Bools = np.asarray(found[0].sees.any(axis=0))
     hidden = np.flatnonzero(~seen)
     rng.shuffle(hidden)
@@ -161,11 +163,11 @@ def find_viewpoints(
         left = part[~seen[part]]
         if clock.is_up or not len(left):
             continue
-        tell(f"looking for what is hidden, {int((~seen).sum())} patches left")
-        for place, patch in zip(*viewer.before(*_around(viewer, left, rng)), strict=True):
+        on_progress(f"looking for what is hidden, {int((~seen).sum())} patches left")
+        for place, patch in zip(*viewer.places_before(*_around(viewer, left, rng)), strict=True):
             if seen[patch] or clock.is_up:
                 continue
-            view = viewer.looks(place[None], np.array([patch]))
+            view = viewer.viewpoints_at(place[None], np.array([patch]))
             if view.sees[0, patch]:
                 found.append(view)
                 seen |= view.sees[0]
@@ -181,9 +183,9 @@ def _around(viewer: Viewer, patches: Ints, rng: np.random.Generator) -> tuple[In
     tries = viewer.policy.views_per_hidden_patch
     many = np.repeat(patches, tries)
     off = rng.normal(size=(len(many), 3)) * rng.uniform(0.0, 1.2, len(many))[:, None]
-    least = viewer.policy.min_standoff_ratio * viewer.standoff
-    most = min(viewer.farthest, 2.0 * viewer.standoff)
-    far = rng.uniform(min(least, most), most, len(many))
+    min_far = viewer.policy.min_standoff_ratio * viewer.standoff
+    max_far = min(viewer.farthest, 2.0 * viewer.standoff)
+    far = rng.uniform(min(min_far, max_far), max_far, len(many))
     far[np.arange(len(many)) % tries < tries // 2] = viewer.standoff
     off[::tries] = 0.0
     return many, off, far

@@ -326,9 +326,9 @@ def _checked_places(problem: Problem, candidates: npt.ArrayLike, policy: SizingP
         raise InputError(f"candidates: expected rows of x, y or x, y, z, got shape {given.shape}")
     if not np.isfinite(given).all():
         raise InputError("candidates: expected finite coordinates")
-    most = policy.max_candidates
-    if len(given) > most:
-        raise InputError(f"candidates: {len(given):,}; expected at most {most:,}")
+    max_count = policy.max_candidates
+    if len(given) > max_count:
+        raise InputError(f"candidates: {len(given):,}; expected at most {max_count:,}")
     if given.shape[1] == 2:
         given = np.column_stack([given, np.full(len(given), problem.base[2])])
     return given
@@ -422,8 +422,8 @@ def shortest_paths(problem: Problem, places: Floats) -> tuple[Floats, Floats]:
     if not len(places):
         return np.zeros((0, len(goals))), np.zeros((len(goals), len(goals)))
     # one point for all places and goals at the same spot in the plane
-    every = np.vstack([goals, places])
-    flat, which = np.unique(every[:, :2], axis=0, return_inverse=True)
+    points = np.vstack([goals, places])
+    flat, which = np.unique(points[:, :2], axis=0, return_inverse=True)
     which = np.asarray(which).reshape(-1)
     data: dict[str, Any] = problem.model_dump(exclude={"origin", "state", "bounds", "site"})
     reach = 10.0 * float(np.ptp(flat, axis=0).max() + problem.tether_length)
@@ -440,7 +440,7 @@ def shortest_paths(problem: Problem, places: Floats) -> tuple[Floats, Floats]:
     found = ContactGraph(build_outline(plain)).lengths(sources)
     row = {s: k for k, s in enumerate(sources)}
     planar = np.array([found[row[int(g)]][which] for g in which[: len(goals)]])
-    rise = np.abs(goals[:, 2][:, None] - every[:, 2][None, :])
+    rise = np.abs(goals[:, 2][:, None] - points[:, 2][None, :])
     lengths = np.hypot(planar, rise)
     return lengths[:, len(goals) :].T.copy(), lengths[:, : len(goals)].copy()
 
@@ -467,11 +467,13 @@ def _tour_bound(problem: Problem, to: Floats, between: Floats, clock: Clock, see
     np.fill_diagonal(costs, 0.0)
     choices = problem.clusters[within]
     over = TravelGraph.from_costs(costs, [0, *choices.tolist()])
-    least = 2.0 * max(float(to[choices == c].min()) for c in np.unique(choices))  # there and back
+    bound_by_farthest = 2.0 * max(
+        float(to[choices == c].min()) for c in np.unique(choices)
+    )  # there and back
     if clock.is_up:
-        return least
+        return bound_by_farthest
     bound = solve_graph(over, time_limit=clock, seed=seed).lower_bound or 0.0
-    return max(least, bound) * (1.0 - PATH_ROUNDING)
+    return max(bound_by_farthest, bound) * (1.0 - PATH_ROUNDING)
 
 
 def _finite(value: float) -> float | None:

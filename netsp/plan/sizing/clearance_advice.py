@@ -62,13 +62,13 @@ class ClearanceRoom:
 
     Attributes
     ----------
-    most
+    max_clearance
         Distance of base, goals and robot to the nearest obstacle, in the problem's units.
     place, obstacle
         Names of the place and the obstacle at this distance.
     """
 
-    most: float
+    max_clearance: float
     place: str
     obstacle: str
 
@@ -125,16 +125,18 @@ def clearance_advice(
         f"need (position error {p.position_error:g} m + {p.path_error:g} m + "
         f"{p.error_by_current:g} s × current {p.current:g} m/s); "
     )
-    if room is None or room.most >= needed:
+    if room is None or room.max_clearance >= needed:
         return (
             text + f"raise clearance to {_rounded(needed, up=True):g}{unit} or more and plan again"
         )
-    most = _rounded(room.most, up=False)
+    shown = _rounded(room.max_clearance, up=False)
     less = ", or reduce the position error" if p.position_error else ""
-    raised = f"can be raised to {most:g}{unit} at most" if most > clearance else "cannot be raised"
+    raised = (
+        f"can be raised to {shown:g}{unit} at most" if shown > clearance else "cannot be raised"
+    )
     return (
-        f"{text}{room.place} is only {most:g} {units} from {room.obstacle}, so clearance {raised}: "
-        f"move {room.place}{less}"
+        f"{text}{room.place} is only {shown:g} {units} from {room.obstacle}, "
+        f"so clearance {raised}: move {room.place}{less}"
     )
 
 

@@ -152,10 +152,10 @@ def margins(
     slack = min(v.slack for v in visits)
     if slack < -problem.tolerance:
         raise InputError(f"solution: its tether is {-slack:.6g} too short; expected one that fits")
-    least, limited_by = _max_growth(problem, solution, policy or SizingPolicy())
+    growth, limited_by = _max_growth(problem, solution, policy or SizingPolicy())
     beside = _obstacle_distance(problem, np.array(solution.path))
     return Margins(
-        least, limited_by, max(slack, 0.0), max(min(beside, slack), 0.0), friction, visits
+        growth, limited_by, max(slack, 0.0), max(min(beside, slack), 0.0), friction, visits
     )
 
 

@@ -320,13 +320,13 @@ def _max_useful_tether(
     the shortest sufficient tether."""
     if not shortest < problem.tether_length:
         return problem.tether_length  # out of reach, which will be said; or no choice
-    least = min(shortest * (1.0 + REQUEST_TOLERANCE), problem.tether_length)
-    graph = travel_graph(problem.model_copy(update={"tether_length": least}), time_limit=clock)
+    min_tether = min(shortest * (1.0 + REQUEST_TOLERANCE), problem.tether_length)
+    graph = travel_graph(problem.model_copy(update={"tether_length": min_tether}), time_limit=clock)
     with graph.on_clock(clock):
         known = solve_graph(graph, solver, time_limit=clock, seed=seed).length
     if known is None:
         return problem.tether_length
-    return min(max(0.5 * known * (1.0 + REQUEST_TOLERANCE), least), problem.tether_length)
+    return min(max(0.5 * known * (1.0 + REQUEST_TOLERANCE), min_tether), problem.tether_length)
 
 
 def _solve_step(
@@ -338,6 +338,6 @@ def _solve_step(
     with graph.on_clock(clock):
         result = solve_graph(graph.subgraph(vertices), solver, time_limit=clock, seed=seed)
     left_out = graph.least_left_out
-    least = graph.least_by_way_of(left_out) if left_out <= limit else math.inf
+    bound_left_out = graph.least_by_way_of(left_out) if left_out <= limit else math.inf
     because = "a tour by way of a class left out goes along its tether and back"
-    return with_classes_left_out(result, least, Scope.ALL_TOURS, because), vertices
+    return with_classes_left_out(result, bound_left_out, Scope.ALL_TOURS, because), vertices
