@@ -1,7 +1,7 @@
 """Tests of the checks of the numbers in policies."""
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 
 import pytest
 
@@ -9,6 +9,9 @@ from netsp.base.errors import InputError
 from netsp.base.files import FilePolicy
 from netsp.base.number_ranges import check_not_negative, check_positive
 from netsp.base.ram import MemoryPolicy
+from netsp.online.fly import flight_policy
+from netsp.online.guard import guard_policy
+from netsp.online.link import link_policy
 from netsp.world.scene.scene_policy import FieldPolicy, FloorPolicy, GridPolicy, SeamPolicy
 from netsp.world.scene.surfaces import SurfacePolicy
 from netsp.world.tether.tether_policy import TetherPolicy, pull_settings
@@ -79,3 +82,22 @@ def test_kernels_get_every_number_of_the_tether_policy():
     )._asdict()
     assert settings["max_sidesteps"] == 3
     assert {f.name: getattr(policy, f.name) for f in fields(policy)}.items() <= settings.items()
+
+
+def policies(*modules):
+    """Default policies of all classes that modules define."""
+    for module in modules:
+        for kind in vars(module).values():
+            if is_dataclass(kind) and kind.__module__ == module.__name__:
+                has_defaults = kind is not guard_policy.CoursePolicy
+                yield kind() if has_defaults else kind(1.0, 0.8, 0.6)
+
+
+@pytest.mark.parametrize(
+    "policy", [*policies(guard_policy, link_policy, flight_policy)], ids=lambda p: type(p).__name__
+)
+def test_no_number_of_a_guard_a_link_or_a_flight_is_negative(policy):
+    for f in fields(policy):
+        if f.type in ("int", "float"):
+            with pytest.raises(InputError, match=f"{f.name}: expected"):
+                replace(policy, **{f.name: -1})

@@ -40,6 +40,7 @@ class ClockPolicy:
     n_behind: int = 2
 
     def __post_init__(self) -> None:
+        check_not_negative(self)
         if not 0.0 < self.max_late_s <= self.min_restart_step_s:
             raise InputError(
                 f"max_late_s: expected more than 0 and at most {self.min_restart_step_s:g} s, got "
@@ -47,7 +48,6 @@ class ClockPolicy:
             )
         if not self.max_boot_s > 0.0:
             raise InputError(f"max_boot_s: expected a positive time, got {self.max_boot_s!r}")
-        check_not_negative(self)
         if self.n_behind < 1:
             raise InputError(f"n_behind: expected 1 or more, got {self.n_behind!r}")
 
