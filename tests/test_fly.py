@@ -206,7 +206,7 @@ def test_a_clock_that_stands_still_ends_the_flight(monkeypatch):
 
 def test_positions_without_heartbeats_are_told_from_silence():
     class Heard:
-        silent_s, unplaced_s, system, others = np.inf, 0.1, 7, ()
+        silent_s, position_age_s, system, others = np.inf, 0.1, 7, ()
 
         def sleep(self, seconds):
             pass
@@ -255,13 +255,11 @@ def test_a_vehicle_with_another_system_id_is_named(tour):
         ({"do": "silence", "seconds": 60}, "the link is lost"),
     ],
 )
-def test_a_flight_stops_when_the_vehicle_is_not_ours_any_more_and_says_why(
-    tour, what, why, monkeypatch
-):
-    if what["do"] == "silence":
-        monkeypatch.undo()
+def test_a_flight_stops_when_the_vehicle_is_not_ours_any_more_and_says_why(tour, what, why):
+    policy = FlightPolicy() if what["do"] == "silence" else PATIENT
     with Flown(pace=3.0) as flown:
-        done = flown.fly(tour, on_step=after(6.0, lambda: flown.autopilot.tell(**what)))
+        tell = after(6.0, lambda: flown.autopilot.tell(**what))
+        done = flown.fly(tour, on_step=tell, policy=policy)
         assert done.summary["status"] == "stopped"
         assert why in done.stopped
         sent = len(flown.targets)
