@@ -171,7 +171,7 @@ def test_a_sea_floor_lies_within_the_depths_of_its_areas(seed):
         elif not inside:
             assert np.isnan(height)
         else:
-            assert -inside[0].greatest - 1e-9 <= height <= -inside[0].least + 1e-9
+            assert -inside[0].max_depth - 1e-9 <= height <= -inside[0].min_depth + 1e-9
 
 
 @pytest.mark.parametrize("name", ["floor.asc", "floor.tif"])

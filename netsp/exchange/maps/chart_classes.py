@@ -156,12 +156,12 @@ def lone_equipment(features: Sequence[Feature], policy: ImportPolicy = DEFAULT_I
     if not equipment:
         return set()
     tree = shapely.STRtree([carrier.shape for carrier in carriers])
-    own, _ = tree.query(
+    near, _ = tree.query(
         [feature.shape for feature in equipment],
         predicate="dwithin",
         distance=policy.carrier_distance,
     )
-    carried = set(own.tolist())
+    carried = set(near.tolist())
     return {feature.where for k, feature in enumerate(equipment) if k not in carried}
 
 

@@ -337,15 +337,15 @@ class _Site:
         base = self._base(parts)
         if base is None:
             raise self._refused()
-        anchor, own = base
-        tether = self._length(own, "tether_length", self.options.tether)
+        anchor, base_feature = base
+        tether = self._length(base_feature, "tether_length", self.options.tether)
         if tether is None:
             self._complain(
                 "has no tether length; expected tether_length of the base",
                 ", or --tether L",
                 "tether",
             )
-        clearance = self._length(own, "clearance", self.options.clearance) or 0.0
+        clearance = self._length(base_feature, "clearance", self.options.clearance) or 0.0
         goals = self._goals(parts["goal"]) + self._table_goals()
         candidates = [
             place for _, place in self._table_places("candidate", self.options.candidates)

@@ -31,13 +31,13 @@ class DepthArea:
 
     Attributes
     ----------
-    least, greatest
+    min_depth, max_depth
         Depths, metres downwards; None if the chart does not give them.
     """
 
     shape: shapely.Geometry
-    least: float | None
-    greatest: float | None
+    min_depth: float | None
+    max_depth: float | None
 
 
 @dataclass(frozen=True)
@@ -156,8 +156,8 @@ def sea_floor(
     has_area = np.zeros((rows, columns), dtype=bool)
     for area in areas:
         inside = _covered(area.shape, x, y)
-        low = area.least if area.least is not None else -np.inf
-        high = area.greatest if area.greatest is not None else np.inf
+        low = area.min_depth if area.min_depth is not None else -np.inf
+        high = area.max_depth if area.max_depth is not None else np.inf
         max_depth[inside] = np.minimum(max_depth[inside], high)
         first = inside & ~has_area
         min_depth[first] = low
@@ -189,7 +189,7 @@ def _is_shoal(soundings: Floats, areas: Sequence[DepthArea]) -> np.ndarray:
     tree = shapely.STRtree([area.shape for area in areas])
     spots = shapely.points(soundings[:, :2])
     for spot, area in tree.query(spots, predicate="intersects").T.tolist():
-        low = areas[area].least
+        low = areas[area].min_depth
         min_depth[spot] = min(min_depth[spot], -np.inf if low is None else low)
     return np.asarray(np.isfinite(min_depth) & (soundings[:, 2] < min_depth))
 
