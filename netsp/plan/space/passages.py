@@ -3,7 +3,7 @@
 A cell is free if its middle has enough room, so a slot that is wide enough for the robot may be
 closed on the grid. The search samples finer points between free cells. A gap lies where two
 neighbouring points have enough room but their nearest free cells are not connected nearby.
-Every plan of a mission begins with this search (`netsp.plan.space.space_plan.water_of`).
+Every plan of a mission begins with this search (`netsp.plan.space.space_plan.prepare_context`).
 """
 
 from __future__ import annotations
