@@ -1,1 +1,1 @@
-"""What every run of a solver shares: limits, incumbent, bound, report, options, leg costs."""
+"""Solvers of a generalised TSP: runs, limits, options, costs, searches, walks and files."""

@@ -10,7 +10,7 @@ from netsp.base.number_ranges import check_not_negative, check_positive, check_s
 
 @dataclass(frozen=True)
 class CostPolicy:
-    """How costs of legs are measured and held.
+    """Measuring and storage of the costs of legs.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ class LocalSearchPolicy:
 
 @dataclass(frozen=True)
 class NeighbourhoodPolicy:
-    """Which vertices of each cluster a search sees while there are too many for all.
+    """Vertices of each cluster that a search sees while there are too many for all.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""From the result on a travel graph to the solution of a problem."""
+"""Conversion of a result on a travel graph into the solution of a problem."""
 
 from __future__ import annotations
 

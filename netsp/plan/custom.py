@@ -1,4 +1,4 @@
-"""Solvers third-party: any callable that takes a travel graph."""
+"""Third-party solvers: any callable that takes a travel graph."""
 
 from __future__ import annotations
 
@@ -24,14 +24,16 @@ from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
 from netsp.model.solution import Status
 
 OFFERED = ("params", "limits", "time", "iterations", "rng", "warm_start")
-"""What a solver may ask for by name: its options, the limits, and each field of them."""
+"""Names of the parameters that a solver may have: options, limits, and each field of these."""
 
 VARIADIC = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
 
 
 def read_options(solver: Callable[..., Any], name: str, params: Mapping[str, Any] | None) -> Any:
-    """What a solver gets as `params`: the dataclass that it annotates them with, its values checked
-    as those of our own solvers are, or else the mapping as it is.
+    """Return the argument `params` of a solver.
+
+    It is the dataclass that `params` is annotated with, with its values checked, or else the
+    mapping as it is.
 
     Raises
     ------
@@ -59,7 +61,7 @@ def read_options(solver: Callable[..., Any], name: str, params: Mapping[str, Any
 
 
 def whole_numbers(values: Any) -> tuple[int, ...]:
-    """A sequence of whole numbers as a tuple; empty if it is anything else."""
+    """Return a sequence of whole numbers as a tuple; an empty one for anything else."""
     if isinstance(values, str | bytes | Mapping | Set) or not isinstance(values, Iterable):
         return ()
     listed = list(values)
@@ -68,7 +70,7 @@ def whole_numbers(values: Any) -> tuple[int, ...]:
 
 
 def _asked(solver: Callable[..., Any]) -> Mapping[str, Parameter]:
-    """What a solver takes, by name; nothing if it is compiled and does not say."""
+    """Return the parameters of a solver by name; none if it is compiled and has no signature."""
     try:
         asked = inspect.signature(solver).parameters
     except (TypeError, ValueError):

@@ -12,7 +12,7 @@ from netsp.plan.search_effort import SearchEffort
 
 @dataclass(frozen=True)
 class RoutePolicy:
-    """Which solver `auto` uses, by size, and how it divides the time.
+    """Choice of the solver by size in `auto`, and division of its time.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class RoutePolicy:
 
 @dataclass(frozen=True)
 class SubsetPolicy:
-    """Which problems are solved by dynamic programming over sets of goals.
+    """Size of problems that are solved by dynamic programming over sets of goals.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ class CarryPolicy:
 
 @dataclass(frozen=True)
 class WarmStartPolicy:
-    """How the tour of an older version of a problem becomes a warm start.
+    """Adaptation of the tour of an older version of a problem.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""From a problem to its solution, by names of roadmaps and solvers."""
+"""Solving a problem, by names of roadmaps and solvers."""
 
 from __future__ import annotations
 

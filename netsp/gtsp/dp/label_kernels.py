@@ -41,7 +41,7 @@ class Labels(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """Which labels are kept: onward (n + 1, V), minimum cost of the visits still to make; limit
+    """Limits of labels: onward (n + 1, V), minimum cost of the visits still to make; limit
     (V,), maximum cost of a label before its price is taken off; cut, maximum cost of a walk."""
 
     onward: Floats

@@ -28,7 +28,7 @@ MAX_REMEMBERED = TABLES * BITS_PER_TABLE
 
 
 class Memory:
-    """For each goal the goals it remembers; bit k of a memory at goal g stands for the k-th of g.
+    """Goals that each goal remembers; bit k of a memory at goal g stands for the k-th goal of g.
 
     Parameters
     ----------

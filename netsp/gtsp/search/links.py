@@ -34,7 +34,7 @@ may be off by this share of its largest number (`netsp.gtsp.search.layers.Instan
 
 
 class Tables(NamedTuple):
-    """What an instance holds for kernels.
+    """Arrays of an instance for kernels.
 
     ``nearest`` is (m + 1, m + 1), ``rank`` (m + 1, k). The clusters that cluster c may be inserted
     next to are ``beside[first[c]:first[c + 1]]``, as in ``near``. ``min_gain`` is the share of the

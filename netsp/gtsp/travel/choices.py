@@ -1,4 +1,4 @@
-"""Goals with alternatives: their vertices are one cluster."""
+"""Goals with alternatives: the vertices of all their places are one cluster."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from netsp.gtsp.travel.parity_distances import WaysByParity
 
 
 def with_choices(graph: TravelGraph, clusters: Ints) -> TravelGraph:
-    """A travel graph over places as one over goals, of which some are choices among places.
+    """Return a travel graph over places as one over goals that are choices among places.
 
     Parameters
     ----------
     graph : TravelGraph
-        Its clusters are places.
+        Graph whose clusters are places.
     clusters : ndarray of int, shape (places + 1,)
-        The goal of each place, the base (0) first.
+        Goal of each place, the base (0) first.
 
     Returns
     -------
     TravelGraph
-        The same vertices and legs, but none between alternatives.
+        Graph with the same vertices and legs, without legs between alternatives.
     """
     cluster = clusters[graph.cluster]
     out = TravelGraph(
@@ -42,14 +42,14 @@ def with_choices(graph: TravelGraph, clusters: Ints) -> TravelGraph:
 
 
 class _LegsOfChoices:
-    """The legs of another travel graph, but for those between alternatives."""
+    """Legs of another travel graph, without those between alternatives."""
 
     def __init__(self, graph: TravelGraph, cluster: Ints) -> None:
         self.graph, self.cluster = graph, cluster
 
     @property
     def left_out(self) -> set[tuple[int, int]]:
-        """As beneath."""
+        """Property of the graph over places."""
         return set(self.graph.legs_left_out)
 
     def bounds_of_left_out(self) -> Floats:
@@ -57,7 +57,7 @@ class _LegsOfChoices:
 
     @property
     def quick(self) -> bool:
-        """As beneath."""
+        """Property of the graph over places."""
         return self.graph.quick_legs
 
     def lengths(
@@ -71,7 +71,7 @@ class _LegsOfChoices:
 
     @property
     def at_once(self) -> bool:
-        """As beneath."""
+        """Property of the graph over places."""
         return self.graph.legs_at_once
 
     def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
@@ -85,7 +85,7 @@ class _LegsOfChoices:
 
     @property
     def in_blocks(self) -> bool:
-        """As beneath."""
+        """Property of the graph over places."""
         return self.graph.legs_in_blocks
 
     def blocks(

@@ -42,21 +42,21 @@ if TYPE_CHECKING:
 
 
 class Carrier(Protocol):
-    """Classes that tethers come into when the robot goes on to a goal near by."""
+    """Provider of the classes that a tether comes into when it is carried to a goal near by."""
 
     def ways(self, goal: int, most: int) -> list[tuple[int, Word]]:
-        """The nearest goals to one (from 1; 0 is the base), and the words of the shortest ways
-        there."""
+        """Return the goals nearest to one (from 1; 0 is the base), and the words of the shortest
+        paths there."""
 
     def carried(self, start: int, word: Word, goal: int) -> Word | None:
-        """The word that a tether has when it has come along the shortest way from a goal, or the
-        base, to another goal; None if it does not reach so far."""
+        """Return the word of a tether that is carried along the shortest path from a goal, or the
+        base, to another goal; None if it is too short."""
 
     def with_classes(
         self, wanted: Iterable[tuple[int, Word]], up: Callable[[], bool]
     ) -> TravelGraph:
-        """The travel graph with more classes, given by goal (from 1) and word: those of them that
-        the tether reaches, and that are looked at before the time is up."""
+        """Return the travel graph with more classes, given by goal (from 1) and word, as far as the
+        tether reaches them and time is not up."""
 
 
 class TravelGraph(Drawn):
@@ -155,7 +155,7 @@ class TravelGraph(Drawn):
     def from_costs(
         cls, costs: npt.ArrayLike, clusters: npt.ArrayLike, base: int | None = 0
     ) -> TravelGraph:
-        """Any symmetric generalised TSP as a travel graph, for the solvers that need no geometry.
+        """Return a symmetric generalised TSP as a travel graph, for solvers that need no geometry.
 
         Parameters
         ----------
@@ -239,7 +239,7 @@ class TravelGraph(Drawn):
         return out
 
     def __repr__(self) -> str:
-        """In a line."""
+        """Return one line with the size of the graph."""
         return (
             f"<TravelGraph: {counted(self.goal_count, 'goal')}, {len(self) - 1} classes, "
             f"roadmap {self.roadmap}>"
@@ -265,11 +265,11 @@ class TravelGraph(Drawn):
 
     @property
     def measured(self) -> bool:
-        """Whether all legs have been measured."""
+        """True once all legs have been measured."""
         return self._costs is not None
 
     def costs_among(self, vertices: npt.ArrayLike, asked: Bools | None = None) -> Floats:
-        """Leg costs among some vertices only, for solvers that eliminate the others first.
+        """Return the costs of legs among some vertices, for solvers that drop the others first.
 
         Parameters
         ----------
@@ -294,7 +294,7 @@ class TravelGraph(Drawn):
         return self._measured(chosen, asked)
 
     def costs_rounded(self, vertices: npt.ArrayLike) -> Floats:
-        """Leg costs among some vertices in single precision, for solvers that need very many.
+        """Return the costs of legs among some vertices in single precision, rounded down.
 
         Parameters
         ----------
@@ -323,14 +323,13 @@ class TravelGraph(Drawn):
 
     @property
     def legs_in_blocks(self) -> bool:
-        """Whether `costs_in_blocks` may be asked for."""
+        """True if `costs_in_blocks` is available."""
         return bool(getattr(self._legs, "in_blocks", hasattr(self._legs, "blocks")))
 
     def costs_in_blocks(
         self, vertices: npt.ArrayLike | None = None, rows: Ints | None = None
     ) -> Iterator[tuple[Ints, Floats]]:
-        """Leg costs in single precision, those of some vertices at a time, for solvers that let go
-        of most at once.
+        """Yield costs of legs in single precision, those of some vertices at a time.
 
         Parameters
         ----------
@@ -364,7 +363,7 @@ class TravelGraph(Drawn):
             yield block
 
     def costs_of(self, us: Ints, vs: Ints) -> Floats:
-        """Costs of single legs.
+        """Return the costs of single legs.
 
         Parameters
         ----------
@@ -395,7 +394,7 @@ class TravelGraph(Drawn):
 
     @contextmanager
     def on_clock(self, clock: Clock | None) -> Iterator[None]:
-        """While a solver runs, its clock ends the measuring of legs, too.
+        """End the measuring of legs by a clock while the body runs.
 
         Parameters
         ----------
@@ -422,32 +421,34 @@ class TravelGraph(Drawn):
 
     @property
     def roadmapped(self) -> bool:
-        """Whether every vertex has a leg to every other of another goal, as over a roadmap; costs
-        given as a matrix promise nothing."""
+        """True if every vertex has a leg to each vertex of another goal, as over a roadmap.
+
+        Costs given as a matrix promise nothing.
+        """
         return not isinstance(self._legs, CostTable)
 
     @property
     def complete(self) -> bool:
-        """Whether no class was left out for want of time or room."""
+        """True if the roadmap left no class out to save time or memory."""
         return self.least_left_out == math.inf
 
     @property
     def quick_legs(self) -> bool:
-        """Whether a leg by itself is quickly measured."""
+        """True if a single leg is measured quickly."""
         return bool(getattr(self._legs, "quick", True))
 
     @property
     def legs_at_once(self) -> bool:
-        """Whether all legs together are found about as quickly as bounds on them."""
+        """True if all legs together are found about as quickly as bounds on them."""
         return bool(getattr(self._legs, "at_once", False))
 
     @property
     def geometric(self) -> bool:
-        """Whether a problem's geometry lies beneath, so that legs can be walked and retraced."""
+        """True if the graph has the geometry of a problem, so that legs can be drawn."""
         return self._make_detours is not None
 
     def detours(self, *, sub_goals: bool, check: Callable[[], None] = lambda: None) -> Detours:
-        """Detours in any class, for solvers blind to the tether.
+        """Return the detours in any class, for solvers that ignore the tether.
 
         Parameters
         ----------
@@ -475,7 +476,7 @@ class TravelGraph(Drawn):
         return self._detours[sub_goals]
 
     def between_goals(self, up: Callable[[], bool] = lambda: False) -> Floats:
-        """Lower bounds on the legs between goals, in any class.
+        """Return lower bounds on the legs between goals, in any class.
 
         Parameters
         ----------
@@ -502,11 +503,11 @@ class TravelGraph(Drawn):
 
     @property
     def knows_ways(self) -> bool:
-        """Whether `ways_by_parity` may tell any."""
+        """True if `ways_by_parity` is available."""
         return self._by_parity is not None
 
     def ways_by_parity(self, up: Callable[[], bool] = lambda: False) -> WaysByParity | None:
-        """Ways between goals, by the rays that they cross an odd number of times.
+        """Return the shortest paths between goals, by the rays that they cross oddly.
 
         Parameters
         ----------
@@ -521,7 +522,7 @@ class TravelGraph(Drawn):
         return None if self._by_parity is None else self._by_parity(up)
 
     def subgraph(self, vertices: npt.ArrayLike) -> TravelGraph:
-        """The travel graph on some of the vertices.
+        """Return the travel graph on some of the vertices.
 
         Parameters
         ----------
@@ -547,12 +548,12 @@ class TravelGraph(Drawn):
         return part
 
     def unordered(self) -> TravelGraph:
-        """The travel graph without its precedences.
+        """Return the travel graph without its precedences.
 
         Returns
         -------
         TravelGraph
-            What no tour of it falls short of, none of this graph does.
+            Graph whose bounds hold for this one.
         """
         free = self.subgraph(np.arange(len(self)))
         free.before, free.declared_scope = UNORDERED, self.scope
@@ -568,7 +569,7 @@ class TravelGraph(Drawn):
         return out
 
     def vertices_of(self, order: Sequence[int], words: Sequence[Word]) -> list[int] | None:
-        """The vertices of goals with given words.
+        """Return the vertices of goals with given words.
 
         Parameters
         ----------
@@ -593,7 +594,7 @@ class TravelGraph(Drawn):
     def lower_bounds(
         self, vertices: npt.ArrayLike | None = None, rows: npt.ArrayLike | None = None
     ) -> Floats:
-        """Lower bounds on the leg costs among some vertices, without measuring the legs.
+        """Return lower bounds on the costs of legs among some vertices, without measuring them.
 
         Parameters
         ----------
@@ -621,7 +622,7 @@ class TravelGraph(Drawn):
         return bounds
 
     def members(self, cluster: int) -> Ints:
-        """Vertices of a cluster.
+        """Return the vertices of a cluster.
 
         Parameters
         ----------
@@ -636,7 +637,7 @@ class TravelGraph(Drawn):
         return np.flatnonzero(self.cluster == cluster)
 
     def tour_length(self, tour: Sequence[int]) -> float:
-        """Length of the closed tour through the given vertices.
+        """Return the length of the closed tour through vertices.
 
         Parameters
         ----------
@@ -651,7 +652,7 @@ class TravelGraph(Drawn):
         return self.walk_length([*tour, tour[0]]) if len(tour) > 1 else 0.0
 
     def walk_length(self, walk: Sequence[int]) -> float:
-        """Length of the legs from each vertex to the next.
+        """Return the length of the legs from each vertex to the next.
 
         Parameters
         ----------
@@ -671,8 +672,7 @@ class TravelGraph(Drawn):
         return float(among[at[:-1], at[1:]].sum())
 
     def is_tour(self, tour: Sequence[int]) -> bool:
-        """Whether vertices are a tour: from the base, exactly one of every cluster, and in an order
-        that the precedences allow.
+        """Return whether vertices are a tour: from the base, one of every cluster, in order.
 
         Parameters
         ----------
@@ -687,7 +687,7 @@ class TravelGraph(Drawn):
         return self.why_no_tour(tour) is None
 
     def why_no_tour(self, tour: Sequence[int]) -> str | None:
-        """Why vertices are no tour.
+        """Return why vertices are no tour.
 
         Parameters
         ----------
@@ -697,7 +697,7 @@ class TravelGraph(Drawn):
         Returns
         -------
         str or None
-            What is wrong with them first; None for a tour.
+            The first thing that is wrong; None for a tour.
         """
         t = [int(v) for v in tour]
         if not t or t[0] != 0:
@@ -719,7 +719,7 @@ class TravelGraph(Drawn):
         return None
 
     def takes_one_of_each(self, vertices: Sequence[int]) -> bool:
-        """Whether vertices are exactly one of every cluster, in any order.
+        """Return whether vertices are exactly one of every cluster, in any order.
 
         Parameters
         ----------
@@ -737,7 +737,7 @@ class TravelGraph(Drawn):
         return inside and sorted(self.cluster[v].tolist()) == list(range(clusters))
 
     def path(self, u: int, v: int) -> Floats:
-        """The leg from one vertex to another.
+        """Return the leg from one vertex to another.
 
         Parameters
         ----------
@@ -840,7 +840,7 @@ class TravelGraph(Drawn):
         return sorted(getattr(self._legs, "left_out", ()))
 
     def bounds_of_left_out(self) -> Floats:
-        """Lower bounds for the legs left out.
+        """Return lower bounds for the legs left out.
 
         Returns
         -------
@@ -861,7 +861,7 @@ class TravelGraph(Drawn):
         return float(self.bounds_of_left_out().sum(axis=1).min(initial=math.inf))
 
     def least_by_way_of(self, tether: float) -> float:
-        """No tour by way of a class with so long a tether is shorter: it goes there and back.
+        """Return a lower bound on tours through a class: twice its tether.
 
         Parameters
         ----------
@@ -886,7 +886,7 @@ class TravelGraph(Drawn):
         Returns
         -------
         callable or None
-            What the solver is to call.
+            Listener for the solver.
         """
         if listener is None:
             return None
@@ -894,7 +894,7 @@ class TravelGraph(Drawn):
 
 
 def least_tethers(tethers: Floats, cluster: Ints, classes: int) -> Ints:
-    """Vertices of the shortest tethers of every cluster, at most so many of each, in order."""
+    """Return the vertices of shortest tether, at most `classes` of each cluster, in order."""
     order = np.lexsort((tethers, cluster))
     grouped = cluster[order]
     rank = np.arange(len(order)) - np.searchsorted(grouped, grouped)
@@ -966,7 +966,7 @@ class BaselessGraph(TravelGraph):
     """
 
     def __repr__(self) -> str:
-        """In a line."""
+        """Return one line with the size of the graph."""
         return (
             f"<TravelGraph: {counted(self.cluster_count, 'cluster')} of {len(self)} vertices, "
             "no base>"
@@ -988,7 +988,7 @@ class BaselessGraph(TravelGraph):
         raise InputError("graph: has no base; expected solve_graph to be called with it")
 
     def is_tour(self, tour: Sequence[int]) -> bool:
-        """Whether vertices are a tour: exactly one of every cluster.
+        """Return whether vertices are a tour: exactly one of every cluster.
 
         Parameters
         ----------
@@ -1003,7 +1003,7 @@ class BaselessGraph(TravelGraph):
         return self.takes_one_of_each(tour)
 
     def rooted(self, root: int) -> tuple[TravelGraph, Ints]:
-        """The tours through a vertex, as those from a base.
+        """Return the tours through a vertex as those of a graph with a base.
 
         Parameters
         ----------

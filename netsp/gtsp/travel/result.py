@@ -1,4 +1,4 @@
-"""What a solver returns, and how it reports on the way."""
+"""Results and progress of solvers."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def of_part(
 
 @dataclass(frozen=True, eq=False)
 class Trajectory(ComparesArrays):
-    """What a baseline blind to the tether walked: a closed path, whatever it entangles.
+    """Closed path of a baseline that ignores the tether, whatever it entangles.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ class Result:
         )
 
     def __repr__(self) -> str:
-        """In a line."""
+        """Return one line with status, length and bound."""
         length = "no tour" if self.length is None else f"length {self.length:.6g}"
         bound = "" if self.bound is None else f", {self.bound.says(self.length)}"
         visits = "" if self.tour is None else f", tour of {len(self.tour)} vertices"
@@ -222,7 +222,7 @@ def relative_gap(length: float | None, bound: float | None) -> float | None:
 
 
 def proven(length: float, bound: float) -> bool:
-    """Whether a bound proves a length optimal.
+    """Return whether a bound proves a length optimal.
 
     Parameters
     ----------
