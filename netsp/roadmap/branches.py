@@ -220,8 +220,8 @@ def _fill_in_numpy(
         u = order[i]
         if row[i] >= 0 and point[u] != 0:
             row_values = out[row[i]]
-            is_asked = (row_values[order[j:]] == OPEN) & (place[j:] != point[u]) & (place[j:] != 0)
-            for k in (np.flatnonzero(is_asked) + j).tolist():
+            is_open = (row_values[order[j:]] == OPEN) & (place[j:] != point[u]) & (place[j:] != 0)
+            for k in (np.flatnonzero(is_open) + j).tolist():
                 v = order[k]
                 if row_values[v] != OPEN:
                     continue  # filled together with an earlier leg
@@ -306,8 +306,8 @@ def _parallel_ranges(
 ) -> tuple[int, int, int, int]:
     """Return the ranges of places of the vertices whose legs have the same crossing as that of u
     and v: on the side of u, and on the side of v."""
-    p, p_least, p_place = _find_fork(u, 1, 1, 1, count, path, branches)
-    q, q_least, q_place = _find_fork(v, count - 1, -1, 0, count, path, branches)
+    p, p_angle, p_place = _find_fork(u, 1, 1, 1, count, path, branches)
+    q, q_angle, q_place = _find_fork(v, count - 1, -1, 0, count, path, branches)
     i0, j0 = branches.rank[u], branches.rank[v]
     i1, j1 = i0 + 1, j0 + 1
     if p >= 0 and q >= 0 and p_place >= q_place:
@@ -315,15 +315,15 @@ def _parallel_ranges(
         # the side of u are to leave no earlier than u does
         if p_place == q_place:
             i0, i1 = (
-                _first_place(p, p_least + path.floats[p_place, SLID], branches),
+                _first_place(p, p_angle + path.floats[p_place, SLID], branches),
                 branches.end[p],
             )
-            j0, j1 = _first_place(q, q_least, branches), branches.end[q]
+            j0, j1 = _first_place(q, q_angle, branches), branches.end[q]
     else:
         if p >= 0:
-            i0, i1 = _first_place(p, p_least, branches), branches.end[p]
+            i0, i1 = _first_place(p, p_angle, branches), branches.end[p]
         if q >= 0:
-            j0, j1 = _first_place(q, q_least, branches), branches.end[q]
+            j0, j1 = _first_place(q, q_angle, branches), branches.end[q]
     return i0, i1, j0, j1
 
 

@@ -31,7 +31,7 @@ from netsp.model.bound_scope import OPTIMALITY_TOLERANCE, LowerBound, Scope
 from netsp.model.problem import Goal, Problem
 from netsp.model.solution import Status
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.reach_bounds import ways_by_parity
+from netsp.roadmap.reach_bounds import find_parity_paths
 from netsp.roadmap.roadmap_policy import RoadmapPolicy
 from netsp.roadmap.taut import TautRoadmap
 from netsp.roadmap.taut_legs import TautLegs
@@ -168,8 +168,8 @@ class GraphFromState(TravelGraph):
         """Return a lower bound on paths along a leg left out: the leg and the path home, with the
         surcharge of every tour."""
         first, leg, second = self.bounds_of_left_out().T
-        least = float((leg + np.minimum(first, second)).min(initial=math.inf))
-        return least + 2.0 * self.surcharge
+        shortest = float((leg + np.minimum(first, second)).min(initial=math.inf))
+        return shortest + 2.0 * self.surcharge
 
     def least_by_way_of(self, tether: float) -> float:
         """Return a lower bound on paths by way of a class whose tether is at least so long: the
@@ -346,7 +346,7 @@ def graph_from_state(
         between=legs.paths.bounds_in_any_class,
         classes=roadmap.rule if roadmap.complete else "shortest",
         least_left_out=roadmap.least_left_out,
-        by_parity=partial(ways_by_parity, legs.paths),
+        by_parity=partial(find_parity_paths, legs.paths),
     )
     part.excluded_by_rule = roadmap.rule != "all"
     if len(problem.precedences):

@@ -23,7 +23,7 @@ ParityRows = tuple[Ints, Floats, npt.NDArray[np.uint64]]
 """(k,) other goals, (k,) planar lengths, (k, w) bits."""
 
 
-def ways_by_parity(paths: TautPaths, up: Callable[[], bool]) -> WaysByParity | None:
+def find_parity_paths(paths: TautPaths, up: Callable[[], bool]) -> WaysByParity | None:
     """Return the paths between goals up to a length that yields not too many, and those from the
     base up to the tether length; None if that takes too long."""
     points, tether = paths.outline.points, paths.problem.tether_length

@@ -53,7 +53,7 @@ class SightPolicy:
     max_shift_share: float = 0.05
 
     def __post_init__(self) -> None:
-        least = {
+        minima = {
             "sectors": 8,
             "min_pairs": 0,
             "block": 1,
@@ -61,7 +61,7 @@ class SightPolicy:
             "min_clearance_ratio": math.nextafter(1.0, 2.0),
             "max_shift_share": 0.0,
         }
-        for name, value in least.items():
+        for name, value in minima.items():
             if not getattr(self, name) >= value:
                 raise InputError(f"{name}: expected at least {value}, got {getattr(self, name)}")
 

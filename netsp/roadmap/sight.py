@@ -389,9 +389,9 @@ def pairs_in_sight(
                         offset = (1 - 2 * tj) * rj - (1 - 2 * ti) * r
                         direction = math.atan2(dy, dx) - math.asin(offset / d)
                         length = math.sqrt(d * d - offset * offset)
-                        back = 2 * j + 1 - tj if j < a_count else a_count + j
+                        reverse = 2 * j + 1 - tj if j < a_count else a_count + j
                         visible = _may_see(direction, length, pencil, horizons) and _may_see(
-                            direction + math.pi, length, back, horizons
+                            direction + math.pi, length, reverse, horizons
                         )
                     if visible:
                         seen[j] = i

@@ -512,10 +512,13 @@ def _write_letters(
                 if f < hi:
                     # departures just before the cut of a whole circle, arrival just after it
                     if full[goal // 2] and wrap == 0.0 and f == lo:
-                        back = hi - 1
-                        while back > lo and key[back] - TWO_PI >= arrival_key[e] - ANGLE_TOLERANCE:
-                            f, wrap = back, -TWO_PI
-                            back -= 1
+                        earlier = hi - 1
+                        while (
+                            earlier > lo
+                            and key[earlier] - TWO_PI >= arrival_key[e] - ANGLE_TOLERANCE
+                        ):
+                            f, wrap = earlier, -TWO_PI
+                            earlier -= 1
                     first[e] = f
                     turn[e] = key[f] + wrap - arrival_key[e]
                     arrival_row[e, 0] = n

@@ -25,7 +25,7 @@ from netsp.roadmap.any_class_paths import taut_detours
 from netsp.roadmap.classes import find_classes
 from netsp.roadmap.explore import ALL, NON_LOOPING
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.reach_bounds import ways_by_parity
+from netsp.roadmap.reach_bounds import find_parity_paths
 from netsp.roadmap.roadmap_policy import RoadmapPolicy
 from netsp.roadmap.taut_legs import TautLegs
 
@@ -112,7 +112,7 @@ class TautRoadmap:
             classes=self.rule if self.complete else "shortest",
             least_left_out=self.least_left_out,
             carrier=None if self.complete else self,
-            by_parity=partial(ways_by_parity, self.paths),
+            by_parity=partial(find_parity_paths, self.paths),
         )
         graph.excluded_by_rule = self.rule != "all"
         return graph

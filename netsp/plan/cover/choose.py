@@ -69,8 +69,15 @@ def choose(
 
 
 def merge_patches(sees: Bools, areas: Floats) -> tuple[Bools, Floats]:
-    """Merge the patches that the same viewpoints see, and drop those that none sees. Return the (n,
-    k) matrix of what each viewpoint sees, and (k,) areas."""
+    """Merge the patches that the same viewpoints see, and drop those that no viewpoint sees.
+
+    Returns
+    -------
+    matrix : ndarray of bool, shape (n, k)
+        Whether each viewpoint sees each merged patch.
+    weights : ndarray, shape (k,)
+        Areas.
+    """
     is_seen = sees.any(axis=0) & (areas > 0.0)
     packed = np.packbits(sees[:, is_seen], axis=0)
     _, first, which = np.unique(packed, axis=1, return_index=True, return_inverse=True)
