@@ -89,7 +89,8 @@ def test_rows_ask_for_room_before_they_grow(monkeypatch):
     costs = some_costs(rng)
     asked = []
     monkeypatch.setattr(
-        "netsp.gtsp.sparse_costs.check_available", lambda size, what, advice: asked.append((size, len(what)))
+        "netsp.gtsp.sparse_costs.check_available",
+        lambda size, what, advice: asked.append((size, len(what))),
     )
     rows_of(costs, rng)
     assert sum(size for size, _ in asked) == 8.0 * np.isfinite(costs).sum()
