@@ -17,14 +17,14 @@ FIRST_COMMIT = "01e50a9b"
 CEILINGS = {
     "basenames": 0,
     "rooms": 16,
-    "constants": 868,
-    "ambiguous": 95,
-    "long": 177,
-    "parameters": 97,
-    "openings": 1694,
-    "identifiers": 796,
-    "pronouns": 193,
-    "skips": 645,
+    "constants": 98,
+    "ambiguous": 0,
+    "long": 172,
+    "parameters": 70,
+    "openings": 40,
+    "identifiers": 122,
+    "pronouns": 24,
+    "skips": 29,
 }
 """Places that may break each rule, as counted by `python benchmarks/structure.py`. A change may
 lower a ceiling, and lowers it where it mends places; no change raises one."""

@@ -70,9 +70,7 @@ def around(mesh, count, seed=0):
 
 
 @pytest.mark.parametrize(
-    "mesh",
-    [boxes(1), boxes(2), torn(3), hollow()],
-    ids=["boxes", "more boxes", "torn", "hollow"],
+    "mesh", [boxes(1), boxes(2), torn(3), hollow()], ids=["boxes", "more boxes", "torn", "hollow"]
 )
 def test_near_surfaces_a_sparse_grid_says_what_a_full_one_says(mesh):
     build = on_mesh(mesh)

@@ -9,14 +9,7 @@ from hypothesis import strategies as st
 
 from netsp import Circle, Problem
 from netsp.command.main import main
-from netsp.hsignature import (
-    concatenate,
-    crossings,
-    cyclically_reduced,
-    entangled,
-    invert,
-    reduce,
-)
+from netsp.hsignature import concatenate, crossings, cyclically_reduced, entangled, invert, reduce
 from netsp.hsignature.signature_measures import (
     _cross_rays,
     measure,

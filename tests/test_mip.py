@@ -33,23 +33,12 @@ from netsp.mip.flows import Edges, contracted
 from netsp.mip.goal_relaxation import one_tree_bound
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.lagrangian_bound import exact_bound
-from netsp.mip.mip_policy import (
-    CutPolicy,
-    LpPolicy,
-    MipPolicy,
-    PricingPolicy,
-    SchedulePolicy,
-)
+from netsp.mip.mip_policy import CutPolicy, LpPolicy, MipPolicy, PricingPolicy, SchedulePolicy
 from netsp.mip.mip_solver import MipRun, Params
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
 from netsp.mip.reducedcosts import reduced_costs_at
-from netsp.mip.subtours import (
-    components,
-    fractional_cuts,
-    goal_cuts,
-    strongest_cut,
-)
+from netsp.mip.subtours import components, fractional_cuts, goal_cuts, strongest_cut
 from netsp.model.solution import Status
 from netsp.plan.random_worlds import random_world as far_world
 from netsp.roadmap.taut import TautRoadmap

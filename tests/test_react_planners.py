@@ -12,11 +12,7 @@ from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from netsp.world.planner import PLANNERS, PlannerOptions, make_planner
 from netsp.world.planner.pivots import Pivots
-from netsp.world.planner.react_draft import (
-    DraftRule,
-    ReactDraftPlanner,
-    ReactThresholdsPlanner,
-)
+from netsp.world.planner.react_draft import DraftRule, ReactDraftPlanner, ReactThresholdsPlanner
 from netsp.world.planner.react_planner import ReactPlanner
 from netsp.world.simulator.mission_run import simulate
 

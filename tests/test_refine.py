@@ -8,14 +8,7 @@ from hypothesis import strategies as st
 from netsp import InputError
 from netsp.base.geometry import polylines
 from netsp.world import Scene
-from netsp.world.paths.refine import (
-    REFINEMENTS,
-    RefineParams,
-    clear,
-    perturbed,
-    refined,
-    smoothed,
-)
+from netsp.world.paths.refine import REFINEMENTS, RefineParams, clear, perturbed, refined, smoothed
 from netsp.world.paths.sampled import OMPL_PLANNERS, SampledPaths
 from netsp.world.paths.tree import Grid, are_homotopic, pull_taut
 from netsp.world.planner import PlannerOptions, make_planner

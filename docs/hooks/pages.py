@@ -41,10 +41,7 @@ def run(notebook: Path) -> dict[str, str | bytes]:
     )
     exporter = MarkdownExporter()
     text, resources = exporter.from_notebook_node(
-        book,
-        resources={
-            "unique_key": f"{notebook.stem}-pictures",
-        },
+        book, resources={"unique_key": f"{notebook.stem}-pictures"}
     )
     text = text.replace("](../docs/", "](").replace(".ipynb)", ".md)")
     return {f"{notebook.stem}.md": text, **resources["outputs"]}

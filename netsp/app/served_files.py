@@ -349,11 +349,7 @@ def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str,
         notes = [
             *([surface] if surface is not None else []),
             *warnings(
-                problem,
-                solution,
-                points,
-                settings.policy.min_slack,
-                settings.policy.min_clearance,
+                problem, solution, points, settings.policy.min_slack, settings.policy.min_clearance
             ),
             *written.warnings,
             *written.notes,

@@ -17,13 +17,7 @@ from typing import Any
 from urllib.parse import quote, urlsplit
 
 from netsp.app.dragged_tethers import Cursor
-from netsp.app.drawn_path import (
-    drawn_figures,
-    drawn_file,
-    drawn_points,
-    end_tether,
-    worth_of_order,
-)
+from netsp.app.drawn_path import drawn_figures, drawn_file, drawn_points, end_tether, worth_of_order
 from netsp.app.facts import facts
 from netsp.app.served_files import (
     EXPORTS,

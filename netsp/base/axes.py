@@ -740,10 +740,7 @@ def meanings(
 
 
 def _by_position(
-    rows: Sequence[Sequence[str]],
-    positional: Sequence[Quantity],
-    source: str,
-    sample_lines: int,
+    rows: Sequence[Sequence[str]], positional: Sequence[Quantity], source: str, sample_lines: int
 ) -> dict[Quantity, tuple[int, Column]]:
     """Return the columns of a table without a head."""
     width = min(map(len, rows))

@@ -148,9 +148,7 @@ POINT3_SCHEMA = {"type": "array", "items": {"type": "number"}, "minItems": 2, "m
 
 
 Point3 = Annotated[
-    tuple[float, float, float],
-    BeforeValidator(lambda v: _point3(v)),
-    WithJsonSchema(POINT3_SCHEMA),
+    tuple[float, float, float], BeforeValidator(lambda v: _point3(v)), WithJsonSchema(POINT3_SCHEMA)
 ]
 
 

@@ -10,13 +10,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from netsp.base.errors import EXIT_INTERRUPTED, InputError
 from netsp.command import json_output, messages
 from netsp.command.patience import span
-from netsp.command.types import (
-    length,
-    natural,
-    positive,
-    seconds,
-    shard,
-)
+from netsp.command.types import length, natural, positive, seconds, shard
 
 if TYPE_CHECKING:
     from netsp.study.compare.rows import TrialRow

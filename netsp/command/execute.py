@@ -11,12 +11,7 @@ from typing import TYPE_CHECKING
 
 from netsp.base.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 from netsp.command import json_output
-from netsp.command.types import (
-    length,
-    natural,
-    seconds,
-    vector,
-)
+from netsp.command.types import length, natural, seconds, vector
 
 if TYPE_CHECKING:
     from netsp.model.problem import Problem

@@ -71,9 +71,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--speed", type=length, default=0.5, metavar="V", help="fastest speed, m/s; default 0.5"
     )
     p.add_argument(
-        "--state",
-        metavar="FILE",
-        help="keep the class here, and go on from it when started again",
+        "--state", metavar="FILE", help="keep the class here, and go on from it when started again"
     )
     p.add_argument(
         "--publish",

@@ -93,10 +93,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--inspect", type=positive, metavar="N", help="N goals about every obstacle, at every depth"
     )
     p.add_argument(
-        "--standoff",
-        type=length,
-        metavar="S",
-        help="distance (m) of those goals from its surface",
+        "--standoff", type=length, metavar="S", help="distance (m) of those goals from its surface"
     )
     p.add_argument(
         "--of",
@@ -167,9 +164,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="take cells that the map does not know as free, not as obstacles",
     )
     p.add_argument(
-        "--plot",
-        metavar="FILE",
-        help="draw the problem, what was left out dashed: PNG, SVG or PDF",
+        "--plot", metavar="FILE", help="draw the problem, what was left out dashed: PNG, SVG or PDF"
     )
     p.add_argument(
         "-o", "--output", metavar="FILE", help="write the problem to this file (default: stdout)"

@@ -6,12 +6,7 @@ import argparse
 
 from netsp.base.errors import EXIT_DEFECT, EXIT_NOT_ALL, InputError
 from netsp.command import json_output
-from netsp.command.types import (
-    choices,
-    length,
-    natural,
-    vector,
-)
+from netsp.command.types import choices, length, natural, vector
 
 EXAMPLE = "netsp simulate missions/basin.json -o run"
 

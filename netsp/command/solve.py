@@ -270,11 +270,7 @@ def run(args: argparse.Namespace) -> int:
     return _EXIT.get(solution.status.value, 0)
 
 
-_EXIT = {
-    "infeasible": 3,
-    "no_solution_found": EXIT_NOT_ALL,
-    "invalid": EXIT_NOT_VERIFIED,
-}
+_EXIT = {"infeasible": 3, "no_solution_found": EXIT_NOT_ALL, "invalid": EXIT_NOT_VERIFIED}
 
 
 def _defaults() -> dict[str, object]:

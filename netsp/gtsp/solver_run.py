@@ -48,11 +48,7 @@ class SolverRun:
     """
 
     def __init__(
-        self,
-        graph: TravelGraph,
-        limits: Limits | None = None,
-        *,
-        policy: CostPolicy = CostPolicy(),
+        self, graph: TravelGraph, limits: Limits | None = None, *, policy: CostPolicy = CostPolicy()
     ) -> None:
         limits = limits or Limits()
         if isinstance(graph, BaselessGraph):

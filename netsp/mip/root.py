@@ -195,11 +195,7 @@ class Root:
 
     def size(self) -> dict[str, int]:
         """Return the numbers of cuts, legs and vertices for the report."""
-        return {
-            "cuts": len(self.lp.cuts),
-            "legs": self.dead.left,
-            "vertices": len(self.costs),
-        }
+        return {"cuts": len(self.lp.cuts), "legs": self.dead.left, "vertices": len(self.costs)}
 
     def _adopt(self, goal_bound: GoalBound) -> list[Cut]:
         """Fix out what a program over goals or cells excludes, and return its cuts.

@@ -209,10 +209,7 @@ class _Columns:
 
 
 def _along_straight_lines(
-    graph: TravelGraph,
-    rng: np.random.Generator,
-    clock: Clock,
-    policy: CarryPolicy = CarryPolicy(),
+    graph: TravelGraph, rng: np.random.Generator, clock: Clock, policy: CarryPolicy = CarryPolicy()
 ) -> list[Class]:
     """Return the classes that the tether comes into along a short tour over straight lines.
 

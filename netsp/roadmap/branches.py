@@ -237,13 +237,7 @@ def _fill_in_numpy(
 
 @kernel
 def fill_parallel(
-    u: int,
-    v: int,
-    length: float,
-    count: int,
-    path: Path,
-    branches: Branches,
-    lengths: Lengths,
+    u: int, v: int, length: float, count: int, path: Path, branches: Branches, lengths: Lengths
 ) -> None:
     """Fill in all legs with the same crossing as the leg from u to v, given its planar length and
     its path of `count` tangents."""
@@ -277,13 +271,7 @@ def _write_legs(
 
 @interprets(fill_parallel)
 def _fill_parallel_in_numpy(
-    u: int,
-    v: int,
-    length: float,
-    count: int,
-    path: Path,
-    branches: Branches,
-    lengths: Lengths,
+    u: int, v: int, length: float, count: int, path: Path, branches: Branches, lengths: Lengths
 ) -> None:
     """Vectorise `fill_parallel` over all legs."""
     i0, i1, j0, j1 = interpreted(_parallel_ranges)(u, v, count, path, branches)

@@ -19,9 +19,7 @@ REACH_TOLERANCE = 1e-6
 
 
 def keep_reachable_goals(
-    problem: Problem,
-    removable: Collection[str] | None = None,
-    policy: RoadmapPolicy | None = None,
+    problem: Problem, removable: Collection[str] | None = None, policy: RoadmapPolicy | None = None
 ) -> tuple[Problem, list[str]]:
     """Return the problem without the goals that its tether cannot reach, and a line for each of
     those.

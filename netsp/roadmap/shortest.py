@@ -232,8 +232,7 @@ class MilestoneGraph:
         self.places = places
         cost = np.hypot(*(places[edges[:, 0]] - places[edges[:, 1]]).T)
         self._graph = csr_array(
-            (np.maximum(cost, 1e-300), (edges[:, 0], edges[:, 1])),
-            shape=(len(places), len(places)),
+            (np.maximum(cost, 1e-300), (edges[:, 0], edges[:, 1])), shape=(len(places), len(places))
         )
 
     def tree(self, source: int) -> tuple[Floats, Ints]:

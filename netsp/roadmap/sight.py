@@ -280,15 +280,7 @@ def find_horizons(
                 if d > min_clearance_ratio * (r + radius):
                     far = max(math.hypot(ux, uy), math.hypot(vx, vy))
                     _lower_horizons(
-                        cx,
-                        cy,
-                        offset,
-                        edges[e, :2],
-                        edges[e, 2:],
-                        radius,
-                        far,
-                        pencil,
-                        horizons,
+                        cx, cy, offset, edges[e, :2], edges[e, 2:], radius, far, pencil, horizons
                     )
 
 
@@ -365,11 +357,7 @@ def pairs_in_sight(
                     away, angle = _subtended(cx, cy, box, node)
                     shift = ARCSINE_RATIO * r / near
                     if _is_hidden(
-                        away - low - shift,
-                        angle + 2.0 * shift,
-                        near - r,
-                        pencil,
-                        horizons,
+                        away - low - shift, angle + 2.0 * shift, near - r, pencil, horizons
                     ):
                         node = skip[node]
                         continue

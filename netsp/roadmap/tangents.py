@@ -26,12 +26,7 @@ from netsp.roadmap.letters import arc_letters, segment_letters
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.pending_letters import pending_boxes
 from netsp.roadmap.roadmap_policy import SightPolicy
-from netsp.roadmap.sight import (
-    build_targets,
-    empty_horizons,
-    find_horizons,
-    pairs_in_sight,
-)
+from netsp.roadmap.sight import build_targets, empty_horizons, find_horizons, pairs_in_sight
 
 JOINING = "finding tangents between the corners of obstacles"
 """Name of the stage in messages about the time limit."""

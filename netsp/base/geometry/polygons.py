@@ -157,10 +157,7 @@ def polygon_interior_point(vertices: Vertices) -> tuple[float, float]:
     x, y = (v - origin).T
     cross = x * np.roll(y, -1) - np.roll(x, -1) * y
     centroid = origin + np.array(
-        [
-            np.sum((x + np.roll(x, -1)) * cross),
-            np.sum((y + np.roll(y, -1)) * cross),
-        ]
+        [np.sum((x + np.roll(x, -1)) * cross), np.sum((y + np.roll(y, -1)) * cross)]
     ) / (3.0 * np.sum(cross))
     candidates, half = [centroid], [np.inf]
     low, high = v[:, 1].min(), v[:, 1].max()

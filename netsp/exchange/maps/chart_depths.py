@@ -200,10 +200,7 @@ class _FloorParts:
     land: list[Any] = field(default_factory=list)
 
     def add(
-        self,
-        feature: Feature,
-        plane: Callable[[shapely.Geometry], Any],
-        window: CropWindow | None,
+        self, feature: Feature, plane: Callable[[shapely.Geometry], Any], window: CropWindow | None
     ) -> None:
         """Add a feature that states depths or is land."""
         layer = feature.layer.upper()

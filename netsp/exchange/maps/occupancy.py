@@ -304,10 +304,7 @@ def _placing(map_file: MapFile, rows: int) -> tuple[float, ...]:
 
 
 def _apply(m: tuple[float, ...], column: float, row: float) -> tuple[float, float]:
-    return (
-        float(m[0] * column + m[1] * row + m[2]),
-        float(m[3] * column + m[4] * row + m[5]),
-    )
+    return (float(m[0] * column + m[1] * row + m[2]), float(m[3] * column + m[4] * row + m[5]))
 
 
 def _polygons(

@@ -58,10 +58,7 @@ class FoundPath:
 
 
 def read_paths(
-    file: str | Path,
-    problem: Problem,
-    frame: str | None = None,
-    policy: ReadPolicy = DEFAULT_READ,
+    file: str | Path, problem: Problem, frame: str | None = None, policy: ReadPolicy = DEFAULT_READ
 ) -> list[FoundPath]:
     """Return the paths of a file, in its order.
 

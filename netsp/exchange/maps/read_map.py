@@ -427,11 +427,7 @@ class _Site:
         for feature in self.map.features:
             try:
                 decision = kind_of(
-                    feature,
-                    self.kinds,
-                    is_chart=self.is_chart,
-                    layers=layers,
-                    policy=self.policy,
+                    feature, self.kinds, is_chart=self.is_chart, layers=layers, policy=self.policy
                 )
             except InputError as error:
                 complaint = str(error).removeprefix(feature.where)
@@ -574,9 +570,7 @@ class _Site:
             if feature is None:
                 if not self.complaints:
                     self._complain(
-                        "has no base; expected a Point of kind base",
-                        ", or --base LAT,LON",
-                        "base",
+                        "has no base; expected a Point of kind base", ", or --base LAT,LON", "base"
                     )
                 return None
             heading = self._number(feature, "heading") or 0.0

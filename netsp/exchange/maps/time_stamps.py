@@ -54,10 +54,7 @@ class TimeStamps:
     """
 
     def __init__(
-        self,
-        meaning: Column,
-        on_note: Callable[[str], None],
-        policy: ReadPolicy = DEFAULT_READ,
+        self, meaning: Column, on_note: Callable[[str], None], policy: ReadPolicy = DEFAULT_READ
     ) -> None:
         self.on_note, self.policy = on_note, policy
         self.scale: float | None = None

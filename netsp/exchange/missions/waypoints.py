@@ -61,10 +61,7 @@ class Waypoint:
 
 
 def waypoints_of(
-    problem: Problem,
-    solution: Solution,
-    radius: float = 0.0,
-    policy: ExportPolicy = DEFAULT_EXPORT,
+    problem: Problem, solution: Solution, radius: float = 0.0, policy: ExportPolicy = DEFAULT_EXPORT
 ) -> list[Waypoint]:
     """Return the waypoints of a solution in the order of the tour, without the start.
 
@@ -105,10 +102,7 @@ def waypoints_of(
     line = np.array([points[k] for k in keep])
     marks = [kinds[k] for k in keep]
     line, marks = _coarsened(
-        line,
-        marks,
-        [o.shape(problem.clearance) for o in problem.obstacles],
-        policy.max_arc_turn,
+        line, marks, [o.shape(problem.clearance) for o in problem.obstacles], policy.max_arc_turn
     )
     line = _widened(line, marks, solids, radius, policy.bend_shifts)
     _check_class(problem, solution, line, marks)

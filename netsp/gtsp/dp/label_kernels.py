@@ -51,12 +51,7 @@ class Bounds(NamedTuple):
 
 @kernel
 def completions(
-    graph: Graph,
-    prices: Floats,
-    alive: Bools,
-    least: Floats,
-    onward: Floats,
-    stop: Ints,
+    graph: Graph, prices: Floats, alive: Bools, least: Floats, onward: Floats, stop: Ints
 ) -> None:
     """Fill bounds on the completion of labels: walks that remember only the goal before the last.
 
@@ -369,12 +364,7 @@ def _undominated_of(memory: npt.NDArray[np.int32], block_size: int = 32) -> Bool
 
 
 @kernel
-def join(
-    goal: Ints,
-    prices: Floats,
-    a: Labels,
-    b: Labels,
-) -> Floats:
+def join(goal: Ints, prices: Floats, a: Labels, b: Labels) -> Floats:
     """Return the cost (V,) of the best walk through each vertex v.
 
     It joins a walk that ends at v with one read backwards; the two may remember no goal in common

@@ -155,10 +155,7 @@ class RunRecord:
     """
 
     def __init__(
-        self,
-        folder: str | Path,
-        solution: Solution,
-        policy: ExecutePolicy = ExecutePolicy(),
+        self, folder: str | Path, solution: Solution, policy: ExecutePolicy = ExecutePolicy()
     ) -> None:
         self.folder, self.solution, self.policy = Path(folder), solution, policy
         self._problem: Problem | None = None

@@ -117,11 +117,7 @@ class _Standby:
     """
 
     def __init__(
-        self,
-        session: Session,
-        ending: Ending,
-        on_note: Callable[[str], None],
-        policy: FlightPolicy,
+        self, session: Session, ending: Ending, on_note: Callable[[str], None], policy: FlightPolicy
     ) -> None:
         self.session, self.ending, self.on_note = session, ending, on_note
         self.vehicle = LinkedVehicle(session, 1.0, policy)

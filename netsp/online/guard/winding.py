@@ -90,11 +90,7 @@ def _returns(points: Floats, turned: Floats, end: int, policy: LoopPolicy) -> np
 
 
 def _last_loop(
-    field: DistanceField,
-    model: GeodesicTether,
-    points: Floats,
-    turned: Floats,
-    policy: SitePolicy,
+    field: DistanceField, model: GeodesicTether, points: Floats, turned: Floats, policy: SitePolicy
 ) -> tuple[Loop | None, int | None]:
     """Return the last loop, and the index of the place where it begins."""
     if turned[-1] < policy.loops.min_turn:

@@ -10,11 +10,7 @@ from netsp.plan.cover.viewpoints import Viewpoints
 
 
 def find_alternatives(
-    found: Viewpoints,
-    chosen: Ints,
-    areas: Floats,
-    needed: float,
-    policy: CoverPolicy | None = None,
+    found: Viewpoints, chosen: Ints, areas: Floats, needed: float, policy: CoverPolicy | None = None
 ) -> list[list[int]]:
     """Return the numbers of the alternatives of each chosen viewpoint.
 

@@ -280,11 +280,7 @@ class _Judge:
             wrong.append(f"words are{'' if words.exact else ' not'} exact, stated otherwise")
         certain = "" if words.exact else "; other words may be of the same class, too"
         return [
-            Check(
-                "words at the stops",
-                not wrong,
-                _first_of(wrong) or f"all as stated{certain}",
-            ),
+            Check("words at the stops", not wrong, _first_of(wrong) or f"all as stated{certain}"),
             Check(
                 "empty word at the end",
                 broken is None and word == (),
@@ -317,11 +313,7 @@ class _Judge:
                 longest <= limit * (1.0 + STATED_TOLERANCE),
                 f"longest {longest:.3f} of {limit:g} m, on the way to {name}",
             ),
-            Check(
-                "tethers as long as stated",
-                not deviations,
-                _first_of(deviations) or "all",
-            ),
+            Check("tethers as long as stated", not deviations, _first_of(deviations) or "all"),
             Check(
                 "free at home",
                 left <= PlannerPolicy().free_tolerance * self.mission.delta,

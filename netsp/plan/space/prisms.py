@@ -33,15 +33,7 @@ from netsp.roadmap.from_state import from_state
 from netsp.roadmap.taut import TautRoadmap
 from netsp.world.mission.mission import Mission
 from netsp.world.scene.scene import Scene
-from netsp.world.scene.shapes import (
-    Box,
-    Capsule,
-    Cylinder,
-    HalfSpace,
-    Post,
-    Prism,
-    Shape,
-)
+from netsp.world.scene.shapes import Box, Capsule, Cylinder, HalfSpace, Post, Prism, Shape
 
 UPRIGHT_TOLERANCE = 1e-9
 """Tolerance for rounding in files: largest difference from 1 of the cosine between an upright axis

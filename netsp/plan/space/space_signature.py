@@ -19,15 +19,7 @@ from netsp.base.deprecated import deprecated_method
 from netsp.base.errors import InputError
 from netsp.hsignature.groups import Group, eliminated
 from netsp.hsignature.words import Word, invert
-from netsp.hsignature.wordtable import (
-    Rules,
-    Table,
-    empty_table,
-    number_of,
-    packed,
-    times,
-    word_of,
-)
+from netsp.hsignature.wordtable import Rules, Table, empty_table, number_of, packed, times, word_of
 from netsp.plan.space.cells import Cells
 from netsp.plan.space.mission_policy import WordPolicy
 from netsp.plan.space.triangle_labels import (
@@ -307,11 +299,7 @@ class SpaceSignature:
 
 
 def _labelled_complex(
-    cells: Cells,
-    labels: Labels,
-    known: npt.NDArray[np.uint8],
-    tolerance: float,
-    policy: WordPolicy,
+    cells: Cells, labels: Labels, known: npt.NDArray[np.uint8], tolerance: float, policy: WordPolicy
 ) -> LabelledComplex:
     """Return a labelled complex for kernels."""
     return LabelledComplex(

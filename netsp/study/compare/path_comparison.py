@@ -339,12 +339,7 @@ def compare_paths(
         try:
             measured.append(
                 measure_path(
-                    problem,
-                    path.points,
-                    times=path.times,
-                    speed=speed,
-                    policy=policy,
-                    tether=laid,
+                    problem, path.points, times=path.times, speed=speed, policy=policy, tether=laid
                 )
             )
         except InputError as error:

@@ -252,12 +252,7 @@ class Trial:
     def id(self) -> str:
         """Hash of all of it: the same trial anywhere."""
         return _digest(
-            {
-                "world": self.world,
-                "roadmap": self.roadmap,
-                "solver": self.solver,
-                "seed": self.seed,
-            }
+            {"world": self.world, "roadmap": self.roadmap, "solver": self.solver, "seed": self.seed}
         )[:16]
 
 

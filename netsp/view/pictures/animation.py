@@ -126,11 +126,7 @@ def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
     ]
     moving = [_moving(ax, film) for ax, film in zip(panels, films, strict=True)]
     figure.legend(
-        handles=handles,
-        loc="outside lower center",
-        ncols=columns,
-        fontsize=8,
-        frameon=False,
+        handles=handles, loc="outside lower center", ncols=columns, fontsize=8, frameon=False
     )
     style.literal(figure)
     shown: list[Problem | None] | None = None

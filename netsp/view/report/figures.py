@@ -63,11 +63,7 @@ def by_goals(
                 mid = np.array([s.median for _, s in points])
                 spread = [mid - [s.low for _, s in points], [s.high for _, s in points] - mid]
                 panel.errorbar(at, mid, spread, label=name, capsize=2, lw=1.2, **_style(k))
-        panel.set(
-            title=f"tether {tether:g}",
-            xlabel="number of goals",
-            xticks=goals,
-        )
+        panel.set(title=f"tether {tether:g}", xlabel="number of goals", xticks=goals)
         if not span:  # all beside the one number, which stands in the middle
             panel.set_xlim(0.9 * goals[0], 1.1 * goals[0])
         panel.grid(alpha=0.3)

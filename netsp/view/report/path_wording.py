@@ -106,11 +106,9 @@ def _stretches(problem: Problem, found: list[Stretch]) -> str:
         if parts[0].kind == "touching":
             out.append(f"{names} at ({x:.4g}, {y:.4g}){times}")
             continue
-        by = {
-            "obstacle": "deep",
-            "clearance": f"of {problem.clearance:g} short",
-            "bounds": "out",
-        }[parts[0].kind]
+        by = {"obstacle": "deep", "clearance": f"of {problem.clearance:g} short", "bounds": "out"}[
+            parts[0].kind
+        ]
         begin = f"{names} " if names else ""
         out.append(
             f"{begin}for {size:.3g} {u} from ({x:.4g}, {y:.4g}) on, {depth:.3g} {u} {by}{times}"

@@ -100,6 +100,5 @@ class RangeSensor(Model):
         Field(description="full angle of its cone, degrees"),
     ] = 120.0
     noise: Annotated[
-        Annotated[NonNegative, Field(le=1.0)],
-        Field(description="standard deviation of a range, m"),
+        Annotated[NonNegative, Field(le=1.0)], Field(description="standard deviation of a range, m")
     ] = 0.0

@@ -101,12 +101,7 @@ def nearest_in_blocks(
 
 @kernel
 def nearest_to_corners(
-    sites: Floats,
-    place: Place,
-    blocks: Blocks,
-    corners: Owners,
-    distances: Singles,
-    owner: Owners,
+    sites: Floats, place: Place, blocks: Blocks, corners: Owners, distances: Singles, owner: Owners
 ) -> None:
     """Measure the sites nearest to a cell's corners at the outermost points of each block.
 

@@ -19,12 +19,7 @@ from netsp.base.arrays import Floats
 from netsp.base.axes import metres_per_unit
 from netsp.base.errors import InputError, counted
 from netsp.base.files import FilePolicy
-from netsp.world.scene.mesh_checks import (
-    binary_stl,
-    collada_parts,
-    gltf_parts,
-    plain_obj,
-)
+from netsp.world.scene.mesh_checks import binary_stl, collada_parts, gltf_parts, plain_obj
 from netsp.world.scene.pcd import read_pcd
 from netsp.world.scene.ply import read_ply
 from netsp.world.scene.point_clouds import (

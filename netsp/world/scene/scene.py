@@ -277,10 +277,7 @@ class Scene(FileModel):
         return self.field_with(solids, grid, policy)
 
     def field_with(
-        self,
-        solids: tuple[Solid, ...],
-        grid: VoxelGrid | None,
-        policy: ScenePolicy | None = None,
+        self, solids: tuple[Solid, ...], grid: VoxelGrid | None, policy: ScenePolicy | None = None
     ) -> DistanceField:
         """Return the field of other solids with the same voxels.
 

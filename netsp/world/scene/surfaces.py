@@ -110,10 +110,7 @@ def _tube(line: Floats, radius: float, sides: int, round_ends: bool = False) -> 
     nxt = (k + 1) % sides
     faces = [
         np.vstack(
-            [
-                np.column_stack([a + k, a + nxt, b + k]),
-                np.column_stack([a + nxt, b + nxt, b + k]),
-            ]
+            [np.column_stack([a + k, a + nxt, b + k]), np.column_stack([a + nxt, b + nxt, b + k])]
         )
         for a, b in ((sides * i, sides * (i + 1)) for i in range(len(rings) - 1))
     ]

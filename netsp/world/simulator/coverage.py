@@ -277,11 +277,7 @@ def _nearest_in_numpy(centres: Floats, eye: Floats) -> int:
 
 @kernel
 def mark_visible(
-    field: Field,
-    surface: PatchArrays,
-    seen: Bools,
-    seen_through: Bools,
-    view: CameraView,
+    field: Field, surface: PatchArrays, seen: Bools, seen_through: Bools, view: CameraView
 ) -> tuple[float, float]:
     """Mark the patches in view; return the shares that were new, with and without regard to what
     stands in between."""

@@ -16,15 +16,7 @@ from netsp.world.mission.mission_limits import check_bounds
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene, Solid
 
-KINDS = (
-    "appear",
-    "vanish",
-    "move",
-    "add_waypoint",
-    "cancel_waypoint",
-    "push",
-    "tether_length",
-)
+KINDS = ("appear", "vanish", "move", "add_waypoint", "cancel_waypoint", "push", "tether_length")
 """Fields of an event, of which it has one."""
 
 

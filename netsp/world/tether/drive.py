@@ -15,13 +15,7 @@ from netsp.world.tether.tether_policy import PullSettings
 
 @kernel
 def follow(
-    field: Field,
-    strand: Floats,
-    last: bool,
-    x: float,
-    y: float,
-    z: float,
-    settings: PullSettings,
+    field: Field, strand: Floats, last: bool, x: float, y: float, z: float, settings: PullSettings
 ) -> tuple[Floats, float, float, float]:
     """Move one end of a copy of the strand to (x, y, z), as `pull_end` does.
 
@@ -46,12 +40,7 @@ def follow(
 
 @kernel
 def drive(
-    field: Field,
-    strand: Floats,
-    count: int,
-    path: Floats,
-    settings: PullSettings,
-    floor: float,
+    field: Field, strand: Floats, count: int, path: Floats, settings: PullSettings, floor: float
 ) -> tuple[Floats, int, float, Floats]:
     """Move the robot along a path (k, 3).
 

@@ -28,12 +28,7 @@ from netsp.world.tether.measure import corner_excess
 from netsp.world.tether.pull import pull
 from netsp.world.tether.strand import strand_length
 from netsp.world.tether.taut_tether import Tether, new_strand
-from netsp.world.tether.tether_policy import (
-    THINNEST,
-    PullSettings,
-    TetherPolicy,
-    pull_settings,
-)
+from netsp.world.tether.tether_policy import THINNEST, PullSettings, TetherPolicy, pull_settings
 
 
 @dataclass(frozen=True)

@@ -119,12 +119,7 @@ def strand_turning(strand: Floats, count: int, min_piece: float) -> float:
 
 @kernel
 def drive_under(
-    field: Field,
-    strand: Floats,
-    count: int,
-    path: Floats,
-    settings: PullSettings,
-    load: Load,
+    field: Field, strand: Floats, count: int, path: Floats, settings: PullSettings, load: Load
 ) -> tuple[Floats, int, float, Floats, Floats]:
     """Move the robot as `drive` does, with payout and turning at each point instead of the
     length."""

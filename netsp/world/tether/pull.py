@@ -202,11 +202,7 @@ def pull(
 
 @kernel
 def refresh_frames(
-    field: Field,
-    strand: Floats,
-    count: int,
-    settings: PullSettings,
-    reach: float,
+    field: Field, strand: Floats, count: int, settings: PullSettings, reach: float
 ) -> float:
     """Update the frames of contacts that have moved by more than 0.15 of `reach`.
 
@@ -322,12 +318,7 @@ def free_part(
 
 @kernel
 def slide_contacts(
-    field: Field,
-    strand: Floats,
-    count: int,
-    settings: PullSettings,
-    damping: float,
-    gain: float,
+    field: Field, strand: Floats, count: int, settings: PullSettings, damping: float, gain: float
 ) -> tuple[float, float]:
     """Take one Newton step of the length in the motions of the contacts along their directions.
 

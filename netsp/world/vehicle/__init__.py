@@ -18,10 +18,7 @@ def _bluerov2(place: npt.NDArray[np.float64], speed: float) -> Vehicle:
 
 
 VEHICLES: Registry[Callable[[npt.NDArray[np.float64], float], Vehicle]] = Registry(
-    "vehicle",
-    "netsp.vehicles",
-    {"kinematic": KinematicVehicle, "bluerov2": _bluerov2},
-    later,
+    "vehicle", "netsp.vehicles", {"kinematic": KinematicVehicle, "bluerov2": _bluerov2}, later
 )
 """Factories of vehicles by name, each called with a place (3,) and a speed."""
 
