@@ -264,7 +264,7 @@ def test_a_moving_anchor_is_refused(mission):
 
 def test_the_page_shows_solids_from_above(site):
     with Page(site, 0) as page:
-        shown = page.site()
+        shown = page.site_data()
     assert [o["name"] for o in shown["obstacles"]] == ["pile", "mooring", "ring"]
     assert "below" in shown["sides"]
 

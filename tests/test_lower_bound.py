@@ -223,6 +223,7 @@ def test_records_take_bounds_on_all_tours_only(solved):
 
 SHOWN = {"lower_bound", "gap", "bound_of_all", "gap_to_all"}
 ELSEWHERE = {
+    "netsp/base/moved_modules.py": "names of modules",
     "netsp/model/bound_scope.py": "the type itself",
     "netsp/plan/space/judge.py": "quotes what a file states wrongly",
     "netsp/study/library/records.py": "a record is updated; it holds bounds on all tours only",

@@ -52,9 +52,9 @@ def test_it_cuts_at_integer_points_only(monkeypatch):
     programs = []
     run = cbc_program.run_cbc
 
-    def watched(model, *, integer, limit):
+    def watched(model, *, integer, limit, policy):
         programs.append((integer, [name for name in model.constraints if "subtour" in name]))
-        return run(model, integer=integer, limit=limit)
+        return run(model, integer=integer, limit=limit, policy=policy)
 
     monkeypatch.setattr(cbc_program, "run_cbc", watched)
     solve_graph(two_groups(), "mip-2017")

@@ -93,7 +93,7 @@ RUNS = {
     "base": ("base p.json --grid 4,4 -o out.csv", "plan/sizing/base_placement.py", 130),
     "tether": ("tether p.json -o out.csv", "plan/sizing/tether_sizing.py", 130),
     "gtsp": (f"gtsp {ROOT}/examples/7ring28.gtsp -o out.tour", "gtsp/search/local_search.py", 0),
-    "world": ("world --goals 9 -o out.json", "worlds.py", 130),
+    "world": ("world --goals 9 -o out.json", "plan/random_worlds.py", 130),
     "simulate": ("simulate mission.json --quiet", "world/simulator/simulation.py", 4),
     "execute": ("execute p.json s.json -o out", "online/execute/tour_execution.py", 130),
     "execute mission": ("execute planned.json -o out", "plan/space/judge.py", 130),
@@ -117,7 +117,7 @@ RUNS = {
     ),
     "combine": ("combine rows.jsonl -o out.jsonl", "study/compare/rows.py", 130),
     "report": ("report s.json --problem p.json -o out.html", "view/report/briefing.py", 130),
-    "warm-up": ("warm-up", "problem.py", 130),
+    "warm-up": ("warm-up", "model/problem.py", 130),
 }  # fmt: skip
 """Commands by name: arguments, the module where the signal comes, the exit code. Short work that
 is broken off within the grace of `netsp.base.clock.TimingPolicy` ends as if nobody had pressed."""

@@ -122,14 +122,14 @@ def test_what_has_gone_or_moved_comes_off_the_map():
         {"time": 40, "move": {"solid": "pile 6 3", "by": [0.5, -0.8, 0]}},
     ]
     maps = []
-    told = Surroundings._tell
+    update_planner = Surroundings._update_planner
 
     def spy(self, *args):
         maps.append({s.name for s in self.mapped})
-        return told(self, *args)
+        return update_planner(self, *args)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Surroundings, "_tell", spy)
+        patch.setattr(Surroundings, "_update_planner", spy)
         run = fly(events, {})
     assert kept(run)
     assert "pile 0 -3" not in maps[-1]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -38,7 +38,7 @@ def facts(
     Returns
     -------
     dict or None
-        ``sufficient`` (m, None if unknown), ``margins`` (as of `Margins`, None where the tour has
+        ``sufficient`` (m, None if unknown), ``margins`` (as `Margins.to_json`, None if the tour has
         none), ``profile`` (rows of: share of the tour, tether out, height) and ``visits`` (shares);
         None if stopped.
     """
@@ -55,7 +55,7 @@ def facts(
     found = None
     if problem.state is None:
         try:
-            found = plain(asdict(margins(problem, solution)))
+            found = json.loads(margins(problem, solution).to_json())
         except InputError:  # found with limits of its own; the judge says more
             found = None
     return {

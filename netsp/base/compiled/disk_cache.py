@@ -37,9 +37,9 @@ from netsp.base.compiled.lazy_library import LINKABLE, is_for_kernel, is_linkabl
 FORMAT_VERSION = 7
 """Format version of the files; kernels in files of another version are compiled again."""
 
-_PACKAGE = Path(__file__).resolve().parent.parent
+_PACKAGE = Path(__file__).resolve().parents[2]
 _IMPORTS = re.compile(r"^from (netsp[\w.]*) import (\([^)]*\)|[^\n]*)", re.M)
-_HAS_KERNELS = re.compile(r"^from netsp\.compiled\.kernel import", re.M)
+_HAS_KERNELS = re.compile(r"^from netsp\.base\.compiled\.kernel import", re.M)
 
 
 class KernelFile(IndexDataCacheFile):  # type: ignore[misc]

@@ -168,7 +168,7 @@ def stops(problem: Problem, solution: Solution, found: Margins | None) -> str:
             f"{problem.tether_length - v.tether_length:.5g}",
         ]
         if found is not None:
-            s = found.stops[n]
+            s = found.visits[n]
             row += [
                 f"{math.degrees(s.turning):.0f}",
                 "–" if math.isinf(s.clearance) else f"{s.clearance:.4g}",
@@ -247,7 +247,7 @@ def margin_list(problem: Problem, found: Margins) -> str:
         f"the robot may be {found.cross_track:.4g} {u} beside its path",
     ]
     if found.friction:
-        worst = max(found.stops, key=lambda s: s.tension_ratio)
+        worst = max(found.visits, key=lambda s: s.tension_ratio)
         lines.append(
             f"friction multiplies the tension by at most {worst.tension_ratio:.3g}, at {worst.name}"
         )
