@@ -1,7 +1,6 @@
 """The map in the browser: versions, the solver beside it, who is let in, and the page itself."""
 
 import asyncio
-import dataclasses
 import itertools
 import json
 import re
@@ -20,7 +19,7 @@ from hypothesis import strategies as st
 
 from netsp import Circle, InfeasibleError, InputError, Problem, Solution, Tethers, solve, verify
 from netsp.app.dragged_tethers import Cursor
-from netsp.app.facts import facts, plain, shortest_sufficient
+from netsp.app.facts import facts, shortest_sufficient
 from netsp.app.served_files import EXPORTS, bare_name
 from netsp.app.shown import read_shown
 from netsp.app.solving import Worker
@@ -324,7 +323,7 @@ def test_what_is_told_beside_the_length_is_true():
     assert max(lengths) <= problem.tether_length
     at_visits = [min(told["profile"], key=lambda r, v=v: abs(r[0] - v))[1] for v in told["visits"]]
     assert at_visits == pytest.approx([v.tether_length for v in solution.tour], abs=1e-3)
-    assert told["margins"] == plain(dataclasses.asdict(margins(problem, solution)))
+    assert told["margins"] == json.loads(margins(problem, solution).to_json())
     least = told["sufficient"]
     assert solve(problem.model_copy(update={"tether_length": least * (1 + 1e-9)})).length
     with pytest.raises(InfeasibleError):
