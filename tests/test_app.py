@@ -689,7 +689,7 @@ def test_the_map_in_a_notebook(tmp_path):
 @pytest.mark.parametrize("check", [
     ("tsc", "-p", "tests/js"),
     ("eslint", "--config", "tests/js/eslint.config.mjs", "netsp/app/static",
-     "netsp/guard/static"),
+     "netsp/online/guard/static"),
 ])  # fmt: skip
 def test_the_scripts_of_the_page_pass_the_linter_and_the_type_checker(check):
     done = subprocess.run(

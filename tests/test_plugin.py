@@ -217,7 +217,7 @@ def test_what_other_packages_raise_is_told_in_one_line(tmp_path):
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1\n")
     (info / "entry_points.txt").write_text(
-        "[netsp.plan]\nfails = broken:fails\nleaves = broken:leaves\n"
+        "[netsp.solvers]\nfails = broken:fails\nleaves = broken:leaves\n"
         "unloadable = unloadable:solve\n[netsp.roadmaps]\nplain = broken:Plain\n"
     )
     env = {**os.environ, "PYTHONPATH": str(tmp_path)}
