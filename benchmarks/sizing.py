@@ -22,7 +22,7 @@ from netsp import Problem, Status, solve, verify
 from netsp.exchange.maps import Projection, read_site
 from netsp.exchange.maps.options import InspectionOptions
 from netsp.plan.random_worlds import reachable_world
-from netsp.plan.sizing import best_base, tether_curve, tether_margins
+from netsp.plan.sizing import best_base, margins, tether_curve
 from netsp.plan.sizing.candidates import over_grid
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
@@ -150,7 +150,7 @@ def margined(worlds: int) -> None:
     for problem, margin in cases:
         solution = solve(problem, margin=margin)
         begin = time.perf_counter()
-        found = tether_margins(problem, solution)
+        found = margins(problem, solution)
         took = time.perf_counter() - begin
         bad = violations(problem, solution, found.obstacles, worlds, seed=0)
         row(problem.name, f"{margin:g}", f"{solution.length:.3f}", f"{found.obstacles:.4f}",

@@ -29,7 +29,7 @@ def recordings() -> tuple[str, bool]:
         watching = Guard(problem, GuardOptions(noise=0.02, drift=0.01))
         nearest: dict[int, tuple[float, bool]] = {}
         for k, place in enumerate(true):
-            report = watching.take(Fix(k * bench.DT, tuple(place), estimate=True))
+            report = watching.update(Fix(k * bench.DT, tuple(place), estimate=True))
             loops += any(a.kind == "loop" for a in report.raised)
             for visit in tour.tour:
                 goal = np.array(problem.goals[visit.goal].position)

@@ -92,14 +92,14 @@ def margined() -> tuple[str, bool]:
     from sizing import world
 
     from netsp import Problem, solve
-    from netsp.plan.sizing import tether_margins
+    from netsp.plan.sizing import margins
 
     bad = count = 0
     for problem, margin in (
         (Problem.load(ROOT / "problems" / "wharf.json"), 0.3), (world(10, 1, 330.0), 0.0),
     ):  # fmt: skip
         solution = solve(problem, margin=margin)
-        found = tether_margins(problem, solution).obstacles
+        found = margins(problem, solution).obstacles
         assert found >= margin * (1.0 - 1e-9)
         bad += violations(problem, solution, found, 200, seed=1)
         count += 200
