@@ -1,4 +1,4 @@
-"""What is told of a tour besides its length: margins, the tether along it, the shortest tether."""
+"""Figures of a tour besides its length: margins, tether along it, and shortest tether."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ EXPORTS = {
     "kml": "tour.kml",
     "csv": "tour.csv",
 }
-"""What a tour can be written as, and the name that it is offered under."""
+"""Formats in which a tour can be written, with the names offered for them."""
 
 
 def bare_name(name: str) -> str:

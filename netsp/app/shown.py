@@ -1,4 +1,4 @@
-"""What is looked at and not edited: a solution, a tour that was carried out, a mission flown."""
+"""Read-only contents of the page: a solution, a tour that was carried out, or a flown mission."""
 
 from __future__ import annotations
 

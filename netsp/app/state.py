@@ -1,4 +1,4 @@
-"""What is being edited: a problem as its file has it, every version of it, and nothing of the web.
+"""Edited problem as its file has it, with every version; knows nothing of the web.
 
 A version may break the format while somebody is at it: it is kept as it is, with what is wrong, and
 only versions that are problems are solved.

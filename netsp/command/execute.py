@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from netsp.online.execute.execution_log import ExecutionRow
 
 SPEED = 0.5
-"""Of a robot in the plane, where none is given; missions have their own."""
+"""Default speed of a robot in the plane; missions have a speed of their own."""
 
 EXAMPLE = (
     "netsp execute problems/wharf.json solution.json --surprise examples/surprises.json -o run"

@@ -1,4 +1,4 @@
-"""What takes so long, and how long it will take: told where nothing else is for some seconds."""
+"""Lines that name a long step and its duration if nothing else is printed for some seconds."""
 
 from __future__ import annotations
 

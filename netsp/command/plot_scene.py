@@ -1,4 +1,4 @@
-"""What `netsp plot` does with a scene."""
+"""Scenes in `netsp plot`."""
 
 from __future__ import annotations
 

@@ -1,5 +1,8 @@
-"""What `netsp solve` and `netsp order` do with a mission: find the shortest tour of its waypoints
-that leaves the tether free, and write the mission in that order, with the tour."""
+"""Missions in `netsp solve` and `netsp order`.
+
+The commands find the shortest tour of the waypoints that leaves the tether free, and write the
+mission in that order, with the tour.
+"""
 
 from __future__ import annotations
 

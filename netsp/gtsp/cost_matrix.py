@@ -101,7 +101,7 @@ class CostMatrix:
 
     @property
     def rounded(self) -> bool:
-        """Whether values are rounded down to single precision."""
+        """True if values are rounded down to single precision."""
         return self.rows is not None or self.values.dtype == np.float32
 
     def _as_held(self, costs: Floats) -> Floats:

@@ -198,7 +198,7 @@ class SolverRun:
 
     @property
     def is_done(self) -> bool:
-        """Whether no tour shorter than the incumbent, or than the known length, is left to find."""
+        """True if no tour is shorter than the incumbent, or than the known length."""
         if self.tour is None or self.bound is None:
             return False
         return proven(min(self.length, self.known_length), self.bound)

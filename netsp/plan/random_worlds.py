@@ -219,7 +219,7 @@ def random_world(
     radii: tuple[float, float] = (10.0, 30.0),
     attempt: int = 0,
 ) -> Problem:
-    """A world of a family: obstacles, a random base, goals drawn among the places that the tether
+    """Return a world of a family: obstacles, a random base, goals drawn among the places the tether
     reaches.
 
     Parameters
@@ -305,7 +305,7 @@ def random_world(
 
 
 def reachable_world(seed: int, **recipe: object) -> tuple[Problem, int]:
-    """The first world of a seed that fits.
+    """Return the first world of a seed that fits.
 
     Parameters
     ----------
@@ -366,7 +366,7 @@ def _check(
 def _circles(
     candidates: Iterator[tuple[float, float, float]], count: int, side: float
 ) -> list[Obstacle]:
-    """The first candidates that keep apart."""
+    """Return the first candidates that keep apart."""
     taken: list[tuple[float, float, float]] = []
     for _ in range(GIVE_UP):
         if len(taken) == count:
@@ -379,14 +379,14 @@ def _circles(
 
 
 def _rectangle(center: Place, along: Place, long: float, half: float) -> Polygon:
-    """The rectangle of half axes `long` and `half`, its first axis in a given direction."""
+    """Return the rectangle of half axes `long` and `half`, its first axis in a given direction."""
     (x, y), (c, s) = center, along
     corners = ((-long, -half), (long, -half), (long, half), (-long, half))
     return Polygon(polygon=tuple((x + a * c - b * s, y + a * s + b * c) for a, b in corners))
 
 
 def _holds(shape: Obstacle, x: float, y: float) -> bool:
-    """Whether a circle or a convex polygon holds a point; its boundary counts."""
+    """Return whether a circle or a convex polygon covers a point; its boundary counts."""
     if isinstance(shape, Circle):
         return math.hypot(x - shape.center[0], y - shape.center[1]) <= shape.radius
     corners = shape.polygon
@@ -398,7 +398,7 @@ def _holds(shape: Obstacle, x: float, y: float) -> bool:
 
 
 def _apart(shape: Polygon, other: Obstacle, gap: float) -> bool:
-    """Whether two convex polygons keep a gap: an edge of one separates them."""
+    """Return whether an edge of one of two convex polygons separates them by a gap."""
     assert isinstance(other, Polygon)
     for one, two in ((shape.polygon, other.polygon), (other.polygon, shape.polygon)):
         for a, b in zip(one, (*one[1:], one[0]), strict=True):

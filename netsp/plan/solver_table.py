@@ -40,7 +40,7 @@ class Solver:
 
     @property
     def ours(self) -> bool:
-        """Whether it is a part of netsp and takes `(graph, params, limits)`."""
+        """True if the solver is part of netsp and takes `(graph, params, limits)`."""
         return self.function.startswith("netsp.")
 
 
@@ -64,7 +64,7 @@ class RoadmapKind:
 
     @property
     def ours(self) -> bool:
-        """Whether it is a part of netsp, so that its exceptions are defects of netsp."""
+        """True if the solver is part of netsp, so that its exceptions are defects of netsp."""
         return self.build.startswith("netsp.")
 
 

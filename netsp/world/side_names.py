@@ -1,4 +1,4 @@
-"""How a tether runs, in words: by the names of obstacles and the sides on which it passes them."""
+"""Words for the course of a tether: obstacles, and the sides on which it passes them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TOUCHING = 2e-3
 
 
 def bearing(problem: Problem, direction: npt.ArrayLike) -> float:
-    """Where a direction in the plan points.
+    """Return the bearing of a direction in the plan.
 
     Parameters
     ----------
@@ -45,14 +45,14 @@ def bearing(problem: Problem, direction: npt.ArrayLike) -> float:
 
 
 def side(problem: Problem, direction: npt.ArrayLike) -> str:
-    """The name of a direction: a wind, or an axis where north is not known."""
+    """Return the name of a direction: a compass point, or an axis if north is unknown."""
     names = WINDS if problem.origin else AXES
     return names[int((bearing(problem, direction) + 22.5) // 45.0) % 8]
 
 
 @dataclass(frozen=True)
 class Passage:
-    """How a tether passes an obstacle.
+    """Passage of a tether at an obstacle.
 
     Parameters
     ----------
@@ -70,8 +70,8 @@ class Passage:
 
 
 def passages(problem: Problem, tether: Floats, word: Word) -> list[Passage]:
-    """The obstacles that make the class of a taut tether, from the base on: those that it lies
-    against, and those whose letters its word has.
+    """Return the obstacles that make the class of a taut tether, from the base on: those that it
+    lies against, and those whose letters its word has.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def passages(problem: Problem, tether: Floats, word: Word) -> list[Passage]:
 
 
 def _touched(problem: Problem, points: Floats) -> npt.NDArray[np.intp]:
-    """(k,) the obstacles that corners (k, 3) of a taut tether lie on; -1 for none."""
+    """Return the obstacles (k,) that corners (k, 3) of a taut tether lie on; -1 for none."""
     if not problem.obstacles:
         return np.full(len(points), -1, dtype=np.intp)
     clearance = problem.clearance
@@ -135,7 +135,7 @@ def _touched(problem: Problem, points: Floats) -> npt.NDArray[np.intp]:
 
 @lru_cache(maxsize=4096)
 def _size(obstacle: Circle | Polygon, clearance: float) -> float:
-    """The longer side of its bounding box."""
+    """Return the longer side of an obstacle's bounding box."""
     return float(np.ptp(np.array(obstacle.shape(clearance).bounds).reshape(2, 2), axis=0).max())
 
 
@@ -150,7 +150,7 @@ def listed(problem: Problem, run: list[Passage]) -> str:
 
 
 def back_from(problem: Problem, runs: list[list[Passage]], names: list[str], k: int) -> str:
-    """What to do when the tether snags at visit k or on the way on from there.
+    """Return what to do if the tether snags at visit k or on the leg after it.
 
     Parameters
     ----------

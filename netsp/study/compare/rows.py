@@ -119,7 +119,7 @@ _VALUES: dict[str, tuple[type, ...]] = {
     "history": (list, type(None)),
     "lower_bound_of": (str, type(None)),
 }
-"""Which types the fields of a row may have; a page is made of them without asking again."""
+"""Types that the fields of a row may have; pages rely on them."""
 
 
 def _fits(value: object, kinds: tuple[type, ...]) -> bool:

@@ -48,7 +48,7 @@ MARKS: tuple[tuple[str, dict[str, Any]], ...] = (
     (LEFT_OUT, {"marker": "x", "color": style.LEFT_OUT, "ms": 8, "mew": 2.2}),
     (CANCELLED, {"marker": "+", "color": style.CANCELLED, "ms": 9, "mew": 2.2}),
 )
-"""What has become of goals and waypoints."""
+"""Marks of the fates of goals and waypoints."""
 
 CAPTION_LETTERS = 62
 """Maximum number of letters in a line of a panel's title."""

@@ -23,7 +23,7 @@ RESPONSES = {
     "defect": "defect, went home",
     "shorten": "tether shortened",
 }
-"""What is said of what a robot did about an event."""
+"""Words for the robot's response to an event."""
 
 
 def save_execution(done: Execution, file: str | Path) -> None:

@@ -1,4 +1,4 @@
-"""What a moving picture shows: moments of a tour, a run, a flight or a planned mission."""
+"""Contents of a moving picture: moments of a tour, a run, a flight or a planned mission."""
 
 from __future__ import annotations
 

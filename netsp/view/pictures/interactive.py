@@ -28,7 +28,7 @@ VISIBLE_SHARE = 1e-3
 """Smallest visible deviation of a line, as a share of the picture's size."""
 
 EYE = {"x": 1.5, "y": -1.6, "z": 1.0}
-"""Where a scene is looked at from, in its own size: from the south-east, as figures are."""
+"""Point of view of a scene, in units of its size: from the south-east, as in figures."""
 
 COORDINATE_DIGITS = 3
 """Number of decimals of coordinates in pages."""

@@ -24,7 +24,7 @@ from netsp.world.simulator.mission_run import mission_grid
 from netsp.world.tether import GeodesicTether, Tether
 
 DASHES = ("-", "-.")
-"""Of two runs side by side, so that they can be told apart in grey."""
+"""Line styles of two runs side by side, which differ in grey, too."""
 
 
 def path_of(run: Run) -> Floats:

@@ -27,7 +27,7 @@ MAX_MOMENTS = 400
 """Approximate maximum number of points of the path so far in one picture."""
 
 VISITED, LEFT_OUT, CANCELLED = "visited", "left out", "cancelled"
-"""What may have become of a goal or waypoint."""
+"""Fates of a goal or waypoint."""
 
 Fates = Mapping[str, tuple[int, ...]]
 """Numbers of goals or waypoints, by what has become of them so far."""

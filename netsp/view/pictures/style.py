@@ -1,4 +1,4 @@
-"""How pictures look: one colour for each role, wherever it is drawn, and one way to save.
+"""Style of all pictures: one colour for each role, and one function to save them.
 
 The colours are those of Okabe and Ito (2008), told apart with any kind of colour vision; they are
 helped by shape and line style, so that a print in grey can be read as well.
@@ -25,7 +25,7 @@ ROBOT, TETHER = "#e69f00", "#d55e00"
 """Orange and vermilion."""
 
 PATH, PLAN = "#0072b2", "#56b4e9"
-"""What is or will be travelled, in blue; what was planned instead, in sky blue and dashed."""
+"""Colours of paths: travelled or planned in blue, abandoned plans in sky blue and dashed."""
 
 OBSTACLE, EDGE, WRAPPED = "#c5ccd3", "#5a6672", "#e5c1d5"
 """Greys; and what the tether winds about, in light purple."""

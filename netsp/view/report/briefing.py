@@ -1,5 +1,5 @@
-"""What an operator takes along: every stop in numbers, how the tether runs there in words, what to
-do if it snags, and how far the world may be off."""
+"""Briefing for the operator: every visit in numbers, the course of the tether there in words, what
+to do if it snags, and by how much the world may differ from the map."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STYLE = """
 .ok { color: #2b8a3e } .bad { color: #c92a2a } .wide { overflow-x: auto }
 th.words, td.words { text-align: left } td { vertical-align: top }
 """
-"""Of tables and checks."""
+"""Style sheet of tables and checks."""
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[int] = ()) -> str:

@@ -66,7 +66,7 @@ LEGEND = (
 
 
 MOVING = ("visited by then", "gone so far", "tether")
-"""What moves with the slider, and is not on paper."""
+"""Marks that move with the slider and are not printed."""
 
 MOVES = ' class="noprint"'
 

@@ -21,7 +21,7 @@ CONTROLS = (
 )
 
 STATE = '<p class="state note noprint"></p>'
-"""What is said of the moment, below each map."""
+"""Captions of the current moment, below each map."""
 
 STYLE = f"""
 .map {{ background: #fff; width: 100%; max-width: 900px }} .map text {{ font-size: 12px }}

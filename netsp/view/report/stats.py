@@ -1,4 +1,4 @@
-"""What the rows of a comparison say: groups, medians with intervals, profiles."""
+"""Statistics of a comparison's rows: groups, medians with intervals, profiles."""
 
 from __future__ import annotations
 
