@@ -144,7 +144,7 @@ def drawn(figure):
 
 @pytest.fixture(scope="module", params=KINDS)
 def figure(request):
-    """Of each kind one, for all that looks at it and changes nothing."""
+    """One figure of each kind, shared by all tests that only read it."""
     matplotlib.use("Agg")
     with pytest.MonkeyPatch.context() as monkeypatch:
         found = of(request.param, request, monkeypatch)

@@ -1,4 +1,4 @@
-"""What packed pages hold (`netsp.view.pictures.interactive`)."""
+"""Contents of packed pages (`netsp.view.pictures.interactive`)."""
 
 import base64
 import gzip

@@ -96,7 +96,10 @@ def words_of_flight(
     """
     mission = run.mission
     if mission.track:
-        raise InputError("track: of a moving anchor no words are told; expected a mission without")
+        raise InputError(
+            "track: the words of a tether on a moving anchor are not known; "
+            "expected a mission without a track"
+        )
     scene = scene or mission.load_scene()
     words = _words_in_scene(
         run, PlanningContext.for_mission(mission, scene, field or scene.field())

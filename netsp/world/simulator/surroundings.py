@@ -2,7 +2,7 @@
 
 The map begins as the scene's file. A solid that is not on it is put there once rays of the range
 sensor have met it, where the mean of their measurements says; a solid that rays pass through is
-removed. Without a range sensor, the planner is told of every change.
+removed. Without a range sensor, the planner learns every change at once.
 """
 
 from __future__ import annotations
