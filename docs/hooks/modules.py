@@ -23,7 +23,7 @@ def module_list(root: Path = ROOT / "netsp") -> list[str]:
         ]
         if rows:
             name = package.relative_to(root)
-            out += [f"## {name}/", "", first_sentence(package / "__init__.py"), ""]
+            out += [f"### {name}/", "", first_sentence(package / "__init__.py"), ""]
             out += ["| module | subject |", "|---|---|", *rows, ""]
     return out
 

@@ -18,7 +18,7 @@ from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.compiled.compile_policy import current_policy
 from netsp.base.compiled.interpretation import interprets
 from netsp.base.geometry.kernels import TWO_PI
-from netsp.world.scene.packing import CELLS, COUNT, NEAR, ROW, ROWS, candidates
+from netsp.world.scene.packing import CELLS, COUNT, NEAR, ROW, ROWS, VOXELS, candidates
 from netsp.world.scene.solids import BOX, CAPSULE, CYLINDER, POST, PRISM, TORUS
 
 Vectors = tuple[Floats, Floats, Floats]
@@ -32,9 +32,10 @@ Row = list[Any]
 (`netsp.world.scene.packing`)."""
 
 
-def is_short(data: Floats, count: int) -> bool:
-    """Return whether a loop over points is faster than NumPy."""
-    return count * (2 + int(data[COUNT])) < current_policy().min_numpy_items
+def needs_loop(data: Floats, count: int) -> bool:
+    """Return whether a loop over points is faster than NumPy, or needed because of voxels."""
+    items = count * (2 + int(data[COUNT]))
+    return data[VOXELS] > 0.0 or items < current_policy().min_numpy_items
 
 
 def distances(data: Floats, offset: float, x: Floats, y: Floats, z: Floats) -> Floats:

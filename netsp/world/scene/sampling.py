@@ -232,8 +232,8 @@ def sample_many(field: Field, points: Floats) -> Floats:
 
 @interprets(sample_many)
 def _sample_many_in_numpy(field: Field, points: Floats) -> Floats:
-    """Vectorise `sample_many` over the points, where there are many."""
-    if point_batches.is_short(field.data, len(points)):
+    """Vectorise `sample_many` over the points of a field without voxels, where there are many."""
+    if point_batches.needs_loop(field.data, len(points)):
         sampled = interpreted(sample)
         return np.array([sampled(field, x, y, z) for x, y, z in points]).reshape(-1, 5)
     return point_batches.samples(field.data, field.offset, points)
@@ -271,13 +271,13 @@ def lowest_along_each(field: Field, a: Floats, b: Floats, tolerance: float) -> F
     Parameters
     ----------
     field : Field
-        Field without voxels.
+        Field of the distances.
     a, b : ndarray, shape (n, 3)
         Ends of the segments.
     tolerance : float
         Tolerance of `lowest_along`.
     """
-    if not point_batches.is_short(field.data, len(a)):
+    if not point_batches.needs_loop(field.data, len(a)):
         return point_batches.lowest_along(field.data, field.offset, a, b, tolerance)
     lowest = interpreted(lowest_along)
     return np.array([lowest(field, *a[k], *b[k], tolerance)[0] for k in range(len(a))], dtype=float)
