@@ -7,8 +7,11 @@ import itertools
 import numpy as np
 import pytest
 
-from netsp.base.axes import UNITS, column, height_axis, map_unit, metres_per_unit, read_table
+from netsp.base.axes import height_axis, map_unit
+from netsp.base.columns import column
 from netsp.base.errors import InputError
+from netsp.base.table_file import read_table
+from netsp.base.units import UNITS, metres_per_unit
 
 XYZ = ("x", "y", "z")
 

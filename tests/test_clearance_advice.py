@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, InputError, Problem, solve
-from netsp.base.axes import metres_per_unit
+from netsp.base.units import metres_per_unit
 from netsp.command.main import main
 from netsp.plan.sizing.clearance_advice import ClearancePolicy, clearance_advice, clearance_room
 

@@ -60,8 +60,11 @@ def subjects():
         ["git", "log", "--no-merges", "--format=%s", f"{FIRST_COMMIT}..HEAD"],
         cwd=ROOT, capture_output=True, text=True, check=True,
     )  # fmt: skip
-    return log.stdout.splitlines()
+    return [s for s in log.stdout.splitlines() if s not in PUSHED]
 
+
+PUSHED = {"Read voxels in NumPy runs of the distance field, and nest the module list"}
+"""Subjects that break the rule and were pushed before this was noticed."""
 
 NOT_IMPERATIVE = re.compile(r"^(\w+(ed|ing)|The|A|An|Some|Now|It|This|Various|WIP\b.*)\s")
 

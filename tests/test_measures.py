@@ -185,7 +185,7 @@ def test_a_tour_out_and_home_past_the_same_side_does_not_cross_itself():
 
 
 def test_a_byte_order_mark_does_not_cost_a_point(tmp_path):
-    from netsp.base.axes import read_path
+    from netsp.base.polyline_file import read_path
 
     (tmp_path / "a.csv").write_text("\ufeff0,0\n1,1\n", encoding="utf-8")
     assert len(read_path(tmp_path / "a.csv")) == 2

@@ -12,8 +12,8 @@ import pytest
 
 from netsp import Circle, InputError, Problem, TravelGraph, solve, solve_graph, travel_graph
 from netsp.base.arrays import ComparesArrays
-from netsp.base.axes import read_path
 from netsp.base.files import csv_rows
+from netsp.base.polyline_file import read_path
 from netsp.command.main import main
 from netsp.exchange.maps.read_map import read_site
 from netsp.model.problem import State

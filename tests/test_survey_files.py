@@ -9,9 +9,10 @@ import struct
 import numpy as np
 import pytest
 
-from netsp.base.axes import height_meaning, marks_of_no_height
+from netsp.base.columns import height_meaning
 from netsp.base.errors import InputError
 from netsp.world.scene.floor import read_floor
+from netsp.world.scene.missing_heights import marks_of_no_height
 from netsp.world.scene.pcd import unpack_lzf
 from netsp.world.scene.readers import read_cloud_file, read_mesh_file
 

@@ -62,7 +62,7 @@ def warn_of_clearance(
     room: ClearanceRoom | None = None,
 ) -> None:
     """Warn if the clearance of a plan among obstacles is too small to be flown."""
-    from netsp.base.axes import metres_per_unit
+    from netsp.base.units import metres_per_unit
     from netsp.plan.sizing.clearance_advice import ClearancePolicy, clearance_advice
 
     policy = ClearancePolicy(position_error=position_error, current=current)

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from netsp.base.arrays import Floats
-from netsp.base.axes import read_path
 from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
+from netsp.base.polyline_file import read_path
 from netsp.command import messages
 from netsp.view.pictures import scene_picture as pictures
 from netsp.view.pictures import style

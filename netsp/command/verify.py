@@ -165,7 +165,7 @@ def _is_path(file: str) -> bool:
 
 def _measure_paths(problem: Problem, args: argparse.Namespace) -> None:
     """Print the measures of every path of a file."""
-    from netsp.base.axes import read_path
+    from netsp.base.polyline_file import read_path
     from netsp.command.measures import describe_path, entered
     from netsp.exchange.maps.path_file import ENDINGS, FoundPath
     from netsp.online.guard.recorded_path import read_any_paths

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from netsp.base.axes import UNITS
 from netsp.base.errors import InputError, UnansweredError, counted
 from netsp.base.files import check_file
+from netsp.base.units import UNITS
 from netsp.exchange.maps.chart_classes import SOUNDINGS
 from netsp.exchange.maps.feature import Feature, Map
 from netsp.exchange.maps.import_policy import DEFAULT_READ, ReadPolicy

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from netsp.base.arrays import Floats
-from netsp.base.axes import MAP_PAIRS, Quantity, read_table
+from netsp.base.columns import MAP_PAIRS, Quantity
 from netsp.base.errors import InputError
+from netsp.base.table_file import read_table
 from netsp.base.validated import shown
 from netsp.exchange.maps.projection import Projection
 
@@ -24,7 +25,7 @@ def from_table(
     Parameters
     ----------
     file : str or Path
-        Table whose first line names its columns in any order (`netsp.base.axes`): x, y (easting,
+        Table whose first line names its columns in any order (`netsp.base.columns`): x, y (easting,
         northing without a projection; lat, lon with one), and perhaps z or depth, and name.
     projection : Projection, optional
         Projection of latitudes and longitudes into the plane.

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from netsp.base.arrays import Floats
-from netsp.base.axes import UNITS
 from netsp.base.errors import InputError, UnansweredError, counted
 from netsp.base.files import check_file, read_bytes
 from netsp.base.geometry.polygons import union
+from netsp.base.units import UNITS
 from netsp.exchange.maps.contract import WORDS, words_in
 from netsp.exchange.maps.dxf_shapes import WITHOUT_WIDTH, shape_damage, simple_entities
 from netsp.exchange.maps.dxf_tags import Drawing, Record, Tag, read_drawing, written
@@ -114,7 +114,7 @@ def read_dxf(
     crs : str, optional
         Coordinate system of the drawing; default: a local plane.
     units : str, optional
-        Unit that the user states, one of `netsp.base.axes.UNITS`; default: the header's.
+        Unit that the user states, one of `netsp.base.units.UNITS`; default: the header's.
 
     Raises
     ------

@@ -6,9 +6,9 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from netsp.base.axes import decode_text
 from netsp.base.errors import InputError
 from netsp.base.files import read_bytes
+from netsp.base.table_file import decode_text
 from netsp.base.validated import shown
 from netsp.exchange.maps.feature import Feature, Map, Unread
 from netsp.exchange.maps.import_policy import DEFAULT_IMPORT, ImportPolicy

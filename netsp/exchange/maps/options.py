@@ -50,7 +50,7 @@ class SiteOptions:
         Coordinate system, such as ``EPSG:32632``; ``local`` for a plane without a place on the
         earth.
     units
-        Unit of lengths in the file, one of `netsp.base.axes.UNITS`, but not of coordinates on the
+        Unit of lengths in the file, one of `netsp.base.units.UNITS`, but not of coordinates on the
         earth; None for the unit that the file states, or metres.
     maps
         Kinds of layers and names of properties: ``("obstacle", layer)``, ``("name", property)``.

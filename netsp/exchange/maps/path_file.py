@@ -15,10 +15,12 @@ from typing import Any
 import numpy as np
 
 from netsp.base.arrays import Floats
-from netsp.base.axes import Quantity, Table, read_path, read_table
+from netsp.base.columns import Quantity
 from netsp.base.errors import InputError
 from netsp.base.field_types import LARGEST
 from netsp.base.files import read_text
+from netsp.base.polyline_file import read_path
+from netsp.base.table_file import Table, read_table
 from netsp.base.validated import parse_json_object, shown
 from netsp.exchange.maps.gpx import read_gpx
 from netsp.exchange.maps.import_policy import DEFAULT_READ, ReadPolicy

@@ -17,11 +17,12 @@ import numpy as np
 from pydantic import ValidationError
 
 from netsp.base import progress
-from netsp.base.axes import UNITS, column
+from netsp.base.columns import column
 from netsp.base.deprecated import renamed_parameters
 from netsp.base.errors import InputError, UnansweredError, counted
 from netsp.base.field_types import checked_number
 from netsp.base.geometry.polygons import union
+from netsp.base.units import UNITS
 from netsp.base.validated import explain, shown
 from netsp.exchange.maps.chart_classes import (
     DEPTH_AREAS,

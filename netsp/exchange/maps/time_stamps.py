@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from datetime import UTC, datetime
 
-from netsp.base.axes import Column
+from netsp.base.columns import Column
 from netsp.base.errors import InputError
 from netsp.base.validated import shown
 from netsp.exchange.maps.import_policy import DEFAULT_READ, ReadPolicy

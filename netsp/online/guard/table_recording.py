@@ -1,4 +1,4 @@
-"""Recordings that are tables with named columns (`netsp.base.axes`)."""
+"""Recordings that are tables with named columns (`netsp.base.columns`)."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from netsp.base.axes import Quantity, Table, read_table
+from netsp.base.columns import Quantity
 from netsp.base.errors import InputError
 from netsp.base.field_types import Point3
+from netsp.base.table_file import Table, read_table
 from netsp.base.validated import shown
 from netsp.exchange.maps.time_stamps import NO_VALUES, TimeStamps
 from netsp.online.guard.guard_policy import RecordingPolicy

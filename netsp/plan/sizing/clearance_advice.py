@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from netsp.base.axes import metres_per_unit
 from netsp.base.errors import InputError
+from netsp.base.units import metres_per_unit
 from netsp.model.problem import Problem
 
 

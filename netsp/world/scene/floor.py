@@ -13,16 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Floats
-from netsp.base.axes import (
-    Column,
-    height_axis,
-    height_meaning,
-    map_unit,
-    marks_of_no_height,
-    metres_per_unit,
-)
+from netsp.base.axes import height_axis, map_unit
+from netsp.base.columns import Column, height_meaning
 from netsp.base.errors import InputError, counted
 from netsp.base.files import read_bytes
+from netsp.base.units import metres_per_unit
+from netsp.world.scene.missing_heights import marks_of_no_height
 from netsp.world.scene.point_clouds import read_text_cloud
 from netsp.world.scene.scene_policy import FloorPolicy
 from netsp.world.scene.tally import Tally

@@ -11,27 +11,20 @@ from typing import Any
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats
-from netsp.base.axes import (
-    MAP_PAIRS,
-    NOISE_CLASSES,
-    Column,
-    HeightAxis,
-    Quantity,
-    Table,
-    decode_text,
-    height_axis,
-    map_unit,
-    marks_of_no_height,
-    meanings,
-    metres_per_unit_code,
-    read_table,
-)
+from netsp.base.axes import HeightAxis, height_axis, map_unit
+from netsp.base.columns import MAP_PAIRS, Column, Quantity, meanings
 from netsp.base.errors import InputError, counted
 from netsp.base.files import read_bytes
+from netsp.base.table_file import Table, decode_text, read_table
+from netsp.base.units import metres_per_unit_code
+from netsp.world.scene.missing_heights import marks_of_no_height
 from netsp.world.scene.tally import Tally
 
 TEXT_SUFFIXES = (".csv", ".txt", ".xyz", ".asc", ".pts")
 """Extensions of clouds that are tables of text."""
+
+NOISE_CLASSES = {7: "low noise", 18: "high noise"}
+"""Classes of points that belong to no surface (ASPRS LAS 1.4 R15, tables 9 and 17)."""
 
 
 @dataclass(frozen=True)
@@ -113,8 +106,8 @@ def read_text_cloud(path: str | Path) -> PointCloud:
     Parameters
     ----------
     path : str or Path
-        Table as `netsp.base.axes.read_table` reads it, or PTS, which begins with the number of
-        points.
+        Table as `netsp.base.table_file.read_table` reads it, or PTS, which begins with the number
+        of points.
 
     Raises
     ------
@@ -161,7 +154,7 @@ def coordinate_fields(
     Parameters
     ----------
     names : sequence of str
-        Names of the fields, as `netsp.base.axes.column` reads them.
+        Names of the fields, as `netsp.base.columns.column` reads them.
     source : str
         Name of the file, for messages.
     where : str
@@ -191,7 +184,7 @@ def cloud_of_fields(
     Parameters
     ----------
     names : sequence of str
-        Names of k fields, as `netsp.base.axes.column` reads them.
+        Names of k fields, as `netsp.base.columns.column` reads them.
     values : ndarray, shape (n, k)
         Values of n points.
     source : str

@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Floats
-from netsp.base.axes import metres_per_unit
 from netsp.base.errors import InputError, counted
 from netsp.base.files import FilePolicy
+from netsp.base.units import metres_per_unit
 from netsp.world.scene.mesh_checks import binary_stl, collada_parts, gltf_parts, plain_obj
 from netsp.world.scene.pcd import read_pcd
 from netsp.world.scene.ply import read_ply
