@@ -15,7 +15,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import netsp.base.clock
-from netsp.base.clock import Clock, Flag
+from netsp.base.clock import Clock
+from netsp.base.time_flags import Flag
 
 OWN = {netsp.base.clock.__file__, __file__}
 

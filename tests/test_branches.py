@@ -9,8 +9,9 @@ from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, Polygon, Problem
-from netsp.base.clock import NEVER, Clock
+from netsp.base.clock import Clock
 from netsp.base.errors import InfeasibleError, LimitReachedError
+from netsp.base.time_flags import NEVER
 from netsp.plan.random_worlds import FAMILIES, random_world
 from netsp.roadmap import taut_legs as legs_of
 from netsp.roadmap.branches import OPEN

@@ -7,17 +7,12 @@ import numpy as np
 import pytest
 
 from netsp import Problem, Status, solve, solve_graph, travel_graph, verify
-from netsp.base.clock import (
-    BOUNDED,
-    NEVER,
-    Clock,
-    TimingPolicy,
-    end_if_abandoned,
-    is_abandoned_work_running,
-)
+from netsp.base.bounded_work import BOUNDED, end_if_abandoned, is_abandoned_work_running
+from netsp.base.clock import Clock, TimingPolicy
 from netsp.base.compiled.compile_policy import everything_compiled
 from netsp.base.errors import InputError, LimitReachedError, MemoryLimitError
 from netsp.base.ram import available_memory, check_available
+from netsp.base.time_flags import NEVER
 from netsp.mip.cutpool import CutPool
 from netsp.mip.cuts import Cut
 from netsp.plan.random_worlds import random_world, reachable_world

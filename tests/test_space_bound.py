@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp.base.clock import NEVER, Clock
+from netsp.base.clock import Clock
 from netsp.base.errors import InputError
+from netsp.base.time_flags import NEVER
 from netsp.plan.solve_problem import solve
 from netsp.plan.space.mission_policy import PotentialPolicy, StatePolicy
 from netsp.plan.space.path_bound import LegBounds, bound_all_tours

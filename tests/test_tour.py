@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from netsp.base.clock import Clock, deferred_interrupts, until_interrupt
+from netsp.base.clock import Clock
 from netsp.base.geometry import polylines
+from netsp.base.interrupt_signals import deferred_interrupts, until_interrupt
 from netsp.command.main import main
 from netsp.model.solution import Status
 from netsp.plan.space.flown import words_of_flight

@@ -7,32 +7,23 @@ check the flag now and then, and end with what they have.
 
 from __future__ import annotations
 
-import contextvars
-import heapq
-import itertools
 import math
-import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
-from netsp.base.deprecated import deprecated_method
+from netsp.base.bounded_work import AbandonableCall, ThreadedCall, abandoned, end_if_abandoned
+from netsp.base.deprecated import deprecated_method, deprecated_names
 from netsp.base.errors import LimitReachedError
 from netsp.base.number_ranges import check_not_negative
+from netsp.base.time_flags import DEADLINES, Flag, StopThread
 
-Flag = npt.NDArray[np.int64]
 T = TypeVar("T")
-
-NEVER: Flag = np.zeros(1, dtype=np.int64)
-"""Flag of a clock without a limit."""
 
 
 @dataclass(frozen=True)
@@ -95,9 +86,9 @@ class Clock:
         begun = begun or (time.monotonic(), time.process_time())
         self.start = begun[0]
         self.deadline = math.inf if limit is None else self.start + limit
-        self._stop: _Stop | None = None
+        self._stop: StopThread | None = None
         if should_stop is not None:
-            self._stop = _Stop(should_stop, self.policy.stop_interval_s)
+            self._stop = StopThread(should_stop, self.policy.stop_interval_s)
         self._family: _Family = _Family(begun) if within is None else within._family
         if within is not None:
             self.deadline = min(self.deadline, within.deadline)
@@ -159,6 +150,11 @@ class Clock:
         if self._flag is not None:
             self._flag[0] = 1
 
+    def stop(self) -> None:
+        """End the time of this clock, and of all within it, if it was made with `should_stop`."""
+        if self._stop is not None:
+            self._stop.now = True
+
     def close(self) -> None:
         """End the calls of `should_stop`; raise what it raised."""
         if self._stop is not None:
@@ -177,7 +173,7 @@ class Clock:
             if self.is_up:
                 self._flag[0] = 1
             elif self.deadline < math.inf:
-                _WATCH.add(self.deadline, self._flag)
+                DEADLINES.add(self.deadline, self._flag)
             if self._stop is not None:
                 self._stop.add(self._flag)
         return self._flag
@@ -298,101 +294,35 @@ class Clock:
             return call()
         if self.is_overdue:
             raise self._broken_off(doing)
-        outcome: list[T] = []
-        failure: list[BaseException] = []
-        abandoned: Flag = np.zeros(1, dtype=np.int64)
-        done = threading.Event()
-
-        def body() -> None:
-            _abandoned.set(abandoned)
-            try:
-                outcome.append(call())
-            except BaseException as error:
-                failure.append(error)
-            done.set()
-
-        context = contextvars.copy_context()
-        thread = threading.Thread(target=context.run, args=(body,), daemon=True, name=BOUNDED)
-        thread.start()
+        work = AbandonableCall(call)
         try:
-            while not done.wait(min(0.2, max(self.policy.stop_interval_s, self.left))):
+            while not work.ends_within(min(0.2, max(self.policy.stop_interval_s, self.left))):
                 more = self.policy.stop_grace_s if winds_down and self.is_stopped else 0.0
-                if self._overdue(more) or _abandoned.get()[0]:
+                if self._overdue(more) or abandoned()[0]:
                     raise self._broken_off(self._family.doing or doing)
         except (KeyboardInterrupt, LimitReachedError):
-            abandoned[0] = 1
-            _ABANDONED.append(thread)
+            work.abandon()
             raise
-        if failure:
-            raise failure[0]
-        return outcome[0]
+        return work.result()
 
     def interruptible(self, call: Callable[[], T]) -> T:
         """Return the result of a call that checks the flag, made in a thread, so that Ctrl-C ends
         it at once."""
-        outcome: list[T] = []
-        failure: list[BaseException] = []
-
-        def body() -> None:
-            try:
-                outcome.append(call())
-            except BaseException as error:
-                failure.append(error)
-
-        thread = threading.Thread(target=body, daemon=True)
-        flag = self.flag
-        thread.start()
+        flag, work = self.flag, ThreadedCall(call)
         try:
-            while thread.is_alive():
-                thread.join(0.2)
+            while not work.ends_within(0.2):
+                pass
         except KeyboardInterrupt:
             flag[0] = 1
-            thread.join()
+            work.ends_within()
             raise
-        if failure:
-            raise failure[0]
-        return outcome[0]
-
-
-def is_abandoned_work_running(wait: float = 0.0) -> bool:
-    """Return whether a thread that `Clock.bounded` has abandoned still runs, after waiting `wait`
-    seconds."""
-    until = time.monotonic() + wait
-    while _ABANDONED:
-        _ABANDONED[0].join(max(0.0, until - time.monotonic()))
-        if _ABANDONED[0].is_alive():
-            return True
-        del _ABANDONED[0]
-    return False
-
-
-_ABANDONED: list[threading.Thread] = []
+        return work.result()
 
 
 def _is_compiling() -> bool:
     """Return whether Numba compiles a kernel just now."""
     lock = sys.modules.get("numba.core.compiler_lock")
     return lock is not None and bool(lock.global_compiler_lock.is_locked())
-
-
-BOUNDED = "netsp-bounded"
-"""Name of the threads of `Clock.bounded`."""
-
-_abandoned: ContextVar[Flag] = ContextVar("abandoned", default=NEVER)
-
-
-def abandoned() -> Flag:
-    """Return the flag of the enclosing `Clock.bounded`, for compiled loops and other threads.
-
-    It is 1 once the work is abandoned, and stays 0 outside of `Clock.bounded`.
-    """
-    return _abandoned.get()
-
-
-def end_if_abandoned() -> None:
-    """Raise LimitReachedError if the enclosing `Clock.bounded` has abandoned this work."""
-    if _abandoned.get()[0]:
-        raise LimitReachedError("abandoned")
 
 
 class _Family:
@@ -437,195 +367,11 @@ TimeLimit = float | Clock | None
 """Seconds, or the clock of the run that the work belongs to, or no limit."""
 
 
-@contextmanager
-def until_interrupt(limit: TimeLimit) -> Iterator[Clock]:
-    """Yield a clock whose time is up at Ctrl-C, too, so that successive stages end with what they
-    have.
-
-    A second Ctrl-C interrupts as usual. SIGTERM does the same where it interrupts
-    (`netsp.command.interrupts`). In other threads, and where another handler is set, nothing
-    changes.
-    """
-    if not _interrupts() or (isinstance(limit, Clock) and limit.can_stop):
-        yield Clock.from_limit(limit)
-        return
-    pressed = threading.Event()
-    within, seconds = (limit, None) if isinstance(limit, Clock) else (None, limit)
-    clock = Clock(seconds, within=within, should_stop=pressed.is_set)
-
-    def press() -> None:
-        pressed.set()
-        if clock._stop is not None:
-            clock._stop.now = True  # also where the work ends before the thread asks again
-
-    with _on_interrupt(press, once=True):
-        try:
-            yield clock
-        finally:
-            clock.close()
-
-
-@contextmanager
-def deferred_interrupts() -> Iterator[None]:
-    """Defer Ctrl-C to the end of a block that must not be interrupted.
-
-    Compiled code that returns tuples calls Python to make them, and an interrupt at that moment
-    would crash it.
-    """
-    pressed = threading.Event()
-    with _on_interrupt(pressed.set):
-        yield
-    if pressed.is_set():
-        raise KeyboardInterrupt
-
-
-@contextmanager
-def remembered_interrupts() -> Iterator[Callable[[], None]]:
-    """Remember Ctrl-C during work that is useless in part.
-
-    Ctrl-C interrupts as usual, and again at the next check where a callee took it as a request to
-    return what it has, as solvers and flights do.
-
-    Yields
-    ------
-    callable
-        Raises KeyboardInterrupt if Ctrl-C was pressed; so does the end of the work.
-    """
-    pressed = threading.Event()
-
-    def press() -> None:
-        pressed.set()
-        raise KeyboardInterrupt
-
-    def check() -> None:
-        if pressed.is_set():
-            raise KeyboardInterrupt
-
-    with _on_interrupt(press, callable):
-        yield check
-    check()
-
-
-INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
-"""Signals that end a command.
-
-Python raises KeyboardInterrupt at SIGINT, and `netsp.command.interrupts` makes it do so at SIGTERM.
-"""
-
-
-def _is_default(handler: object) -> bool:
-    """Return whether a handler raises KeyboardInterrupt and does nothing else."""
-    return handler is signal.default_int_handler
-
-
-def _interrupts(hears: Callable[[object], bool] = _is_default) -> dict[signal.Signals, Any]:
-    """Return the handlers of `INTERRUPTS` that `hears` accepts.
-
-    There are none in other threads, where no handler can be set.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        return {}
-    handlers = {number: signal.getsignal(number) for number in INTERRUPTS}
-    return {number: handler for number, handler in handlers.items() if hears(handler)}
-
-
-@contextmanager
-def _on_interrupt(
-    press: Callable[[], None], hears: Callable[[object], bool] = _is_default, *, once: bool = False
-) -> Iterator[None]:
-    """Call a function at Ctrl-C and SIGTERM instead of their handlers.
-
-    Parameters
-    ----------
-    press : callable
-        Function called at the signal.
-    hears : callable
-        Returns whether a handler is to be replaced.
-    once : bool
-        Whether the old handlers are restored at the first signal, for the second.
-    """
-    before = _interrupts(hears)
-
-    def restore() -> None:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-    def handle(*_: Any) -> None:
-        if once:
-            restore()
-        press()
-
-    for number in before:
-        signal.signal(number, handle)
-    try:
-        yield
-    finally:
-        restore()
-
-
-class _Stop:
-    """Thread that calls `should_stop`, and sets flags once it returns True."""
-
-    def __init__(self, should_stop: Callable[[], bool], interval_s: float) -> None:
-        self.now = False
-        self._should_stop, self._interval_s = should_stop, interval_s
-        self._flags: list[Flag] = []
-        self._error: Exception | None = None
-        self._closed = threading.Event()
-        self._lock = threading.Lock()
-        threading.Thread(target=self._run, daemon=True, name="netsp-stop").start()
-
-    def add(self, flag: Flag) -> None:
-        with self._lock:
-            self._flags.append(flag)
-            if self.now:
-                flag[0] = 1
-
-    def close(self) -> None:
-        self._closed.set()
-        if self._error is not None:
-            raise self._error
-
-    def _run(self) -> None:
-        while not self._closed.is_set():
-            try:
-                stop = self._should_stop()
-            except Exception as error:  # raised again by `close`, because this thread has no caller
-                self._error, stop = error, True
-            if stop:
-                with self._lock:
-                    self.now = True
-                    for flag in self._flags:
-                        flag[0] = 1
-                return
-            self._closed.wait(self._interval_s)
-
-
-class _Watch:
-    """Thread that sets flags when their time comes."""
-
-    def __init__(self) -> None:
-        self._queue: list[tuple[float, int, Flag]] = []
-        self._count = itertools.count()
-        self._changed = threading.Condition()
-        self._thread: threading.Thread | None = None
-
-    def add(self, deadline: float, flag: Flag) -> None:
-        with self._changed:
-            heapq.heappush(self._queue, (deadline, next(self._count), flag))
-            if self._thread is None or not self._thread.is_alive():
-                self._thread = threading.Thread(target=self._run, daemon=True, name="netsp-clock")
-                self._thread.start()
-            self._changed.notify()
-
-    def _run(self) -> None:
-        with self._changed:
-            while True:
-                while self._queue and self._queue[0][0] <= time.monotonic():
-                    heapq.heappop(self._queue)[2][0] = 1
-                # a day at most, which every platform's wait can hold
-                wait = self._queue[0][0] - time.monotonic() if self._queue else 86400.0
-                self._changed.wait(min(max(wait, 0.0), 86400.0))
-
-
-_WATCH = _Watch()
+__getattr__ = deprecated_names(
+    globals(),
+    NEVER="netsp.base.time_flags:NEVER",
+    is_abandoned_work_running="netsp.base.bounded_work:is_abandoned_work_running",
+    until_interrupt="netsp.base.interrupt_signals:until_interrupt",
+    deferred_interrupts="netsp.base.interrupt_signals:deferred_interrupts",
+    remembered_interrupts="netsp.base.interrupt_signals:remembered_interrupts",
+)

@@ -148,8 +148,8 @@ def _mission(args: argparse.Namespace) -> int:
 
 def _problem(args: argparse.Namespace) -> int:
     """Carry out a tour in the plane."""
-    from netsp.base.clock import until_interrupt
     from netsp.base.files import output_folder
+    from netsp.base.interrupt_signals import until_interrupt
     from netsp.model.problem import Problem
     from netsp.model.solution import Solution
     from netsp.online.execute.events import Surprises

@@ -42,8 +42,8 @@ def fly(
 
     `check` has the mission's tour judged before; `inputs` are files that must not be overwritten;
     `how` is as of `simulate`. Ctrl-C ends the flight, and what was flown is written."""
-    from netsp.base.clock import until_interrupt
     from netsp.base.compiled.compile_policy import long_work
+    from netsp.base.interrupt_signals import until_interrupt
 
     if output is not None:
         existing = [str(Path(output) / name) for name in WRITTEN if (Path(output) / name).exists()]

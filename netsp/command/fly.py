@@ -262,7 +262,7 @@ def complain(text: str) -> None:
 def _report_failure(args: argparse.Namespace, done: Execution) -> tuple[Exception | None, bool]:
     """Write the files of the run and print its result; return an exception that this raised, and
     whether Ctrl-C was pressed meanwhile. The caller stands by the vehicle in either case."""
-    from netsp.base.clock import deferred_interrupts
+    from netsp.base.interrupt_signals import deferred_interrupts
 
     failure = None
     try:
@@ -332,8 +332,8 @@ def _flown(
 ) -> tuple[Execution | BaseException, Session, Clock]:
     """Fly the tour, or return what ended the flight under way; the link stays open until the stack
     is left."""
-    from netsp.base.clock import until_interrupt
     from netsp.base.files import output_folder
+    from netsp.base.interrupt_signals import until_interrupt
     from netsp.command.execute import show_execution
     from netsp.online.execute.events import Surprises
     from netsp.online.execute.execute_policy import RepairPolicy

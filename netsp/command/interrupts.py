@@ -66,8 +66,8 @@ def until_interrupted(doing: str, call: Callable[[], T]) -> T:
     KeyboardInterrupt
         It was broken off.
     """
-    from netsp.base.clock import until_interrupt
     from netsp.base.errors import LimitReachedError
+    from netsp.base.interrupt_signals import until_interrupt
 
     with until_interrupt(None) as clock:
         try:

@@ -55,8 +55,8 @@ ABANDONED_GRACE_S = 0.5
 def _end_abandoned_work(code: int) -> None:
     """End the process at once if work that was abandoned still runs in another language: Python
     would end its thread in the middle of it, which aborts the process."""
-    clock = sys.modules.get("netsp.base.clock")
-    if clock is None or not clock.is_abandoned_work_running(ABANDONED_GRACE_S):
+    bounded_work = sys.modules.get("netsp.base.bounded_work")
+    if bounded_work is None or not bounded_work.is_abandoned_work_running(ABANDONED_GRACE_S):
         return
     with contextlib.suppress(OSError, ValueError):
         sys.stdout.flush()

@@ -191,7 +191,7 @@ def run(args: argparse.Namespace) -> int:
     from netsp.model.solution import Solution
 
     json_output.check_stdout(args)
-    from netsp.base.clock import deferred_interrupts
+    from netsp.base.interrupt_signals import deferred_interrupts
     from netsp.judge import checked
     from netsp.plan import warm_start as warm_starts
     from netsp.plan.solve_problem import solve

@@ -18,7 +18,7 @@ from fractions import Fraction
 from functools import cached_property
 from itertools import product
 
-from netsp.base.clock import end_if_abandoned
+from netsp.base.bounded_work import end_if_abandoned
 from netsp.hsignature.signature_policy import CompletionPolicy
 from netsp.hsignature.words import Word, cyclically_reduced, invert, reduce
 

@@ -21,8 +21,9 @@ from pathlib import Path
 
 import pulp
 
-from netsp.base.clock import Clock, TimeLimit, deferred_interrupts
+from netsp.base.clock import Clock, TimeLimit
 from netsp.base.errors import NetspError
+from netsp.base.interrupt_signals import deferred_interrupts
 from netsp.mip.mip_policy import LpPolicy
 
 

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from netsp.base.clock import Clock, TimeLimit, until_interrupt
+from netsp.base.clock import Clock, TimeLimit
 from netsp.base.errors import InputError, LimitReachedError
 from netsp.base.field_types import checked_argument
+from netsp.base.interrupt_signals import until_interrupt
 from netsp.base.registry import foreign, load
 from netsp.base.validated import shown
 from netsp.gtsp.limits import Limits

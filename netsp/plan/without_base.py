@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from netsp.base.arrays import Ints
-from netsp.base.clock import Clock, until_interrupt
+from netsp.base.clock import Clock
+from netsp.base.interrupt_signals import until_interrupt
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.search.lns_solver import Params as SearchParams
 from netsp.gtsp.search.lns_solver import solve as search

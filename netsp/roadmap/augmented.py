@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from netsp.base.arrays import Floats, Ints
-from netsp.base.clock import NEVER, Flag
 from netsp.base.compiled.dynamic_array import longer, more_int_rows
 from netsp.base.compiled.kernel import kernel
 from netsp.base.errors import InputError, NetspError
+from netsp.base.time_flags import NEVER, Flag
 from netsp.hsignature import Word
 from netsp.roadmap.trie import LETTER, PARENT, Trie, add_child, trie_child
 

@@ -21,10 +21,10 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Floats, Ints
-from netsp.base.clock import NEVER, Flag
 from netsp.base.compiled.dynamic_array import longer, more_int_rows, more_rows
 from netsp.base.compiled.hash_map import rehashed
 from netsp.base.compiled.kernel import kernel
+from netsp.base.time_flags import NEVER, Flag
 from netsp.roadmap.pending_letters import MAX_PENDING, XMAX, XMIN, YMAX, YMIN
 from netsp.roadmap.tangents import TangentGraph
 from netsp.roadmap.trie import CORE, LETTER, PARENT, Trie, add_child, trie_child

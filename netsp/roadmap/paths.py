@@ -9,8 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from netsp.base.arrays import Floats, Ints
-from netsp.base.clock import NEVER, Clock, Flag
+from netsp.base.clock import Clock
 from netsp.base.errors import InputError, LimitReachedError, NetspError, counted, warn_left_out
+from netsp.base.time_flags import NEVER, Flag
 from netsp.hsignature import Word
 from netsp.model.problem import Problem
 from netsp.roadmap.arcs import Arcs, build_arcs

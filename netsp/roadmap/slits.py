@@ -28,8 +28,8 @@ import numpy as np
 import shapely
 
 from netsp.base.arrays import Floats, Ints
-from netsp.base.clock import NEVER, Flag
 from netsp.base.compiled.kernel import kernel
+from netsp.base.time_flags import NEVER, Flag
 from netsp.hsignature import Word
 from netsp.model.problem import Circle, Problem
 from netsp.roadmap.roadmap_policy import LegPolicy

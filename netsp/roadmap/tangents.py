@@ -18,10 +18,11 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Bools, Floats, Ints
-from netsp.base.clock import Clock, Flag
+from netsp.base.clock import Clock
 from netsp.base.compiled.dynamic_array import more_rows
 from netsp.base.compiled.kernel import kernel
 from netsp.base.geometry.kernels import TWO_PI, Blockers, segment_blocked
+from netsp.base.time_flags import Flag
 from netsp.roadmap.letters import arc_letters, segment_letters
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.pending_letters import pending_boxes

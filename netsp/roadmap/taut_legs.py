@@ -10,9 +10,10 @@ from functools import cached_property
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
-from netsp.base.clock import NEVER, Clock, Flag
+from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
 from netsp.base.ram import check_available
+from netsp.base.time_flags import NEVER, Flag
 from netsp.hsignature import Word, concatenate, invert
 from netsp.roadmap.branches import OPEN, Branches, Lengths, build_branches, fill, fill_parallel
 from netsp.roadmap.paths import TautPaths, UnknownPathError

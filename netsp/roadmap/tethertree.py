@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from netsp.base.arrays import Floats, Ints
-from netsp.base.clock import Flag
 from netsp.base.compiled.dynamic_array import more_int_rows, more_rows
 from netsp.base.compiled.kernel import kernel
+from netsp.base.time_flags import Flag
 from netsp.roadmap.arcs import LENGTH, RADIUS, Arcs
 from netsp.roadmap.slits import Ends, Slits, empty_workspace, max_word_length
 from netsp.roadmap.taut_by_word import EDGE, NODE, SAME_ANGLE, SLID, Path, empty_path, pull

@@ -22,7 +22,7 @@ from itertools import pairwise
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
-from netsp.base.clock import NEVER, Flag
+from netsp.base.time_flags import NEVER, Flag
 from netsp.gtsp.dp.label_kernels import Bounds, Graph, Labels, completions, extend, join, step_back
 from netsp.gtsp.dp.ng_sets import Memory
 from netsp.gtsp.gtsp_policy import WalkPolicy

@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Bools, Ints
-from netsp.base.clock import NEVER, Clock
+from netsp.base.clock import Clock
 from netsp.base.compiled.rng import seeded
+from netsp.base.time_flags import NEVER
 from netsp.gtsp.search.descent import descend, two_opt
 from netsp.gtsp.search.layers import Instance, best_classes
 from netsp.gtsp.search.links import Tables, link, no_links

@@ -7,9 +7,9 @@ from functools import cache
 
 import numpy as np
 
-from netsp.base.clock import remembered_interrupts
 from netsp.base.compiled.compile_policy import compiles, everything_compiled
 from netsp.base.compiled.kernel import runs_compiled
+from netsp.base.interrupt_signals import remembered_interrupts
 from netsp.gtsp.dp.label_kernels import extend
 from netsp.model.problem import Circle, Goal, Problem, State
 from netsp.online.execute.execute_policy import RepairPolicy

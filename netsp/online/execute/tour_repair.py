@@ -16,9 +16,10 @@ import numpy.typing as npt
 import shapely
 
 from netsp.base.arrays import Floats
-from netsp.base.clock import Clock, until_interrupt
+from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError, NetspError
 from netsp.base.geometry import polylines
+from netsp.base.interrupt_signals import until_interrupt
 from netsp.gtsp.travel.result import Result
 from netsp.hsignature import concatenate, crossings, signature
 from netsp.model.problem import Circle, Goal, Problem, State

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from functools import cache
 
-from netsp.base.clock import remembered_interrupts
 from netsp.base.compiled.compile_policy import compiles, everything_compiled
+from netsp.base.interrupt_signals import remembered_interrupts
 from netsp.model.problem import Problem
 from netsp.online.execute.events import Surprises
 from netsp.online.execute.execution_log import ExecutionOptions

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from netsp.base.arrays import Bools, ComparesArrays, Floats
-from netsp.base.clock import TimeLimit, until_interrupt
+from netsp.base.clock import TimeLimit
 from netsp.base.errors import InputError
 from netsp.base.field_types import Point3, checked_argument
 from netsp.base.geometry import polylines
+from netsp.base.interrupt_signals import until_interrupt
 from netsp.plan.cover.choose import Choice, choose
 from netsp.plan.cover.cover_policy import CoverPolicy
 from netsp.plan.cover.viewpoint_swaps import find_alternatives

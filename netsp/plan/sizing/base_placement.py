@@ -21,10 +21,11 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Floats
-from netsp.base.clock import Clock, TimeLimit, until_interrupt
+from netsp.base.clock import Clock, TimeLimit
 from netsp.base.data_frames import frame_of
 from netsp.base.errors import InfeasibleError, InputError, LimitReachedError
 from netsp.base.files import cell, write_text
+from netsp.base.interrupt_signals import until_interrupt
 from netsp.base.reprs import Drawn
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip.cost_fixing import PATH_ROUNDING

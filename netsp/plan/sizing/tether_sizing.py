@@ -27,11 +27,12 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from netsp.base.arrays import Floats
-from netsp.base.clock import Clock, TimeLimit, until_interrupt
+from netsp.base.clock import Clock, TimeLimit
 from netsp.base.data_frames import frame_of
 from netsp.base.errors import InputError, LimitReachedError
 from netsp.base.field_types import checked_argument
 from netsp.base.files import write_text
+from netsp.base.interrupt_signals import until_interrupt
 from netsp.base.reprs import Drawn
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.kept import with_classes_left_out

@@ -16,10 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Floats, Ints
-from netsp.base.clock import Flag, abandoned, end_if_abandoned
+from netsp.base.bounded_work import abandoned, end_if_abandoned
 from netsp.base.compiled.dynamic_array import write_ints
 from netsp.base.compiled.kernel import kernel
 from netsp.base.errors import InputError
+from netsp.base.time_flags import Flag
 from netsp.plan.space.mission_policy import WordPolicy
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.sampling import Field, distance

@@ -20,9 +20,11 @@ from typing import Any
 import numpy as np
 
 from netsp.base.arrays import Floats
-from netsp.base.clock import Clock, TimeLimit, end_if_abandoned, until_interrupt
+from netsp.base.bounded_work import end_if_abandoned
+from netsp.base.clock import Clock, TimeLimit
 from netsp.base.errors import InputError, LimitReachedError
 from netsp.base.geometry import polylines
+from netsp.base.interrupt_signals import until_interrupt
 from netsp.gtsp.travel.result import relative_gap
 from netsp.model.bound_scope import LowerBound, Scope
 from netsp.model.solution import Status

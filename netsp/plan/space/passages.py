@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
-from netsp.base.clock import Clock, end_if_abandoned
+from netsp.base.bounded_work import end_if_abandoned
+from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
 from netsp.plan.space.mission_policy import GapPolicy, WordPolicy
 from netsp.plan.space.potential import Ends, GridBox, Region, possibly_free, steepness

@@ -12,8 +12,9 @@ from itertools import pairwise
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats
-from netsp.base.clock import NEVER, Flag, end_if_abandoned
+from netsp.base.bounded_work import end_if_abandoned
 from netsp.base.geometry import polylines
+from netsp.base.time_flags import NEVER, Flag
 from netsp.plan.space.cells import FREE_CELL, OPEN_CELL
 from netsp.plan.space.mission_policy import MissionPolicy
 from netsp.plan.space.passages import GapResolution

@@ -17,9 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Bools, Floats, Singles
-from netsp.base.clock import Clock, Flag
+from netsp.base.clock import Clock
 from netsp.base.compiled.dynamic_array import more_int_rows
 from netsp.base.compiled.kernel import kernel
+from netsp.base.time_flags import Flag
 from netsp.plan.space.mission_policy import PotentialPolicy
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.sampling import Field, distance

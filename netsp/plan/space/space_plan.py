@@ -22,9 +22,10 @@ from typing import Any
 import numpy as np
 
 from netsp.base.arrays import Floats
-from netsp.base.clock import Clock, TimeLimit, until_interrupt
+from netsp.base.clock import Clock, TimeLimit
 from netsp.base.deprecated import deprecated_method
 from netsp.base.errors import InputError, LimitReachedError, counted
+from netsp.base.interrupt_signals import until_interrupt
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result, relative_gap
 from netsp.model.bound_scope import LowerBound, Scope

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Floats, Ints
-from netsp.base.clock import abandoned, end_if_abandoned
+from netsp.base.bounded_work import abandoned, end_if_abandoned
 from netsp.base.deprecated import deprecated_method
 from netsp.base.errors import InputError
 from netsp.hsignature.groups import Group, eliminated

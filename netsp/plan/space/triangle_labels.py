@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Bools, Ints
-from netsp.base.clock import Flag
 from netsp.base.compiled.dynamic_array import more_int_rows, write_ints
 from netsp.base.compiled.kernel import kernel
+from netsp.base.time_flags import Flag
 from netsp.hsignature.wordtable import Rules, Table, times, times_inverse, times_letter
 from netsp.plan.space.cells import EDGE_BIT, FREE_CELL, OPEN_CELL, SQUARE_BIT
 

@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Bools, Ints
-from netsp.base.clock import Flag
 from netsp.base.compiled.dynamic_array import more_int_rows
 from netsp.base.compiled.kernel import kernel
+from netsp.base.time_flags import Flag
 from netsp.hsignature.wordtable import Rules, Table, times, times_inverse
 from netsp.plan.space.cells import FREE_CELL
 from netsp.plan.space.triangle_labels import (

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-from netsp.base.clock import INTERRUPTS
 from netsp.base.errors import PluginError
+from netsp.base.interrupt_signals import INTERRUPTS
 from netsp.study.compare.rows import LOST, TrialRow
 from netsp.study.compare.study import Trial
 

@@ -19,10 +19,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from netsp.base.clock import Clock, until_interrupt
+from netsp.base.clock import Clock
 from netsp.base.errors import InputError, NetspError
 from netsp.base.field_types import Name, NonNegative, Total
 from netsp.base.files import read_text
+from netsp.base.interrupt_signals import until_interrupt
 from netsp.base.registry import foreign
 from netsp.base.validated import Model, read_model
 from netsp.judge import verify

@@ -15,13 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Bools, Floats, Ints
-from netsp.base.clock import Flag, abandoned, end_if_abandoned
+from netsp.base.bounded_work import abandoned, end_if_abandoned
 from netsp.base.compiled.compile_policy import current_policy
 from netsp.base.compiled.dynamic_array import more_int_rows
 from netsp.base.compiled.interpretation import interprets
 from netsp.base.compiled.kernel import kernel
 from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
+from netsp.base.time_flags import Flag
 from netsp.world.paths.path_policy import PathPolicy
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.point_batches import distances

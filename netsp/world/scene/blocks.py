@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Floats, Ints, Singles
-from netsp.base.clock import Flag
 from netsp.base.compiled.kernel import kernel
+from netsp.base.time_flags import Flag
 from netsp.world.scene.closest import Owners, yz_crossing
 from netsp.world.scene.grid import SIDE
 from netsp.world.scene.sites import extent, site_distance

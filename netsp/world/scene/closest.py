@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Floats, Singles
-from netsp.base.clock import Flag
 from netsp.base.compiled.kernel import kernel
+from netsp.base.time_flags import Flag
 from netsp.world.scene.sites import extent, site_distance
 
 Owners = npt.NDArray[np.int32]

@@ -16,7 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Bools, Floats, Ints, Singles
-from netsp.base.clock import Flag, abandoned, end_if_abandoned
+from netsp.base.bounded_work import abandoned, end_if_abandoned
+from netsp.base.time_flags import Flag
 from netsp.world.scene import blocks as compiled
 from netsp.world.scene.blocks import REACHED, WATER
 from netsp.world.scene.closest import Owners, nearest_sites, sweep, windings

@@ -19,7 +19,7 @@ from shapely.geometry import LineString, Polygon, box
 from shapely.geometry.polygon import orient
 
 from netsp.base.arrays import Floats
-from netsp.base.clock import end_if_abandoned
+from netsp.base.bounded_work import end_if_abandoned
 from netsp.world.scene.scene_policy import SeamPolicy
 from netsp.world.scene.shapes import Box, Cylinder, HalfSpace, Prism, Shape
 

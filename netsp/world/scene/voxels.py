@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Floats, Singles
-from netsp.base.clock import end_if_abandoned
+from netsp.base.bounded_work import end_if_abandoned
 from netsp.base.errors import InputError
 from netsp.world.scene.grid import SIDE, VoxelGrid
 from netsp.world.scene.lattice import Dense, Lattice, OnStage, report_stage, sparse_near

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Floats
-from netsp.base.clock import end_if_abandoned
+from netsp.base.bounded_work import end_if_abandoned
 from netsp.base.errors import InputError
 from netsp.world.scene.field import DistanceField, finite_point
 from netsp.world.tether.drive import drive, follow
