@@ -18,7 +18,7 @@ from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.prices import Prices
 from netsp.mip.program import Duals
 from tests.brute import brute_tour
-from tests.travel_graphs import random_graph
+from tests.travel_graphs import bound_legs_first, random_graph
 from tests.worlds import costs_of, random_world
 
 
@@ -168,7 +168,8 @@ def test_dp_proves_the_same_optimum_as_mip_whether_legs_are_measured_or_bounded(
 ):
     problem = random_world(seed, circles=12, goals=7, tether=330.0)
     expected = solve_graph(travel_graph(problem), "mip").length
-    monkeypatch.setattr(TravelGraph, "legs_at_once", at_once)
+    if not at_once:
+        bound_legs_first(monkeypatch)
     params = {"search_rounds": 0, "policy.costs.max_measured_vertices": 20}
     result = solve_graph(travel_graph(problem), "dp", params=params)
     assert result.status is Status.OPTIMAL

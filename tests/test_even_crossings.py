@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from netsp import Circle, Problem, Status, solve_graph, travel_graph
 from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
+from netsp.gtsp.cost_oracle import MatrixCosts
 from netsp.gtsp.gtsp_policy import CostPolicy, GtspPolicy, ProofSearchPolicy
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.solver_run import RunStopped
-from netsp.gtsp.travel.costs import CostTable
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.parity_distances import WaysByParity
 from netsp.mip import root
@@ -290,7 +290,7 @@ def test_however_long_covers_take_the_core_has_its_share_of_what_is_left(monkeyp
 
 def share_of_covers(goals, classes):
     cluster = np.sort(np.append(np.arange(goals + 1), np.ones(classes - goals - 1, dtype=int)))
-    costs = CostTable(np.broadcast_to(1.0, (classes, classes)), cluster)
+    costs = MatrixCosts(np.broadcast_to(1.0, (classes, classes)), cluster)
     graph = TravelGraph(cluster, [()] * classes, np.ones(classes), costs)
     return MipRun(graph)._cover_time_share
 

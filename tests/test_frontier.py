@@ -9,17 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp import (
-    NetspError,
-    Polygon,
-    Problem,
-    Status,
-    TravelGraph,
-    solve,
-    solve_graph,
-    travel_graph,
-    verify,
-)
+from netsp import NetspError, Polygon, Problem, Status, solve, solve_graph, travel_graph, verify
 from netsp.base.clock import Clock
 from netsp.base.errors import MemoryLimitError
 from netsp.gtsp.gtsp_policy import CostPolicy, GtspPolicy
@@ -33,7 +23,7 @@ from netsp.plan.solve_policy import RoutePolicy, SolvePolicy, SubsetPolicy
 from netsp.roadmap.slits import _taut_string, build_slits, slit_lengths
 from netsp.roadmap.taut import TautRoadmap
 from tests.brute import brute_tour
-from tests.travel_graphs import random_graph
+from tests.travel_graphs import bound_legs_first, random_graph
 from tests.worlds import random_world, small_worlds
 
 
@@ -339,7 +329,8 @@ def core_first(problem, share=0.4, **limits):
 def test_a_proof_over_the_core_first_ends_at_the_same_optimum(monkeypatch, seed, at_once):
     problem = random_world(seed, goals=7, tether=300.0)
     best = solve(problem, "mip", seed=0).length
-    monkeypatch.setattr(TravelGraph, "legs_at_once", at_once)
+    if not at_once:
+        bound_legs_first(monkeypatch)
     run = core_first(problem)
     assert any(row.stage == "core" for row in run.trace)
     goals = next(row for row in run.trace if row.stage == "goals")

@@ -43,7 +43,7 @@ from netsp.model.solution import Status
 from netsp.plan.random_worlds import random_world as far_world
 from netsp.roadmap.taut import TautRoadmap
 from tests.brute import brute_tour as brute
-from tests.travel_graphs import random_graph
+from tests.travel_graphs import bound_legs_first, random_graph
 from tests.worlds import costs_of, random_world
 
 
@@ -458,19 +458,19 @@ def test_the_certificate_in_exact_rationals_is_no_lower_than_the_bound_claimed(s
 
 def test_a_long_tether_is_solved_without_measuring_most_legs_where_that_takes_long(monkeypatch):
     problem = far_world(0, goals=5, tether_length=500.0)
-    monkeypatch.setattr(TravelGraph, "legs_at_once", False)
+    bound_legs_first(monkeypatch)
     lazy, whole = travel_graph(problem), travel_graph(problem)
     whole.costs  # noqa: B018
     assert len(whole) > CostPolicy().max_measured_vertices
     asked = []
-    lengths = lazy._legs.lengths
+    lengths = lazy.oracle.lengths
 
     def count(vertices, asked_for=None, clock=None):
         out = lengths(vertices, asked_for, clock)
         asked.append(out.size // 2 if asked_for is None else int(asked_for.sum()) // 2)
         return out
 
-    lazy._legs.lengths = count
+    lazy.oracle.lengths = count
     a, b = solve(lazy), solve(whole)
     assert a.status is b.status is Status.OPTIMAL
     assert a.length == pytest.approx(b.length, rel=2e-6)
@@ -478,7 +478,7 @@ def test_a_long_tether_is_solved_without_measuring_most_legs_where_that_takes_lo
 
 
 def test_legs_that_an_lp_uses_are_measured_and_no_others(monkeypatch):
-    monkeypatch.setattr(TravelGraph, "legs_at_once", False)
+    bound_legs_first(monkeypatch)
     graph = travel_graph(far_world(0, goals=5, tether_length=500.0))
     costs = CostMatrix(graph)
     bounds = costs.values.copy()
@@ -504,7 +504,7 @@ def test_no_leg_comes_into_an_lp_that_is_only_bounded(monkeypatch):
         return few(self, legs, price)
 
     monkeypatch.setattr(root.Root, "_few_per_vertex", note)
-    monkeypatch.setattr(TravelGraph, "legs_at_once", False)
+    bound_legs_first(monkeypatch)
     assert solve(travel_graph(far_world(0, goals=5, tether_length=500.0))).status is Status.OPTIMAL
     assert seen
     assert all(seen)
@@ -515,7 +515,8 @@ def test_no_leg_comes_into_an_lp_that_is_only_bounded(monkeypatch):
 def test_rounded_costs_prove_the_same(monkeypatch, rounded_from, at_once):
     problem = far_world(0, goals=7, tether_length=450.0)
     plain = solve(travel_graph(problem))
-    monkeypatch.setattr(TravelGraph, "legs_at_once", at_once)
+    if not at_once:
+        bound_legs_first(monkeypatch)
     policy = CostPolicy(
         max_measured_vertices=5, max_double_vertices=rounded_from, block_rows=100, block_legs=70
     )
@@ -537,7 +538,7 @@ def test_what_is_measured_of_rounded_costs_is_as_long_as_it_is(monkeypatch):
     policy = CostPolicy(
         max_measured_vertices=5, max_double_vertices=10, block_rows=50, block_legs=30
     )
-    monkeypatch.setattr(TravelGraph, "legs_at_once", False)
+    bound_legs_first(monkeypatch)
     graph = travel_graph(far_world(0, goals=5, tether_length=400.0))
     costs, rng = CostMatrix(graph, policy=policy), np.random.default_rng(0)
     asked = rng.random(costs.values.shape) < 0.5

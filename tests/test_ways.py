@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp import TravelGraph, travel_graph
+from netsp import travel_graph
 from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.gtsp_policy import CostPolicy, GtspPolicy
 from netsp.gtsp.limits import Limits
@@ -27,7 +27,7 @@ from netsp.mip.reducedcosts import reduced_costs
 from netsp.model.solution import Status
 from netsp.plan.random_worlds import random_world
 from tests.cut_points import some_cut
-from tests.travel_graphs import random_graph
+from tests.travel_graphs import bound_legs_first, random_graph
 from tests.worlds import costs_of
 
 
@@ -132,7 +132,7 @@ def test_once_few_legs_are_left_all_of_them_are_measured(seed, monkeypatch):
         return longer
 
     monkeypatch.setattr(root.Root, "_measure_left", note)
-    monkeypatch.setattr(TravelGraph, "legs_at_once", False)
+    bound_legs_first(monkeypatch)
     found = MipRun(travel_graph(problem), Limits(), policy=policy).solve("highs", None)
     assert after
     assert all(after)

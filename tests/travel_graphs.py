@@ -3,6 +3,8 @@
 import numpy as np
 
 from netsp import TravelGraph
+from netsp.gtsp.cost_oracle import CostOracle
+from netsp.roadmap.taut_legs import TautLegs
 
 
 def random_graph(seed, goals, most=4):
@@ -12,3 +14,8 @@ def random_graph(seed, goals, most=4):
     cluster = np.repeat(np.arange(goals + 1), sizes)
     at = rng.uniform(0, 1, (len(cluster), 3))
     return TravelGraph.from_costs(np.linalg.norm(at[:, None] - at[None, :], axis=2), cluster)
+
+
+def bound_legs_first(monkeypatch):
+    """Make all legs of a taut roadmap seem slow to measure, so that solvers bound them first."""
+    monkeypatch.setattr(TautLegs, "estimate", CostOracle.estimate)

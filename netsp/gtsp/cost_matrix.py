@@ -66,7 +66,7 @@ class CostMatrix:
             self.values = NO_VALUES
             return
         is_rounded = len(graph) > policy.max_double_vertices
-        if graph.measured or len(graph) <= policy.max_measured_vertices:
+        if len(graph) <= policy.max_measured_vertices or not graph.estimate(len(graph)).seconds:
             self.values = np.array(graph.costs)
             return
         check_available(
@@ -75,12 +75,17 @@ class CostMatrix:
             f"bounding every tour over {len(graph)} homotopy classes",
             "lower tether_length or max_classes, or use solver 'lns'",
         )
-        if graph.legs_at_once:
+        if policy.allows_all(graph.oracle.estimate(len(graph)).seconds, len(graph)):
             costs = graph.costs_rounded if is_rounded else graph.costs_among
             self.values = costs(self.vertices)
             return
         self.values = self._rounded_bounds() if is_rounded else graph.lower_bounds()
         self._mark_unmeasured()
+
+    @property
+    def measures_single_legs(self) -> bool:
+        """True if legs are measured one by one as they are needed."""
+        return self.policy.allows_single(self.graph.oracle.estimate(2).seconds)
 
     def _rounded_bounds(self) -> Floats:
         n, block_rows = len(self.vertices), self.policy.block_rows

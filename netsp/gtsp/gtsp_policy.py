@@ -23,6 +23,13 @@ class CostPolicy:
     untimed_vertices
         Number of vertices up to which legs among them are measured even if time is up, such as
         those of a tour whose length is needed.
+    max_s_per_leg
+        CPU time of a leg, s, up to which all legs are measured at once instead of bounded first. A
+        bound takes about as long.
+    max_single_leg_s
+        CPU time of a single leg, s, up to which legs are measured one by one as they are needed.
+    s_per_single_leg, s_per_copied_leg
+        Estimated CPU time of a leg, s: measured by itself, and copied from a matrix.
     tried_legs
         Legs that are measured at a time while the nearest vertex is sought in order of bounds.
     bytes_per_leg
@@ -44,6 +51,10 @@ class CostPolicy:
     max_measured_vertices: int = 400
     max_double_vertices: int = 5000
     untimed_vertices: int = 50
+    max_s_per_leg: float = 5e-7
+    max_single_leg_s: float = 1e-4
+    s_per_single_leg: float = 2e-6
+    s_per_copied_leg: float = 1e-9
     tried_legs: int = 16
     bytes_per_leg: float = 24.0
     bytes_per_rounded_leg: float = 8.0
@@ -58,6 +69,14 @@ class CostPolicy:
         for name in ("tried_legs", "block_rows", "block_legs", "task_rows"):
             if getattr(self, name) < 1:
                 raise InputError(f"{name}: expected 1 or more, got {getattr(self, name)}")
+
+    def allows_all(self, seconds: float, k: int) -> bool:
+        """Return whether all legs among k vertices are measured at once if that takes some time."""
+        return seconds <= self.max_s_per_leg * k * (k - 1) / 2
+
+    def allows_single(self, seconds: float) -> bool:
+        """Return whether legs are measured one by one if each takes some time."""
+        return seconds <= self.max_single_leg_s
 
 
 @dataclass(frozen=True)

@@ -149,7 +149,7 @@ class SolverRun:
         if self.tour is not None or not graph.roadmapped:
             return
         core = least_tethers(graph.costs_to_base, graph.cluster, 1)
-        if graph.quick_legs:
+        if self.cost_policy.allows_single(graph.oracle.estimate(2).seconds):
             self._build_nearest_neighbour_tour(core)
         else:
             self._build_star_tour(core)

@@ -27,10 +27,10 @@ from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError, interrupted
 from netsp.gtsp.cost_matrix import CostMatrix
+from netsp.gtsp.cost_oracle import MatrixCosts
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.searching import SearchingRun
 from netsp.gtsp.solver_run import RunStopped
-from netsp.gtsp.travel.costs import CostTable
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip.cover_bounds import CellBound, Cells
 from netsp.mip.cover_costs import Covers
@@ -164,7 +164,7 @@ class _Level:
         )
         cluster = self.cells.cluster
         graph = TravelGraph(
-            cluster, _words(self.cells), np.zeros(len(cluster)), CostTable(costs, cluster)
+            cluster, _words(self.cells), np.zeros(len(cluster)), MatrixCosts(costs, cluster)
         )
         # tours over cells are none over classes: the incumbent is one over classes
         run = self.run = SearchingRun(graph, limits, policy=policy.gtsp)

@@ -246,8 +246,14 @@ class MipRun(SearchingRun):
 
         if self._uses_sparse_costs:
             return CoverCosts(on_sparse=keep)
-        is_known = self._uses_covers and graph.legs_at_once and graph.complete
+        is_known = self._uses_covers and graph.complete and self._measures_all_legs
         return CoverCosts(matrix=matrix if is_known else None)
+
+    @property
+    def _measures_all_legs(self) -> bool:
+        """True if measuring all legs takes no longer than bounding them."""
+        seconds = self.graph.oracle.estimate(len(self.graph)).seconds
+        return self.gtsp_policy.costs.allows_all(seconds, len(self.graph))
 
     @property
     def _uses_covers(self) -> bool:
@@ -262,7 +268,7 @@ class MipRun(SearchingRun):
         graph = self.graph
         # with many goals, all that covers prove is to hold for classes left out, too
         is_whole = graph.complete or graph.goal_count < self.mip_policy.many_goals
-        is_known = is_whole and graph.legs_in_blocks and graph.knows_ways
+        is_known = is_whole and graph.knows_ways
         return is_known and len(graph) > self.gtsp_policy.costs.max_double_vertices
 
     @property

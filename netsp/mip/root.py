@@ -83,7 +83,7 @@ class Root:
         usable = run.tour is not None and warm and np.isin(warm.vertices, costs.vertices).all()
         warm = warm if usable else None
         legs = self._first_legs() if warm is None else self._warm_legs(warm)
-        if graph.quick_legs:
+        if costs.measures_single_legs:
             costs.measure_legs(legs)
         self.lp = relaxation(costs.cluster, legs, costs.costs_of(legs), policy)
         if warm is not None:
@@ -315,7 +315,7 @@ class Root:
         The legs in the LP have been measured before.
         """
         exact = self.costs.exact
-        if exact is None or not self.costs.graph.quick_legs:
+        if exact is None or not self.costs.measures_single_legs:
             return False
         assert isinstance(self.dead, DeadLegs)
         left = ~(self.dead.matrix() | exact)
@@ -363,7 +363,7 @@ class Root:
             legs, price = prices.most_negative(tolerance)
             missing = ~np.isin(self._keys(legs), self._keys(self.lp.legs))
             legs, price = legs[missing], price[missing]
-            if self.costs.graph.quick_legs and self.costs.measure_legs(legs):
+            if self.costs.measures_single_legs and self.costs.measure_legs(legs):
                 longer, price = True, prices.reduced_costs(legs)
             negative = price < -tolerance
             new = self._few_per_vertex(legs[negative], price[negative])

@@ -22,8 +22,10 @@ import numpy.typing as npt
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock, TimeLimit
 from netsp.base.errors import InputError, NetspError
+from netsp.gtsp.cost_oracle import Estimate
 from netsp.gtsp.travel.costs import rounded_down
 from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.leg_provider import Legs
 from netsp.gtsp.travel.parity_distances import BITS_PER_WORD, WaysByParity
 from netsp.gtsp.travel.result import OnProgress, Progress, Result
 from netsp.hsignature import reduce
@@ -213,14 +215,14 @@ def add_surcharge(table: Floats, rows: Ints, columns: Ints, start: int, surcharg
     return out
 
 
-class _SurchargedLegs:
+class _SurchargedLegs(Legs):
     """Legs with the surcharge."""
 
     def __init__(self, within: TravelGraph, start: int, surcharge: float) -> None:
         self.within, self.start, self.surcharge = within, start, surcharge
 
     @property
-    def left_out(self) -> set[tuple[int, int]]:
+    def left_out(self) -> set[tuple[int, int]]:  # type: ignore[override]
         return set(self.within.legs_left_out)
 
     def bounds_of_left_out(self) -> Floats:
@@ -235,9 +237,9 @@ class _SurchargedLegs:
         with self.within.on_clock(clock or self.within.clock):
             return self._charged(self.within.costs_among(vertices, asked), vertices, vertices)
 
-    @property
-    def at_once(self) -> bool:
-        return self.within.legs_at_once
+    def estimate(self, k: int) -> Estimate:
+        """Return the estimate without the surcharge."""
+        return self.within.oracle.estimate(k)
 
     def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
         with self.within.on_clock(clock or self.within.clock):
@@ -246,10 +248,6 @@ class _SurchargedLegs:
             row = self._charged(out[k : k + 1].astype(np.float64), vertices[k : k + 1], vertices)
             out[k] = out[:, k] = rounded_down(row)[0]
         return out
-
-    @property
-    def in_blocks(self) -> bool:
-        return self.within.legs_in_blocks
 
     def blocks(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None

@@ -22,7 +22,9 @@ from netsp.base.clock import Clock, TimeLimit
 from netsp.base.compiled.kernel import kernel
 from netsp.base.errors import InputError, LimitReachedError, counted, warn_left_out
 from netsp.base.geometry.kernels import Blockers, depth_in_obstacle, segment_blocked
+from netsp.gtsp.cost_oracle import Estimate
 from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.leg_provider import Legs
 from netsp.gtsp.travel.tether_blind_legs import Detours
 from netsp.hsignature import Word
 from netsp.model.problem import Circle, Problem
@@ -37,8 +39,8 @@ from netsp.roadmap.shortest import MilestoneGraph
 from netsp.roadmap.taut_legs import TautLegs
 
 
-class PrmRoadmap:
-    """PRM* and its homotopy-augmented graph. Satisfies `netsp.gtsp.travel.graph.Legs`.
+class PrmRoadmap(Legs):
+    """PRM* and its homotopy-augmented graph, whose shortest paths are legs.
 
     Parameters
     ----------
@@ -267,10 +269,15 @@ class PrmRoadmap:
         along the roadmap is no shorter than the taut leg."""
         return self._taut.lower_bounds(vertices, rows, clock)
 
-    @property
-    def quick(self) -> bool:
-        """Return whether a single leg is measured without a search of the whole graph."""
-        return self.shortcut
+    def estimate(self, k: int) -> Estimate:
+        """Return the estimate for all legs among k vertices: a search of the whole graph from each,
+        or legs pulled taut one by one."""
+        if self.shortcut:
+            return super().estimate(k)
+        prm = self.policy.prm
+        return Estimate(
+            k * (prm.s_per_search + prm.s_per_searched_state * len(self.augmented)), 8.0 * k * k
+        )
 
     @cached_property
     def _before(self) -> Ints:

@@ -193,6 +193,8 @@ class LegPolicy:
     max_parted_classes
         Maximum number of classes for which it is soon known where all their tethers part. Among
         more, a few legs are pulled one by one.
+    s_per_leg
+        Estimated CPU time of a leg, s, where all are measured together.
     min_joint_searches
         From one more than this many tethers that cannot be pulled on, one search finds them all.
     """
@@ -203,6 +205,7 @@ class LegPolicy:
     max_single_legs: int = 20_000
     untimed_vertices: int = CostPolicy.untimed_vertices
     max_parted_classes: int = 1500
+    s_per_leg: float = 8e-8
     min_joint_searches: int = 20
 
     def __post_init__(self) -> None:
@@ -322,11 +325,16 @@ class PrmPolicy:
         Maximum share of the remaining time for sampling.
     max_augmented
         Maximum number of vertices (milestone, word) of the augmented graph.
+    s_per_search, s_per_searched_state
+        Estimated CPU time of a search for shortest paths, s: of any, and for each vertex of the
+        augmented graph.
     """
 
     samples: int = 1000
     max_time_share: float = 0.4
     max_augmented: int = 2_000_000
+    s_per_search: float = 1e-3
+    s_per_searched_state: float = 2e-6
 
     def __post_init__(self) -> None:
         check_positive(self)

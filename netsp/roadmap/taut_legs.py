@@ -14,6 +14,8 @@ from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
 from netsp.base.ram import check_available
 from netsp.base.time_flags import NEVER, Flag
+from netsp.gtsp.cost_oracle import Estimate
+from netsp.gtsp.travel.leg_provider import Legs
 from netsp.hsignature import Word, concatenate, invert
 from netsp.roadmap.branches import OPEN, Branches, Lengths, build_branches, fill, fill_parallel
 from netsp.roadmap.paths import TautPaths, UnknownPathError
@@ -25,8 +27,8 @@ ROUNDED_DOWN = 1.0 - 2.0**-23
 """Format of single precision: a length times this is rounded to no more than the length."""
 
 
-class TautLegs:
-    """Exact legs between given augmented goals. Satisfies `netsp.gtsp.travel.graph.Legs`.
+class TautLegs(Legs):
+    """Exact legs between given augmented goals.
 
     Parameters
     ----------
@@ -52,7 +54,9 @@ class TautLegs:
         self._tree: TetherTree | None = None
         self.left_out: set[tuple[int, int]] = set()
 
-    at_once = True
+    def estimate(self, k: int) -> Estimate:
+        """Return the estimate for all legs among k vertices, found branch by branch."""
+        return Estimate(self.policy.s_per_leg * k * (k - 1) / 2, 8.0 * k * k)
 
     def lengths(
         self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
@@ -327,7 +331,7 @@ class TautLegs:
         out[rows, columns] = out[columns, rows] = self.pairs(us, vs)
         return out
 
-    def pairs(self, us: Ints, vs: Ints) -> Floats:
+    def pairs(self, us: Ints, vs: Ints, clock: Clock | None = None) -> Floats:
         """Return the (k,) 3D lengths of legs between vertices of different goals."""
         planar = self._pull_pairs(us, vs)
         around: dict[int, float] = {}

@@ -73,7 +73,8 @@ def _nearest_by_tether(run: SolverRun, *, retrace: bool) -> str:
     graph = run.graph
     tour = [0]
     left = graph.cluster != 0
-    exact = graph.measured or len(graph) <= run.cost_policy.max_measured_vertices
+    is_small = len(graph) <= run.cost_policy.max_measured_vertices
+    exact = is_small or not graph.estimate(len(graph)).seconds
     every = np.arange(len(graph))
     while left.any():
         run.check()

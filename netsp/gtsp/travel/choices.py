@@ -10,7 +10,9 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock
+from netsp.gtsp.cost_oracle import Estimate
 from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.travel.leg_provider import Legs
 from netsp.gtsp.travel.parity_distances import WaysByParity
 
 
@@ -41,24 +43,23 @@ def with_choices(graph: TravelGraph, clusters: Ints) -> TravelGraph:
     return out
 
 
-class _LegsOfChoices:
+class _LegsOfChoices(Legs):
     """Legs of another travel graph, without those between alternatives."""
 
     def __init__(self, graph: TravelGraph, cluster: Ints) -> None:
         self.graph, self.cluster = graph, cluster
 
     @property
-    def left_out(self) -> set[tuple[int, int]]:
+    def left_out(self) -> set[tuple[int, int]]:  # type: ignore[override]
         """Property of the graph over places."""
         return set(self.graph.legs_left_out)
 
     def bounds_of_left_out(self) -> Floats:
         return self.graph.bounds_of_left_out()
 
-    @property
-    def quick(self) -> bool:
-        """Property of the graph over places."""
-        return self.graph.quick_legs
+    def estimate(self, k: int) -> Estimate:
+        """Return the estimate of the graph over places."""
+        return self.graph.oracle.estimate(k)
 
     def lengths(
         self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
@@ -69,11 +70,6 @@ class _LegsOfChoices:
         out[own[:, None] == own[None, :]] = np.inf
         return out
 
-    @property
-    def at_once(self) -> bool:
-        """Property of the graph over places."""
-        return self.graph.legs_at_once
-
     def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
         with self.graph.on_clock(clock or self.graph.clock):
             out = self.graph.costs_rounded(vertices)
@@ -82,11 +78,6 @@ class _LegsOfChoices:
             alike = np.flatnonzero(own == c)
             out[np.ix_(alike, alike)] = np.inf
         return out
-
-    @property
-    def in_blocks(self) -> bool:
-        """Property of the graph over places."""
-        return self.graph.legs_in_blocks
 
     def blocks(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
@@ -98,7 +89,7 @@ class _LegsOfChoices:
                     costs[np.ix_(own[some] == c, own == c)] = np.inf
                 yield some, costs
 
-    def pairs(self, us: Ints, vs: Ints) -> Floats:
+    def pairs(self, us: Ints, vs: Ints, clock: Clock | None = None) -> Floats:
         return self.graph.costs_of(us, vs)
 
     def to_base(self) -> Floats:

@@ -1,14 +1,12 @@
-"""Given costs: their checks, and the legs of a graph made from them."""
+"""Given costs: their checks and their grain."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from netsp.base.arrays import Bools, Floats, Ints
-from netsp.base.clock import Clock
+from netsp.base.arrays import Floats, Ints
 from netsp.base.errors import InputError
-from netsp.gtsp.gtsp_policy import CostPolicy
 
 
 def rounded_down(values: Floats) -> Floats:
@@ -16,44 +14,6 @@ def rounded_down(values: Floats) -> Floats:
     out = values.astype(np.float32)
     np.nextafter(out, np.float32(-np.inf), out=out, where=out > values)
     return out  # type: ignore[return-value]
-
-
-class CostTable:
-    """Legs given as a matrix."""
-
-    at_once = True
-
-    def __init__(self, costs: Floats, cluster: Ints, policy: CostPolicy = CostPolicy()) -> None:
-        self.costs, self.cluster, self.policy = costs, cluster, policy
-
-    def lengths(
-        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
-    ) -> Floats:
-        """Return costs as `netsp.gtsp.travel.leg_provider.Legs.lengths`."""
-        return self.costs[np.ix_(vertices, vertices)]
-
-    def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
-        """Return costs as `netsp.gtsp.travel.leg_provider.LegsAtOnce.rounded`."""
-        out = np.empty((len(vertices), len(vertices)), dtype=np.float32)
-        block = self.policy.block_rows
-        for k in range(0, len(vertices), block):
-            rows = slice(k, k + block)
-            out[rows] = rounded_down(self.costs[np.ix_(vertices[rows], vertices)])
-        return out  # type: ignore[return-value]
-
-    def to_base(self) -> Floats:
-        """Return the costs (V,) of the legs from the base."""
-        return np.asarray(self.costs[0])
-
-    def lower_bounds(
-        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
-    ) -> Floats:
-        """Return the costs themselves."""
-        return self.lengths(vertices) if rows is None else self.lengths(vertices)[rows]
-
-    def path(self, u: int, v: int) -> Floats:
-        """Raise InputError, because there are no paths."""
-        raise InputError(f"no path from vertex {u} to {v}: this travel graph was made from costs")
 
 
 MAX_WHOLE_COST = 2.0**40

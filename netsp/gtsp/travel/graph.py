@@ -22,11 +22,14 @@ import numpy.typing as npt
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock
+from netsp.base.deprecated import warn_renamed
 from netsp.base.errors import InputError, counted
 from netsp.base.reprs import Drawn
-from netsp.gtsp.travel.costs import CostTable, checked_costs, grain_of, rounded_down
+from netsp.gtsp.cost_oracle import CostOracle, Estimate, MatrixCosts
+from netsp.gtsp.gtsp_policy import CostPolicy
+from netsp.gtsp.travel.costs import checked_costs, grain_of, rounded_down
 from netsp.gtsp.travel.kept import with_bound
-from netsp.gtsp.travel.leg_provider import Legs
+from netsp.gtsp.travel.leg_provider import LegProvider, Legs, as_oracle
 from netsp.gtsp.travel.parity_distances import WaysByParity
 from netsp.gtsp.travel.tether_blind_legs import Detours
 from netsp.hsignature import Word
@@ -70,8 +73,8 @@ class TravelGraph(Drawn):
         The word of the tether at each vertex.
     tethers : array_like, shape (V,)
         Lengths of the taut tethers, in 3D.
-    legs : Legs
-        Lengths and paths of the legs.
+    legs : CostOracle or LegProvider
+        Costs of the legs; a `Legs` or a `LegProvider` also has their paths.
     roadmap : str
         Name of the roadmap it came from.
     detours : callable, optional
@@ -89,6 +92,8 @@ class TravelGraph(Drawn):
 
     Attributes
     ----------
+    oracle : CostOracle
+        Costs of the legs.
     legs_s : float
         Seconds spent measuring legs so far.
     start : int or None
@@ -124,7 +129,7 @@ class TravelGraph(Drawn):
         cluster: npt.ArrayLike,
         signatures: Sequence[Word],
         tethers: npt.ArrayLike,
-        legs: Legs,
+        legs: CostOracle | LegProvider,
         roadmap: str = "custom",
         detours: Callable[[bool, Callable[[], None], Clock | None], Detours] | None = None,
         between: Callable[[Callable[[], bool]], Floats] | None = None,
@@ -145,7 +150,7 @@ class TravelGraph(Drawn):
         self.goal = self.cluster
         self.before: Bools = UNORDERED
         self.clock: Clock | None = None
-        self._legs = legs
+        self.oracle = as_oracle(legs)
         self._costs: Floats | None = None
         self._make_detours, self._between, self._by_parity = detours, between, by_parity
         self._detours: dict[bool, Detours] = {}
@@ -188,7 +193,7 @@ class TravelGraph(Drawn):
         """
         if base is not None and (isinstance(base, bool) or base != 0):
             raise InputError(f"base: expected 0 or None, got {base!r}")
-        table = CostTable(*checked_costs(costs, clusters, base=base is not None))
+        table = MatrixCosts(*checked_costs(costs, clusters, base=base is not None))
         cluster = table.cluster
         kind: type[TravelGraph] = BaselessGraph if base is None else cls
         graph = kind(cluster, [()] * len(cluster), np.zeros(len(cluster)), table)
@@ -263,10 +268,20 @@ class TravelGraph(Drawn):
             self._costs = costs
         return self._costs
 
-    @property
-    def measured(self) -> bool:
-        """True once all legs have been measured."""
-        return self._costs is not None
+    def estimate(self, k: int) -> Estimate:
+        """Return the estimate for the costs of all legs among k vertices.
+
+        Parameters
+        ----------
+        k : int
+            Number of vertices.
+
+        Returns
+        -------
+        Estimate
+            Time and memory; none once all legs have been measured.
+        """
+        return self.oracle.estimate(k) if self._costs is None else Estimate(0.0, 0.0)
 
     def costs_among(self, vertices: npt.ArrayLike, asked: Bools | None = None) -> Floats:
         """Return the costs of legs among some vertices, for solvers that drop the others first.
@@ -312,19 +327,10 @@ class TravelGraph(Drawn):
             The clock was up before they were found.
         """
         chosen = np.asarray(vertices, dtype=np.int64)
-        rounded = getattr(self._legs, "rounded", None)
-        if rounded is None or self._costs is not None:
+        if self._costs is not None:
             return rounded_down(self.costs_among(chosen))
-        begin = time.monotonic()
-        try:
-            return np.asarray(rounded(chosen, self.clock))
-        finally:
-            self.legs_s += time.monotonic() - begin
-
-    @property
-    def legs_in_blocks(self) -> bool:
-        """True if `costs_in_blocks` is available."""
-        return bool(getattr(self._legs, "in_blocks", hasattr(self._legs, "blocks")))
+        with self._timed():
+            return np.asarray(self.oracle.rounded(chosen, self.clock))
 
     def costs_in_blocks(
         self, vertices: npt.ArrayLike | None = None, rows: Ints | None = None
@@ -351,13 +357,10 @@ class TravelGraph(Drawn):
             The clock was up before they were found.
         """
         chosen = np.arange(len(self)) if vertices is None else np.asarray(vertices, dtype=np.int64)
-        blocks = self._legs.blocks(chosen, rows, self.clock)  # type: ignore[attr-defined]
+        blocks = self.oracle.blocks(chosen, rows, self.clock)
         while True:
-            begin = time.monotonic()
-            try:
+            with self._timed():
                 block = next(blocks, None)
-            finally:
-                self.legs_s += time.monotonic() - begin
             if block is None:
                 return
             yield block
@@ -379,18 +382,8 @@ class TravelGraph(Drawn):
         """
         if self._costs is not None:
             return np.asarray(self._costs[us, vs])
-        pairs = getattr(self._legs, "pairs", None)
-        if pairs is not None:
-            begin = time.monotonic()
-            try:
-                return np.asarray(pairs(us, vs))
-            finally:
-                self.legs_s += time.monotonic() - begin
-        chosen, at = np.unique(np.concatenate([us, vs]), return_inverse=True)
-        i, j = at[: len(us)], at[len(us) :]
-        asked = np.zeros((len(chosen), len(chosen)), dtype=bool)
-        asked[i, j] = asked[j, i] = True
-        return np.asarray(self.costs_among(chosen, asked)[i, j])
+        with self._timed():
+            return self.oracle.pairs(us, vs, self.clock)
 
     @contextmanager
     def on_clock(self, clock: Clock | None) -> Iterator[None]:
@@ -413,9 +406,15 @@ class TravelGraph(Drawn):
             self.clock = before
 
     def _measured(self, vertices: Ints, asked: Bools | None = None) -> Floats:
+        with self._timed():
+            return self.oracle.lengths(vertices, asked, self.clock)
+
+    @contextmanager
+    def _timed(self) -> Iterator[None]:
+        """Add the time of the body to `legs_s`."""
         begin = time.monotonic()
         try:
-            return self._legs.lengths(vertices, asked, self.clock)
+            yield
         finally:
             self.legs_s += time.monotonic() - begin
 
@@ -425,7 +424,7 @@ class TravelGraph(Drawn):
 
         Costs given as a matrix promise nothing.
         """
-        return not isinstance(self._legs, CostTable)
+        return not isinstance(self.oracle, MatrixCosts)
 
     @property
     def complete(self) -> bool:
@@ -433,14 +432,28 @@ class TravelGraph(Drawn):
         return self.least_left_out == math.inf
 
     @property
+    def measured(self) -> bool:
+        """Deprecated: True once `estimate` is nothing."""
+        warn_renamed("TravelGraph.measured", "TravelGraph.estimate")
+        return self._costs is not None
+
+    @property
     def quick_legs(self) -> bool:
-        """True if a single leg is measured quickly."""
-        return bool(getattr(self._legs, "quick", True))
+        """Deprecated: True if the estimate of a leg is short by `CostPolicy`."""
+        warn_renamed("TravelGraph.quick_legs", "TravelGraph.oracle.estimate")
+        return CostPolicy().allows_single(self.oracle.estimate(2).seconds)
 
     @property
     def legs_at_once(self) -> bool:
-        """True if all legs together are found about as quickly as bounds on them."""
-        return bool(getattr(self._legs, "at_once", False))
+        """Deprecated: True if the estimate of all legs is short by `CostPolicy`."""
+        warn_renamed("TravelGraph.legs_at_once", "TravelGraph.oracle.estimate")
+        return CostPolicy().allows_all(self.oracle.estimate(len(self)).seconds, len(self))
+
+    @property
+    def legs_in_blocks(self) -> bool:
+        """Deprecated: True, because `costs_in_blocks` is available everywhere."""
+        warn_renamed("TravelGraph.legs_in_blocks", "TravelGraph.costs_in_blocks")
+        return True
 
     @property
     def geometric(self) -> bool:
@@ -564,7 +577,7 @@ class TravelGraph(Drawn):
     @property
     def costs_to_base(self) -> Floats:
         """(V,) costs of the legs from the base, without measuring any other; inf at the base."""
-        out = self._legs.to_base().copy()
+        out = self.oracle.to_base().copy()
         out[0] = np.inf
         return out
 
@@ -615,7 +628,7 @@ class TravelGraph(Drawn):
         """
         chosen = np.arange(len(self)) if vertices is None else np.asarray(vertices, dtype=np.int64)
         some = None if rows is None else np.asarray(rows, dtype=np.int64)
-        bounds = self._legs.lower_bounds(chosen, some, self.clock)
+        bounds = self.oracle.lower_bounds(chosen, some, self.clock)
         cluster = self.cluster[chosen]
         own = cluster if some is None else cluster[some]
         bounds[own[:, None] == cluster[None, :]] = np.inf
@@ -751,7 +764,11 @@ class TravelGraph(Drawn):
         ndarray, shape (n, 3)
             Polyline.
         """
-        return self._legs.path(u, v)
+        if not isinstance(self.oracle, Legs):
+            raise InputError(
+                f"no path from vertex {u} to {v}: this travel graph was made from costs"
+            )
+        return self.oracle.path(u, v)
 
     @property
     def scope(self) -> Scope:
@@ -837,7 +854,7 @@ class TravelGraph(Drawn):
     def legs_left_out(self) -> list[tuple[int, int]]:
         """Legs whose taut path was not found, as pairs of vertices. Their cost is the length of the
         path back to the base and out again."""
-        return sorted(getattr(self._legs, "left_out", ()))
+        return sorted(self.oracle.left_out) if isinstance(self.oracle, Legs) else []
 
     def bounds_of_left_out(self) -> Floats:
         """Return lower bounds for the legs left out.
@@ -847,8 +864,9 @@ class TravelGraph(Drawn):
         ndarray, shape (k, 3)
             Bounds on the tether at one end, the leg, and the tether at the other end.
         """
-        bounds = getattr(self._legs, "bounds_of_left_out", None)
-        return np.zeros((0, 3)) if bounds is None else np.asarray(bounds())
+        if not isinstance(self.oracle, Legs):
+            return np.zeros((0, 3))
+        return self.oracle.bounds_of_left_out()
 
     def least_along_left_out(self) -> float:
         """Return a lower bound on tours along a leg left out, which come from the base and go home.
@@ -901,14 +919,14 @@ def least_tethers(tethers: Floats, cluster: Ints, classes: int) -> Ints:
     return np.asarray(np.sort(order[rank < classes]), dtype=np.int64)
 
 
-class _PartOfLegs:
+class _PartOfLegs(Legs):
     """The legs of another travel graph, among some of its vertices."""
 
     def __init__(self, graph: TravelGraph, chosen: Ints) -> None:
         self.graph, self.chosen = graph, chosen
 
     @property
-    def left_out(self) -> set[tuple[int, int]]:
+    def left_out(self) -> set[tuple[int, int]]:  # type: ignore[override]
         place = {int(v): k for k, v in enumerate(self.chosen)}
         return {
             (place[u], place[v]) for u, v in self.graph.legs_left_out if u in place and v in place
@@ -923,17 +941,13 @@ class _PartOfLegs:
         with self.graph.on_clock(clock or self.graph.clock):
             return self.graph.costs_among(self.chosen[vertices], asked)
 
-    @property
-    def at_once(self) -> bool:
-        return self.graph.legs_at_once
+    def estimate(self, k: int) -> Estimate:
+        """Return the estimate of the whole graph, or that for legs one by one if it is shorter."""
+        return min(self.graph.oracle.estimate(k), super().estimate(k))
 
     def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
         with self.graph.on_clock(clock or self.graph.clock):
             return self.graph.costs_rounded(self.chosen[vertices])
-
-    @property
-    def in_blocks(self) -> bool:
-        return self.graph.legs_in_blocks
 
     def blocks(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
@@ -941,7 +955,7 @@ class _PartOfLegs:
         with self.graph.on_clock(clock or self.graph.clock):
             yield from self.graph.costs_in_blocks(self.chosen[vertices], rows)
 
-    def pairs(self, us: Ints, vs: Ints) -> Floats:
+    def pairs(self, us: Ints, vs: Ints, clock: Clock | None = None) -> Floats:
         return self.graph.costs_of(self.chosen[us], self.chosen[vs])
 
     def to_base(self) -> Floats:
@@ -1022,7 +1036,7 @@ class BaselessGraph(TravelGraph):
         cluster = self.cluster[vertices]
         cluster = np.where(cluster == own, 0, cluster + (cluster < own))
         costs = self.costs[np.ix_(vertices, vertices)]
-        table = CostTable(costs, cluster)
+        table = MatrixCosts(costs, cluster)
         graph = TravelGraph(cluster, [()] * len(cluster), np.zeros(len(cluster)), table)
         graph.grain, graph.declared_scope = self.grain, Scope.PART
         return graph, vertices

@@ -1,55 +1,108 @@
-"""Protocols of the legs of a travel graph: their lengths, bounds and paths."""
+"""Legs of a travel graph: their costs, and their paths in space."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from abc import abstractmethod
+from collections.abc import Collection
 from typing import Protocol
+
+import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock
+from netsp.gtsp.cost_oracle import CostOracle, Estimate
 
 
-class Legs(Protocol):
-    """Legs between vertices."""
+class Legs(CostOracle):
+    """Legs between augmented goals: costs of a travel graph that are lengths of paths.
+
+    Attributes
+    ----------
+    left_out
+        Legs (u, v), u < v, whose taut path was not found. Their cost is the length of the path back
+        to the base and out again.
+    """
+
+    left_out: Collection[tuple[int, int]] = ()
+
+    @abstractmethod
+    def path(self, u: int, v: int) -> Floats:
+        """Return the leg from vertex u to vertex v as a polyline (n, 3)."""
+
+    def bounds_of_left_out(self) -> Floats:
+        """Return lower bounds (k, 3) for each leg left out: on the tether at one end, the leg, and
+        the tether at the other end."""
+        return np.zeros((0, 3))
+
+
+class LegProvider(Protocol):
+    """Minimum that a roadmap of another package gives for the legs of its travel graph.
+
+    It may have more of the methods of `Legs`, such as `estimate`.
+    """
 
     def lengths(
         self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
-        """Return symmetric lengths (k, k) among vertices; inf within a cluster, and anything where
-        `asked` (k, k, symmetric) is false.
-
-        Raises LimitReachedError if the clock is up before many are measured.
-        """
+        """Return what `CostOracle.lengths` does."""
 
     def to_base(self) -> Floats:
-        """Return the lengths (V,) of the legs from the base."""
+        """Return what `CostOracle.to_base` does."""
 
     def lower_bounds(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
     ) -> Floats:
-        """Return lower bounds (k, k), much cheaper than lengths; with `rows`, only those from some
-        vertices (positions among them)."""
+        """Return what `CostOracle.lower_bounds` does."""
 
     def path(self, u: int, v: int) -> Floats:
-        """Return the leg from vertex u to vertex v as a polyline (n, 3)."""
+        """Return what `Legs.path` does."""
 
 
-class LegsAtOnce(Legs, Protocol):
-    """Legs that are found quickly all together, if `at_once`."""
+class AdaptedLegs(Legs):
+    """Legs of a provider that does not derive from `Legs`."""
 
-    at_once: bool
+    def __init__(self, provider: LegProvider) -> None:
+        self.provider = provider
+        for name in ("estimate", "rounded", "blocks", "left_out", "bounds_of_left_out"):
+            if hasattr(provider, name):
+                setattr(self, name, getattr(provider, name))
 
-    def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
-        """Return `lengths` in single precision, rounded down."""
+    def estimate(self, k: int) -> Estimate:
+        """Return an estimate by the flags `at_once` and `quick` that providers had before."""
+        policy = self.cost_policy
+        leg_s = policy.s_per_single_leg
+        if getattr(self.provider, "at_once", False):
+            leg_s = policy.max_s_per_leg
+        elif not getattr(self.provider, "quick", True):
+            leg_s = 2.0 * policy.max_single_leg_s
+        return Estimate(leg_s * k * (k - 1) / 2, 8.0 * k * k)
 
+    def lengths(
+        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+    ) -> Floats:
+        """Return the lengths of the provider."""
+        return self.provider.lengths(vertices, asked, clock)
 
-class LegsInBlocks(LegsAtOnce, Protocol):
-    """Legs that are found block by block about as quickly as all together."""
+    def pairs(self, us: Ints, vs: Ints, clock: Clock | None = None) -> Floats:
+        """Return the lengths of single legs."""
+        pairs = getattr(self.provider, "pairs", None)
+        return super().pairs(us, vs, clock) if pairs is None else np.asarray(pairs(us, vs))
 
-    def blocks(
+    def to_base(self) -> Floats:
+        """Return the lengths of the legs from the base."""
+        return self.provider.to_base()
+
+    def lower_bounds(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
-    ) -> Iterator[tuple[Ints, Floats]]:
-        """Yield blocks of `rounded`: positions (r,) of some vertices, and their legs (r, k).
+    ) -> Floats:
+        """Return the bounds of the provider."""
+        return self.provider.lower_bounds(vertices, rows, clock)
 
-        A block is valid until the next. With `rows`, only those rows are yielded.
-        """
+    def path(self, u: int, v: int) -> Floats:
+        """Return the path of the provider."""
+        return self.provider.path(u, v)
+
+
+def as_oracle(legs: CostOracle | LegProvider) -> CostOracle:
+    """Return legs as a cost oracle."""
+    return legs if isinstance(legs, CostOracle) else AdaptedLegs(legs)
