@@ -23,7 +23,7 @@ from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.parity_distances import WaysByParity
 from netsp.mip import root
 from netsp.mip.cover_costs import ClassCovers, PathCovers
-from netsp.mip.covers import refine_covers
+from netsp.mip.covers import cover_steps, refine_covers
 from netsp.mip.cuts import Cut, cut_coefficients
 from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.goal_relaxation import CoverCosts, bound_over_goals
@@ -225,11 +225,11 @@ def test_covers_in_between_prove_the_same(seed, most, monkeypatch):
     problem = random_world(seed, goals=14, tether_length=320.0)
     whole, seen = solve(travel_graph(problem)), []
 
-    def on_cover_bound(*args, **more):
-        seen.append(refine_covers(*args, **more))
+    def noted_steps(*args, **more):
+        seen.append((yield from cover_steps(*args, **more)))
         return seen[-1]
 
-    monkeypatch.setattr("netsp.mip.goal_relaxation.refine_covers", on_cover_bound)
+    monkeypatch.setattr("netsp.mip.goal_relaxation.cover_steps", noted_steps)
     covers = CoverPolicy(min_classes=50, max_cells=most)
     policy = MipPolicy(many_goals=5, covers=covers, gtsp=FEW_MEASURED)
     fewer = solve(travel_graph(problem), Params(policy=policy))

@@ -23,6 +23,7 @@ from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.gtsp_policy import GtspPolicy
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.neighbourhood import classes_near_tour
+from netsp.gtsp.resumable import Steps, run_to_end
 from netsp.gtsp.search.layers import Instance
 from netsp.gtsp.search.local_search import Search
 from netsp.gtsp.solver_run import BOUND_ROUNDING, RunStopped, SolverRun
@@ -301,10 +302,17 @@ class SearchingRun(SolverRun):
                 break
 
     def _search(self, instance: Instance, clock: Clock, *, rounded: bool = False) -> None:
+        run_to_end(self.search_steps(instance, clock, rounded=rounded))
+
+    def search_steps(
+        self, instance: Instance, clock: Clock, *, rounded: bool = False
+    ) -> Steps[None]:
+        """Search an instance from the incumbent, with a step for each chunk of rounds."""
         start = None if self.tour is None else self.graph.cluster[list(self.tour)]
         search = Search(instance, self.rng, start, clock)
         search.settle()
-        search.run(self.search_rounds, clock)
+        for _ in search.chunks(self.search_rounds, clock):
+            yield
         self.offer_incumbent_from(search, rounded=rounded)
         length, tour = search.best()
         if np.isfinite(length) and tour not in self.local_optima:

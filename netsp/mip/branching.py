@@ -23,6 +23,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
+from netsp.gtsp.resumable import Steps, run_to_end
 from netsp.gtsp.solver_run import RunStopped
 from netsp.mip.blossoms import cluster_flows
 from netsp.mip.cuts import Cut
@@ -100,6 +101,10 @@ class Tree:
 
     def solve(self) -> None:
         """Process nodes until none is left that could hold a shorter tour."""
+        run_to_end(self.steps())
+
+    def steps(self) -> Steps[None]:
+        """Do what `solve` does, with a step for each node."""
         run = self.run
         whole = np.ones(len(self.legs), dtype=bool)
         node: Node | None = Node(run.bound or 0.0, next(self._rank), whole, ())
@@ -115,6 +120,7 @@ class Tree:
             if node.bound >= run.cutoff:
                 settled, node = min(settled, node.bound), None
                 continue
+            yield
             bound, choice = self._process(node)
             processed, node = node, None
             if choice is None:

@@ -29,6 +29,7 @@ from netsp.base.errors import LimitReachedError, interrupted
 from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.cost_oracle import MatrixCosts
 from netsp.gtsp.limits import Limits
+from netsp.gtsp.resumable import Steps, run_to_end
 from netsp.gtsp.searching import SearchingRun
 from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.travel.graph import TravelGraph
@@ -75,10 +76,23 @@ def refine_covers(
     refine_costs
         Called after `CoverPolicy.coarse_covers` covers.
     """
+    return run_to_end(cover_steps(covers, tour, length, limits, on_cover, refine_costs, policy))
+
+
+def cover_steps(
+    covers: Covers,
+    tour: ParityTour,
+    length: float,
+    limits: Limits,
+    on_cover: OnCover = lambda *_: None,
+    refine_costs: RefineCosts | None = None,
+    policy: MipPolicy = MipPolicy(),
+) -> Steps[CellBound | None]:
+    """Do what `refine_covers` does, with a step for each LP."""
     clock = Clock.from_limit(limits.time)
     series = _Series(covers, Limits(clock, rng=limits.rng), on_cover, refine_costs, policy)
     try:
-        series.run(tour, length, clock)
+        yield from series.steps(tour, length, clock)
     except (RunStopped, LimitReachedError):
         pass
     except (KeyboardInterrupt, SystemError) as error:
@@ -103,7 +117,7 @@ class _Series:
         self.on_cover, self.refine_costs = on_cover, refine_costs
         self.found: CellBound | None = None
 
-    def run(self, tour: ParityTour, length: float, clock: Clock) -> None:
+    def steps(self, tour: ParityTour, length: float, clock: Clock) -> Steps[None]:
         """Solve cover after cover, until the tour is proven or no cover is left."""
         refinement = CoverRefinement(self.covers, self.policy.covers)
         obstacles: list[int] = []
@@ -112,7 +126,7 @@ class _Series:
             cells = self.covers.cells(tuple(obstacles))
             costs = self.covers.costs(cells)
             level = _Level(cells, costs, tour, length, self.limits, level, self.policy)
-            proven = level.solve()
+            proven = yield from level.steps()
             if proven is not None:
                 self.found = proven
                 better = self.on_cover(proven.bound, proven.cells, level.visited_cells())
@@ -182,10 +196,10 @@ class _Level:
             self.root.lp = HighsRelaxation(cluster, all_legs, leg_costs, policy)
             self.root.lp.add_cuts([replace(c, inside=c.inside[cell_below]) for c in cuts])
 
-    def solve(self) -> CellBound | None:
+    def steps(self) -> Steps[CellBound | None]:
         """Solve until there is nothing to add or progress stalls, and return the bound."""
         try:
-            self.root.solve()
+            yield from self.root.steps()
         except RunStopped:
             self.is_over = True
         self.is_over |= self.run.is_done

@@ -20,13 +20,14 @@ import numpy as np
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock
 from netsp.gtsp.limits import Limits
+from netsp.gtsp.resumable import Steps, run_to_end
 from netsp.gtsp.sparse_costs import SparseCosts
 from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.gtsp.travel.result import Result
 from netsp.mip.cost_fixing import PATH_ROUNDING, surviving_legs
 from netsp.mip.cover_bounds import CellBound, Cells, GoalBound
 from netsp.mip.cover_costs import ClassCovers, Covers, PathCovers
-from netsp.mip.covers import ParityTour, refine_covers
+from netsp.mip.covers import ParityTour, cover_steps
 from netsp.mip.cuts import Cut
 from netsp.mip.mip_policy import GoalBoundPolicy, MipPolicy
 from netsp.mip.parity_cuts import odd_letters
@@ -81,6 +82,19 @@ def bound_over_goals(
     tour
         Best tour known; without one, covers are skipped.
     """
+    return run_to_end(goal_bound_steps(graph, prove, limits, tour, costs, on_bound, policy))
+
+
+def goal_bound_steps(
+    graph: TravelGraph,
+    prove: Prove,
+    limits: Limits,
+    tour: Sequence[int] | None = None,
+    costs: CoverCosts = CoverCosts(),
+    on_bound: OnBound = lambda *_: None,
+    policy: MipPolicy = MipPolicy(),
+) -> Steps[GoalBound]:
+    """Do what `bound_over_goals` does, with a step for each LP of a cover."""
     clock = Clock.from_limit(limits.time)
     least = graph.between_goals(lambda: clock.is_up)
     bound = one_tree_bound(least, lambda: clock.is_up, policy.goals)
@@ -88,7 +102,8 @@ def bound_over_goals(
     cells: CellBound | None = None
     _raise_bound_in_any_class(graph, bound * (1.0 - PATH_ROUNDING))
     if tour is not None and len(graph) > policy.covers.min_classes:
-        cells = _CoverRun(graph, tour, replace(limits, time=clock), costs, on_bound, policy).bound()
+        run = _CoverRun(graph, tour, replace(limits, time=clock), costs, on_bound, policy)
+        cells = yield from run.steps()
     if cells is None or graph.goal_count < policy.goals.max_proven_goals:
         over = TravelGraph.from_costs(least, range(graph.goal_count + 1))
         programs = policy.goals.max_programs
@@ -143,20 +158,22 @@ class _CoverRun:
         self.clock = Clock.from_limit(limits.time)
         self.odd: Bools = np.zeros((0, 0), dtype=bool)
 
-    def bound(self) -> CellBound | None:
+    def steps(self) -> Steps[CellBound | None]:
         """Return the bound; None if the paths between goals are not known."""
         matrix = None if self.costs.matrix is None else self.costs.matrix()
         covers = self._first_covers(matrix)
         if covers is None:
             return None
-        return refine_covers(
-            covers,
-            self._parity_tour(),
-            self.graph.tour_length(self.tour),
-            replace(self.limits, time=self.clock),
-            self._on_cover,
-            None if self.costs.on_sparse is None else self._refine_costs,
-            self.policy,
+        return (
+            yield from cover_steps(
+                covers,
+                self._parity_tour(),
+                self.graph.tour_length(self.tour),
+                replace(self.limits, time=self.clock),
+                self._on_cover,
+                None if self.costs.on_sparse is None else self._refine_costs,
+                self.policy,
+            )
         )
 
     def _first_covers(self, matrix: Floats | None) -> Covers | None:

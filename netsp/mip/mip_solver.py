@@ -19,6 +19,7 @@ from netsp.base.clock import Clock
 from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.dp.dp_solver import bound_by_walks
 from netsp.gtsp.limits import Limits
+from netsp.gtsp.resumable import Steps, run_to_end
 from netsp.gtsp.search import Search
 from netsp.gtsp.searching import SearchingRun
 from netsp.gtsp.solver_run import RunStopped
@@ -309,6 +310,10 @@ class MipRun(SearchingRun):
 
     def cut(self, costs: CostMatrix, backend: str, warm: WarmStart | None) -> None:
         """Solve the root, search again, and branch and cut."""
+        run_to_end(self.cut_steps(costs, backend, warm))
+
+    def cut_steps(self, costs: CostMatrix, backend: str, warm: WarmStart | None) -> Steps[None]:
+        """Do what `cut` does, with a step for each LP of the root and each node of the tree."""
         policy = self.mip_policy
         self._gap_searched = self.length
         if warm is not None:
@@ -317,19 +322,19 @@ class MipRun(SearchingRun):
         self.root = root = Root(
             self, costs, _load(BACKENDS[backend]), self.round_point, warm, self._goal_bound, policy
         )
-        root.solve()
+        yield from root.steps()
         if not self.is_done and root.point is not None:
             before, used = self.length, np.flatnonzero(root.point.x > INTEGRALITY_TOLERANCE)
             self.search(costs, used)
             self.report("heuristic", **root.size())
             if costs.exact is None and self.length < before:
-                root.solve()
+                yield from root.steps()
         if not self.is_done and costs.exact is not None:
             self.check()
             root.measure()
             self.search(costs)
             self.report("measured", **root.size())
-            root.solve()
+            yield from root.steps()
         for _ in range(policy.max_searches):
             if self.is_done or root.size()["legs"] <= policy.max_branching_legs:
                 break
@@ -337,12 +342,12 @@ class MipRun(SearchingRun):
             self.search(costs)
             self.report("heuristic", **root.size())
             if self.length < before:
-                root.solve()
+                yield from root.steps()
         legs = root.size()["legs"]
         if self.is_done or legs > policy.max_branching_legs or self._core_is_for_warm_start:
             return
         if backend not in LAZY:
-            Tree(root).solve()
+            yield from Tree(root).steps()
         elif legs <= self.clock.left / policy.min_integer_s_per_leg:
             self.solve_integer(root, _load(LAZY[backend]))
 

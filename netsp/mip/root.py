@@ -14,6 +14,7 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.gtsp.cost_matrix import CostMatrix
+from netsp.gtsp.resumable import Steps
 from netsp.gtsp.searching import SearchingRun
 from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.sparse_costs import SparseCosts
@@ -100,11 +101,15 @@ class Root:
             return np.zeros(0, dtype=np.int64)
         return np.searchsorted(self.costs.vertices, np.array(self.run.tour))
 
-    def solve(self) -> None:
-        """Solve, price, fix out and separate until there is nothing to add or progress stalls."""
+    def steps(self) -> Steps[None]:
+        """Solve, price, fix out and separate until there is nothing to add or progress stalls.
+
+        Each LP is a step.
+        """
         run, policy, is_settling = self.run, self.policy.schedule, False
         schedule = PricingSchedule(policy)
         while not run.is_done:
+            yield
             point = self._solve_lp()
             if not (is_settling or schedule.is_due):
                 schedule.rounds += 1

@@ -22,6 +22,7 @@ from netsp.gtsp.dp.handover import Handover
 from netsp.gtsp.dp.walks import Walks
 from netsp.gtsp.gtsp_policy import GtspPolicy, WalkPolicy
 from netsp.gtsp.limits import Limits
+from netsp.gtsp.resumable import Steps, run_to_end
 from netsp.gtsp.searching import SearchingRun
 from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
@@ -95,6 +96,13 @@ def bound_by_walks(
     It ends with a proof, when progress stalls, or when few legs remain that are all measured; then
     the caller goes on with the proof over those.
     """
+    run_to_end(walk_steps(run, costs, handover))
+
+
+def walk_steps(
+    run: SearchingRun, costs: CostMatrix, handover: Handover = NO_HANDOVER
+) -> Steps[None]:
+    """Do what `bound_by_walks` does, with a step for each pass over all layers."""
     policy = run.gtsp_policy.walks
     before = run.graph.before
     walks = Walks(costs.cluster, costs.values, run.clock.flag, before, policy)
@@ -104,6 +112,7 @@ def bound_by_walks(
     history: list[tuple[float, int]] = []
     searched = run.searches_all_vertices(costs)
     while not run.is_done:
+        yield
         run.check()
         cutoff = run.cutoff
         walk = walks.solve(prices, cutoff, run.check)

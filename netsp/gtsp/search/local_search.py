@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -138,6 +138,14 @@ class Search:
         on_chunk : callable, optional
             Called after every chunk with the number of its rounds.
         """
+        for count in self.chunks(rounds, clock, progress):
+            if on_chunk:
+                on_chunk(count)
+
+    def chunks(
+        self, rounds: float, clock: Clock, progress: Callable[[], float] | None = None
+    ) -> Iterator[int]:
+        """Do what `run` does, and yield the number of rounds after every chunk."""
         policy = self.instance.policy
         n = len(self.order)
         self._link()
@@ -168,8 +176,7 @@ class Search:
             was_short = clock.elapsed - begin < policy.min_chunk_s
             if was_short and chunk < max(1, rounds / policy.temperature_steps):
                 chunk *= 2
-            if on_chunk:
-                on_chunk(count)
+            yield count
 
     def best(self) -> tuple[float, tuple[int, ...]]:
         """Return the best tour so far.

@@ -1,0 +1,37 @@
+"""Work that can be paused: a generator that yields wherever something else may run first.
+
+Proofs and searches of this package are written as such generators. A solver that does one thing
+after another runs them to the end (`run_to_end`); a scheduler gives each a slice of the time
+(`netsp.plan.scheduler`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import TypeVar
+
+T = TypeVar("T")
+
+Steps = Generator[None, None, T]
+"""Steps of some work, with its result at the end. It may be resumed after each, in any state of
+what it shares with other work, such as an incumbent that has become shorter."""
+
+
+def run_to_end(steps: Steps[T]) -> T:
+    """Return the result of some work after all its steps.
+
+    Examples
+    --------
+    >>> def count_to(n):
+    ...     for _ in range(n):
+    ...         yield
+    ...     return n
+    >>> run_to_end(count_to(3))
+    3
+    """
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            result: T = end.value
+            return result
