@@ -41,7 +41,8 @@ from netsp.world.simulator.mission_run import simulate
 
 testclient = pytest.importorskip("starlette.testclient")
 
-from netsp.app.server import Session, application  # noqa: E402
+from netsp.app.page_session import Session  # noqa: E402
+from netsp.app.server import application  # noqa: E402
 
 ROOT = Path(__file__).parent.parent
 JS = ROOT / "tests" / "js"

@@ -91,7 +91,8 @@ def run(args: argparse.Namespace) -> int:
         import uvicorn
     except ImportError:
         raise InputError("the map needs uvicorn: pip install 'netsp[app]'") from None
-    from netsp.app.server import MAX_MESSAGE_BYTES, Session, application
+    from netsp.app.page_session import Session
+    from netsp.app.server import MAX_MESSAGE_BYTES, application
     from netsp.app.state import Document
 
     looked_at, notes = None, list[str]()
