@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from netsp import Circle, InputError, Problem, Solution, solve, verify
 from netsp.base.errors import brief
-from netsp.base.files import cell, read_gzip, write_text
+from netsp.base.files import csv_cell, read_gzip, write_text
 from netsp.command.main import main
 from netsp.exchange.maps.read_map import read_site
 from netsp.exchange.missions import Projection, export
@@ -246,7 +246,7 @@ def test_messages_cut_what_they_quote():
 
 
 def test_cells_of_a_table_are_no_formulas():
-    assert [cell(t) for t in ("=1+1", "@x", "+a", "-b", "\tq", "pile 3", "-2 3 1", None)] == [
+    assert [csv_cell(t) for t in ("=1+1", "@x", "+a", "-b", "\tq", "pile 3", "-2 3 1", None)] == [
         "'=1+1", "'@x", "'+a", "'-b", "'\tq", "pile 3", "-2 3 1", "",
     ]  # fmt: skip
 

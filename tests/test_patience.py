@@ -28,19 +28,19 @@ def at_once(monkeypatch):
 def test_what_is_quickly_done_says_nothing():
     out = io.StringIO()
     with Patience(out, "counting"):
-        list(progress.each(range(10)))
+        list(progress.track(range(10)))
     assert out.getvalue() == ""
 
 
 def test_the_time_left_is_that_of_the_steps_left(at_once):
     out = io.StringIO()
     with Patience(out, "counting") as told:
-        for k in progress.each(range(4)):
+        for k in progress.track(range(4)):
             if k == 3:
                 time.sleep(0.1)
                 told._since = time.monotonic() - 60.0
                 assert told.line == "counting: 3 of 4, about 0:20 left"
-        for _ in progress.each(range(100)):  # other steps: their pace is their own
+        for _ in progress.track(range(100)):  # other steps: their pace is their own
             assert "about 1:" not in told.line
     assert "counting: " in out.getvalue()
     assert "3 of 4" in out.getvalue()

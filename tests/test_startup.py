@@ -156,9 +156,9 @@ def test_compiled_code_is_looked_for_where_numba_keeps_it(tmp_path, monkeypatch)
         if place is not None:
             (places[place] / "labels.extend-12.py311.nbi").touch()
         monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-        assert kept_code.may_be_kept.__wrapped__() == (place in ("package", "user"))
+        assert kept_code.may_be_on_disk.__wrapped__() == (place in ("package", "user"))
         monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "chosen"))
-        assert kept_code.may_be_kept.__wrapped__() == (place == "chosen")
+        assert kept_code.may_be_on_disk.__wrapped__() == (place == "chosen")
         if place is not None:
             (places[place] / "labels.extend-12.py311.nbi").unlink()
 

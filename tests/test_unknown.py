@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError
-from netsp.base.errors import interrupted
+from netsp.base.errors import is_interrupt
 from netsp.command.main import main
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
@@ -186,11 +186,11 @@ def test_a_scene_may_become_empty_and_is_drawn(tmp_path):
 
 def test_an_interrupt_that_python_calls_a_system_error_is_one():
     error = SystemError("returned a result with an exception set")
-    assert not interrupted(error)
+    assert not is_interrupt(error)
     error.__cause__ = KeyboardInterrupt()
-    assert interrupted(error)
-    assert interrupted(KeyboardInterrupt())
-    assert not interrupted(ValueError())
+    assert is_interrupt(error)
+    assert is_interrupt(KeyboardInterrupt())
+    assert not is_interrupt(ValueError())
 
     def stop(row, planner):
         if row.time > 3.0:

@@ -1,4 +1,4 @@
-"""Array types by what they hold, for annotations; shapes are in the docstrings."""
+"""Array types for annotations, named by their contents; docstrings state the shapes."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ Floats = npt.NDArray[np.float64]
 """Lengths, coordinates, costs."""
 
 Singles = npt.NDArray[np.float32]
-"""Numbers that are stored by the million, such as distances at grid points."""
+"""Numbers in single precision, for arrays of millions, such as distances at grid points."""
 
 Ints = npt.NDArray[np.int64]
 """Indices, letters, counts."""
 
 Bools = npt.NDArray[np.bool_]
-"""Marks, one per row."""
+"""Masks."""
 
 
 class ComparesArrays:
-    """Base of dataclasses with arrays among their fields, which are equal if all fields are.
+    """Base of dataclasses that have arrays as fields, and are equal if all their fields are.
 
-    A dataclass compares its fields in one tuple, which raises for arrays of more than one element.
-    Derived classes are declared with ``@dataclass(eq=False)``. Arrays are equal if shapes and all
-    elements are; NaN equals NaN.
+    The `__eq__` of a dataclass compares tuples of fields, which raises ValueError for arrays, so
+    derived classes are declared with ``@dataclass(eq=False)``. Arrays are equal if their shapes,
+    dtypes and elements are; NaN equals NaN.
     """
 
     def __eq__(self, other: object) -> bool:

@@ -1,4 +1,4 @@
-"""Old names that keep working, with a DeprecationWarning, for one release."""
+"""Old names that work for one more release, with a DeprecationWarning."""
 
 from __future__ import annotations
 

@@ -6,8 +6,10 @@ import re
 import warnings
 from collections.abc import Sequence
 
+from netsp.base.deprecated import deprecated_names
+
 EXIT_DEFECT = 1
-"""Code of a defect of netsp; whatever moved is safely home."""
+"""Code of a defect of netsp. A vehicle that was under way has been brought home."""
 
 EXIT_BAD_INPUT = 2
 """Code of input that cannot be used."""
@@ -26,17 +28,14 @@ EXIT_INTERRUPTED = 130
 
 
 def brief(message: str, max_quote: int = 80) -> str:
-    """Return a message in one line, with long quotes, lists and words cut, and other characters
-    escaped.
+    """Return a message in one line: long quotes, lists and words are cut, and characters that
+    cannot be printed are escaped.
 
     Parameters
     ----------
-    message : str
-        Message.
     max_quote : int
-        Maximum length of a quoted value; half of that of a list or word.
+        Maximum length of a quoted value, characters; lists and words may be twice as long.
     """
-
     quoted = re.compile(rf"(['\"])((?:(?!\1).){{{max_quote + 1},}}?)\1", re.DOTALL)
     text = quoted.sub(lambda m: f"{m[1]}{m[2][: max_quote - 1]}…{m[1]}", message)
     long_list = re.compile(rf"\[[^\[\]]{{{2 * max_quote},}}\]")
@@ -50,13 +49,12 @@ def brief(message: str, max_quote: int = 80) -> str:
 
 
 def counted(number: int, noun: str) -> str:
-    """Return a number with its singular noun, which gets an s unless the number is 1: ``8
-    goals``."""
+    """Return a number and a noun, with an s unless the number is 1: ``8 goals``."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 class NetspError(Exception):
-    """Base of all netsp errors that a user can act on; `exit_code` is that of the command line."""
+    """Base of all errors that a user can act on; the command line ends with its `exit_code`."""
 
     exit_code = EXIT_DEFECT
 
@@ -116,10 +114,10 @@ class InfeasibleError(NetspError):
     goal : int, optional
         Index of the first goal that cannot be visited.
     needed : float, optional
-        Length of the shortest tether that reaches it, in the problem's units; infinite where it is
-        cut off; None where the length is not the reason.
+        Length of the shortest tether that reaches it, in the problem's units; infinite if the
+        goal is cut off; None if the length is not the reason.
     enclosing : sequence of int
-        Obstacles that cut it off, or the base.
+        Indices of the obstacles that cut off the goal or the base.
     """
 
     exit_code = EXIT_INFEASIBLE
@@ -137,18 +135,19 @@ class InfeasibleError(NetspError):
 
 
 class LimitReachedError(NetspError):
-    """Time limit that was reached before there was any solution; the message says during which
-    work."""
+    """Error of a time limit that passed before there was any solution; the message names the work
+    that it cut short."""
 
     exit_code = EXIT_NOT_ALL
 
 
 class MemoryLimitError(LimitReachedError):
-    """Work that would take more memory than there is; the message says what to lower."""
+    """Error of work that would need more memory than is available; the message says what to
+    lower."""
 
 
 class PluginError(NetspError):
-    """Failure of another package's code. The message says which; the error itself is the cause."""
+    """Failure of a plug-in. The message names the plug-in; its error is the cause of this one."""
 
 
 class VerificationError(NetspError):
@@ -172,7 +171,7 @@ def warn_left_out(what: str) -> None:
     warnings.warn(what, LeftOutWarning, stacklevel=3)
 
 
-def interrupted(error: BaseException) -> bool:
+def is_interrupt(error: BaseException) -> bool:
     """Return whether an error is Ctrl-C, or a consequence of it.
 
     Python raises SystemError ("returned a result with an exception set") if the signal arrives just
@@ -182,3 +181,6 @@ def interrupted(error: BaseException) -> bool:
     while isinstance(cause, SystemError):
         cause = cause.__cause__
     return isinstance(cause, KeyboardInterrupt)
+
+
+__getattr__ = deprecated_names(globals(), interrupted="is_interrupt")

@@ -23,8 +23,7 @@ SMALLEST = 1e-100
 
 
 def checked_number(value: Any, max_magnitude: float = LARGEST) -> Any:
-    """Return a number, also one of NumPy; ValueError for strings, booleans and numbers too
-    large."""
+    """Return a finite number of Python or NumPy as a float; raise ValueError for other values."""
     real = isinstance(value, int | float | np.integer | np.floating)
     if isinstance(value, bool | np.bool_ | np.timedelta64) or not real:
         raise ValueError(f"expected a number, got {shown(value)}")
@@ -40,7 +39,7 @@ def checked_number(value: Any, max_magnitude: float = LARGEST) -> Any:
 
 
 def checked_integer(value: Any) -> int:
-    """Return a whole number, also one of NumPy; ValueError for strings, booleans and fractions."""
+    """Return an integer of Python or NumPy as an int; raise ValueError for other values."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
         raise ValueError(f"expected a whole number, got {shown(value)}")
     return int(value)
@@ -53,7 +52,7 @@ def is_index(value: object, count: int) -> TypeGuard[int]:
 
 
 def _size(value: Any) -> Any:
-    """Return a length or radius; ValueError for those whose squares underflow."""
+    """Return a length or radius; raise ValueError if it is too small to be squared."""
     number = checked_number(value)
     if 0.0 < number < SMALLEST:
         raise ValueError(f"expected at least {SMALLEST:g}, got {shown(value)}")
@@ -61,8 +60,8 @@ def _size(value: Any) -> Any:
 
 
 def checked_argument(name: str, value: Any, low: float, high: float = LARGEST) -> float:
-    """Return an argument of a call as a number within limits; InputError, which names it,
-    otherwise."""
+    """Return an argument as a float; raise InputError, which names it, unless low ≤ value ≤
+    high."""
     try:
         number = float(checked_number(value))
     except ValueError as error:
@@ -80,11 +79,11 @@ def checked_instance(name: str, value: object, kind: type) -> None:
 
 
 SPACES = dict.fromkeys(map(ord, "\u00a0\u3000\u200c\u200d"), " ")
-"""Spaces and joiners in names of some scripts, which Python does not call printable."""
+"""Translation table for spaces and joiners of some scripts, which `str.isprintable` rejects."""
 
 
 def _name(value: Any) -> Any:
-    """Return a name that fits in one line; ValueError otherwise."""
+    """Return a printable name of at most 200 characters; raise ValueError for other values."""
     plain = isinstance(value, str) and value.translate(SPACES).isprintable()
     if isinstance(value, str) and (len(value) > 200 or not plain):
         raise ValueError(f"expected a name of at most 200 printable characters, got {shown(value)}")
@@ -117,8 +116,8 @@ def _track_point(value: Any) -> tuple[float, ...]:
 
 Name = Annotated[str, BeforeValidator(_name)]
 
-# Validators of two parameters stand behind a lambda: pydantic would hand its own information about
-# the field to the second.
+# A lambda wraps each validator that has a second parameter: pydantic would pass a `ValidationInfo`
+# for it.
 
 
 Number = Annotated[float, BeforeValidator(lambda v: checked_number(v))]

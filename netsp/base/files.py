@@ -1,4 +1,4 @@
-"""Reading and writing whole files: kind and size are checked first, and no file is half written."""
+"""Reading and writing of whole files: kind and size are checked first, and writing is atomic."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from netsp.base.number_ranges import check_positive
 from netsp.base.validated import Model, read_model, shown
 
 STANDARD = "-"
-"""Name of a file that stands for standard input or output."""
+"""File name that means standard input or standard output."""
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,13 @@ def check_file(path: str | Path, max_bytes: int = FilePolicy.max_bytes) -> None:
 
 
 def read_bytes(path: str | Path, max_bytes: int = FilePolicy.max_bytes) -> bytes:
-    """Return the contents of a regular file or of standard input; InputError if they cannot be
-    read."""
+    """Return the contents of a regular file, or of standard input for ``-``.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read.
+    """
     if path == STANDARD:
         return _standard_input(max_bytes)
     check_file(path, max_bytes)
@@ -91,7 +96,8 @@ def read_bytes(path: str | Path, max_bytes: int = FilePolicy.max_bytes) -> bytes
 
 @lru_cache(maxsize=1)
 def _standard_input(max_bytes: int) -> bytes:
-    """Return all of standard input, which can be read only once but is needed several times."""
+    """Return all of standard input; the cache serves later calls, because a pipe is read only
+    once."""
     if sys.stdin is None:
         raise InputError("-: standard input is closed; expected a file piped in")
     if sys.stdin.isatty():
@@ -114,7 +120,7 @@ def read_text(path: str | Path) -> str:
 
 
 def read_gzip(path: str | Path, policy: FilePolicy = FilePolicy()) -> bytes:
-    """Return the unpacked contents of a gzipped file; InputError if they are too large."""
+    """Return the unpacked contents of a gzipped file; raise InputError if they are too large."""
     data = read_bytes(path)
     out, size = [], 0
     try:
@@ -139,8 +145,7 @@ def read_gzip(path: str | Path, policy: FilePolicy = FilePolicy()) -> bytes:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text to a file in UTF-8, replacing the file as `write_bytes` does; ``-`` is standard
-    output.
+    """Write a text in UTF-8 as `write_bytes` writes bytes.
 
     Raises
     ------
@@ -159,9 +164,9 @@ def write_text(path: str | Path, text: str) -> None:
 
 
 def write_bytes(path: str | Path, data: bytes) -> None:
-    """Write a file by renaming a finished one into place, so that it is never half written.
+    """Write a temporary file and rename it into place, so that no reader sees half a file.
 
-    Through a symbolic link, its target is replaced; ``-`` is standard output.
+    A symbolic link stays, and its target is replaced. The name ``-`` means standard output.
 
     Raises
     ------
@@ -187,7 +192,7 @@ def write_bytes(path: str | Path, data: bytes) -> None:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:40]}.")
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
-    except ValueError as error:  # half a character, a zero
+    except ValueError as error:  # a lone surrogate or a null character in the name
         raise InputError(f"{shown(str(path))}: cannot be written: {error}") from None
     try:
         with os.fdopen(handle, "wb") as stream:
@@ -202,12 +207,12 @@ def write_bytes(path: str | Path, data: bytes) -> None:
 
 
 def make_folder(folder: str | Path) -> Path:
-    """Return a folder, after making it if it does not exist.
+    """Create a folder unless it exists, and return its path.
 
     Raises
     ------
     InputError
-        It cannot be made, or files cannot be written there.
+        The folder cannot be created, or no files can be written to it.
     """
     place = Path(folder)
     if folder == STANDARD:
@@ -226,8 +231,8 @@ def make_folder(folder: str | Path) -> Path:
 
 @contextmanager
 def output_folder(folder: str | Path | None) -> Iterator[None]:
-    """Make a folder before long work begins; remove it if it is new and empty when the work
-    fails."""
+    """Create a folder before the body runs; if the body raises, remove the folder if it is new and
+    empty."""
     if folder is None:
         yield
         return
@@ -241,10 +246,10 @@ def output_folder(folder: str | Path | None) -> Iterator[None]:
         raise
 
 
-def cell(text: str | None) -> str:
-    """Return a text as a cell of a table that spreadsheets do not take for a formula.
+def csv_cell(text: str | None) -> str:
+    """Return a text as a CSV cell that no spreadsheet evaluates as a formula.
 
-    A text that begins like a formula gets an apostrophe (OWASP, "CSV injection").
+    A text that begins like a formula gets an apostrophe in front (OWASP, "CSV injection").
     """
     text = text or ""
     if _NUMBERS.fullmatch(text):
@@ -269,9 +274,9 @@ def csv_lines(text: str, source: str) -> Iterator[list[str]]:
 
 
 def csv_rows(text: str, source: str) -> list[dict[str, str]]:
-    """Return the rows of a CSV text by column name, which the first line with cells states.
+    """Return the rows of a CSV text as dictionaries; the first line with cells names the columns.
 
-    Lines without cells are left out; cells that a short line lacks are empty.
+    Empty lines are skipped, and cells that a short line lacks are empty.
 
     Parameters
     ----------
@@ -283,7 +288,7 @@ def csv_rows(text: str, source: str) -> list[dict[str, str]]:
     Raises
     ------
     InputError
-        A line cannot be read, or has more cells than there are names.
+        A line cannot be read, or has more cells than the header.
 
     Examples
     --------
@@ -309,14 +314,14 @@ class FileModel(Model):
 
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str | None = None) -> Self:
-        """Return the model in the text of a file, after validation.
+        """Return the validated model that a JSON text describes.
 
         Parameters
         ----------
         text : str or bytes
-            JSON of the format version.
+            JSON of format version 1.
         source : str, optional
-            Name in messages; by default the kind of file.
+            Name of the text in messages; by default the kind of file.
 
         Raises
         ------
@@ -329,7 +334,7 @@ class FileModel(Model):
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a file.
+        """Return the validated model in a file.
 
         Raises
         ------
@@ -341,12 +346,12 @@ class FileModel(Model):
         return cls.from_json(read_text(path), source=str(path))
 
     def to_json(self) -> str:
-        """Return the model as JSON of format version 1, without fields that are not given."""
+        """Return the model as JSON of format version 1, without fields that are None."""
         data = self.model_dump(mode="json", exclude_none=True)
         return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
     def save(self, path: str | Path) -> None:
-        """Write the file, whole or not at all; a file of that name is replaced.
+        """Write the model to a file, as JSON; an existing file is replaced at once.
 
         Raises
         ------

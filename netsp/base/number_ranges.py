@@ -33,7 +33,7 @@ def check_positive(policy: Any) -> None:
 
 
 def check_shares(policy: Any, *names: str) -> None:
-    """Raise InputError, which names the field, if one of some fields is not from 0 to 1."""
+    """Raise InputError, which names the field, if one of the named fields is not from 0 to 1."""
     for name in names:
         value = getattr(policy, name)
         if not (isinstance(value, Real) and 0.0 <= float(value) <= 1.0):

@@ -8,7 +8,7 @@ from contextvars import ContextVar
 from typing import TypeVar
 
 Listener = Callable[[int, int], None]
-"""Function that gets the number of steps done, and of all steps."""
+"""Callback that gets the number of steps done and the number of all steps."""
 
 _listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
 
@@ -25,15 +25,15 @@ def reported_to(listener: Listener) -> Iterator[None]:
         _listener.reset(token)
 
 
-def each(items: Sequence[Item]) -> Iterator[Item]:
-    """Yield the items of a sequence, and report each as done when the next is wanted."""
+def track(items: Sequence[Item]) -> Iterator[Item]:
+    """Yield the items of a sequence; report an item as done when the caller asks for the next."""
     for done, item in enumerate(items, 1):
         yield item
-        tell(done, len(items))
+        report(done, len(items))
 
 
-def tell(done: int, total: int) -> None:
-    """Report that some steps of a total are done."""
+def report(done: int, total: int) -> None:
+    """Report how many steps of a total are done, if anyone listens."""
     listener = _listener.get()
     if listener is not None:
         listener(done, total)

@@ -33,7 +33,8 @@ class MemoryPolicy:
 def available_memory() -> float:
     """Return the bytes that this process may still use; infinite where no limit can be read.
 
-    The machine's free memory, the control group and the limit of the process are considered.
+    It is the least of three: the machine's free memory, what the control group leaves, and what the
+    address space limit of the process leaves.
     """
     free = [float("inf")]
     with contextlib.suppress(OSError, ValueError, IndexError):
@@ -62,16 +63,14 @@ def available_memory() -> float:
 def check_available(
     size: float, name: str, advice: str, policy: MemoryPolicy = MemoryPolicy()
 ) -> None:
-    """Raise MemoryLimitError, in one line, if `size` bytes are more than are available.
+    """Raise MemoryLimitError if `size` bytes are more than the policy's share of available memory.
 
     Parameters
     ----------
     name : str
-        What the memory is for, for the message.
+        Noun phrase for the array, for the message.
     advice : str
-        What to lower.
-    policy : MemoryPolicy
-        Share of the memory that may be used.
+        Clause that says what to lower, for the message.
     """
     if size < policy.min_bytes:
         return

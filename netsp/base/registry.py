@@ -1,11 +1,11 @@
-"""Registries of named things, netsp's and other packages': the plug-in doors of netsp.
+"""Registries of solvers, roadmaps and other parts by name, netsp's own and those of plug-ins.
 
-A package adds to a registry by an entry point in its `pyproject.toml`. The name then works wherever
-netsp's own names do, in study files and on the command line too:
+A package registers a part by an entry point in its `pyproject.toml`. The name then works wherever
+netsp's own names do, also in study files and on the command line:
 
     [project.entry-points."netsp.solvers"] my-solver = "my_package:solve"
 
-Without a package, ``module:attribute`` itself is a name.
+An object reference, ``module:attribute``, is a name, too; it needs no package.
 """
 
 from __future__ import annotations
@@ -25,24 +25,23 @@ from netsp.base.errors import InputError, NetspError, PluginError
 R = TypeVar("R")
 
 
-_WHERE = re.compile(r"[\w.]+:[\w.]+")
-"""Pattern of ``module:attribute``."""
+_REFERENCE = re.compile(r"[\w.]+:[\w.]+")
+"""Pattern of an object reference, ``module:attribute``."""
 
 
 class Registry(MutableMapping[str, R], Generic[R]):
-    """Records by name, netsp's first, in order.
+    """Mapping from names to records; netsp's own come first.
 
     Parameters
     ----------
     kind : str
-        Term for a record in messages.
+        Noun for a record in messages, such as "solver".
     group : str
         Name of the entry points of other packages.
     builtin : dict
         netsp's records by name.
     record : callable
-        Function that makes the record of another package's entry point from its name and
-        ``module:attribute``.
+        Function that makes a record from the name and the object reference of an entry point.
     """
 
     def __init__(
@@ -52,7 +51,7 @@ class Registry(MutableMapping[str, R], Generic[R]):
 
     @cached_property
     def _foreign(self) -> dict[str, R]:
-        """Records of other packages, which cannot replace netsp's."""
+        """Records of plug-ins; an entry point with the name of a record of netsp is ignored."""
         found = importlib.metadata.entry_points(group=self.group)
         return {e.name: self._record(e.name, e.value) for e in found if e.name not in self._builtin}
 
@@ -74,15 +73,15 @@ class Registry(MutableMapping[str, R], Generic[R]):
         return len({**self._builtin, **self._foreign})
 
     def named(self, name: object) -> R:
-        """Return the record of a name.
+        """Return the record with a name, or of an object reference.
 
         Raises
         ------
         InputError
             No record has that name; the message lists the choices.
         """
-        if isinstance(name, str) and name not in self and _WHERE.fullmatch(name):
-            self._check_there(name)
+        if isinstance(name, str) and name not in self and _REFERENCE.fullmatch(name):
+            self._check_loads(name)
             return self._record(name, name)
         if not isinstance(name, str) or name not in self:
             raise InputError(
@@ -91,45 +90,44 @@ class Registry(MutableMapping[str, R], Generic[R]):
             )
         return self[name]
 
-    def _check_there(self, where: str) -> None:
-        """Raise InputError unless ``module:attribute`` can be imported.
+    def _check_loads(self, reference: str) -> None:
+        """Raise InputError unless an object reference can be imported.
 
-        The current folder is searched, too, where an installed command does not look for modules.
+        The current folder is added to the search path: an installed command does not search it.
         """
-        module, _, attribute = where.partition(":")
+        module, _, attribute = reference.partition(":")
         if (folder := os.getcwd()) not in sys.path and "" not in sys.path:
             sys.path.append(folder)
-        with foreign(f"{self.kind}: {where}: cannot be loaded"):
+        with foreign(f"{self.kind}: {reference}: cannot be loaded"):
             try:
                 _found(module, attribute)
             except (ImportError, AttributeError) as error:
-                raise InputError(f"{self.kind}: {where}: cannot be loaded: {error}") from None
+                raise InputError(f"{self.kind}: {reference}: cannot be loaded: {error}") from None
 
 
-def later(name: str, where: str) -> Callable[..., Any]:
-    """Return a record that is a callable, loaded from ``module:attribute`` at its first call."""
-    del name
-    return lambda *args, **more: load(where)(*args, **more)
+def later(_name: str, reference: str) -> Callable[..., Any]:
+    """Return a function that imports an object reference when called, and calls the object."""
+    return lambda *args, **options: load(reference)(*args, **options)
 
 
-def load(where: str) -> Any:
-    """Return the attribute that ``module:attribute`` names.
+def load(reference: str) -> Any:
+    """Return the object of a reference, ``module:attribute``.
 
     Raises
     ------
     InputError
-        It belongs to another package, and does not exist.
+        A plug-in does not have the object.
     PluginError
-        It belongs to another package, which fails on import.
+        A plug-in raises an error on import.
     """
-    module, _, attribute = where.partition(":")
+    module, _, attribute = reference.partition(":")
     if module.split(".")[0] == "netsp":
         return _found(module, attribute)
-    with foreign(f"{where}: cannot be loaded"):
+    with foreign(f"{reference}: cannot be loaded"):
         try:
             return _found(module, attribute)
         except (ImportError, AttributeError) as error:
-            raise InputError(f"{where}: cannot be loaded: {error}") from error
+            raise InputError(f"{reference}: cannot be loaded: {error}") from error
 
 
 def _found(module: str, attribute: str) -> Any:
@@ -141,7 +139,7 @@ def _found(module: str, attribute: str) -> Any:
 
 @contextmanager
 def foreign(what: str) -> Iterator[None]:
-    """Turn errors of another package's code into PluginError; errors of netsp, and Ctrl-C, pass.
+    """Turn errors of a plug-in into PluginError; let errors of netsp and Ctrl-C through.
 
     Parameters
     ----------
@@ -156,7 +154,7 @@ def foreign(what: str) -> Iterator[None]:
     Raises
     ------
     PluginError
-        Any other error was raised, also an exit; the error itself is the cause.
+        The body raised another error, or called `exit`; that error is the cause.
     """
     try:
         yield

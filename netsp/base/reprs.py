@@ -1,7 +1,7 @@
-"""Representations of netsp's objects in notebooks: the short text, and a picture below it.
+"""Representations of netsp's objects in notebooks: a line of text, and a picture below it.
 
-The pictures live in an upper layer (`netsp.view.pictures`). A class names its picture, which is
-loaded when it is shown, so models and graphs stay free of Matplotlib.
+The pictures live in an upper room (`netsp.view.pictures`). A class names the function that draws
+it, which is imported at the first call: models and graphs do not import Matplotlib.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from netsp.base.registry import load
 
 
 class Drawn:
-    """Base of classes with a picture; `picture` names the function that draws it on axes."""
+    """Base of classes with a picture; `picture` is the ``module:function`` that draws it on
+    axes."""
 
     picture: ClassVar[str]
 

@@ -1,4 +1,4 @@
-"""Models from JSON text, with one line of complaint that names field and value."""
+"""Models from JSON text; an invalid text raises one line that names the field and its value."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ SCHEMA_VERSION = 1
 """Format version of all files."""
 
 
-MARKS = {
+MARKER_FIELDS = {
     "problem": {"base", "tether_length"},
     "solution": {"tour", "lower_bound"},
     "mission": {"anchor", "waypoints"},
     "surprise file": {"events"},
     "scene": {"solids"},
 }
-"""Fields that a file of each kind has and no other."""
+"""Fields that only files of one kind have, by kind."""
 
 
 class Model(BaseModel):
@@ -40,8 +40,9 @@ class Model(BaseModel):
         except ValidationError as error:
             raise InputError(f"{type(self).__name__}: {explain(error)}") from None
 
-    # nested models are then validated as if there were no `__init__` here, so that a complaint
-    # names the whole path of a field
+    # pydantic validates nested models without calling this `__init__`, so that a complaint names
+    # the
+    # whole path of a field
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
     @classmethod
@@ -51,15 +52,14 @@ class Model(BaseModel):
         cls.__signature__ = _signature(cls)
 
     def __eq__(self, other: object) -> bool:
-        """Compare the fields only: cached properties may be arrays, which are neither equal nor
-        unequal."""
+        """Compare fields, not cached properties: those may be arrays, whose comparison is no
+        bool."""
         if not isinstance(other, Model) or type(self) is not type(other):
             return NotImplemented
         return all(getattr(self, name) == getattr(other, name) for name in type(self).model_fields)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """Return a copy without the cached properties of the original, which may not hold for the
-        copy."""
+        """Return a copy without cached properties, which may be wrong for the updated fields."""
         copy = super().model_copy(update=update, deep=deep)
         for name in copy.__dict__.keys() - type(self).model_fields.keys():
             del copy.__dict__[name]
@@ -68,7 +68,7 @@ class Model(BaseModel):
 
 def _signature(model: type[BaseModel]) -> inspect.Signature:
     """Return the signature of a model's constructor for `inspect.signature` and help."""
-    types = get_type_hints(model)  # without Annotated, which holds the checks of fields
+    types = get_type_hints(model)  # plain types: the checks of fields are in `Annotated`
     parameters = []
     for name, field in model.model_fields.items():
         default = inspect.Parameter.empty
@@ -89,9 +89,9 @@ M = TypeVar("M", bound=BaseModel)
 def read_model(
     model: type[M], text: str | bytes, source: str, context: Mapping[str, Any] | None = None
 ) -> M:
-    """Return a model of format version 1 from JSON; InputError in one line if it is not valid.
+    """Return a model of format version 1 from JSON; raise InputError in one line if it is invalid.
 
-    Validators of the model get the context.
+    Pydantic passes the context to the validators of the model.
     """
     data = parse_json_object(text, source)
     _check_kind(model, data, source)
@@ -109,29 +109,29 @@ def read_model(
 
 
 def kind_of(data: Mapping[str, Any]) -> str | None:
-    """Return the kind of a file with characteristic fields, else None."""
-    return next((k for k, marks in MARKS.items() if marks <= data.keys()), None)
+    """Return the kind of a file by the fields that only this kind has, or None."""
+    return next((k for k, marks in MARKER_FIELDS.items() if marks <= data.keys()), None)
 
 
 def _check_kind(model: type[BaseModel], data: dict[str, Any], source: str) -> None:
     """Raise InputError if a file is clearly of another kind than that of the model."""
     kind = kind_of(data)
     expected_kind = next(
-        (k for k, marks in MARKS.items() if marks <= model.model_fields.keys()), None
+        (k for k, marks in MARKER_FIELDS.items() if marks <= model.model_fields.keys()), None
     )
     if kind and expected_kind and kind != expected_kind:
         raise InputError(f"{source}: this is a {kind}; expected a {expected_kind}")
 
 
 def parse_json(text: str | bytes, source: str) -> Any:
-    """Return the value that a JSON text holds, as `json.loads`; no object in it may repeat a key.
+    """Return the value of a JSON text, as `json.loads` does, but refuse repeated keys.
 
     Parameters
     ----------
     text : str or bytes
         Text; bytes are UTF-8.
     source : str
-        Name in messages, such as that of the file.
+        Name of the text in messages, such as its file.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def parse_json(text: str | bytes, source: str) -> Any:
 
 
 def parse_json_object(text: str | bytes, source: str) -> dict[str, Any]:
-    """Return the object that a JSON text holds, as `parse_json`; InputError for other values."""
+    """Return the object of a JSON text, as `parse_json` does; raise InputError for other values."""
     data = parse_json(text, source)
     if not isinstance(data, dict):
         raise InputError(f"{source}: expected a JSON object, got {type(data).__name__}")
@@ -208,7 +208,7 @@ def explain(error: ValidationError) -> str:
         message = f"expected an object, {got}"
     else:
         message = f"{_decapitalise(first['msg'])}, {got}"
-    # pydantic does not count wrong items of a list, and then calls the list too short, too
+    # pydantic leaves wrong items out of a list, and then also reports that the list is too short
     short = {e["loc"] for e in errors if e["type"] == "too_short"}
     counted = [e for e in errors if e["loc"] not in short or not _has_wrong_item(e, errors)]
     extra = [e["loc"][-1] for e in errors if e["type"] == "extra_forbidden"]
@@ -220,7 +220,7 @@ def explain(error: ValidationError) -> str:
 
 
 def _has_wrong_item(error: ErrorDetails, errors: Sequence[ErrorDetails]) -> bool:
-    """Return whether there is an error about an item of the list that an error is about."""
+    """Return whether another error concerns an item of the list that this error concerns."""
     place = error["loc"]
     return any(other["loc"][: len(place)] == place != other["loc"] for other in errors)
 
@@ -230,7 +230,7 @@ def _decapitalise(text: str) -> str:
 
 
 def shown(value: Any) -> str:
-    """Return a value as it is shown in messages, cut at 60 characters."""
+    """Return the `repr` of a value for messages, of at most 60 characters."""
     try:
         text = repr(value)
     except Exception:  # a foreign class, or a number with too many digits for Python

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from netsp.base.errors import interrupted
+from netsp.base.errors import is_interrupt
 
 T = TypeVar("T")
 
@@ -35,7 +35,7 @@ def resending_lost_interrupts() -> Iterator[None]:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
 
     def hook(unraisable: Any) -> None:
-        if unraisable.exc_value is None or not interrupted(unraisable.exc_value):
+        if unraisable.exc_value is None or not is_interrupt(unraisable.exc_value):
             before(unraisable)
             return
         again = threading.Timer(SIGNAL_INTERVAL_S, _interrupt)

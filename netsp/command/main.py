@@ -25,7 +25,7 @@ from netsp.base.errors import (
     InputError,
     NetspError,
     SeveralErrors,
-    interrupted,
+    is_interrupt,
 )
 from netsp.command import background_warm_up, messages
 from netsp.command.command_clock import begin_command
@@ -101,7 +101,7 @@ def _main(argv: Sequence[str] | None) -> int:
         )
         return EXIT_NOT_ALL
     except (KeyboardInterrupt, SystemError) as error:
-        if not interrupted(error):
+        if not is_interrupt(error):
             raise
         messages.error(
             "interrupted; what was compiled is kept, and `netsp warm-up` compiles the rest"

@@ -11,7 +11,7 @@ import numpy as np
 
 from netsp.base.arrays import Ints
 from netsp.base.clock import Clock
-from netsp.base.errors import InputError, LimitReachedError, MemoryLimitError, interrupted
+from netsp.base.errors import InputError, LimitReachedError, MemoryLimitError, is_interrupt
 from netsp.gtsp.gtsp_policy import CostPolicy
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.travel.graph import BaselessGraph, TravelGraph, least_tethers
@@ -112,7 +112,7 @@ class SolverRun:
         except MemoryLimitError:
             raise
         except (RunStopped, LimitReachedError, KeyboardInterrupt, SystemError) as error:
-            if interrupted(error):
+            if is_interrupt(error):
                 self.clock.end()  # also ends the run that this one is a part of
             elif isinstance(error, SystemError):
                 raise

@@ -1,4 +1,4 @@
-"""Homotopy signatures: words of a free group, and how a path writes one."""
+"""Homotopy signatures: words of a free group, and the word of a path."""
 
 from netsp.hsignature.rays import crossings, signature
 from netsp.hsignature.words import (

@@ -2,11 +2,12 @@
 
 The classes of loops in a scene form a group, which `netsp.plan.space.triangle_labels` finds as
 generators and relations. Generators that a relation expresses by others are eliminated (Tietze
-1908). The result is usually a free group, whose elements are the reduced words. If relations are
-left, rules that replace the later of two equal words (by length, then letters) by the earlier are
-completed (Knuth & Bendix 1970). If the completion ends, every element has exactly one word to which
-no rule applies. It need not end; then it is cut off, and the rules still only join words that are
-equal: an empty word means contractible, and any other word means nothing certain (`Group.exact`).
+1908). Usually a free group remains, whose elements are the reduced words. Otherwise, each relation
+becomes a rule that replaces a word by an equal word that is shorter, or as long and first in
+alphabetical order, and the rules are completed (Knuth & Bendix 1970). If the completion ends, each
+element has exactly one word to which no rule applies. It may not end; then it is cut off. The rules
+still replace words by equal words only, so an empty word means that a loop is contractible, but any
+other word proves nothing (`Group.exact`).
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from netsp.hsignature.signature_policy import CompletionPolicy
 from netsp.hsignature.words import Word, cyclically_reduced, invert, reduce
 
 Endings = dict[int, list[tuple[int, Word, Word]]]
-"""Rules by the last letter of their left side: its length, the left side, the right side."""
+"""Rules by the last letter of their left side, as (length of the left side, left, right)."""
 
 
 @dataclass(frozen=True)
@@ -33,11 +34,11 @@ class Group:
     Parameters
     ----------
     rank : int
-        Number of generators; letters are their numbers from 1, negative for inverses.
+        Number of generators. Letters are the numbers of generators from 1, negative for inverses.
     relators : tuple of Word
         Words that are equal to the empty word.
     rules : tuple of (Word, Word)
-        Left sides and what replaces them. The cancellation of inverses is not among the rules.
+        Left sides, and the right sides that replace them. Adjacent inverses cancel without a rule.
     exact : bool
         Whether every element has exactly one normal form.
     """
@@ -51,7 +52,7 @@ class Group:
     def presented(
         cls, rank: int, relators: Iterable[Word], policy: CompletionPolicy = CompletionPolicy()
     ) -> Group:
-        """Return the group of a presentation, with completed rules.
+        """Return the group with given generators and relators, with completed rules.
 
         Examples
         --------
@@ -70,7 +71,7 @@ class Group:
         return not self.relators
 
     def normal(self, letters: Iterable[int]) -> Word:
-        """Return the equal word to which no rule applies."""
+        """Return the normal form of a word: the equal word to which no rule applies."""
         return _rewritten(letters, self._endings)
 
     @cached_property
@@ -79,18 +80,18 @@ class Group:
 
     @cached_property
     def functionals(self) -> tuple[tuple[int, ...], ...]:
-        """Rows of integer weights, one for each generator.
+        """Rows of integer weights of the generators, one row for each winding number.
 
-        The sum of a word's letters, weighted with a row, depends on the element alone. All sums
-        together are its class in the abelianisation, except for torsion, of which the complement of
-        solids in space has none (Alexander duality).
+        Equal words have equal sums of weighted letters. The sums with all rows are the class of a
+        word in the abelianisation. This ignores torsion, but the complement of solids in space has
+        none (Alexander duality).
         """
         return _annihilators([_exponents(r, self.rank) for r in self.relators], self.rank)
 
     def windings(self, word: Iterable[int]) -> tuple[int, ...]:
-        """Return how often a path winds, with signs: its class in the abelianisation.
+        """Return the winding numbers of a word, one for each row of `functionals`.
 
-        There is one number for each of `functionals`.
+        They are its class in the abelianisation.
         """
         e = _exponents(word, self.rank)
         return tuple(sum(f * x for f, x in zip(row, e, strict=True)) for row in self.functionals)
@@ -144,7 +145,8 @@ def eliminated(rank: int, relators: Iterable[Word]) -> tuple[list[Word], int, tu
 
 
 def _lone_letter(relators: Sequence[Word]) -> tuple[int, int] | None:
-    """Return the shortest relator in which a generator occurs once, and its place there."""
+    """Return the shortest relator in which some generator occurs once, and the index of its
+    letter."""
     for r in sorted(range(len(relators)), key=lambda r: (len(relators[r]), relators[r])):
         seen: dict[int, int] = {}
         for x in relators[r]:
@@ -156,9 +158,9 @@ def _lone_letter(relators: Sequence[Word]) -> tuple[int, int] | None:
 
 
 def _shortened(relators: Sequence[Word]) -> tuple[int, Word, list[Word]] | None:
-    """Return a Nielsen move that makes the relators shorter in all, or None.
+    """Return a Nielsen move that lowers the total length of the relators, or None.
 
-    It is a generator, the product with another that replaces it, and the new relators.
+    It consists of a generator, the product that replaces it, and the new relators.
     """
     used = sorted({abs(x) for w in relators for x in w})
     now = sum(map(len, relators))
@@ -179,7 +181,7 @@ def _substituted(word: Word, generator: int, means: Word) -> Word:
 
 
 def _distinct(relators: Iterable[Word]) -> tuple[Word, ...]:
-    """Return distinct relators, each as the first rotation of itself or of its inverse."""
+    """Return distinct relators, each as the first rotation, in order, of itself or its inverse."""
     out: dict[Word, None] = {}
     for word in relators:
         w = cyclically_reduced(word)
@@ -203,9 +205,10 @@ def _by_last_letter(rules: Iterable[tuple[Word, Word]]) -> Endings:
 
 
 def _rewritten(letters: Iterable[int], endings: Endings) -> Word:
-    """Return the normal form of letters.
+    """Return the normal form of a word.
 
-    No rule applies to the letters kept so far, so rules are tried at their end only.
+    No rule applies to the letters kept so far, so after each letter only rules that end with it are
+    tried, at the end of the word.
     """
     todo, kept = list(letters)[::-1], list[int]()
     while todo:
@@ -227,10 +230,10 @@ def _completed(
 ) -> tuple[tuple[tuple[Word, Word], ...], bool]:
     """Return the rules of a group, and whether they are complete."""
     inverses: list[tuple[Word, Word]] = [((x, -x), ()) for g in range(1, rank + 1) for x in (g, -g)]
-    place = _places(rank, relators)
+    rank_of = _generator_order(rank, relators)
 
     def order(word: Word) -> tuple[int, list[tuple[int, bool]]]:
-        return len(word), [(place[abs(x)], x < 0) for x in word]
+        return len(word), [(rank_of[abs(x)], x < 0) for x in word]
 
     rules: list[tuple[Word, Word]] = []
     endings: Endings = {}
@@ -242,17 +245,17 @@ def _completed(
             a, b = (_rewritten(w, endings) for w in equations.pop())
             if a == b:
                 continue
-            big, small = (a, b) if order(a) > order(b) else (b, a)
-            if len(big) > policy.max_side or len(rules) >= policy.max_rules:
+            larger, smaller = (a, b) if order(a) > order(b) else (b, a)
+            if len(larger) > policy.max_side or len(rules) >= policy.max_rules:
                 exact = False
                 continue
             # rules that the new one rewrites become equations again
-            again = [r for r in rules if _within(big, r[0])]
-            done -= sum(rules.index(r) < done for r in again)
-            every = _by_last_letter([*rules, (big, small)])
-            rules = [(x, _rewritten(y, every)) for x, y in rules if not _within(big, x)]
-            equations.extend(again)
-            rules.append((big, small))
+            reopened = [r for r in rules if _contains(r[0], larger)]
+            done -= sum(rules.index(r) < done for r in reopened)
+            every = _by_last_letter([*rules, (larger, smaller)])
+            rules = [(x, _rewritten(y, every)) for x, y in rules if not _contains(x, larger)]
+            equations.extend(reopened)
+            rules.append((larger, smaller))
             endings = _by_last_letter(rules)
         if done >= len(rules) or pairs > policy.max_overlaps:
             break
@@ -266,22 +269,23 @@ def _completed(
     return tuple(sorted(rules, key=lambda r: _order(r[0]))), exact
 
 
-def _places(rank: int, relators: Sequence[Word]) -> dict[int, int]:
-    """Return the place of each generator in the order of words, those in most relations first.
+def _generator_order(rank: int, relators: Sequence[Word]) -> dict[int, int]:
+    """Return the place of each generator in the alphabet; generators in many relators come first.
 
-    Generators that commute with others are then collected in front, and the completion of Z x F_n
+    Rules then move generators that commute with others to the front, and the completion of Z x F_n
     ends.
     """
     count = {g: sum(g in map(abs, r) for r in relators) for g in range(1, rank + 1)}
     return {g: k for k, g in enumerate(sorted(count, key=lambda g: (-count[g], g)))}
 
 
-def _within(part: Word, word: Word) -> bool:
+def _contains(word: Word, part: Word) -> bool:
     return any(word[k : k + len(part)] == part for k in range(len(word) - len(part) + 1))
 
 
 def _overlaps(first: tuple[Word, Word], second: tuple[Word, Word]) -> Iterable[tuple[Word, Word]]:
-    """Yield the two words that a word becomes by either rule, for each overlap of left sides."""
+    """Yield, for each overlap of two left sides, what the overlapping word becomes by either
+    rule."""
     (a, b), (c, d) = first, second
     for k in range(1, min(len(a), len(c))):
         if a[-k:] == c[:k]:

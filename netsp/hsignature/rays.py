@@ -1,15 +1,14 @@
 """Crossings of a path with the rays of the obstacles.
 
-From the representative point of every obstacle one ray goes straight up (+y). Each rule below is
-chosen so that the word of a path depends on floating-point comparisons of *vertices* alone and so
-never changes when a path is split, reversed or concatenated:
+A ray runs straight up (+y) from the representative point of each obstacle. By the rules below, the
+word of a path depends on floating-point comparisons of its *vertices* alone, so splitting,
+reversing or joining paths never changes a word:
 
-- half-open sides: a vertex with ``x < x_ray`` is left of a ray, any other is right of it, so a
-  vertex exactly on a ray is counted once and a vertical segment crosses nothing;
-- a segment is monotone in x, so it crosses its rays in the order of their x, whatever their
-  heights; rays with equal x are taken in the order of their numbers, as if each ray stood an
-  infinitesimal step to the right of its predecessor;
-- a ray passes through everything above it, other obstacles included.
+- half-open sides: a vertex with ``x < x_ray`` is left of a ray, and any other is right of it, so a
+  vertex on a ray counts once, and a vertical segment crosses nothing;
+- a segment crosses rays in the order of their x, because it is monotone in x; rays with equal x are
+  crossed in the order of their numbers, as if each stood infinitesimally to the right of the last;
+- a ray passes through everything above it, also through other obstacles.
 """
 
 from __future__ import annotations
@@ -39,7 +38,8 @@ def crossings(
     Returns
     -------
     tuple of int
-        Obstacle i gives i + 1 from left to right, -(i + 1) from right to left.
+        i + 1 where the path crosses the ray of obstacle i from left to right, -(i + 1) from right
+        to left.
     """
     xy = np.asarray(path, dtype=float)
     rays = np.asarray(points, dtype=float).reshape(-1, 2)
@@ -79,8 +79,8 @@ def _segment_crossings(
 def signature(path: npt.ArrayLike, points: npt.ArrayLike, *, closed: bool = False) -> Word:
     """Return the h-signature of a polyline: its ray crossings, reduced.
 
-    The path must not meet a representative point; netsp's paths keep clear of the obstacles that
-    contain these points.
+    The path must not pass through a representative point. Free paths do not, because these points
+    lie inside obstacles.
 
     Parameters
     ----------

@@ -1,25 +1,27 @@
-"""Measures of the entanglement of a path, by the definitions in use.
+"""Measures of the entanglement of a path, by the definitions of the literature.
 
-As a loop (closed, because both ends are the base):
+Of the path as a loop, which starts and ends at the base:
 
-- *empty signature*: its reduced word is empty, so it can be pulled back to the base (McCammon &
+- *empty signature*: the reduced word is empty, so the tether can be pulled back to the base
+(McCammon &
   Hollinger 2017, section III).
 - *entangled obstacles*: those of the cyclically reduced word (`netsp.hsignature.entangled`).
-- *winding numbers*: turns around each obstacle, counter-clockwise positive. They are weaker than
-  the word: a path may wind around nothing and still be entangled.
-- *self-crossings*: number of times that it crosses itself in plan.
+- *winding numbers*: turns around each obstacle, counter-clockwise positive. They say less than the
+  word: a path may have winding number 0 around each obstacle and still be entangled.
+- *self-crossings*: number of times that the path crosses itself in plan.
 
-As a tether from its first point, the anchor, to its last, the robot (Battocletti, Boskos, Tolić,
+Of the path as a tether from the anchor, its first point, to the robot (Battocletti, Boskos, Tolić,
 Palunko & De Schutter 2024, "Entanglement definitions for tethered robots: exploration and
-analysis", IEEE Access; a tether that merely touches an obstacle is not entangled by it):
+analysis", IEEE Access; touching an obstacle is not entanglement):
 
 - *obstacle-free convex hull*: the convex hull of the tether meets the interior of no obstacle.
-- *obstacle-free linear homotopy*: drawn straight to the anchor, H(s, t) = (1 - t) γ(s) + t γ(0),
-  the tether sweeps the interior of no obstacle.
+- *obstacle-free linear homotopy*: each point of the tether moves straight to the anchor, H(s, t) =
+  (1 - t) γ(s) + t γ(0), and the tether sweeps the interior of no obstacle.
 - *local visibility homotopy*: whenever two points of the tether see each other, the tether between
   them is homotopic to the straight line between them.
 
-Each definition holds, or names the obstacles that break it. The first implies the other two.
+The result for each definition is the set of obstacles that break it. If none breaks the convex
+hull, none breaks the other two.
 """
 
 from __future__ import annotations
@@ -48,9 +50,9 @@ class Measures:
     signature
         Reduced word.
     closed
-        Whether the path ends where it starts; if not, `entangled` and `winding` are None.
+        Whether the path ends where it starts. If not, `entangled` and `winding` are None.
     convex_hull, linear_homotopy, local_visibility
-        Obstacles that break the definition of that name.
+        Obstacles that break the definition.
     """
 
     signature: Word
@@ -66,7 +68,8 @@ class Measures:
 def measure(
     problem: Problem, path: npt.ArrayLike, policy: MeasurePolicy = MeasurePolicy()
 ) -> Measures:
-    """Return all measures of a polyline (k, 2) or (k, 3) among a problem's obstacles, in plan."""
+    """Return the measures of a polyline (k, 2) or (k, 3), in plan, among the obstacles of a
+    problem."""
     xy = np.asarray(path, dtype=float)[:, :2]
     rays = problem.representative_points
     slack = policy.contact_depth * problem.scale
@@ -91,7 +94,7 @@ def measure(
 def winding_numbers(path: Floats, points: Floats) -> Floats:
     """Return the turns (n,) of a polyline around each point, counter-clockwise positive.
 
-    They are whole numbers if the path is closed.
+    Turns of a closed path are whole numbers.
     """
     if len(points) == 0:
         return np.zeros(0)
@@ -105,9 +108,9 @@ def winding_numbers(path: Floats, points: Floats) -> Floats:
 def self_crossings(path: Floats, *, tolerance: float = 0.0) -> int:
     """Return the number of times that a polyline crosses itself in plan.
 
-    A later vertex within `tolerance` of a segment's line counts as on neither side. The path
-    crosses the segment where it comes from one side and leaves on the other. So a crossing at a
-    vertex counts once, and a path that touches or retraces itself does not cross.
+    A vertex within `tolerance` of the line of an earlier segment is on neither side of it. The path
+    crosses the segment if it comes from one side and leaves on the other. So a crossing at a vertex
+    counts once, and a path that touches or retraces itself does not cross itself.
     """
     step = np.hypot(*np.diff(path, axis=0).T)
     p = path[np.concatenate([[True], step > max(tolerance, 1e-150)])]
@@ -130,7 +133,8 @@ def self_crossings(path: Floats, *, tolerance: float = 0.0) -> int:
             if near < t < 1.0 - near:
                 count += 1
             elif abs(t) <= near and k > 0:
-                # through the vertex between two segments: in on one side of them, out on the other
+                # through the vertex between two segments: does it come and leave on different
+                # sides?
                 arms = p[[k - 1, k + 1, k + 1 + i, k + 1 + j]] - p[k]
                 turn = np.mod(np.arctan2(arms[:, 1], arms[:, 0]), 2.0 * np.pi)
                 turn = np.mod(turn - turn[0], 2.0 * np.pi)
@@ -144,9 +148,9 @@ def in_convex_hull(path: Floats, shapes: Sequence[shapely.Geometry]) -> tuple[in
 
 
 def in_linear_homotopy(path: Floats, shapes: Sequence[shapely.Geometry]) -> tuple[int, ...]:
-    """Return the obstacles whose interior a path sweeps when drawn straight to its first point.
+    """Return the obstacles whose interior a path sweeps as it shrinks straight to its first point.
 
-    They are those that meet a triangle of the first point and a segment.
+    An obstacle is swept if it meets the triangle of the first point and some segment.
     """
     triangles = [shapely.MultiPoint([path[0], a, b]).convex_hull for a, b in pairwise(path[1:])]
     return _met([shapely.LineString(path), *triangles], shapes)
@@ -158,21 +162,21 @@ def against_local_visibility(
     rays: Floats,
     policy: MeasurePolicy = MeasurePolicy(),
 ) -> tuple[int, ...]:
-    """Return the obstacles between a tether and a free line of sight between two of its points.
+    """Return the obstacles between a tether and a free line of sight that joins two of its points.
 
-    Lines of sight are tried between all vertices and points that are spread evenly.
+    Lines of sight are tried between vertices and evenly spaced points of the tether.
     """
     if len(shapes) == 0 or len(path) < 3:
         return ()
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-    spots = np.union1d(along, np.linspace(0.0, along[-1], policy.visibility_points))
-    line = np.column_stack([np.interp(spots, along, path[:, k]) for k in range(2)])
+    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    samples = np.union1d(s, np.linspace(0.0, s[-1], policy.visibility_points))
+    line = np.column_stack([np.interp(samples, s, path[:, k]) for k in range(2)])
     first, second = np.triu_indices(len(line), 2)
     sight = shapely.linestrings(np.stack([line[first], line[second]], axis=1))
     solid = shapely.union_all(list(shapes))
     shapely.prepare(solid)
     free = ~shapely.intersects(solid, sight)
-    # letters of the tether up to every point, from which all its parts have theirs
+    # the letters between any two points are a slice of `letters`
     steps = [crossings(line[k : k + 2], rays) for k in range(len(line) - 1)]
     begin = np.concatenate([[0], np.cumsum([len(s) for s in steps])])
     letters = [x for s in steps for x in s]

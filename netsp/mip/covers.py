@@ -25,7 +25,7 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock
-from netsp.base.errors import LimitReachedError, interrupted
+from netsp.base.errors import LimitReachedError, is_interrupt
 from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.cost_oracle import MatrixCosts
 from netsp.gtsp.limits import Limits
@@ -96,7 +96,7 @@ def cover_steps(
     except (RunStopped, LimitReachedError):
         pass
     except (KeyboardInterrupt, SystemError) as error:
-        if not interrupted(error):
+        if not is_interrupt(error):
             raise
         clock.end()  # also ends the run that this is a part of
     return series.found

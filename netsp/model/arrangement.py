@@ -1,4 +1,4 @@
-"""Relations between goals: alternatives, of which one suffices, and precedences.
+"""Relations between goals: choices, of whose goals a tour visits one, and precedences.
 
 The goals of one choice are one cluster of the travel graph, whose tours visit one vertex of each
 cluster (McCammon & Hollinger 2017, section IV). With precedences, the problem is a sequential
@@ -16,7 +16,7 @@ from netsp.base.arrays import Bools, Ints
 
 
 class Goal(Protocol):
-    """Fields of a goal that matter here (`netsp.model.problem.Goal`)."""
+    """Protocol of a goal: the fields that define its relations (`netsp.model.problem.Goal`)."""
 
     @property
     def name(self) -> str | None:
@@ -24,22 +24,21 @@ class Goal(Protocol):
 
     @property
     def choice(self) -> str | None:
-        """Name of the choice that the goal is an alternative of."""
+        """Name of the choice that the goal belongs to."""
 
     @property
     def after(self) -> tuple[str, ...]:
-        """Names of goals or choices to be visited before it."""
+        """Names of goals or choices that must be visited before the goal."""
 
 
 UNORDERED: Bools = np.zeros((0, 0), dtype=bool)
-"""Precedences of goals without any."""
+"""Precedence matrix of goals without precedences."""
 
 
 def cluster_numbers(goals: Sequence[Goal]) -> Ints:
-    """Return the number (m,) of each goal's cluster, from 1 in the order of the clusters' first
-    goals.
+    """Return the cluster (m,) of each goal, numbered from 1 in order of first appearance.
 
-    Goals of one choice have the same number.
+    Goals of one choice share a cluster.
     """
     known: dict[str, int] = {}
     out, last = [], 0
@@ -55,15 +54,14 @@ def cluster_numbers(goals: Sequence[Goal]) -> Ints:
 
 
 def precedence_matrix(goals: Sequence[Goal]) -> Bools:
-    """Return which clusters must be visited before which.
+    """Return the matrix of precedences between clusters, transitively closed.
 
     Names that no goal has are ignored.
 
     Returns
     -------
     ndarray of bool, shape (c + 1, c + 1)
-        True at (a, b) if cluster a must be visited before b, directly or through others; shape (0,
-        0) without precedences.
+        True at (a, b) if cluster a must be visited before b; shape (0, 0) without precedences.
     """
     if not any(goal.after for goal in goals):
         return UNORDERED
@@ -85,7 +83,7 @@ def transitive_closure(direct: Bools) -> Bools:
 
 
 def respects_precedences(order: Sequence[int], before: Bools) -> bool:
-    """Return whether an order of clusters is one that precedences allow."""
+    """Return whether an order of clusters keeps all precedences."""
     if not len(before):
         return True
     o = np.asarray(order, dtype=np.int64)
@@ -94,8 +92,7 @@ def respects_precedences(order: Sequence[int], before: Bools) -> bool:
 
 
 def arrangement_complaint(goals: Sequence[Goal]) -> str | None:
-    """Return the first fault in the relations between goals, in one line that names the field, or
-    None."""
+    """Return the first fault in the relations between goals in one line, or None."""
     named = _named(goals)
     cluster = cluster_numbers(goals)
     for k, goal in enumerate(goals):
@@ -121,7 +118,7 @@ def arrangement_complaint(goals: Sequence[Goal]) -> str | None:
 
 
 def _named(goals: Sequence[Goal]) -> dict[str, list[int]]:
-    """Return the indices of goals by their names, and by those of their choices."""
+    """Return the indices of goals by goal name and by choice name."""
     out: dict[str, list[int]] = {}
     for k, goal in enumerate(goals):
         for name in {goal.name, goal.choice} - {None}:

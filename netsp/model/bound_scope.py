@@ -1,9 +1,9 @@
-"""Lower bounds on tours, each with the tours that it holds for, and the words for them.
+"""Lower bounds on tours, the scope of each bound, and how both are put into words.
 
 A bound over the homotopy classes that a roadmap kept is no bound on all tours. A bound along a
 sampled roadmap does not hold in the continuous world, and a bound between the states that were
-found does not hold for the mission. So `LowerBound` carries its `Scope`, the set of tours that it
-holds for. Every page, table, message and file takes the words for a bound from this module.
+found does not hold for the mission. So each `LowerBound` has a `Scope`: the set of tours for which
+it holds. Pages, tables, messages and files take their wording from this module.
 
 Scopes are ordered by inclusion. A bound of a scope also holds for each part of that scope
 (`LowerBound.for_part`). The reverse needs a bound on all other tours (`LowerBound.or_elsewhere`).
@@ -19,8 +19,7 @@ from types import MappingProxyType
 OPTIMALITY_TOLERANCE = 1e-6
 """Tolerance for the relative gap of a tour that is called optimal.
 
-Bounds come from dual values in floating point, whose rounding errors are orders of magnitude
-smaller.
+It is orders of magnitude above the rounding errors of the dual values that bounds come from.
 """
 
 
@@ -188,7 +187,7 @@ class LowerBound:
         return length - self.length <= OPTIMALITY_TOLERANCE * max(length, 1e-300)
 
     def capped_at(self, length: float) -> LowerBound:
-        """Return the bound, reduced to the length of a tour of the scope if rounding lifted it
+        """Return the bound, lowered to the length of a tour of the scope if rounding put it
         above."""
         return LowerBound(min(self.length, length), self.scope, self.because)
 
@@ -215,12 +214,11 @@ class LowerBound:
         return LowerBound(self.length, scope, because)
 
     def or_elsewhere(self, other_bound: float, scope: Scope, because: str) -> LowerBound:
-        """Return a bound for a larger scope, the smaller of this one and a bound on its other
-        tours.
+        """Return a bound for a larger scope: this bound, or the one on the other tours if lower.
 
         Parameters
         ----------
-        least : float
+        other_bound : float
             Lower bound on the tours of the larger scope that are not in the scope of this bound.
         scope : Scope
             Larger scope.
@@ -236,7 +234,7 @@ class LowerBound:
         return LowerBound(min(self.length, max(other_bound, 0.0)), scope, because)
 
     def above(self, length: float) -> str:
-        """Return how far a tour may be above the shortest of the scope: "at most 3.8 % above the
+        """Return in words how much longer a tour may be than the shortest: "at most 3.8 % above the
         shortest tour"."""
         gap = self.gap(length)
         if gap >= 1.0:
@@ -264,15 +262,15 @@ class LowerBound:
 
 
 def gap_of(length: float | None, bound: LowerBound | None) -> float | None:
-    """Return the gap of a tour; None if length or bound is missing.
+    """Return the gap of a tour, or None if length or bound is missing.
 
-    Name the scope of the bound wherever the gap is shown.
+    Callers that show the gap must name the scope of the bound.
     """
     return None if length is None or bound is None else bound.gap(length)
 
 
 def strongest(*bounds: LowerBound | None) -> LowerBound | None:
-    """Return the largest of several bounds of one scope; None if all are None.
+    """Return the largest of some bounds of one scope, or None if all are None.
 
     Raises
     ------
@@ -290,9 +288,9 @@ def strongest(*bounds: LowerBound | None) -> LowerBound | None:
 
 
 def above_shortest(length: float | None, bound: LowerBound | None) -> str:
-    """Return how far a tour may be above the shortest of the bound's scope, in words.
+    """Return in words how much longer a tour may be than the shortest of the bound's scope.
 
-    The answer is "no bound" if length or bound is missing, or the bound is 0.
+    Return "no bound" if length or bound is missing, or the bound is 0.
     """
     if length is None or bound is None or bound.length == 0.0 < length:
         return "no bound"

@@ -1,4 +1,4 @@
-"""Record of what an import made of every feature of a map: `site` in a problem file."""
+"""Record of an import, the field `site` of a problem file: what each feature of the map became."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from netsp.base.field_types import Name, Number, Positive
 from netsp.base.validated import Model
 
 UsedAs = Literal["base", "candidate", "goal", "obstacle", "bounds", "path", "floor"]
-"""Kinds of use of a feature of a map."""
+"""Uses of a feature of a map."""
 
 MAX_NAMED = 5
-"""Format of import records: maximum number of features that a note names; the file counts all."""
+"""Format of import records: maximum number of omitted features that are named, not just counted."""
 
 
 class OmittedFeatures(Model):
@@ -88,9 +88,10 @@ class LayerRecord(Model):
 
 
 class CropCircle(Model):
-    """Circle outside of which an import left obstacles out.
+    """Circle outside of which an import left out obstacles.
 
-    The tether of the import cannot leave the circle. The problem does not hold for a longer tether.
+    The tether given to the import cannot leave the circle. With a longer tether, obstacles may be
+    missing.
     """
 
     center: Annotated[
@@ -100,7 +101,7 @@ class CropCircle(Model):
 
 
 class Site(Model):
-    """Source of a problem, and record of what became of every feature of the map.
+    """Map that a problem was imported from, and what each of its features became.
 
     Examples
     --------
@@ -122,7 +123,7 @@ class Site(Model):
 
     @property
     def notes(self) -> list[str]:
-        """One line for each layer and reason for which features were left out."""
+        """Lines that say how many features of each layer were left out, and why."""
         lines = []
         for layer in self.imported:
             name = f"layer {layer.layer!r}: " if layer.layer else ""
@@ -138,7 +139,7 @@ class Site(Model):
     def table(self) -> list[tuple[str, ...]]:
         """Return the rows of the table that `netsp import` prints, the head first.
 
-        Columns are layer, features, one for each kind that occurs, and what was left out and why.
+        Columns are the layer, its features, each kind that occurs, and what was left out and why.
         """
         kinds = [k for k in KIND_COLUMNS if any(k in layer.used for layer in self.imported)]
         rows: list[tuple[str, ...]] = [("layer", "features", *kinds, "left out")]
@@ -158,4 +159,4 @@ KIND_COLUMNS: tuple[UsedAs, ...] = (
     "path",
     "floor",
 )
-"""Order of the columns of the table."""
+"""Order of the columns of `Site.table`."""

@@ -1,7 +1,7 @@
-"""Problem: what the robot must visit, the obstacles, and the length of the tether.
+"""Problem: the goals that a robot must visit, the obstacles, and the length of its tether.
 
-Problems are frozen and validated when they are made, so no other code has to check them. The JSON
-format is version 1; `netsp schema problem` prints its JSON Schema, problems/README.md explains it.
+Problems are frozen, and validated when they are created, so no other code has to check them. The
+JSON format is version 1: `netsp schema problem` prints its schema, problems/README.md explains it.
 """
 
 from __future__ import annotations
@@ -58,21 +58,15 @@ if TYPE_CHECKING:
 
 
 MAX_EXTENT_RATIO = 1e4
-"""Tolerance for the extent of an obstacle within reach, in units of the distance of the farthest
-goal.
-
-With larger ones, tolerances would come near the distances between goals.
-"""
+"""Tolerance for the extent of an obstacle within reach, as a multiple of the distance to the
+farthest goal: beyond it, tolerances would be comparable to the distances between goals."""
 
 MIN_WIDTH_RATIO = 1e-7
-"""Tolerance for the width of the narrowest obstacle within reach, in units of the problem's size.
-
-With narrower ones, its sides would come near the tolerances, and a tether could be wound around it
-without end.
-"""
+"""Tolerance for the width of an obstacle within reach, as a share of the problem's size: below it,
+widths would be comparable to tolerances, and a tether could wrap the obstacle without end."""
 
 RELATIVE_TOLERANCE = 1e-9
-"""Tolerance for lengths that count as zero, such as those of touching shapes, in units of the
+"""Tolerance for lengths that count as zero, such as gaps between touching shapes, as a share of the
 problem's size."""
 
 
@@ -222,7 +216,7 @@ class State(Model):
 
 
 class Origin(Model):
-    """Place of the base on the earth, and direction of the y axis."""
+    """Position of the base on the earth, and direction of the y axis."""
 
     latitude: Annotated[Number, Field(description="of the base, degrees", ge=-90, le=90)]
     longitude: Annotated[Number, Field(description="of the base, degrees", ge=-180, le=180)]
@@ -233,15 +227,14 @@ class Origin(Model):
 
 
 def _width(o: Circle | Polygon) -> float:
-    """Return the width of an obstacle along the axis where it is widest."""
+    """Return the extent of an obstacle along x or y, whichever is larger."""
     if isinstance(o, Circle):
         return 2.0 * o.radius
     return float(np.ptp(np.array(o.polygon), axis=0).max())
 
 
 RUN_CONTEXT = {"of": "a run"}
-"""Context of validation for a problem of a run: goals may lie in obstacles, which appeared
-later."""
+"""Context that validates the map of a run, in which goals may lie in obstacles that appeared."""
 
 
 class Problem(Drawn, FileModel):
@@ -254,9 +247,9 @@ class Problem(Drawn, FileModel):
     base : (x, y) or (x, y, z)
         Position where the tether is fixed, and the tour starts and ends; z is up.
     goals : tuple of Goal
-        Points to visit. Accepted are also a bare ``[x, y]`` or ``[x, y, z]``, an `Inspection`,
-        which becomes the goals about an obstacle, and ``{"any_of": […]}``, which becomes the goals
-        of one choice.
+        Points to visit. A bare ``[x, y]`` or ``[x, y, z]`` is accepted, too, an `Inspection`, which
+        becomes the goals around an obstacle, and ``{"any_of": […]}``, which becomes the goals of
+        one choice.
     obstacles : tuple of Circle or Polygon
         Vertical projections of circles or simple polygons.
     tether_length : float
@@ -264,23 +257,23 @@ class Problem(Drawn, FileModel):
     clearance : float
         Length by which every obstacle is grown: the vehicle's radius.
     bounds : (xmin, ymin, xmax, ymax) or None
-        Box that the robot's centre and the tether stay in. If the corners of an outline are given,
-        four walls about it become obstacles, from which the clearance is kept.
+        Box that the robot's centre and the tether stay in. The corners of an outline are accepted
+        instead: its bounding box is used, and four walls around it become obstacles.
     state : State or None
-        Start of the tour; None for the base with no tether out. From a state, the tour is the
-        shortest path through all goals back to the base, with the whole tether recovered. The
-        tether may be longer than `tether_length` at the start only.
+        Start of the tour; None if the robot starts at the base. From a state, the tour is the
+        shortest path through all goals back to the base, with the whole tether recovered. Only at
+        the start may the tether be longer than `tether_length`.
     units : str
         Name of the unit of length.
     origin : Origin or None
-        Place of the base on the earth, and direction of the y axis, for exports.
+        Position of the base on the earth, and direction of the y axis, for exports.
     site : Site or None
-        Map that the problem was imported from, with what became of each of its features.
+        Map that the problem was imported from, and what each of its features became.
 
     Raises
     ------
     InputError
-        Values that break the format, in one line; so do `load` and `from_json`.
+        A value breaks the format; `load` and `from_json` raise it, too.
 
     Examples
     --------
@@ -405,7 +398,8 @@ class Problem(Drawn, FileModel):
             )
 
     def _check_state(self) -> None:
-        """Raise ValueError if the robot is not in free space, or its word names no obstacle."""
+        """Raise ValueError if the robot is not in free space, or a letter of its word is no
+        obstacle."""
         if self.state is None:
             return
         xy = np.array(self.state.position[:2])
@@ -434,10 +428,10 @@ class Problem(Drawn, FileModel):
                 )
 
     def size_complaint(self) -> str | None:
-        """Return what is wrong with the sizes of obstacles within reach, or None.
+        """Return what is wrong with the size of an obstacle within reach, or None.
 
-        Tolerances follow the largest size, so goals beside an obstacle too large would be hidden,
-        and an obstacle too small, too.
+        Tolerances are shares of the largest size. An obstacle that is too large would merge goals
+        beside it, and one that is too small would vanish.
         """
         reach = self.tether_length + self.clearance
         away = float(np.abs(self.points - np.array(self.base)).max())
@@ -460,8 +454,10 @@ class Problem(Drawn, FileModel):
         return None
 
     def _check_free(self, *, goals: bool) -> None:
-        """Raise ValueError if the base, or a goal if wanted, is outside the bounds or in a grown
-        obstacle."""
+        """Raise ValueError if the base is outside the bounds or in a grown obstacle.
+
+        Goals are checked, too, if `goals` is true.
+        """
         xy, tolerance = self.points[: None if goals else 1, :2], self.tolerance
         outside: npt.NDArray[np.bool_] = np.zeros(len(xy), dtype=bool)
         if self.bounds is not None:
@@ -487,9 +483,9 @@ class Problem(Drawn, FileModel):
     def scale(self) -> float:
         """Size of the problem, the unit of every tolerance.
 
-        It is the largest coordinate difference from the base to any goal, and to any obstacle
-        within the tether's reach. Geometry is computed relative to the base, so far-off origins
-        (UTM) cost no precision.
+        It is the largest difference along x or y between the base and any goal, or any obstacle
+        within the tether's reach. Geometry is computed relative to the base, so large coordinates
+        (UTM) lose no precision.
         """
         reach = self.tether_length + self.clearance
         away = [float(np.abs(self.points[:, :2] - np.array(self.base[:2])).max())]
@@ -500,8 +496,8 @@ class Problem(Drawn, FileModel):
         return max(*away, 1e-9 * self.tether_length)
 
     def _span(self, o: Circle | Polygon) -> tuple[float, float]:
-        """Return the distance of an obstacle from the base, and its farthest extent from there
-        along an axis."""
+        """Return the distance from the base to an obstacle, and to its farthest point along x or
+        y."""
         base = np.array(self.base[:2])
         if isinstance(o, Circle):
             off = np.abs(np.array(o.center) - base)
@@ -527,18 +523,18 @@ class Problem(Drawn, FileModel):
 
     @cached_property
     def clusters(self) -> Ints:
-        """Number (m,) of each goal's cluster, from 1; alternatives have the same."""
+        """Cluster (m,) of each goal, from 1; goals of one choice share a cluster."""
         return cluster_numbers(self.goals)
 
     @cached_property
     def precedences(self) -> Bools:
-        """Matrix (c + 1, c + 1) of which clusters must be visited before which; (0, 0) without
-        precedences."""
+        """Matrix (c + 1, c + 1) of precedences, true at (a, b) if cluster a comes before b; (0, 0)
+        without precedences."""
         return precedence_matrix(self.goals)
 
     @property
     def visits(self) -> int:
-        """Number of goals that a tour visits: one of each choice."""
+        """Number of visits of a tour, which visits one goal of each choice."""
         return int(self.clusters.max())
 
     def goal_name(self, k: int) -> str:
@@ -568,15 +564,15 @@ class Problem(Drawn, FileModel):
         return f"obstacles[{i}]" + (f" ({name})" if name else "")
 
     def grown(self, margin: float, slack: float = 0.0) -> Problem:
-        """Return the problem with all obstacles grown by a margin, and a part of the tether set
-        aside.
+        """Return the problem with obstacles grown by a margin, and with a part of the tether kept
+        in reserve.
 
         Parameters
         ----------
         margin : float
             Additional clearance, not negative, in the problem's units.
         slack : float
-            Share of the taut length that may be out beyond it.
+            Slack tether that may be out, as a share of the taut length, 0 to 1.
 
         Raises
         ------
@@ -597,15 +593,14 @@ class Problem(Drawn, FileModel):
 
     @classmethod
     def from_run(cls, text: str | bytes, source: str) -> Self:
-        """Return the site as it was during a run, when goals may lie in obstacles and are then
-        lost.
+        """Return the map of a run, in which goals may lie in obstacles that appeared.
 
         Parameters
         ----------
         text : str or bytes
             JSON of a problem file.
         source : str
-            Name in messages.
+            Name of the text in messages.
 
         Raises
         ------
@@ -616,7 +611,7 @@ class Problem(Drawn, FileModel):
 
     @property
     def summary(self) -> str:
-        """Numbers of goals and obstacles, and length of the tether."""
+        """Phrase with the numbers of goals and obstacles and the length of the tether."""
         return (
             f"{self._goals_in_words}, {counted(len(self.obstacles), 'obstacle')}, "
             f"tether {self.tether_length:g} {self.units}"
@@ -634,7 +629,7 @@ class Problem(Drawn, FileModel):
     __str__ = __repr__
 
     def to_json(self) -> str:
-        """Return the problem as JSON of format version 1, in a form that reads back equal."""
+        """Return the problem as JSON of format version 1; reading it gives an equal problem."""
         data = self.model_dump(mode="json", exclude_none=True)
         for goal in data["goals"]:
             if not goal["after"]:
@@ -643,11 +638,11 @@ class Problem(Drawn, FileModel):
 
     @property
     def sha256(self) -> str:
-        """Hash of all values that the answer depends on, without names."""
+        """Hash of all values that the tour depends on: names, units and origin do not count."""
         data = self.model_dump(mode="json", exclude={"name", "units", "origin", "site"})
-        if data["state"] is None:  # older problems have no state, and their hashes must stay
+        if data["state"] is None:  # as in older versions, whose hashes must stay valid
             del data["state"]
-        for k, goal in enumerate(data["goals"]):  # nor relations between goals
+        for k, goal in enumerate(data["goals"]):  # likewise for relations between goals
             cluster = self.clusters[k]
             if goal.pop("choice") is not None and (self.clusters == cluster).sum() > 1:
                 goal["cluster"] = int(cluster)

@@ -1,6 +1,6 @@
 """Shorthand of problem files, and its expansion.
 
-Structures to inspect, goals with alternatives, and bounds that are no box exist in files only.
+Structures to inspect, choices and outlines exist in files only; problems have goals and boxes.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ MAX_VIEWPOINTS = 1000
 
 
 class Inspection(Model):
-    """Structure to look at from all sides; it stands for a goal at each viewpoint.
+    """Structure to inspect from all sides; it expands to a goal at each viewpoint.
 
     Attributes
     ----------
     inspect : str
         Name of the obstacle.
     viewpoints : int
-        Number of viewpoints at every depth, evenly about a circle or along the outline of a
+        Number of viewpoints at each depth, spaced evenly around a circle or along the outline of a
         polygon.
     standoff : float
-        Distance of the viewpoints from the surface.
+        Distance of the viewpoints from the surface, in the problem's units.
     depths : tuple of float
-        Heights z of the viewpoints, negative below the surface.
+        Heights z of the viewpoints, in the problem's units; negative below the water surface.
     bearing : float
         Direction of the first viewpoint, degrees clockwise from the y axis.
     after : tuple of str
-        Names of goals or choices to be visited before any of its goals.
+        Names of goals or choices that must be visited before all goals of the structure.
     """
 
     inspect: Annotated[Name, Field(description="name of the obstacle to look at from all sides")]
@@ -58,10 +58,9 @@ class Inspection(Model):
     ] = ()
 
     def goals(self, shape: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Return the goals that the structure stands for, as a problem file has them.
+        """Return the goals around an obstacle, `shape`; both are objects as in a problem file.
 
-        The first viewpoints of all depths come first, then the second ones, and so on. `shape` is
-        the obstacle as a problem file has it.
+        The first viewpoint comes first, at each depth, then the second one, and so on.
         """
         places = self._viewpoint_places(shape)
         return [
@@ -75,7 +74,7 @@ class Inspection(Model):
         ]
 
     def _viewpoint_places(self, shape: Mapping[str, Any]) -> np.ndarray:
-        """Return the places (viewpoints, 2) about the obstacle."""
+        """Return the viewpoints (n, 2) around the obstacle."""
         turns = np.arange(self.viewpoints) / self.viewpoints
         if "radius" in shape:
             angle = math.radians(self.bearing) + 2.0 * math.pi * turns
@@ -100,8 +99,7 @@ class Inspection(Model):
 def expand_shorthand(data: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return the fields of a problem with all shorthand expanded.
 
-    Fields need not be valid; shorthand that cannot be understood stays as it is. Data without
-    shorthand are returned themselves.
+    Other fields need not be valid. Data without shorthand are returned unchanged, not copied.
 
     Raises
     ------
@@ -176,7 +174,7 @@ def _alternatives(goal: Mapping[str, Any], k: int) -> list[dict[str, Any]]:
 
 
 def _after_all_of(inspected: Mapping[str, list[str]], goal: Any) -> Any:
-    """Return a goal; one that comes after a structure comes after all goals about it."""
+    """Return a goal in whose `after` the name of a structure is replaced by its goals."""
     after = goal.get("after") if isinstance(goal, dict) else None
     if not isinstance(after, Sequence) or isinstance(after, str):
         return goal
@@ -185,10 +183,10 @@ def _after_all_of(inspected: Mapping[str, list[str]], goal: Any) -> Any:
 
 
 def _with_walls(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the data with bounds of any outline as a box and walls about the outline.
+    """Return the data with an outline as bounds replaced by its bounding box and walls.
 
-    The walls extend beyond the box, so that nothing gets around them. They are solid: robots keep
-    their clearance from them.
+    The walls extend beyond the box, so that no path leads around them. They are obstacles, so
+    robots keep their clearance from them.
     """
     bounds = data.get("bounds")
     if isinstance(bounds, np.ndarray):
@@ -228,10 +226,10 @@ class _Outline(Model):
 def _box_and_walls(
     xy: np.ndarray, margin_share: float = 0.05
 ) -> tuple[np.ndarray, list[list[list[float]]]]:
-    """Return the corners (low, high) of a box about an outline, and walls between both.
+    """Return the bounding box (low, high) of an outline, and the walls that fill it up.
 
-    The walls are four polygons, cut where the outline is farthest to every side. They extend beyond
-    the box by a share of its longer side.
+    The walls are four polygons. They meet where the outline touches the sides of the box, and
+    extend beyond the box by a share of its longer side.
     """
     import shapely
 

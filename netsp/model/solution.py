@@ -1,4 +1,4 @@
-"""Solution of a problem, with what is proven of it. The JSON format is version 1."""
+"""Solution of a problem, with its proof status. The JSON format is version 1."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ if TYPE_CHECKING:
 
 
 class Status(StrEnum):
-    """Outcome of a run, and what is proven of its tour.
+    """Outcome of a solver, and what is proven about its tour.
 
     Attributes
     ----------
     OPTIMAL
-        Proven the shortest of all admissible tours of the continuous world (of those in the given
-        order if the order was kept); of a travel graph that was given as such, the shortest of its
-        tours.
+        Proven the shortest of all admissible tours of the continuous world, or, if the order was
+        given, of all tours in that order. If a travel graph was solved without a world, the
+        shortest of its tours.
     OPTIMAL_OF_KEPT
-        Shortest tour over the homotopy classes that the roadmap kept, if it left others out: they
+        Shortest tour over the homotopy classes that the roadmap kept. It left out others: there
         were too many, the time was too short, or a rule excluded them.
     OPTIMAL_OF_ROADMAP
-        Shortest tour along a sampled roadmap (PRM*), or along that of another package. Shorter
-        tours may exist beside the roadmap.
+        Shortest tour along a sampled roadmap (PRM*) or the roadmap of a plug-in. Shorter tours may
+        exist off the roadmap.
     OPTIMAL_OF_STATES
-        Shortest tour in space along the legs that were found between the states of the tether that
-        were found. Shorter tours may exist between other states.
+        Shortest tour in space over the known states of the tether and the legs found between them.
+        Shorter tours may exist through other states.
     FEASIBLE
-        A tour, not proven the shortest.
+        Tour that is not proven the shortest.
     INFEASIBLE
         Proof that there is no tour.
     NO_SOLUTION_FOUND
-        A limit was reached before there was a tour.
+        No tour: a limit was reached before one was found.
     INVALID
         Tour of a baseline that ignores the tether: it entangles obstacles or overstretches the
         tether.
@@ -66,7 +66,7 @@ class Status(StrEnum):
 
     @property
     def verdict(self) -> str:
-        """Phrase for an optimal status: which tours the tour is the shortest of."""
+        """Phrase that says among which tours an optimal tour is the shortest."""
         return _VERDICTS.get(self, self.value)
 
     @classmethod
@@ -97,20 +97,21 @@ _VERDICTS = {
 
 
 KeptClasses = Literal["all", "non-looping", "shortest"]
-"""Homotopy classes that a roadmap held."""
+"""Homotopy classes that a roadmap kept."""
 
 
 def max_turning(friction: float, max_tension_ratio: float | None) -> float:
-    """Return the angle by which a tether may turn about obstacles, by the capstan's formula,
-    radians.
+    """Return the largest angle by which a tether may turn around obstacles, radians.
+
+    It follows from the capstan equation.
 
     Parameters
     ----------
     friction : float
-        Coefficient.
+        Coefficient of friction, at least 0.
     max_tension_ratio : float, optional
-        Maximum factor of friction on the tension; None for no limit, for which the angle is
-        infinite.
+        Largest factor by which friction may raise the tension; None for no limit, which gives an
+        infinite angle.
     """
     if max_tension_ratio is None or friction == 0.0:
         return math.inf
@@ -118,18 +119,19 @@ def max_turning(friction: float, max_tension_ratio: float | None) -> float:
 
 
 MAX_FRICTION = 10.0
-"""Format limit of all files: coefficient of friction of tether on obstacle; ropes have 0.1 to 1."""
+"""Format limit of all files: coefficient of friction of tether on obstacle, in practice 0.1 to
+1."""
 
 
 def tension_ratio(friction: float, turning: float) -> float:
-    """Return the factor by which friction multiplies a tether's tension, by the capstan's formula.
+    """Return the factor by which friction raises the tension of a tether, by the capstan equation.
 
-    It is e^(friction · turning), and 1e12 where that is more: no tether moves then.
+    It is e^(friction · turning), but at most 1e12, at which no tether moves.
 
     Parameters
     ----------
     friction : float
-        Coefficient, at least 0.
+        Coefficient of friction, at least 0.
     turning : float
         Sum of the angles by which the tether turns about obstacles, radians, at least 0.
 
@@ -142,9 +144,9 @@ def tension_ratio(friction: float, turning: float) -> float:
 
 
 def proof(status: Status, length: float | None, bound: LowerBound | None) -> str:
-    """Return in words what is proven of a tour, and of which tours it is the shortest.
+    """Return in words what is proven about a tour, and for which scope.
 
-    Examples of results are "proven optimal", "at most 3.8 % above the shortest tour", "no bound".
+    Results are, for example, "proven optimal", "at most 3.8 % above the shortest tour", "no bound".
     """
     if status is Status.INVALID:
         return "no tour for a tether: the solver is blind to it"
@@ -158,19 +160,19 @@ def proof(status: Status, length: float | None, bound: LowerBound | None) -> str
 
 
 EXACT_ROADMAPS = frozenset({"taut"})
-"""Names of roadmaps whose travel graph, with all classes, holds every admissible tour."""
+"""Names of the roadmaps whose travel graph, with all classes, contains every admissible tour."""
 
 
 def solution_scope(roadmap: str, classes: KeptClasses | None, *, kept_order: bool = False) -> Scope:
-    """Return the tours that the lower bound of a solution holds for, by what is known of its run.
+    """Return the scope of the lower bounds that a solver can prove on a roadmap.
 
     Parameters
     ----------
     roadmap : str
         Name of the roadmap.
     classes : {"all", "non-looping", "shortest"} or None
-        Homotopy classes of the roadmap. With the shortest classes only, bounds include the classes
-        left out; if a rule excluded classes, they do not.
+        Homotopy classes that the roadmap kept. Bounds cover classes that were left out because
+        their tethers are longer ("shortest"), but not classes that a rule excludes ("non-looping").
     kept_order : bool
         Whether the order of the goals was given.
     """
@@ -191,10 +193,9 @@ class ProblemReference(Model):
 
 
 class Visit(Model):
-    """One visit of the tour.
+    """Visit of a tour: the goal (from 0), and the word and taut length of the tether there.
 
-    It has the goal (from 0), the word and the taut length of the tether there, and the goal's name
-    and position, by which the goal is found again in a problem that has been edited.
+    The goal's name and position identify the goal in a problem that was edited since.
     """
 
     goal: Annotated[
@@ -213,7 +214,7 @@ class Visit(Model):
 
 
 class Timings(Model):
-    """Wall-clock seconds by stage."""
+    """Wall-clock time of each stage, s."""
 
     roadmap_s: Annotated[NonNegative, Field(description="seconds to build the roadmap")] = 0.0
     matrix_s: Annotated[NonNegative, Field(description="seconds to measure legs")] = 0.0
@@ -229,31 +230,33 @@ class Solution(Drawn, FileModel):
     Attributes
     ----------
     margin : float
-        Length by which all obstacles were grown, besides the problem's clearance; path, tethers,
-        bound and status are those among the grown obstacles.
+        Length added to the problem's clearance; path, tethers, bound and status hold for obstacles
+        that are grown by both.
     slack : float
-        Share of the taut length that may be out beyond it within the tether's length.
+        Slack tether that may be out besides the taut length, as a share of it. Both together are
+        within the tether's length.
     friction, max_tension_ratio : float, float or None
-        Coefficient of friction of tether on obstacle, and maximum factor on the tension, at each
-        visit.
+        Coefficient of friction of tether on obstacle, and the largest factor by which friction may
+        raise the tension at a visit; None for no limit.
     kept_order : bool
-        Whether the goals are visited in the order of the problem; then bound, gap and status are
-        those of the tours of that order.
+        Whether the order of the goals was given; bound, gap and status then hold for tours in that
+        order.
     path : tuple of (x, y, z)
         Closed polyline from the base to the base, or from the problem's state to the base.
     start_tether : tuple of (x, y, z)
         Taut tether at the start of a tour from a state.
     lower_bound : float or None
-        Proven lower bound on the tours that `lower_bound_of` names.
+        Proven lower bound on the length of the tours in `lower_bound_of`.
     lower_bound_of : Scope or None
-        Tours that `lower_bound` holds for; None without a bound. For older files, which lack it, it
-        follows from roadmap and classes: along `prm`, the tours of the roadmap.
+        Scope of `lower_bound`; None without a bound. For older files, which lack it, it is derived
+        from roadmap and classes.
     gap : float or None
         (length - lower_bound) / length.
     classes : {"all", "non-looping", "shortest"} or None
-        Homotopy classes that the roadmap held; `shortest` is the shortest of every goal.
+        Homotopy classes that the roadmap kept; "shortest" means those with the shortest tethers of
+        each goal.
     legs_left_out : tuple of (int, int)
-        Pairs of goals (from 0), one for each leg whose taut path was not found.
+        Pairs of goals (from 0), one for each leg for which no taut path was found.
     entangled : tuple of int
         Obstacles (from 0) that the path is wrapped around; only an `invalid` tour has any.
     """
@@ -354,7 +357,7 @@ class Solution(Drawn, FileModel):
     @model_validator(mode="before")
     @classmethod
     def _name_scope(cls, data: Any) -> Any:
-        """Fill in the scope of the bound, and the scope of `optimal`, in data of older files."""
+        """Add the scope of the bound to data of older files, and qualify the status `optimal`."""
         if not isinstance(data, Mapping) or data.get("lower_bound") is None:
             return data
         if data.get("lower_bound_of") is not None:
@@ -369,7 +372,7 @@ class Solution(Drawn, FileModel):
         return out
 
     def __repr__(self) -> str:
-        """Return problem, solver, status, length, bound and number of visits in one line."""
+        """Return one line with problem, solver, status, length, bound and number of visits."""
         length = "" if self.length is None else f", length {self.length:.6g}"
         bound = "" if self.bound is None else f", {self.bound.says(self.length)}"
         return (
@@ -380,7 +383,7 @@ class Solution(Drawn, FileModel):
     __str__ = __repr__
 
     def to_frame(self) -> pandas.DataFrame:
-        """Return the visits as a pandas DataFrame, a row for each in the order of the tour.
+        """Return a pandas DataFrame with a row for each visit, in the order of the tour.
 
         Columns are ``goal`` (from 0), ``name``, ``x``, ``y``, ``z``, ``signature`` and
         ``tether_length``, in the problem's units.
@@ -403,20 +406,20 @@ class Solution(Drawn, FileModel):
 
     @property
     def bound(self) -> LowerBound | None:
-        """Lower bound with the tours that it holds for; None if nothing is known."""
+        """Lower bound with its scope; None if none is known."""
         if self.lower_bound is None or self.lower_bound_of is None:
             return None
         return LowerBound(self.lower_bound, self.lower_bound_of)
 
     @property
     def max_turning(self) -> float:
-        """Sum of angles by which the tether may turn, radians; infinite without a limit of
-        friction."""
+        """Largest sum of the angles by which the tether may turn, radians; infinite without a limit
+        on the tension."""
         return max_turning(self.friction, self.max_tension_ratio)
 
     @property
     def proof(self) -> str:
-        """Words for what is proven of the tour."""
+        """Phrase that says what is proven about the tour."""
         return proof(self.status, self.length, self.bound)
 
     def to_json(self) -> str:

@@ -1,2 +1,1 @@
-"""Compiled kernels: when they are compiled, and random numbers, growing arrays and hash tables in
-them."""
+"""Compiled kernels: when they are compiled, and what kernels share, such as random numbers."""

@@ -11,12 +11,11 @@ from netsp.base.compiled.interpretation import interpreted
 from netsp.base.compiled.overtime import Overtime, within
 
 STOP_PARAMETERS = frozenset({"stop"})
-"""Names of parameters through which other threads end a kernel; their arrays are never restored."""
+"""Names of parameters through which other threads stop a kernel; their arrays are not restored."""
 
 NARROW_DTYPES = frozenset("ef")
-"""Characters of dtypes in which the interpreter computes with fewer bits than compiled code does: a
-single times a Python float is a single in NumPy, but a double in Numba. Calls with arrays of these
-dtypes are never interpreted."""
+"""Characters of the dtypes float16 and float32. Their product with a Python float is as narrow in
+NumPy but a float64 in Numba, so calls with such arrays are never interpreted."""
 
 
 def arrays_in(value: Any) -> list[np.ndarray[Any, Any]]:
@@ -39,8 +38,7 @@ def can_be_interpreted(args: tuple[Any, ...], max_copied_bytes: int) -> bool:
 
 
 def is_in_pool() -> bool:
-    """Return whether this thread belongs to a pool, so that other threads may write to the arrays
-    of its calls."""
+    """Return whether this thread belongs to a pool; other threads may then write to its arrays."""
     return threading.current_thread().name.startswith("ThreadPoolExecutor")
 
 
@@ -51,15 +49,15 @@ def call_interpreted(kernel: Any, args: tuple[Any, ...]) -> Any:
 
 
 def call_within(budget_s: float, kernel: Any, args: tuple[Any, ...]) -> Any:
-    """Run a kernel interpreted within a budget of CPU seconds; return a result with compiled types.
+    """Run a kernel interpreted for at most `budget_s` CPU seconds, and return its result.
 
-    In a thread of a pool the call has no budget, because arrays that other threads write to cannot
-    be restored.
+    In a thread of a pool there is no limit, because arrays that other threads write to cannot be
+    restored.
 
     Raises
     ------
     Overtime
-        The budget is used up; the arguments are restored.
+        The budget is used up; the arrays have their old values again.
     """
     if is_in_pool():
         return call_interpreted(kernel, args)

@@ -19,7 +19,7 @@ except ImportError:  # on Windows two processes may compile one kernel, with the
 
 @contextlib.contextmanager
 def locked(file: Path | None, max_wait_s: float = math.inf) -> Iterator[bool]:
-    """Lock a file while the body runs; yield whether this process has the lock.
+    """Lock a file while the body runs; yield True if this process has the lock.
 
     The system releases the lock when the process ends, even if it is killed. Where the folder is
     not writable there is no lock, and the body runs as if the process had it.
@@ -27,9 +27,9 @@ def locked(file: Path | None, max_wait_s: float = math.inf) -> Iterator[bool]:
     Parameters
     ----------
     file : Path or None
-        The lock file, which is removed afterwards; None for no lock.
+        Lock file, which is removed afterwards; None for no lock.
     max_wait_s : float
-        Maximum wall-clock seconds to wait for another process, which may have been stopped.
+        Longest wall-clock time to wait for another process, s; that process may be suspended.
     """
     descriptor, is_held = (None, True) if file is None else _taken(file, max_wait_s)
     try:

@@ -3,13 +3,13 @@
 Numba recompiles a function only when the function's own file changes. Its cache fails in three
 cases, which this module handles, so that no user has to delete a cache:
 
-- A kernel in another file, which was compiled into the function, has changed. The index of a kernel
-  therefore depends on all files with kernels that the kernel's file imports.
-- A class in the signature was renamed. Loading the index then raises AttributeError; here such an
+- A kernel in another file, which was inlined, has changed. So the index of a kernel depends on all
+  files with kernels that the kernel's own file imports.
+- A class in a signature was renamed. Loading the index then raises AttributeError; here, such an
   index counts as empty.
-- Two processes compile one function for different types at the same time. Numba may give both files
-  the same number, so that the code of one is loaded for the types of the other. Here, files are
-  named by their signature.
+- Two processes compile one function for different types at the same time. Numba may then give both
+  files the same number, and load the code of one for the types of the other. Here, the name of a
+  file is a hash of its signature.
 
 Files that cannot be read, as after a full disk or a power failure, count as absent.
 
@@ -46,8 +46,8 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
     """Files of one kernel: an index by signature, and a file for each signature, named by it."""
 
     def save(self, key: Any, data: Any) -> None:
-        """Save a compiled kernel: first its file, then the index, so that no other process loads an
-        older kernel under the same name."""
+        """Save a compiled kernel: first its file, then the index, so that the index never names a
+        file of older code."""
         if is_linkable(data):
             if not is_for_kernel():  # machine code for Python is saved in a moment
                 return
@@ -62,7 +62,7 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
             self._tidy(set(overloads.values()))
 
     def contains(self, key: Any) -> bool:
-        """Return whether the code that the caller needs, Python or a kernel, is on disk."""
+        """Return whether the code that the caller, Python or another kernel, needs is on disk."""
         index, keys = self._load_index(), _keys(key) if is_for_kernel() else [key]
         names = [index[one] for one in keys if one in index]
         return any(Path(self._data_path(name)).is_file() for name in names)
@@ -96,9 +96,10 @@ class KernelFile(IndexDataCacheFile):  # type: ignore[misc]
         return Path(self._index_path).with_suffix(".lock")
 
     def _tidy(self, named: set[str]) -> None:
-        """Remove files of older sources; a process that still needs one compiles again."""
-        of_all = glob.escape(self._index_name.removesuffix(".nbi")) + ".*.nbc"
-        for old in Path(self._cache_path).glob(of_all):
+        """Remove the files of older sources; a process that still needs one compiles the kernel
+        again."""
+        pattern = glob.escape(self._index_name.removesuffix(".nbi")) + ".*.nbc"
+        for old in Path(self._cache_path).glob(pattern):
             if old.name not in named:
                 old.unlink(missing_ok=True)
 
@@ -117,18 +118,14 @@ def _keys(key: Any) -> list[Any]:
 
 
 def keep_on_disk(dispatcher: Any, function: Callable[..., Any]) -> None:
-    """Make the dispatcher that `cached` returned for a function save its compiled code in a
-    `KernelFile`.
-
-    Where no folder is writable, the code stays in memory only.
-    """
+    """Make a dispatcher from `cached` save its code in a `KernelFile`, if a folder is writable."""
     kept = getattr(dispatcher._cache, "_cache_file", None)
     if kept is None:
         return
     dispatcher._cache._cache_file = KernelFile(
         kept._cache_path,
         kept._index_name.removesuffix(".nbi"),
-        (kept._source_stamp, stamps(Path(function.__code__.co_filename)), FORMAT_VERSION),
+        (kept._source_stamp, source_stamps(Path(function.__code__.co_filename)), FORMAT_VERSION),
     )
 
 
@@ -147,8 +144,7 @@ def is_any_on_disk(dispatcher: Any) -> bool:
 
 
 def lock_file(dispatcher: Any) -> Path | None:
-    """Return the file that is locked while a kernel is compiled; None where nothing is saved on
-    disk."""
+    """Return the file that is locked while a kernel is compiled; None if nothing is saved."""
     file = _file_of(dispatcher)
     return None if file is None else file.lock
 
@@ -159,16 +155,12 @@ def _file_of(dispatcher: Any) -> KernelFile | None:
 
 
 def cached(function: Callable[..., Any], has_wrapper: bool = True) -> Any:
-    """Return Numba's dispatcher of a function; it saves compiled code on disk where a folder is
-    writable.
+    """Return Numba's dispatcher of a function; it saves compiled code if a folder is writable.
 
     Parameters
     ----------
-    function : callable
-        The function.
     has_wrapper : bool
-        Whether the function is compiled with a wrapper for calls from Python; `LazyLibrary` adds
-        it later.
+        Whether to compile a wrapper for calls from Python at once. `LazyLibrary` adds it later.
     """
     # nothing calls kernels from C
     options = {"no_cfunc_wrapper": True, "no_cpython_wrapper": not has_wrapper}
@@ -217,9 +209,11 @@ def is_supported() -> bool:
 
 
 @cache
-def stamps(file: Path) -> tuple[tuple[str, int, int], ...]:
-    """Return name, modification time (ns) and size of each file with kernels that a file imports,
-    directly or indirectly, without the file itself."""
+def source_stamps(file: Path) -> tuple[tuple[str, int, int], ...]:
+    """Return name, modification time (ns) and size (bytes) of the files that a file depends on.
+
+    These are the files with kernels that it imports, directly or not, without the file itself.
+    """
     found: set[Path] = set()
     new = {file}
     while new:

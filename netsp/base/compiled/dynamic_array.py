@@ -1,7 +1,7 @@
 """Kernels that copy, sort and enlarge arrays.
 
-Their loops are explicit, because a slice assignment would compile NumPy's broadcasting and its
-error messages, and sorting would compile NumPy's sort; each takes seconds.
+They are written as loops: Numba would need seconds to compile the broadcasting behind a slice
+assignment, or NumPy's sort.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Hash tables of compiled loops: open addressing in arrays."""
+"""Hash table for kernels: open addressing with linear probing in two arrays."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from netsp.base.compiled.kernel import kernel
 
 @kernel
 def rehashed(key: Ints, value: Floats) -> tuple[Ints, Floats]:
-    """Return keys (slots,), -1 where empty, and values (slots,) in a table with twice the slots."""
+    """Return keys (slots,), -1 for an empty slot, and values (slots,) of a table twice as large."""
     n = 2 * len(key)
     key2 = np.full(n, -1, dtype=np.int64)
     value2 = np.empty(n)

@@ -10,12 +10,11 @@ _PACKAGE = Path(__file__).resolve().parents[2]
 
 
 @cache
-def may_be_kept() -> bool:
-    """Return whether compiled code may be on disk; only Numba knows for certain.
+def may_be_on_disk() -> bool:
+    """Return whether compiled code may be on disk; only Numba can tell for certain.
 
-    Searches the folders in which Numba keeps indexes of compiled functions: `NUMBA_CACHE_DIR`, or
-    else the folders of the sources and the user's cache folder. Indexes of other packages count
-    too.
+    The search covers the folders in which Numba keeps its indexes: `NUMBA_CACHE_DIR`, or else the
+    folders of the sources and the user's cache folder. It also finds indexes of other packages.
     """
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     try:
@@ -29,8 +28,7 @@ def may_be_kept() -> bool:
 
 
 def _user_folders() -> list[Path]:
-    """Return the folders in which Numba keeps compiled code on Linux, macOS and Windows if the
-    sources' folder is not writable."""
+    """Return Numba's cache folders on Linux, macOS and Windows if the sources are not writable."""
     home = Path.home()
     return [
         Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache") / "numba",

@@ -26,7 +26,7 @@ from netsp.base.compiled.arguments import (
 )
 from netsp.base.compiled.compile_policy import CompilePolicy, current_policy
 from netsp.base.compiled.interpretation import called_kernels
-from netsp.base.compiled.kept_code import may_be_kept
+from netsp.base.compiled.kept_code import may_be_on_disk
 from netsp.base.compiled.overtime import Overtime
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -35,16 +35,16 @@ F = TypeVar("F", bound=Callable[..., Any])
 def kernel(function: F) -> F:
     """Return a function that runs interpreted until compiling it pays.
 
-    Arguments are arrays, numbers and tuples of these. Compiled code is kept on disk and releases
-    the interpreter lock. The annotations are for callers and the type checker; Numba infers types
-    of its own. A parameter through which another thread ends the function is named `stop`.
+    Arguments are arrays, numbers and tuples of these. Compiled code is saved on disk and releases
+    the global interpreter lock. Annotations serve readers and mypy; Numba infers its own types. A
+    parameter through which another thread stops the function must be named `stop`.
     """
     if "numba" not in sys.modules and os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
         return Kernel(function)  # type: ignore[return-value]
     return _dispatcher_of(function)  # type: ignore[no-any-return]
 
 
-def is_kept(kernel: Any) -> bool:
+def is_on_disk(kernel: Any) -> bool:
     """Return whether compiled code of a kernel is on disk, for any types; loads Numba."""
     from netsp.base.compiled import disk_cache
 
@@ -58,7 +58,7 @@ def runs_compiled(kernel: Any) -> bool:
     if not compiles():
         return False
     compiled = getattr(kernel, "has_machine_code", bool(kernel.overloads))
-    return current_policy().is_eager or compiled or is_kept(kernel)
+    return current_policy().is_eager or compiled or is_on_disk(kernel)
 
 
 def all_kernels() -> list[Any]:
@@ -67,8 +67,8 @@ def all_kernels() -> list[Any]:
 
 
 def functions_to_compile() -> set[Callable[..., Any]]:
-    """Return the functions of all kernels in the imported modules that this process has not
-    compiled or loaded."""
+    """Return the functions of imported kernels that this process has neither compiled nor
+    loaded."""
     return {
         kernel.py_func
         for kernel in _imported_kernels()
@@ -119,7 +119,7 @@ class Kernel:
 
     def _budget_s(self, policy: CompilePolicy) -> float:
         """Return the CPU seconds that a call may run interpreted before Numba is loaded for it."""
-        if may_be_kept():
+        if may_be_on_disk():
             return 0.0 if is_in_pool() else policy.numba_s - Kernel._total_s
         bytecode = sum(len(k.py_func.__code__.co_code) for k in called_kernels(self))
         return policy.interpreted_share * policy.compile_time_s(bytecode) - self._early_s

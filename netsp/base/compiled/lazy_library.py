@@ -1,9 +1,10 @@
 """Machine code for the kernels that Python calls, and for no others.
 
-Numba wraps each function for calls from Python, generates its machine code, and links the function
-into those that call it, where its machine code is generated again. Yet only kernels call two thirds
-of the kernels. Here, a function stays in LLVM's optimized intermediate representation, which can be
-linked; it gets a wrapper and machine code once Python calls it. That saves a fifth of the time.
+Numba wraps each function for calls from Python, generates its machine code, and links it into its
+callers, where machine code is generated again. Yet two thirds of the kernels are called by other
+kernels only. Here, a function stays in LLVM's optimized intermediate representation, which can be
+linked, until Python calls it; only then does it get a wrapper and machine code. That saves a fifth
+of the compile time.
 
 This module uses private parts of Numba. The function `is_supported` checks that these exist.
 """
@@ -64,8 +65,9 @@ class LazyLibrary(JITCodeLibrary):  # type: ignore[misc]
         for library in dict.fromkeys(self._linking_libraries):
             self._reload_init.update(library._reload_init)
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
-        # Callers optimize it once more. If only they did, LLVM would vectorize fewer loops, and
-        # reduced-cost fixing would take three times as long.
+        # Callers optimize the linked code again. Without this first pass, LLVM would vectorize
+        # fewer
+        # loops, and reduced-cost fixing would take three times as long.
         self._optimize_final_module()
         self._finalize_dynamic_globals()
         self._finalized = True
@@ -85,12 +87,12 @@ class LazyLibrary(JITCodeLibrary):  # type: ignore[misc]
         return super().get_pointer_to_function(name)  # type: ignore[no-any-return]
 
     def wrapped(self, result: Any) -> Any:
-        """Generate a wrapper and machine code; return a result of compiling that Python can call.
+        """Generate a wrapper and machine code; return a `CompileResult` that Python can call.
 
         Parameters
         ----------
         result : numba CompileResult
-            Result of compiling the function, which can only be linked.
+            Compiled function that can only be linked.
         """
         # The wrapper has constants. Processes that load the function inside another one never see
         # them, so they are not added to the constants of the function.
@@ -161,9 +163,9 @@ class _WithoutVariables:
 
 @contextlib.contextmanager
 def lazy_libraries() -> Iterator[None]:
-    """Have Numba create a `LazyLibrary` for each function that is compiled or loaded in the body.
+    """Make Numba create a `LazyLibrary` for each function that the body compiles or loads.
 
-    The caller holds Numba's global lock, so this concerns no function that others compile.
+    The caller holds Numba's global lock, so functions that other threads compile are not affected.
     """
     if not is_supported():
         yield
@@ -194,8 +196,7 @@ def is_for_kernel() -> bool:
 
 
 def is_linkable(reduced: Any) -> bool:
-    """Return whether a function's file, as Numba saves it, has no machine code and can only be
-    linked."""
+    """Return whether a saved function has no machine code, so that it can only be linked."""
     library = reduced[0]  # see `CompileResult._reduce`
     return isinstance(library, tuple) and library[1] == LINKABLE
 

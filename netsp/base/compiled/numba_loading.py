@@ -17,7 +17,6 @@ def when_numba_is_loaded(call: Callable[[], None]) -> None:
 
 
 def on_numba_loaded() -> None:
-    """Run the registered callbacks; `netsp.base.compiled.kernel` calls this when it has loaded
-    Numba."""
+    """Run the waiting callbacks; `netsp.base.compiled.kernel` calls this after loading Numba."""
     while _waiting:
         _waiting.pop(0)()

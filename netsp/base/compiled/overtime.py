@@ -23,7 +23,7 @@ from netsp.base.compiled.compile_policy import current_policy
 T = TypeVar("T")
 
 MAX_STEPS_TO_EXCEPTION = 1000
-"""Tolerance for the number of loop steps until Python raises a pending exception; it checks at each
+"""Tolerance for the delay of a pending exception, loop steps; Python checks for one at each
 step."""
 
 
@@ -44,7 +44,8 @@ class _Call:
         self.was_ended = False
 
     def now(self) -> float:
-        """Return the CPU seconds of the thread, or the wall-clock time where a system has none."""
+        """Return the thread's CPU time, s, or the wall-clock time if the system does not measure
+        it."""
         return time.perf_counter() if self._clock is None else time.clock_gettime(self._clock)
 
 
@@ -137,7 +138,7 @@ if hasattr(os, "register_at_fork"):
 def within(budget_s: float, function: Callable[..., T], args: tuple[Any, ...]) -> T:
     """Call a function and end the call when its budget of CPU seconds is used up.
 
-    Code in other languages that the function calls runs to its end.
+    Calls of C code are not interrupted; they run to their end.
 
     Raises
     ------
@@ -153,7 +154,7 @@ def within(budget_s: float, function: Callable[..., T], args: tuple[Any, ...]) -
         out = function(*args)
         _watch.end(call)
     except BaseException as error:
-        # `Overtime` is raised where a function is entered: enter none outside of a `try`
+        # Python raises `Overtime` as a function is entered, so call functions only within a `try`
         try:
             _watch.end(call)
         except Overtime:

@@ -1,8 +1,9 @@
-"""Random numbers of compiled loops.
+"""Random numbers for kernels.
 
 The generator is xorshift64* (Vigna 2016, "An experimental exploration of Marsaglia's xorshift
-generators, scrambled"). Its state is an array of one word, seeded from the solver's generator. So
-the numbers are the same with every version of NumPy and Numba, and cost a tenth of a method call.
+generators, scrambled"). Its state is an array of one 64-bit integer, seeded from the solver's
+generator. The numbers are the same with every version of NumPy and Numba, and ten times faster than
+a method call.
 """
 
 from __future__ import annotations
@@ -20,13 +21,13 @@ UINT64_MASK = 2**64 - 1
 
 
 def seeded(rng: np.random.Generator) -> npt.NDArray[np.uint64]:
-    """Return the state of a generator that is seeded from another one."""
+    """Return the state (1,) of a generator, seeded from a NumPy generator."""
     return np.array([rng.integers(1, 2**63)], dtype=np.uint64)
 
 
 @kernel
 def uniform(state: npt.NDArray[np.uint64]) -> float:
-    """Return a double in [0, 1)."""
+    """Return a random number in [0, 1)."""
     x = state[0]
     x ^= x >> np.uint64(12)
     x ^= x << np.uint64(25)
@@ -48,15 +49,15 @@ def _uniform_by_integers(state: npt.NDArray[np.uint64]) -> float:
 
 @kernel
 def below(n: int, state: npt.NDArray[np.uint64]) -> int:
-    """Return a whole number in 0 … n - 1."""
+    """Return a random integer from 0 to n - 1."""
     return int(uniform(state) * n)
 
 
 @kernel
 def metropolis(rise: float, theta: float, state: npt.NDArray[np.uint64]) -> bool:
-    """Return whether a change of cost is accepted: always if it falls, else with probability
+    """Return whether a proposal is accepted: always if the cost falls, else with probability
     exp(-rise / θ).
 
-    This is equation (5) of 2017, and (2) of 2016.
+    Source: McCammon & Hollinger 2017, equation (5); 2016, equation (2).
     """
     return rise <= 0.0 or uniform(state) < math.exp(-rise / theta)

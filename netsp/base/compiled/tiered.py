@@ -1,8 +1,7 @@
 """Kernels that run interpreted until compiling them pays.
 
-Compiling a kernel takes up to several seconds, and loading it up to a tenth of a second; small
-problems are solved sooner without either. Whether a kernel runs interpreted or compiled changes no
-result.
+Compiling a kernel takes up to several seconds, and loading it from disk up to a tenth of a second;
+small problems are solved sooner without either. Results are the same either way.
 """
 
 from __future__ import annotations
@@ -40,16 +39,16 @@ OVERRIDDEN = ("compile", "get_call_template", "add_overload")
 class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
     """Dispatcher that interprets its function until compiling it pays (`CompilePolicy`).
 
-    Numba calls `_compile_for_args` when there is no compiled code for the types of a call, and then
-    calls what it returns with the arguments of that call.
+    Numba calls `_compile_for_args` if there is no compiled code for the argument types of a call,
+    and passes the arguments to the function that it returns.
 
     Attributes
     ----------
     interpreted_s : float
         CPU seconds that the function has run interpreted.
     was_on_disk : bool
-        Whether compiled code was found on disk. A search takes about a millisecond, so short calls
-        do not search each time.
+        Whether compiled code was found on disk. A search takes about a millisecond, so not every
+        call searches.
     next_check_s : float
         Value of `interpreted_s` at which the next call searches the disk again.
     has_compiled : bool
@@ -137,7 +136,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         with locked(file, max_wait_s), _collector_paused():
             try:
                 self._obtain(types)
-            except OSError:  # the folder takes no more files; the kernel is compiled all the same
+            except OSError:  # the disk is full, but the kernel is compiled in memory
                 if not self._is_ready(types):
                     raise
                 TieredDispatcher.is_disk_full = True
@@ -147,13 +146,13 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
     def _obtain(self, types: tuple[Any, ...]) -> None:
         """Load the kernel from disk or compile it, and generate machine code if Python calls it."""
         if disk_cache.is_on_disk(self, types):
-            self.overloads.pop(types, None)  # what is in memory has no machine code
+            self.overloads.pop(types, None)  # the version in memory has no machine code
         super().compile(types)
         if self._is_ready(types):
             return
         details = {"dispatcher": self, "args": types, "return_type": None}
         with event.trigger_event("numba:compile", data=details):
-            # after an interrupt, a half-made library is not used again
+            # popped first, so that an interrupt leaves no half-made library behind
             linked = self.overloads.pop(types)
             self.add_overload(linked.library.wrapped(linked))
         self._cache.save_overload(types, self.overloads[types])
@@ -207,7 +206,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
 
 @contextlib.contextmanager
 def _collector_paused() -> Iterator[None]:
-    """Pause Python's garbage collector: Numba creates millions of objects, nearly all of which live
+    """Pause the garbage collector: of the millions of objects that Numba creates, nearly all live
     until the function is compiled."""
     is_collecting = gc.isenabled()
     gc.disable()

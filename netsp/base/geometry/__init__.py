@@ -1,1 +1,1 @@
-"""Planar geometry: kernels, polygons."""
+"""Planar geometry: kernels, polygons, polylines, trees of boxes."""

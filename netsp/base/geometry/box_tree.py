@@ -1,8 +1,9 @@
-"""Binary trees of boxes over items in a row, for queries that concern few of many items.
+"""Binary trees of bounding boxes over a sequence of items, for queries that concern few of them.
 
-The nodes stand in preorder: the left child of node k is k + 1, its right child is ``skip[k + 1]``,
-and ``skip[k]`` is the first node after its subtree. A loop without a stack visits, in the order of
-the items, all nodes whose boxes matter: it goes on at k + 1 if the box matters, else at skip[k].
+Nodes are numbered in preorder: the left child of node k is k + 1, its right child is
+``skip[k + 1]``, and ``skip[k]`` is the first node after its subtree. A query needs no stack: it
+continues at k + 1 if it meets the box of node k, else at skip[k]. It visits leaves in the order of
+the items.
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ class BoxTree(NamedTuple):
     Attributes
     ----------
     box
-        Bounds (nodes, 4), xmin, ymin, xmax, ymax, of all items below.
+        Bounding boxes (nodes, 4) of the items below each node: xmin, ymin, xmax, ymax.
     skip
         First node (nodes,) after the subtree; node + 1 at a leaf.
     first, stop
-        Items (nodes,) below: first to stop - 1.
+        Range (nodes,) of the items below each node: first to stop - 1.
     """
 
     box: Floats
@@ -34,13 +35,12 @@ class BoxTree(NamedTuple):
 
 
 def build_box_tree(boxes: Floats, leaf_items: int = 4) -> BoxTree:
-    """Return the tree over items with boxes (n, 4), whose order it keeps.
+    """Return the tree over items with boxes (n, 4); it keeps their order.
 
     Parameters
     ----------
     leaf_items : int
-        Number of items of a leaf. With fewer there are more nodes; with more, more items are tested
-        in vain.
+        Number of items in a leaf. Fewer make more nodes; more make more tests that find nothing.
     """
     n = len(boxes)
     leaves = -(-n // leaf_items)
@@ -79,7 +79,7 @@ def spatial_order(boxes: Floats, bits: int = 16) -> Ints:
     Parameters
     ----------
     bits : int
-        Number of bits of a coordinate, at most 31; the default means cells of 1/65536 of the whole.
+        Number of bits for each coordinate, at most 31; with 16, a cell is 1/65536 of the extent.
     """
     if len(boxes) == 0:
         return np.zeros(0, dtype=np.int64)

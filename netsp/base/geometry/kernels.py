@@ -1,7 +1,7 @@
 """Planar kernels: distances, containment, crossings. Compiled.
 
 Obstacles are *blockers*: circles ``(x, y, R)`` and polygons given by their edges, each grown by a
-margin. All decisions use distances, so one rule holds for polygons and circles.
+margin. All tests compare distances, so one rule holds for polygons and circles.
 """
 
 from __future__ import annotations
@@ -26,16 +26,18 @@ class Blockers(NamedTuple):
     circles
         Centre and grown radius (n, 3) of each obstacle; the radius is negative for a polygon.
     edges
-        Edges (k, 4) of polygons; obstacle o has edge_start[o]:edge_start[o + 1], grown by grow[o].
+        Edges (k, 4) of polygons. Those of obstacle o are edge_start[o]:edge_start[o + 1].
+    grow
+        Margin (n,) by which each polygon is grown.
     box
         Bounding boxes (n, 4).
     eps
-        Depth up to which a point only touches an obstacle.
+        Depth up to which a point inside an obstacle counts as touching it.
     part
-        Obstacle and edge (parts, 2), -1 for a circle: all circles and edges, those of one polygon
-        in a row and in order.
+        Circles and edges (parts, 2), as the obstacle and its edge, -1 for a circle. The edges of a
+        polygon follow each other in order.
     part_box
-        Grown boxes (parts, 4) of the parts.
+        Bounding boxes (parts, 4) of the grown parts.
     tree
         `BoxTree` over the parts.
     """
@@ -54,7 +56,7 @@ class Blockers(NamedTuple):
 def make_blockers(
     circles: Floats, edges: Floats, edge_start: Ints, grow: Floats, box: Floats, eps: float
 ) -> Blockers:
-    """Return blockers with the tree over their parts."""
+    """Return the blockers of grown obstacles, with their parts and the tree over these."""
     count = np.maximum(np.diff(edge_start), 1)
     order = spatial_order(box)
     owner = np.repeat(order, count[order])
@@ -144,8 +146,10 @@ def depth_in_obstacle(px: float, py: float, o: int, blockers: Blockers) -> float
 def enters_polygon(
     ax: float, ay: float, bx: float, by: float, edges: Floats, start: int, stop: int, growth: float
 ) -> bool:
-    """Return whether a segment is closer than `growth` to the polygon of edges (n, 4) start to stop
-    - 1."""
+    """Return whether a segment comes nearer than `growth` to a polygon, or lies in it.
+
+    The polygon has the edges (n, 4) start to stop - 1.
+    """
     for e in range(start, stop):
         d = segment_segment_distance(
             ax, ay, bx, by, edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
@@ -168,7 +172,7 @@ def segment_blocked(ax: float, ay: float, bx: float, by: float, blockers: Blocke
         x0, y0, x1, y1 = box[node, 0], box[node, 1], box[node, 2], box[node, 3]
         apart = right < x0 or left > x1 or high < y0 or low > y1
         if not apart:
-            # or the line of the segment misses the box
+            # does the line of the segment miss the box?
             side = dx * (0.5 * (y0 + y1) - ay) - dy * (0.5 * (x0 + x1) - ax)
             apart = 2.0 * abs(side) > abs(dx) * (y1 - y0) + abs(dy) * (x1 - x0)
         if apart:
@@ -195,12 +199,12 @@ def segment_blocked(ax: float, ay: float, bx: float, by: float, blockers: Blocke
                 )
                 if d < blockers.grow[o] - eps:
                     return True
-    return in_polygon_of(ax, ay, blockers)
+    return in_any_polygon(ax, ay, blockers)
 
 
 @kernel
-def in_polygon_of(px: float, py: float, blockers: Blockers) -> bool:
-    """Return whether a point lies in any polygon, not grown, of the blockers."""
+def in_any_polygon(px: float, py: float, blockers: Blockers) -> bool:
+    """Return whether a point lies in a polygon of the blockers, before it is grown."""
     skip, box = blockers.tree.skip, blockers.tree.box
     first, stop = blockers.tree.first, blockers.tree.stop
     part, edges = blockers.part, blockers.edges
@@ -256,7 +260,7 @@ def is_covered(px: float, py: float, blockers: Blockers) -> bool:
                 )
                 if blockers.grow[o] - d > eps:
                     return True
-    return in_polygon_of(px, py, blockers)
+    return in_any_polygon(px, py, blockers)
 
 
 @kernel

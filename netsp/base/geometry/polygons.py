@@ -13,11 +13,12 @@ import numpy.typing as npt
 Vertices = Sequence[tuple[float, float]]
 
 SAME_PLACE = 1e-12
-"""Tolerance for the distance of equal places, as a share of the largest coordinate."""
+"""Tolerance for the distance of points that count as equal, as a share of the largest
+coordinate."""
 
 UNION_GRIDS = (0.0, 1e-12, 1e-10, 1e-8)
-"""Tolerance for coordinates of `union`: grids to which they are rounded, as shares of the largest
-coordinate, the finest first."""
+"""Tolerance for coordinates in `union`: spacings of the grids tried, as shares of the largest
+coordinate."""
 
 
 def check_polygon(vertices: Vertices) -> None:
@@ -29,7 +30,7 @@ def check_polygon(vertices: Vertices) -> None:
     shape = shapely.Polygon(vertices)
     size = float(np.ptp(np.asarray(vertices), axis=0).max())
     reason = "" if shape.is_valid else shapely.is_valid_reason(shape)
-    # signed areas of a bow tie cancel; it is the hull that is flat where all vertices lie on a line
+    # the hull, because the signed areas of a bow tie cancel although its vertices are not collinear
     if shapely.convex_hull(shape).area <= 1e-12 * size**2 or (not reason and shape.area == 0.0):
         raise ValueError("polygon has zero area; expected one that encloses something")
     if reason:
@@ -39,10 +40,10 @@ def check_polygon(vertices: Vertices) -> None:
 
 
 def union(shapes: Sequence[Any]) -> Any:
-    """Return the union of shapes, with none of their pieces missing.
+    """Return the union of shapes, checked for missing pieces.
 
-    GEOS 3.14 may lose whole pieces where edges nearly coincide, without an error. A union in which
-    corners of the shapes are missing is repeated with coordinates rounded to a grid.
+    GEOS 3.14 may silently lose pieces where edges nearly coincide. If a corner of a shape is not in
+    the union, the union is computed again with coordinates rounded to a grid.
 
     Examples
     --------
@@ -94,8 +95,8 @@ def counterclockwise(vertices: npt.ArrayLike) -> npt.NDArray[np.float64]:
 def _every_other(flat: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     """Return the mask of flat corners of a ring that can be left out together.
 
-    Of neighbouring flat corners every other one is chosen, because a corner is flat or not by its
-    neighbours. At least one corner is chosen, and at least three remain.
+    Of a run of flat corners every other one is chosen, because leaving one out may make its
+    neighbours less flat. At least one corner is chosen, and at least three remain.
     """
     k = len(flat)
     number = np.arange(k)
@@ -129,7 +130,7 @@ def polygon_signed_distance(vertices: Vertices, xy: npt.ArrayLike) -> npt.NDArra
 def polygon_thickness(vertices: tuple[tuple[float, float], ...]) -> float:
     """Return the width of the thinnest part of a simple polygon, to a millionth of its size.
 
-    The result is cached, because a scene is built anew whenever one of its obstacles changes.
+    The result is cached, because each change of an obstacle rebuilds the scene.
     """
     import shapely
 
@@ -147,10 +148,10 @@ def polygon_thickness(vertices: tuple[tuple[float, float], ...]) -> float:
 
 
 def polygon_interior_point(vertices: Vertices) -> tuple[float, float]:
-    """Return a point well inside, the same on every machine.
+    """Return a point well inside a polygon, the same on every machine.
 
-    It is the centroid if that is at least a tenth as deep as the deepest point found, else the
-    middle of the deepest horizontal chord at 15 fixed heights.
+    It is the centroid, unless the centroid is less than a tenth as deep as the deepest of the
+    candidates: the middles of the horizontal chords at 15 fixed heights. Then it is that candidate.
     """
     v = np.asarray(vertices, dtype=float)
     origin = v[0]
@@ -180,8 +181,8 @@ def _depths(
 ) -> npt.NDArray[np.float64]:
     """Return the depths of points (n, 2) in a polygon, given an upper bound on each.
 
-    A point whose bound shows that another point lies deeper gets -inf. Distances of `chunk_points`
-    points are computed at a time, to save memory.
+    A point gets -inf if its bound shows that another point lies deeper. Distances are computed for
+    `chunk_points` points at a time, to save memory.
     """
     out = np.full(len(points), -np.inf)
     order = np.argsort(-bounds, kind="stable")

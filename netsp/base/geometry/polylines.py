@@ -15,14 +15,14 @@ def length(path: Floats) -> float:
 
 
 def along(path: Floats) -> Floats:
-    """Return the length (k,) of a polyline up to each of its points."""
+    """Return the length (k,) along a polyline up to each of its points."""
     steps: Floats = np.linalg.norm(np.diff(path, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def dense(path: Floats, step: float) -> Floats:
-    """Return points (n, d) of a polyline at most `step` apart: all of its own but the first, and
-    more."""
+    """Return points (n, d) of a polyline, at most `step` apart: its vertices without the first, and
+    points between them."""
     out = []
     for a, b in pairwise(path):
         k = max(1, int(np.ceil(np.linalg.norm(b - a) / step)))
@@ -31,7 +31,7 @@ def dense(path: Floats, step: float) -> Floats:
 
 
 def points_along(path: Floats, step: float) -> Floats:
-    """Return points (n, d) of a polyline at equal distances of at most `step`, with both ends."""
+    """Return points (n, d) along a polyline at equal spacing, at most `step`, with both ends."""
     s = along(path)
     n = max(1, int(np.ceil(s[-1] / step)))
     u = np.linspace(0.0, s[-1], n + 1)
@@ -39,15 +39,17 @@ def points_along(path: Floats, step: float) -> Floats:
 
 
 def part(path: Floats, start: float, end: float) -> Floats:
-    """Return the part (n, d) of a polyline between two lengths along it."""
+    """Return the part (n, d) of a polyline between two arc lengths."""
     s = along(path)
     ends = np.column_stack([np.interp([start, end], s, path[:, k]) for k in range(path.shape[1])])
     return np.vstack([ends[:1], path[(s > start) & (s < end)], ends[1:]])
 
 
-def telling(path: Floats, tolerance: float) -> Bools:
-    """Return which points (k,) are needed to keep a polyline to a tolerance (Douglas & Peucker
-    1973)."""
+def essential(path: Floats, tolerance: float) -> Bools:
+    """Return the mask (k,) of points that keep a polyline within a tolerance of itself.
+
+    Source: Douglas & Peucker 1973.
+    """
     kept = np.zeros(len(path), dtype=bool)
     kept[[0, -1] if len(path) else []] = True
     spans = [(0, len(path) - 1)]
@@ -56,8 +58,8 @@ def telling(path: Floats, tolerance: float) -> Bools:
         if b - a < 2:
             continue
         begin, step = path[a], path[b] - path[a]
-        share = ((path[a + 1 : b] - begin) @ step) / max(float(step @ step), 1e-300)
-        nearest = begin + np.clip(share, 0.0, 1.0)[:, None] * step
+        fraction = ((path[a + 1 : b] - begin) @ step) / max(float(step @ step), 1e-300)
+        nearest = begin + np.clip(fraction, 0.0, 1.0)[:, None] * step
         off = np.linalg.norm(path[a + 1 : b] - nearest, axis=1)
         k = int(off.argmax())
         if off[k] > tolerance:
@@ -67,10 +69,10 @@ def telling(path: Floats, tolerance: float) -> Bools:
 
 
 def distance(path: Floats, point: Floats) -> float:
-    """Return the least distance of a point from a path (n, d)."""
+    """Return the distance of a point from the nearest point of a path (n, d)."""
     if len(path) == 1:
         return float(np.linalg.norm(path[0] - point))
     begin, step = path[:-1], np.diff(path, axis=0)
-    along = ((point - begin) * step).sum(1) / np.maximum((step * step).sum(1), 1e-300)
-    nearest = begin + np.clip(along, 0.0, 1.0)[:, None] * step
+    fraction = ((point - begin) * step).sum(1) / np.maximum((step * step).sum(1), 1e-300)
+    nearest = begin + np.clip(fraction, 0.0, 1.0)[:, None] * step
     return float(np.linalg.norm(nearest - point, axis=1).min())

@@ -749,7 +749,7 @@ class _Site:
             ]
 
         pointlike: list[Feature] = []
-        for feature in progress.each(features):
+        for feature in progress.track(features):
             for shape in _blocks_of(feature.shape):
                 out += self._obstacle(feature, shape, area, drawn, pointlike)
         self._complain_of_points(pointlike)

@@ -26,7 +26,7 @@ import numpy as np
 
 from netsp.base.errors import InputError
 from netsp.base.field_types import checked_argument, checked_instance
-from netsp.base.files import cell, write_bytes, write_text
+from netsp.base.files import csv_cell, write_bytes, write_text
 from netsp.exchange.maps.projection import Projection
 from netsp.exchange.missions.cockpit_mission import cockpit_mission
 from netsp.exchange.missions.export_policy import DEFAULT_EXPORT, ExportPolicy
@@ -490,7 +490,7 @@ def _csv(
         visited = p.goal not in (None, HOME)
         row: list[Any] = [*(f"{v:.6f}" for v in p.position)]
         row += ["start" if p.start else "goal" if visited else "base" if p.goal == HOME else "bend"]
-        row += [p.goal, cell(problem.goals[p.goal or 0].name)] if visited else ["", ""]
+        row += [p.goal, csv_cell(problem.goals[p.goal or 0].name)] if visited else ["", ""]
         row += [_hold(p, settings), f"{p.tether:.6f}" if visited else ""]
         row += [" ".join(map(str, p.word)) if visited else ""]
         if places is not None:

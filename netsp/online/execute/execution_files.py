@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from netsp.base.files import cell, make_folder, write_text
+from netsp.base.files import csv_cell, make_folder, write_text
 from netsp.online.execute.execution_log import Execution
 
 
@@ -50,7 +50,7 @@ def _table(rows: Sequence[dict[str, Any]]) -> str:
     table.writeheader()
     table.writerows(
         {
-            k: round(v, 6) if isinstance(v, float) else cell(v) if isinstance(v, str) else v
+            k: round(v, 6) if isinstance(v, float) else csv_cell(v) if isinstance(v, str) else v
             for k, v in r.items()
         }
         for r in rows

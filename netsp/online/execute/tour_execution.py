@@ -12,7 +12,7 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.deprecated import renamed_parameters
-from netsp.base.errors import InputError, interrupted
+from netsp.base.errors import InputError, is_interrupt
 from netsp.base.field_types import LARGEST, checked_argument, checked_instance
 from netsp.base.geometry import polylines
 from netsp.hsignature import signature
@@ -465,7 +465,7 @@ class _Run:
         try:
             return repair(self.problem, self.vehicle.position, self.tether.nodes, left, why, how)
         except Exception as error:
-            if interrupted(error):
+            if is_interrupt(error):
                 raise KeyboardInterrupt from error
             home = Leg(HOME, np.ascontiguousarray(self.tether.nodes[::-1]), (), 0.0)
             what = f"{type(error).__name__}: {error}"

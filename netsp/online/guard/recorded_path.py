@@ -104,6 +104,6 @@ def _continuous_times(fixes: list[Fix]) -> tuple[Floats, Bools]:
 
 
 def _simplified(path: FoundPath, noise: float) -> FoundPath:
-    kept = polylines.telling(path.points, noise)
+    kept = polylines.essential(path.points, noise)
     times = None if path.times is None else path.times[kept]
     return FoundPath(path.name, path.points[kept], times, path.notes)

@@ -24,7 +24,7 @@ from netsp.base.arrays import Floats
 from netsp.base.clock import Clock, TimeLimit
 from netsp.base.data_frames import frame_of
 from netsp.base.errors import InfeasibleError, InputError, LimitReachedError
-from netsp.base.files import cell, write_text
+from netsp.base.files import csv_cell, write_text
 from netsp.base.interrupt_signals import until_interrupt
 from netsp.base.reprs import Drawn
 from netsp.gtsp.travel.graph import TravelGraph
@@ -177,7 +177,7 @@ class BaseSearch(Drawn):
             table.writerow(
                 [
                     k,
-                    cell(c.name),
+                    csv_cell(c.name),
                     *(f"{v:.9g}" for v in c.position),
                     f"{c.shortest_tether:.9g}",
                     f"{c.bound.length:.9g}",

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from netsp.base.arrays import Floats
-from netsp.base.errors import InputError, LimitReachedError, interrupted
+from netsp.base.errors import InputError, LimitReachedError, is_interrupt
 from netsp.base.field_types import Point3
 from netsp.base.geometry import polylines
 from netsp.plan.space.mission_policy import MissionPolicy
@@ -149,7 +149,7 @@ class RepairPlanner(PredictivePlanner):
             try:
                 self._mend(robot, tether)
             except Exception as error:  # never leave a vehicle without a command
-                if interrupted(error):
+                if is_interrupt(error):
                     raise KeyboardInterrupt from error
                 return self._hold(robot, error, time.process_time() - begin)
             spent = time.process_time() - begin

@@ -14,7 +14,7 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.clock import Clock
 from netsp.base.errors import InfeasibleError, InputError, LimitReachedError
-from netsp.base.files import cell
+from netsp.base.files import csv_cell
 from netsp.exchange.maps.path_file import FoundPath
 from netsp.gtsp.travel.result import OnProgress
 from netsp.model.bound_scope import above_shortest
@@ -228,8 +228,8 @@ def _cell(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.9g}"
     if isinstance(value, list):
-        return cell(";".join(str(v) for v in value))
-    return cell(str(value))
+        return csv_cell(";".join(str(v) for v in value))
+    return csv_cell(str(value))
 
 
 def _details(problem: Problem, path: ComparedPath) -> dict[str, Any]:

@@ -209,7 +209,7 @@ def mesh_trace(name: str, vertices: Floats, faces: npt.NDArray[np.int64]) -> Any
 def seen(points: Floats) -> Ints:
     """Numbers of those points (k, 3) of a line that can be told on a picture of it."""
     size = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
-    return np.flatnonzero(polylines.telling(points, VISIBLE_SHARE * size))
+    return np.flatnonzero(polylines.essential(points, VISIBLE_SHARE * size))
 
 
 def line_trace(name: str, points: Floats, colour: str, width: float) -> dict[str, Any]:

@@ -474,7 +474,7 @@ def draw_obstacles(
     xmin, ymin, xmax, ymax = view(problem, None)
     small = MIN_VISIBLE_SHARE * max(xmax - xmin, ymax - ymin)
     corners: list[tuple[float, float]] = []
-    for i, o in enumerate(progress.each(problem.obstacles)):
+    for i, o in enumerate(progress.track(problem.obstacles)):
         look: dict[str, Any] = {"fc": style.OBSTACLE, "ec": style.EDGE, "lw": 0.6, "zorder": 1}
         if i in wrapped:
             look["fc"] = style.WRAPPED

@@ -140,7 +140,7 @@ def _ticks_formatted(figure: Any) -> Iterator[None]:
             nonlocal done
             done = min(done + 1, len(parts))
             out = draw(*args, **more)
-            progress.tell(done, len(parts))
+            progress.report(done, len(parts))
             return out
 
         return drawn

@@ -357,7 +357,7 @@ def _planned(path: Floats, view: View) -> list[str]:
 
 def _tour(path: Floats, view: View) -> list[str]:
     """Return a path, with an arrowhead in the middle of every long piece."""
-    path = path[polylines.telling(path, 1e-3 / view.scale)]
+    path = path[polylines.essential(path, 1e-3 / view.scale)]
     out = [
         f'<polyline points="{view.points(path)}" fill="none" stroke="{style.PATH}" '
         'stroke-width="1.5"/>'

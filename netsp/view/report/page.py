@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from netsp.base.errors import InputError
-from netsp.base.files import cell as plain_cell
+from netsp.base.files import csv_cell as plain_cell
 from netsp.base.files import write_text
 from netsp.study.compare.rows import TrialRow, read_rows
 from netsp.view.pictures import style

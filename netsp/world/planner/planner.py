@@ -14,7 +14,7 @@ from netsp.base.arrays import Floats
 from netsp.base.clock import Clock
 from netsp.base.compiled.kernel import runs_compiled
 from netsp.base.deprecated import deprecated_method
-from netsp.base.errors import interrupted
+from netsp.base.errors import is_interrupt
 from netsp.base.geometry import polylines
 from netsp.world.mission.anchor_track import AnchorTrack
 from netsp.world.mission.mission import Mission, MissionWaypoint
@@ -321,7 +321,7 @@ class Planner:
                 plan = self.plan_home if self.is_homeward else self.plan
                 planned = plan(robot, tether) or planned
             except Exception as error:  # a vehicle in the water must not be left without a command
-                if interrupted(error):
+                if is_interrupt(error):
                     raise KeyboardInterrupt from error
                 return self._hold(robot, error, time.process_time() - begin)
         spent = time.process_time() - begin if planned else 0.0

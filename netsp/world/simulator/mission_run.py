@@ -12,7 +12,7 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.deprecated import deprecated_names
-from netsp.base.errors import InputError, interrupted
+from netsp.base.errors import InputError, is_interrupt
 from netsp.world.mission.anchor_track import AnchorTrack
 from netsp.world.mission.mission import Mission, MissionWaypoint
 from netsp.world.mission.mission_limits import check_bounds, check_names, check_size, check_tether
@@ -211,7 +211,7 @@ class _MissionRun:
             while self._step():
                 pass
         except (KeyboardInterrupt, SystemError) as error:
-            if not interrupted(error):
+            if not is_interrupt(error):
                 raise
             stopped = True
         wall = time.perf_counter() - begin
