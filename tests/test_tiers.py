@@ -754,9 +754,9 @@ def test_time_before_numba_is_loaded_counts_for_all_kernels_and_for_the_kernel(m
     policy = CompilePolicy(
         numba_s=1.0, compile_s=2.0, compile_s_per_byte=0.0, interpreted_share=0.5
     )
-    monkeypatch.setattr(kernel_module, "may_be_kept", lambda: True)
+    monkeypatch.setattr(kernel_module, "may_be_on_disk", lambda: True)
     assert early._budget_s(policy) == 1.0 - Kernel._total_s
-    monkeypatch.setattr(kernel_module, "may_be_kept", lambda: False)
+    monkeypatch.setattr(kernel_module, "may_be_on_disk", lambda: False)
     assert early._budget_s(policy) == 1.0 - early._early_s
     assert early.dispatcher.interpreted_s == early._early_s
 
