@@ -28,14 +28,12 @@ from netsp.hsignature import concatenate, crossings, signature
 from netsp.model.solution import Solution
 from netsp.online.guard.alarms import Alarm, Alarms, Level
 from netsp.online.guard.belief import Belief
-from netsp.online.guard.correct import passes_on_side
-from netsp.online.guard.dropout import paths_between
 from netsp.online.guard.guard_page import Page
 from netsp.online.guard.guard_policy import GuardPolicy
 from netsp.online.guard.live import watch
 from netsp.online.guard.lookahead import Lookahead, LookaheadResult
 from netsp.online.guard.loops import loop_closed_by, loops_in
-from netsp.online.guard.plane import PlaneSite, RayLetters
+from netsp.online.guard.plane import PlaneSite
 from netsp.online.guard.position_track import Motion, Track
 from netsp.online.guard.reasons import Situation, loop_ahead
 from netsp.online.guard.replay import read_fixes
@@ -47,6 +45,8 @@ from netsp.online.guard.tether_belief import Strands
 from netsp.online.guard.tether_guard import Guard, GuardOptions
 from netsp.online.link.geo_frame import Frame
 from netsp.online.link.modes import Mode
+from netsp.roadmap.plane_world import RayLetters, paths_between
+from netsp.world.side_names import passes_on_side
 from tests.autopilot import Autopilot
 
 RECORDED = Path(__file__).parent / "data" / "ardusub"

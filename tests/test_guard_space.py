@@ -124,7 +124,7 @@ def test_another_class_than_the_planned_one_is_told(solved):
 
 
 def taut_along(site, *points):
-    tether = site.water.start_tether
+    tether = site.context.start_tether
     for a, b in itertools.pairwise(points):
         for share in np.linspace(0.0, 1.0, 12)[1:]:
             there = np.array(a) + share * (np.array(b) - np.array(a))
@@ -193,8 +193,8 @@ def test_a_step_through_a_solid_has_no_word_and_none_is_sought(site, monkeypatch
     through = np.array([[(-0.6, 0.1, -2), (0.6, 0.0, -2)], [(0, 7, -1.5), (0, 7, -2.9)]])
     beside = np.array([[(-1, 0.6, -2), (1, 0.6, -2)], [(1, 0, -2), (1, -1, -2)]])
     words = site.letters.words_of_steps(*beside.swapaxes(0, 1))
-    assert words == [site.water.words.word(step) for step in beside]
-    monkeypatch.setattr(site.letters, "words", replace(site.water.words, labels=None))
+    assert words == [site.context.words.word(step) for step in beside]
+    monkeypatch.setattr(site.letters, "words", replace(site.context.words, labels=None))
     assert site.letters.words_of_steps(*through.swapaxes(0, 1)) == [None, None]
 
 

@@ -51,6 +51,24 @@ def is_index(value: object, count: int) -> TypeGuard[int]:
     return whole and 0 <= int(value) < count  # type: ignore[call-overload]
 
 
+def index_of(which: int | str, things: list, field: str) -> int:  # type: ignore[type-arg]
+    """Return the index of the obstacle or goal that an event names; raise InputError if there is
+    none."""
+    if isinstance(which, str):
+        found = [k for k, thing in enumerate(things) if thing.name == which]
+        if len(found) == 1:
+            return found[0]
+        unnamed = [k for k, thing in enumerate(things) if thing.name is None]
+        if not found and which in (f"#{k}" for k in unnamed):
+            return int(which[1:])
+        raise InputError(
+            f"{field}: expected the name of one, got {which!r}, of which there are {len(found)}"
+        )
+    if not is_index(which, len(things)):
+        raise InputError(f"{field}: expected a number below {len(things)}, got {which!r}")
+    return int(which)
+
+
 def _size(value: Any) -> Any:
     """Return a length or radius; raise ValueError if it is too small to be squared."""
     number = checked_number(value)

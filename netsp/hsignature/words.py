@@ -107,3 +107,21 @@ def entangled(word: Iterable[int]) -> tuple[int, ...]:
     wound = {k for k, n in turns.items() if n}
     left = cyclically_reduced(x for x in w if abs(x) not in wound)
     return tuple(sorted(wound | {abs(x) for x in left}))
+
+
+def least_changed(others: Iterable[Word], believed: Iterable[Word]) -> set[Word]:
+    """Return the words, of `others`, that differ least from a believed one."""
+    known = list(believed)
+    distances = {w: min(_edit_distance(w, other) for other in known) for w in others}
+    smallest = min(distances.values())
+    return {w for w, distance in distances.items() if distance == smallest}
+
+
+def _edit_distance(a: Word, b: Word) -> int:
+    """Return how many letters must be inserted or deleted to make one word of the other."""
+    row = list(range(len(b) + 1))
+    for i, x in enumerate(a, 1):
+        before, row[0] = row[0], i
+        for j, y in enumerate(b, 1):
+            before, row[j] = row[j], min(row[j] + 1, row[j - 1] + 1, before + 2 * (x != y))
+    return row[-1]

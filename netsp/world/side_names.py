@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
+from netsp.base.field_types import index_of
 from netsp.hsignature import Word
 from netsp.hsignature.rays import crossings
 from netsp.model.problem import Circle, Polygon, Problem
@@ -19,6 +22,9 @@ WINDS = (
 )  # fmt: skip
 AXES = ("+y", "+x +y", "+x", "+x −y", "−y", "−x −y", "−x", "−x +y")
 """Sides where north is not known."""
+
+SIDES = {"north": 0, "east": 2, "south": 4, "west": 6}
+"""Index of each side in `WINDS` and in `AXES`."""
 
 TOUCHING = 2e-3
 """Relative to the size of an obstacle: arcs are drawn with corners that lie so far off."""
@@ -48,6 +54,59 @@ def side(problem: Problem, direction: npt.ArrayLike) -> str:
     """Return the name of a direction: a compass point, or an axis if north is unknown."""
     names = WINDS if problem.origin else AXES
     return names[int((bearing(problem, direction) + 22.5) // 45.0) % 8]
+
+
+def side_direction(problem: Problem, side: str) -> Floats:
+    """Return the direction of a side of an obstacle, a unit vector in the plan.
+
+    Raises
+    ------
+    InputError
+        The side is none of `SIDES`, nor of `AXES`, which are for sites whose north is unknown.
+    """
+    names = {**SIDES, **{AXES[k]: k for k in range(0, 8, 2)}}
+    if not isinstance(side, str) or side not in names:
+        raise InputError(f"side: expected north, east, south or west, got {side!r}")
+    heading = problem.origin.heading if problem.origin else 0.0
+    angle = np.radians(45.0 * names[side] - heading)
+    return np.array([np.sin(angle), np.cos(angle)])
+
+
+def crosses_ray(path: Floats, begin: Floats, direction: Floats) -> bool:
+    """Return whether a path, shape (n, 2), crosses a ray from one of its sides to the other.
+
+    A path that begins or ends on the ray does not cross it there. The ray's direction is a unit
+    vector.
+    """
+    off = path - begin
+    along, side = off @ direction, off[:, 1] * direction[0] - off[:, 0] * direction[1]
+    clear = np.flatnonzero(np.abs(side) > 1e-9 * (1.0 + np.abs(off).max()))
+    # between places that are clear of the ray's line
+    for i, j in pairwise(clear):
+        if side[i] * side[j] < 0.0:
+            k = j - 1  # on the line, or before it
+            share = side[k] / (side[k] - side[j])
+            if along[k] + share * (along[j] - along[k]) > 0.0:
+                return True
+    return False
+
+
+def passes_on_side(problem: Problem, path: Floats, side: str, obstacle: int | str) -> bool:
+    """Return whether a tether passes an obstacle on one side, and not on the opposite one.
+
+    Raises
+    ------
+    InputError
+        There is no such obstacle or side.
+    """
+    index = index_of(obstacle, list(problem.obstacles), "obstacle")
+    ray, middle = side_direction(problem, side), problem.representative_points[index]
+    return crosses_ray(path[:, :2], middle, ray) and not crosses_ray(path[:, :2], middle, -ray)
+
+
+def beside(side: str, name: str) -> str:
+    """Return a side of an obstacle as a phrase, such as "north of A2" or "above A2"."""
+    return f"{side} {name}" if side in ("above", "below") else f"{side} of {name}"
 
 
 @dataclass(frozen=True)

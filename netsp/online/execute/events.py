@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from netsp.base.errors import InputError
-from netsp.base.field_types import NonNegative, Point2, Point3, Positive, checked_integer, is_index
+from netsp.base.field_types import NonNegative, Point2, Point3, Positive, checked_integer, index_of
 from netsp.base.files import FileModel
 from netsp.base.validated import Model, shown
 from netsp.model.problem import MAX_EXTENT_RATIO, Circle, GoalLike, Obstacle, Polygon, Problem
@@ -185,21 +185,3 @@ def moved_obstacle(obstacle: Circle | Polygon, by: tuple[float, float]) -> Circl
         return Polygon(polygon=corners, name=obstacle.name)
     except InputError as error:
         raise InputError(f"move: {error}") from None
-
-
-def index_of(which: int | str, things: list, field: str) -> int:  # type: ignore[type-arg]
-    """Return the index of the obstacle or goal that an event names; raise InputError if there is
-    none."""
-    if isinstance(which, str):
-        found = [k for k, thing in enumerate(things) if thing.name == which]
-        if len(found) == 1:
-            return found[0]
-        unnamed = [k for k, thing in enumerate(things) if thing.name is None]
-        if not found and which in (f"#{k}" for k in unnamed):
-            return int(which[1:])
-        raise InputError(
-            f"{field}: expected the name of one, got {which!r}, of which there are {len(found)}"
-        )
-    if not is_index(which, len(things)):
-        raise InputError(f"{field}: expected a number below {len(things)}, got {which!r}")
-    return int(which)

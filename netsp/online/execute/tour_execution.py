@@ -13,14 +13,14 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.deprecated import renamed_parameters
 from netsp.base.errors import InputError, is_interrupt
-from netsp.base.field_types import LARGEST, checked_argument, checked_instance
+from netsp.base.field_types import LARGEST, checked_argument, checked_instance, index_of
 from netsp.base.geometry import polylines
 from netsp.hsignature import signature
 from netsp.judge import verify
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution, Status
 from netsp.online.execute.detour_around import pushed_aside
-from netsp.online.execute.events import Event, Surprises, index_of, problem_after
+from netsp.online.execute.events import Event, Surprises, problem_after
 from netsp.online.execute.execution_log import (
     Arrival,
     Entry,

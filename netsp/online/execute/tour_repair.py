@@ -32,6 +32,7 @@ from netsp.plan.tour_plan import HOME, Leg, legs_of
 from netsp.roadmap.explain_unreachable import unreached_message
 from netsp.roadmap.from_state import GraphFromState, graph_from_state
 from netsp.roadmap.paths import TautPaths, UnknownPathError
+from netsp.roadmap.plane_world import free_position
 from netsp.roadmap.roadmap_policy import RoadmapPolicy
 
 
@@ -308,31 +309,6 @@ def split_reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[
         why = unreached_message(plain, paths.outline, [k + 1])
         left_out.append((order[k], why.removeprefix(f"{plain.goal_label(k)} ")))
     return [g for k, g in enumerate(order) if k not in beyond], left_out
-
-
-def free_position(problem: Problem, robot: Floats) -> tuple[float, float, float]:
-    """Return the robot's place, moved out of obstacles that the tether model's resolution has let
-    it enter."""
-    place = np.array(robot, dtype=float)
-    for _ in range(10):
-        depth = [problem.clearance - float(o.signed_distance(place[:2])) for o in problem.obstacles]
-        i = int(np.argmax(depth)) if depth else -1
-        if i < 0 or depth[i] <= 0.0:
-            break
-        obstacle, xy = problem.obstacles[i], place[:2].copy()
-        rim = obstacle.shape(problem.clearance).exterior
-        nearest = np.array(rim.interpolate(rim.project(shapely.Point(xy))).coords[0])
-        if isinstance(obstacle, Circle):
-            # the rim of a circle is a polygon inside it
-            direction = xy - obstacle.center
-            size = float(np.hypot(*direction))
-            reach = obstacle.radius + problem.clearance
-            nearest = obstacle.center + direction * (reach / size) if size else nearest
-        direction = nearest - xy
-        size = float(np.hypot(*direction))
-        place[:2] = nearest + (direction / size if size else 0.0) * 1e-7 * problem.scale
-    x, y, z = place.tolist()
-    return (x, y, z)
 
 
 def _rest(problem: Problem, order: list[int], state: State, limit: float) -> Problem:

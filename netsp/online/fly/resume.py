@@ -22,12 +22,12 @@ from netsp.model.problem import Circle, Goal, Problem
 from netsp.model.solution import Solution
 from netsp.online.execute.run_record import PROBLEM, SOLUTION, STATE, ResumePoint, RunState
 from netsp.online.execute.tether_reserve import ReservePolicy
-from netsp.online.execute.tour_repair import free_position
 from netsp.online.fly.flight_policy import FlightPolicy
 from netsp.online.fly.stopped import RefusedError
 from netsp.online.guard.state_file import GuardState
 from netsp.plan.tour_plan import HOME, legs_of
 from netsp.roadmap.paths import TautPaths, UnknownPathError
+from netsp.roadmap.plane_world import free_position
 from netsp.roadmap.roadmap_policy import RoadmapPolicy
 
 BeginsAt = Callable[[Floats], ResumePoint]

@@ -21,7 +21,7 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.hsignature import Word
 from netsp.online.guard.guard_policy import BeliefPolicy
-from netsp.online.guard.site import Letters
+from netsp.world.world_protocol import Letters
 
 
 @dataclass(frozen=True)

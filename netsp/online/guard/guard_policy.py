@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from netsp.base.errors import InputError
 from netsp.base.number_ranges import check_not_negative, check_positive
 from netsp.online.link.link_policy import LinkPolicy
+from netsp.world.world_policy import WorldPolicy
 
 
 @dataclass(frozen=True)
@@ -339,31 +340,23 @@ class LoopPolicy:
         Smallest angle by which a loop turns, rad: more than a tether that comes back beside itself.
     sample_spacing
         Distance between the places of the tether that are compared, m.
-    contact_share
-        Distance from a solid within which a tether rests on it, as a share of the tether model's
-        resolution.
     """
 
     max_gap: float = 0.25
     max_gap_share: float = 0.15
     min_turn: float = 1.1 * math.pi
     sample_spacing: float = 0.2
-    contact_share: float = 0.1
 
     def __post_init__(self) -> None:
         check_positive(self)
 
 
 @dataclass(frozen=True)
-class SitePolicy:
+class SitePolicy(WorldPolicy):
     """Policy of the geometry of a site. All numbers are positive.
 
     Attributes
     ----------
-    max_length_factor
-        Longest tether of a class that is looked for, as a multiple of the tether's length.
-    relax_rounds
-        Maximum number of rounds in which a tether is pulled taut.
     lookahead_coarseness
         Resolution of the tether in a look ahead in the plane, as a multiple of the usual one: steps
         of half a metre take half as long, and three in a thousand looks see something else, most of
@@ -371,45 +364,17 @@ class SitePolicy:
     plane_steps_per_update, space_steps_per_update
         Maximum number of steps of looks ahead in one update, which should take 50 ms at most. With
         fewer, a look in several classes tells what was ahead a second ago.
-    max_paths
-        Maximum number of unseen paths that count after a dropout; the shortest are kept.
-    max_searches
-        Maximum number of searches for such paths, each up to a larger length.
-    length_growth
-        Factor from one such length to the next. More than 1.
-    max_detour
-        Largest detour to another class at a place nearby in space, m: that around a pile.
-    max_nearby_paths
-        Maximum number of such detours that are tried; more would take seconds.
-    retry_distance
-        Distance that the robot moves before a class without a tether is tried again in space, m.
-    min_vertical_share
-        Vertical share of a direction from which on it is called above or below.
     arc_segments
         Number of segments of a quarter circle on maps.
     loops
         Policy that decides what counts as a loop in space.
     """
 
-    max_length_factor: float = 2.0
-    relax_rounds: int = 300
     lookahead_coarseness: float = 2.0
     plane_steps_per_update: int = 60
     space_steps_per_update: int = 24
-    max_paths: int = 12
-    max_searches: int = 16
-    length_growth: float = 1.25
-    max_detour: float = 2.5
-    max_nearby_paths: int = 6
-    retry_distance: float = 1.0
-    min_vertical_share: float = 0.7
     arc_segments: int = 12
     loops: LoopPolicy = field(default_factory=LoopPolicy)
-
-    def __post_init__(self) -> None:
-        check_positive(self)
-        if not self.length_growth > 1.0:
-            raise InputError(f"length_growth: expected more than 1, got {self.length_growth!r}")
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,6 @@ from netsp.online.guard.alarms import Level
 from netsp.online.guard.guard_rehearsal import rehearse
 from netsp.online.guard.guard_report import Report
 from netsp.online.guard.message_rates import MessageRates
-from netsp.online.guard.plane import PlaneSite
-from netsp.online.guard.space_site import SpaceSite
 from netsp.online.guard.state_file import restore, save
 from netsp.online.guard.stream import Stream
 from netsp.online.guard.telemetry import Fix
@@ -105,10 +103,7 @@ def _prepare(guard: Guard, state: str | None, note: Callable[[str], None]) -> No
     """Rehearse, and restore the state of the guard if there is one."""
     if state is not None:
         restore(guard, state)  # an error in it is raised before anything takes long
-    if not isinstance(guard.site, SpaceSite):
-        rehearse(in_space=False)
-    if not isinstance(guard.site, PlaneSite):
-        rehearse(in_space=True)
+    rehearse(in_space=not guard.site.is_planar)
     if state is not None:
         known = restore(guard, state)
         if known is not None:

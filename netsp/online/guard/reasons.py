@@ -11,7 +11,8 @@ from netsp.online.guard.alarms import Alarm, Level
 from netsp.online.guard.guard_policy import AlarmPolicy
 from netsp.online.guard.guard_report import ClassReport
 from netsp.online.guard.lookahead import LookaheadResult
-from netsp.online.guard.site import Loop, Site, beside
+from netsp.online.guard.site import Loop, Site
+from netsp.world.side_names import beside
 
 FROZEN = "the position stands still to the last digit while the vehicle moves"
 """Reason not to believe a frozen position."""

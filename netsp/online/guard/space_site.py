@@ -1,97 +1,25 @@
-"""Site of a mission in space; its words are those of the cells of its water."""
+"""Site of a mission in space."""
 
 from __future__ import annotations
 
-import hashlib
-import math
-from collections.abc import Iterable, Sequence
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
-from netsp.base.field_types import is_index
-from netsp.base.geometry import polylines
 from netsp.hsignature import Word
-from netsp.online.guard.correct import least_changed
 from netsp.online.guard.guard_policy import SitePolicy
 from netsp.online.guard.silhouettes import silhouette
-from netsp.online.guard.site import Letters, Loop, beside
+from netsp.online.guard.site import Loop
 from netsp.online.guard.winding import space_loop_closed_by, space_loops_in
-from netsp.plan.space.planning_context import PlanningContext
-from netsp.plan.space.space_signature import SpaceSignature
+from netsp.plan.space.space_world import SpaceWorld
 from netsp.world.mission.mission import Mission
-from netsp.world.scene.field import pushed_out
 from netsp.world.scene.scene import Scene
-from netsp.world.side_names import AXES
 from netsp.world.tether import Tether
 
-DIRECTIONS = {
-    "north": ("+y", "−y"),
-    "east": ("+x", "−x"),
-    "south": ("−y", "+y"),
-    "west": ("−x", "+x"),
-    "above": ("above", "below"),
-    "below": ("below", "above"),
-}
-"""Direction that each side means, and its opposite."""
 
-PUSH_OUT_DISTANCE = 1e-6
-"""Tolerance to which places are moved out of solids, m."""
-
-
-class CellLetters:
-    """Words of the cells that steps pass.
-
-    Parameters
-    ----------
-    words : SpaceSignature
-        Words of the mission's water.
-    """
-
-    def __init__(self, words: SpaceSignature) -> None:
-        self.words, self.field = words, words.cells.field
-        self._letters = lru_cache(maxsize=100_000)(words.letters)
-
-    def words_of_steps(self, starts: Floats, ends: Floats) -> list[Word | None]:
-        """Return the words of straight steps, None through solids; ends in solids are moved out."""
-        a, b = (pushed_out(self.field, points, PUSH_OUT_DISTANCE) for points in (starts, ends))
-        # a step through a solid has no word, which is slow to find out from cells
-        far = np.linalg.norm(b - a, axis=1)
-        is_unsure = self.field.distance(a) < far
-        through = [
-            near and not self.field.line_of_sight(p, q, self.words.tolerance)
-            for near, p, q in zip(is_unsure, a, b, strict=True)
-        ]
-        return [
-            None if hits else self._word(np.stack(pair))
-            for hits, *pair in zip(through, a, b, strict=True)
-        ]
-
-    def _word(self, step: Floats) -> Word | None:
-        number, _ = self.words.word_number(step)
-        return None if number is None else self._letters(number)
-
-    def join(self, a: Word, b: Word) -> Word:
-        """Return the word of one path after another."""
-        return self.words.product(a, b) if b else a
-
-    def inverse(self, word: Word) -> Word:
-        """Return the word of a path in the other direction."""
-        return self.words.inverse(word)
-
-    def is_near(self, points: Floats, reach: float) -> bool:
-        """Return whether a solid may be within reach."""
-        return bool((self.field.distance(points) <= reach * 1.5).any())
-
-    def depth(self, places: Floats) -> Floats:
-        """Return the depth of places inside of solids, shape (k,), m."""
-        return np.maximum(0.0, -np.asarray(self.field.distance(places)))
-
-
-class SpaceSite:
+class SpaceSite(SpaceWorld):
     """Mission as the site of a guard; its state and its tour count, if it has them.
 
     Parameters
@@ -110,119 +38,18 @@ class SpaceSite:
         (`netsp.plan.space.space_signature.SpaceSignature`).
     """
 
-    sides: tuple[str, ...] = tuple(DIRECTIONS)
+    policy: SitePolicy
 
     def __init__(
         self, mission: Mission, scene: Scene | None = None, policy: SitePolicy = SitePolicy()
     ) -> None:
         if mission.track:
             raise InputError("track: a moving anchor cannot be watched; expected one that stays")
-        scene = scene or mission.load_scene()
-        self.mission, self.policy = mission, policy
+        super().__init__(mission, scene, policy)
+        _ = self.context, self.start  # a position must not wait for them
         self.steps_per_update = policy.space_steps_per_update
-        self.name, self.units = mission.name, scene.units
-        self.tether_length = mission.tether_length
-        self.field = scene.field()
-        self.water = PlanningContext.for_mission(mission, scene, self.field)
-        self.model = self.water.model
         self.lookahead_model = self.model
-        self.anchor = np.asarray(mission.anchor, dtype=float)
-        self._first = self.water.present_tether
-        self.start = self._first.robot
-        self.identity = hashlib.sha256(
-            (mission.model_dump_json() + scene.model_dump_json()).encode()
-        ).hexdigest()
-        self.letters: Letters = CellLetters(self.water.words)
         self.centres = np.zeros((0, 2))
-        self._solids = scene.solids
-        self._missed: dict[Word, Floats] = {}
-
-    def start_word(self) -> Word:
-        """Return the word of the tether that the mission begins with."""
-        return self.water.words.word(self._first.nodes)
-
-    def recover_tether(
-        self, word: Word, place: Floats, known: Sequence[tuple[Word, Tether]]
-    ) -> Tether | None:
-        """Return a tether of a class that no straight step from a known tether leads to.
-
-        It goes on from a known one by a detour. Without known ones it begins at the anchor, which
-        takes seconds.
-        """
-        words, policy = self.water.words, self.policy
-        end = words.visible_cell(place)
-        missed = self._missed.get(word)
-        if end is None or (missed is not None and math.dist(missed, place) < policy.retry_distance):
-            return None
-        for other, tether in list(known) or [(self.start_word(), self._first)]:
-            begin = words.visible_cell(tether.robot)
-            far = math.dist(tether.robot, place)
-            if begin is None or far > policy.max_detour:
-                continue
-            max_length = far + policy.max_detour
-            for number, path in self._paths(begin, end, max_length, policy.max_nearby_paths):
-                if words.product(other, words.letters(number)) != word:
-                    continue
-                moved = self._relaxed(np.vstack([tether.nodes, path, place]), word)
-                if moved is not None:
-                    return moved
-            break  # tethers of other classes end at nearly the same place
-        self._missed[word] = place
-        if known:
-            return None
-        for number, path in self._paths(self._root_cell, end, self.tether_length, policy.max_paths):
-            if words.letters(number) == word:
-                return self._relaxed(np.vstack([self.anchor, path, place]), word)
-        return None
-
-    @property
-    def _root_cell(self) -> int:
-        """Return the index of the cell at the anchor."""
-        words = self.water.words
-        return int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
-
-    def _paths(
-        self, begin: int, end: int, max_length: float, max_count: int
-    ) -> list[tuple[int, Floats]]:
-        """Return the numbers of words, and the paths, from one cell to another."""
-        water = self.water
-        return water.paths_to(water.search_words(False, begin, max_count, {end: max_length}), end)
-
-    def _relaxed(self, line: Floats, word: Word) -> Tether | None:
-        """Return a line pulled taut; None if it is too long, or of another class."""
-        tether = self.model.relaxed(line, self.policy.relax_rounds)
-        is_short = tether.length <= self.policy.max_length_factor * self.tether_length
-        return tether if is_short and self.word_of(tether.nodes) == word else None
-
-    def word_of(self, nodes: Floats) -> Word | None:
-        """Return the word of the cells that a tether passes; None if it passes none."""
-        word, broken = self.water.words.try_word(nodes)
-        return word if broken is None else None
-
-    def paths_between(
-        self, before: Floats, after: Floats, max_length: float
-    ) -> list[tuple[Word, float]]:
-        """Return the words and lengths of paths from one place to another, shortest first.
-
-        They come from a search over words; the straight path is taken if it finds none.
-        """
-        words, max_paths = self.water.words, self.policy.max_paths
-        a, b = pushed_out(self.field, np.stack([before, after]), PUSH_OUT_DISTANCE)
-        begin, end = words.visible_cell(a), words.visible_cell(b)
-        out: dict[Word, float] = {}
-        straight = math.dist(a, b)
-        if begin is not None and end is not None:
-            searched = max(1.5 * straight, max_length) + 2.0 * words.cells.cell
-            for number, path in self._paths(begin, end, searched, max_paths):
-                # pulled taut it may pass another side of what cells show as one
-                taut = self.water.pull_taut(np.vstack([a, path, b]))
-                letters = words.letters(number)
-                out[letters] = min(out.get(letters, math.inf), polylines.length(taut))
-        (direct,) = self.letters.words_of_steps(a[None], b[None])
-        if direct is not None or not out:
-            out[direct or ()] = min(out.get(direct or (), math.inf), straight)
-        order = sorted(out.items(), key=lambda pair: pair[1])
-        return [p for p in order if p[1] <= max(max_length, order[0][1])][:max_paths]
 
     def loops_in(self, nodes: Floats) -> list[Loop]:
         """Return the loops of a taut tether, the last to be closed first."""
@@ -235,114 +62,6 @@ class SpaceSite:
     def safe_prefix(self, tether: Tether, places: Floats) -> int:
         """Return 0: the ends of a tether in space do not tell when it comes off its contacts."""
         return 0
-
-    def classes_on_side(
-        self, believed: Iterable[Word], robot: Floats, side: str, obstacle: int | str
-    ) -> dict[Word, Tether]:
-        """Return the tethers to the robot that pass a solid on a side, by their class.
-
-        Of these, only the classes that differ least from a believed one are returned.
-
-        Raises
-        ------
-        InputError
-            There is no such solid, side or class.
-        """
-        index, policy = self._index(obstacle), self.policy
-        end = self.water.words.visible_cell(robot)
-        agree: dict[Word, Tether] = {}
-        if end is not None:
-            for _, path in self._paths(
-                self._root_cell, end, self.tether_length, policy.max_nearby_paths
-            ):
-                line = np.vstack([self.anchor, path, robot])
-                tether = self.model.relaxed(line, policy.relax_rounds)
-                word = self.word_of(tether.nodes)
-                is_short = tether.length <= self.tether_length
-                if word is not None and is_short and self.passes_on_side(tether.nodes, side, index):
-                    agree.setdefault(word, tether)
-        if not agree:
-            raise InputError(
-                f"side: no tether within {self.tether_length:g} {self.units} was found that "
-                f"reaches the robot {beside(side, self.name_of(index))}"
-            )
-        return {word: agree[word] for word in least_changed(agree, believed)}
-
-    def passes_on_side(self, nodes: Floats, side: str, obstacle: int | str) -> bool:
-        """Return whether a tether comes nearest to a solid on one side, not on the opposite one."""
-        if side not in self.sides:
-            raise InputError(f"side: expected {', '.join(self.sides)}, got {side!r}")
-        alone = self._field_of(self._index(obstacle))
-        places = polylines.dense(nodes, 0.5 * self.model.delta)
-        distance = np.asarray(alone.distance(places))
-        near = distance <= max(float(distance.min()), 0.0) + self._contact_distance
-        sides = {s for away in alone.gradient(places[near]) for s in self._direction(away).split()}
-        meant, opposite = DIRECTIONS[side]
-        return meant in sides and opposite not in sides
-
-    def _index(self, obstacle: int | str) -> int:
-        names = [self.name_of(k) for k in range(len(self._solids))]
-        if isinstance(obstacle, str) and obstacle in names:
-            return names.index(obstacle)
-        if is_index(obstacle, len(names)):
-            return int(obstacle)
-        raise InputError(f"obstacle: expected a name or an index of a solid, got {obstacle!r}")
-
-    def _field_of(self, solid: int) -> Any:
-        """Return the distance field of one solid."""
-        return _field_of_solid(self._solids[solid])
-
-    @property
-    def _contact_distance(self) -> float:
-        """Return the distance from a solid within which a tether rests on it, m."""
-        return self.policy.loops.contact_share * self.model.delta
-
-    def _direction(self, away: Floats) -> str:
-        """Return the name of a direction."""
-        x, y, z = (float(v) for v in away)
-        if abs(z) >= self.policy.min_vertical_share:
-            return "above" if z > 0.0 else "below"
-        angle = math.degrees(math.atan2(x, y))
-        return AXES[int((angle + 22.5) // 45.0) % 8]
-
-    def describe_path(self, nodes: Floats, word: Word) -> str:
-        """Describe a tether by the solids that it rests on."""
-        inner = nodes[1:-1]
-        touching = inner[self.field.distance(inner) <= self._contact_distance]
-        out: list[str] = []
-        before = None
-        for place, solid in zip(touching, self.field.nearest(touching), strict=True):
-            if solid != before:
-                side = self._direction(self.field.gradient(place))
-                out.append(f"{beside(side, self.name_of(int(solid)))} (rests on it)")
-            before = solid
-        return ", ".join(out) or "straight from the anchor"
-
-    def turning(self, nodes: Floats) -> float:
-        """Return the sum of the angles by which a tether turns, rad."""
-        steps = np.diff(nodes, axis=0)
-        lengths = np.linalg.norm(steps, axis=1)
-        ahead = steps[lengths > 1e-9] / lengths[lengths > 1e-9][:, None]
-        return float(np.arccos(np.clip((ahead[:-1] * ahead[1:]).sum(1), -1.0, 1.0)).sum())
-
-    def name_of(self, obstacle: int) -> str:
-        """Return the name of a solid, or its number; -1 is the mesh, cloud or sea floor."""
-        if not 0 <= obstacle < len(self._solids):
-            return "the structure"
-        return self._solids[obstacle].name or f"solid {obstacle + 1}"
-
-    def side_of(self, obstacle: int, place: Floats) -> str:
-        """Return the side of a solid by an axis, or above or below."""
-        is_known = 0 <= obstacle < len(self._solids)
-        field = self._field_of(obstacle) if is_known else self.field
-        return self._direction(field.gradient(place))
-
-    def nearest(self, around: Sequence[int], place: Floats) -> int:
-        """Return which of the given solids has the nearest surface."""
-        known = [k for k in around if 0 <= k < len(self._solids)]
-        if not known:
-            return around[0]
-        return min(known, key=lambda k: float(self._field_of(k).distance(place)))
 
     def as_planned(self, robot: Floats, word: Word, off: float) -> bool | None:
         """Return whether the word is that of a visit within reach; None if no visit is."""
@@ -362,18 +81,10 @@ class SpaceSite:
                 planned.append(self.letters.join(tuple(tour.stops[k].signature), letters))
         return word in planned if planned else None
 
-    def check_word(self, word: Word) -> None:
-        """Raise InputError if a letter is not of the group, or the word is not reduced."""
-        group = self.water.words.group
-        if any(x == 0 or abs(x) > group.rank for x in word):
-            raise InputError(f"expected letters from 1 to {group.rank}")
-        if group.normal(word) != word:
-            raise InputError("expected reduced words")
-
     def map_data(self) -> dict[str, Any]:
         """Return the anchor, the waypoints, and the solids from above."""
         obstacles = []
-        for k, solid in enumerate(self._solids):
+        for k, solid in enumerate(self.scene.solids):
             for rim in silhouette(solid.shape, self.policy.arc_segments):
                 middle = rim.mean(0)
                 obstacles.append(
@@ -392,8 +103,3 @@ class SpaceSite:
                 for n, w in enumerate(self.mission.waypoints, 1)
             ],
         }
-
-
-@lru_cache(maxsize=4096)
-def _field_of_solid(solid: Any) -> Any:
-    return Scene(solids=(solid,)).field()

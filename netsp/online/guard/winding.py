@@ -116,6 +116,6 @@ def _loop_of_piece(
     if tether.length <= policy.loops.max_gap:
         return None
     middle = polylines.dense(tether.nodes, 0.5 * model.delta)
-    touching = field.distance(middle) <= policy.loops.contact_share * model.delta
+    touching = field.distance(middle) <= policy.contact_share * model.delta
     around = tuple(sorted({int(k) for k in field.nearest(middle[touching])}))
     return Loop(around, closed) if around else None
