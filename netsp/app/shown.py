@@ -180,24 +180,21 @@ def _of_execution(place: Path, problem: Problem, solution: Solution) -> Shown:
 
 def _of_mission(place: Path) -> Shown:
     """Read a mission that was flown; its tether is computed again along the path."""
+    from netsp.plan.space.space_world import SpaceWorld
     from netsp.world.mission.anchor_track import AnchorTrack
     from netsp.world.mission.mission import Mission
-    from netsp.world.simulator.laid_tether import present_tether
-    from netsp.world.simulator.mission_run import mission_grid
-    from netsp.world.tether import GeodesicTether
 
     mission = Mission.load(place / "mission.json")
     scene = mission.load_scene()
     summary = parse_json_object(read_text(place / "summary.json"), "summary.json")
     rows = _rows(place / "log.csv", ("time", "x", "y", "z", "tether", "mode"))
     path = np.array([[float(r[k]) for k in "xyz"] for r in rows])
-    scene_field = scene.field()
-    model = GeodesicTether(scene_field, mission.delta)
-    state = present_tether(mission, scene_field, model, mission_grid(mission, scene, scene_field))
+    world = SpaceWorld(mission, scene)
+    state = world.present_tether
     track, frames, every = AnchorTrack.for_mission(mission), [], max(1, len(rows) // SHOWN_FRAMES)
     for k, row in enumerate(rows):
         anchor = None if track is None else track(float(row["time"]))
-        state = model.update(state, path[k], anchor)
+        state = world.model.update(state, path[k], anchor)
         if k % every == 0 or k == len(rows) - 1:
             frames.append(_frame(state.nodes, row))
     data = {

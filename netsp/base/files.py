@@ -21,7 +21,7 @@ from typing import ClassVar, Self
 
 from netsp.base.errors import InputError
 from netsp.base.number_ranges import check_positive
-from netsp.base.validated import Model, read_model, shown
+from netsp.base.validated import MARKER_FIELDS, Model, kind_of, parse_json_object, read_model, shown
 
 STANDARD = "-"
 """File name that means standard input or standard output."""
@@ -117,6 +117,17 @@ def read_text(path: str | Path) -> str:
         return read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a text file in UTF-8") from None
+
+
+def is_mission_file(path: str | Path) -> bool:
+    """Return whether a file is a mission, even if fields are missing or misspelt. False for files
+    that cannot be read: reading them as problems reports why."""
+    try:
+        data = parse_json_object(read_text(path), str(path))
+    except InputError:
+        return False
+    kind = kind_of(data)
+    return kind == "mission" or (kind is None and not MARKER_FIELDS["mission"].isdisjoint(data))
 
 
 def read_gzip(path: str | Path, policy: FilePolicy = FilePolicy()) -> bytes:

@@ -5,14 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from netsp.base.errors import InputError
-from netsp.command.solve_mission import is_mission
 from netsp.command.types import check_writable, positive
-
-if TYPE_CHECKING:
-    from netsp.view.pictures.film import Film
 
 EXAMPLE = "netsp animate tour.json --problem problems/wharf.json -o tour.gif"
 
@@ -58,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
     """Draw, and return the exit code."""
     check_writable(args.output, inputs=(*args.source, args.problem))
     from netsp.view.pictures.animation import FORMATS, save_animation
+    from netsp.view.report.opened import open_result
 
     kinds = (*FORMATS, PAGE)
     if Path(args.output).suffix.lower() not in kinds:
@@ -75,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     if Path(args.output).suffix.lower() == PAGE:
         return _page(args)
     count = args.seconds * args.fps
-    films = [_film(source, args.problem, count) for source in args.source]
+    films = [open_result(source, args.problem).film(count) for source in args.source]
 
     def tell(done: int, of: int) -> None:
         print(f"\r{done} of {of} pictures", end="" if done < of else "\r\x1b[K", file=sys.stderr)
@@ -91,58 +87,31 @@ def _animate_runs(args: argparse.Namespace) -> int:
     return 0
 
 
-def _in_space(source: str) -> bool:
-    """Return whether a source is a mission, or the folder of a flight in space."""
-    place = Path(source)
-    if place.is_dir():
-        return (place / "mission.json").exists() and not (place / "solution.json").exists()
-    return is_mission(source)
-
-
 def _page(args: argparse.Namespace) -> int:
     """Write a page that plays."""
-    in_space = [_in_space(source) for source in args.source]
-    if all(in_space):
+    from netsp.view.report.opened import Opened, OpenedMission, open_result
+
+    found = [open_result(source, args.problem) for source in args.source]
+    missions = [what for what in found if isinstance(what, OpenedMission)]
+    tours = [what for what in found if isinstance(what, Opened)]
+    if missions and tours:
+        sources = dict(zip(map(type, found), args.source, strict=True))
+        raise InputError(
+            f"SOURCE: {sources[OpenedMission]} is in space and {sources[Opened]} is not; expected "
+            "a page of one kind"
+        )
+    if missions:
         from netsp.view.pictures.film_page import PAGE_FRAMES, save_page
 
-        films = [_film(source, args.problem, PAGE_FRAMES) for source in args.source]
+        films = [what.film(PAGE_FRAMES) for what in missions]
         names = dict.fromkeys(film.title.split("\n")[0] for film in films)
         save_page(films, " and ".join(names), args.output)
-    elif any(in_space):
-        raise InputError(
-            f"SOURCE: {args.source[in_space.index(True)]} is in space and "
-            f"{args.source[in_space.index(False)]} is not; expected a page of one kind"
-        )
-    elif len(args.source) > 1:
-        from netsp.view.report.opened import opened
+    elif len(tours) > 1:
         from netsp.view.report.side_by_side_page import save_beside
 
-        save_beside([opened(source, args.problem) for source in args.source], args.output)
+        save_beside(tours, args.output)
     else:
-        from netsp.view.report.tour_page import report_tour
+        from netsp.view.report.result_page import write_result_page
 
-        report_tour(args.source[0], args.problem, args.output)
+        write_result_page(args.source[0], tours[0], args.output)
     return _animate_runs(args)
-
-
-def _film(source: str, problem_file: str | None, count: int) -> Film:
-    if not _in_space(source):
-        from netsp.view.report.opened import opened
-
-        return opened(source, problem_file).film(count)
-    if not Path(source).is_dir():
-        from netsp.view.pictures.film import film_of_mission
-        from netsp.world.mission.mission import Mission
-
-        mission = Mission.load(source)
-        return film_of_mission(mission, mission.load_scene(), count)
-    from netsp.view.pictures.film import film_of_flight
-    from netsp.world.mission.run_log import read_run
-
-    run = read_run(source)
-    try:
-        return film_of_flight(run, run.mission.load_scene(), count)
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(
-            f"{source}: a summary of the run is damaged: {type(error).__name__}: {error}"
-        ) from None

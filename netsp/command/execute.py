@@ -86,11 +86,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry the tour out, write what happened, and return the exit code."""
-    from netsp.command.solve_mission import is_mission
+    from netsp.base.files import is_mission_file
 
     if args.planner not in ("repair", "none"):
         raise InputError(f"--planner: expected repair or none, got {args.planner!r}")
-    return _mission(args) if is_mission(args.problem) else _problem(args)
+    return _mission(args) if is_mission_file(args.problem) else _problem(args)
 
 
 def _mission(args: argparse.Namespace) -> int:

@@ -101,10 +101,10 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the file, warn of what is tight, and return the exit code."""
-    from netsp.command.solve_mission import is_mission
+    from netsp.base.files import is_mission_file
 
     json_output.check_stdout(args)
-    if is_mission(args.solution):
+    if is_mission_file(args.solution):
         return _mission(args)
     if args.problem is None:
         raise InputError(f"--problem: {args.solution} is no mission; expected its problem")

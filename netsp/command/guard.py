@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from netsp.base.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 from netsp.command import messages
-from netsp.command.solve_mission import is_mission
 from netsp.command.types import check_writable, length, natural, system_id
 
 if TYPE_CHECKING:
@@ -108,12 +107,15 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--publish, --state, --ask-rates: are for links; a recording is over")
     output = None if args.output == "-" else args.output
     check_writable(output, args.state, inputs=(args.site, args.replay))
+    from netsp.base.files import is_mission_file
     from netsp.model.problem import Problem
     from netsp.online.guard.tether_guard import Guard, GuardOptions
     from netsp.online.link.geo_frame import Frame
     from netsp.world.mission.mission import Mission
 
-    guarded_site = Mission.load(args.site) if is_mission(args.site) else Problem.load(args.site)
+    guarded_site = (
+        Mission.load(args.site) if is_mission_file(args.site) else Problem.load(args.site)
+    )
     options = GuardOptions(args.noise, args.drift, args.speed)
     frame = Frame(guarded_site, args.frame)
     fixes: list[Fix] = []

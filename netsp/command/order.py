@@ -17,10 +17,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Plan, write the mission, and return the exit code."""
-    from netsp.base.files import read_text
-    from netsp.command import solve_mission
+    from netsp.base.files import is_mission_file, read_text
 
-    if not solve_mission.is_mission(args.problem):
+    if not is_mission_file(args.problem):
         read_text(args.problem)
         raise InputError(
             f"{args.problem}: is no mission; expected one, or netsp solve for problems"

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from netsp.base.errors import InputError
 from netsp.command.patience import Patience
-from netsp.command.solve_mission import is_mission
 from netsp.command.types import (
     check_writable,
     length,
@@ -70,7 +69,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _drawn(args: argparse.Namespace) -> int:
-    if is_mission(args.problem):
+    from netsp.base.files import is_mission_file
+
+    if is_mission_file(args.problem):
         return _mission(args)
     if is_scene(args.problem):
         from netsp.command.plot_scene import plot_scene

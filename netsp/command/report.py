@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
 
 from netsp.base.errors import InputError
-from netsp.command.solve_mission import is_mission
 from netsp.command.types import check_writable
 
 EXAMPLE = "netsp report rows.jsonl -o report.html"
@@ -50,25 +48,14 @@ def _written(args: argparse.Namespace) -> None:
     if not args.results.endswith((".jsonl", ".jsonl.gz")):
         if args.figures is not None:
             raise InputError(f"--figures: is for comparisons, and {args.results} is none")
-        if _of_mission(args.results):
-            from netsp.view.report.mission_page import report_mission
+        from netsp.view.report.opened import OpenedMission, open_result
+        from netsp.view.report.result_page import write_result_page
 
-            if args.problem is not None:
-                raise InputError(f"--problem: {args.results} is of a mission; expected none")
-            report_mission(args.results, args.output)
-            return
-        from netsp.view.report.tour_page import report_tour
-
-        report_tour(args.results, args.problem, args.output)
+        what = open_result(args.results, args.problem)
+        if isinstance(what, OpenedMission) and args.problem is not None:
+            raise InputError(f"--problem: {args.results} is of a mission; expected none")
+        write_result_page(args.results, what, args.output)
         return
     from netsp.view.report.page import write_report
 
     write_report(args.results, args.output, args.figures)
-
-
-def _of_mission(source: str) -> bool:
-    """Return whether a source is a mission, or the folder of a flown one."""
-    place = Path(source)
-    if place.is_dir():
-        return (place / "mission.json").exists() and not (place / "solution.json").exists()
-    return is_mission(source)

@@ -180,9 +180,10 @@ def run_mission(args: argparse.Namespace) -> int:
 
 def run(args: argparse.Namespace) -> int:
     """Solve, write, and return the exit code."""
+    from netsp.base.files import is_mission_file
     from netsp.command import solve_mission
 
-    if solve_mission.is_mission(args.problem):
+    if is_mission_file(args.problem):
         solve_mission.check_flags(args, _defaults())
         return run_mission(args)
     from netsp.base.files import write_text

@@ -46,20 +46,6 @@ FOR_PROBLEMS = {
 """Flags of `netsp solve` that say something of a problem only."""
 
 
-def is_mission(file: str) -> bool:
-    """Return whether a file is a mission, even if fields are missing or misspelt. False for files
-    that cannot be read: reading them as problems reports why."""
-    from netsp.base.files import read_text
-    from netsp.base.validated import MARKER_FIELDS, kind_of, parse_json_object
-
-    try:
-        data = parse_json_object(read_text(file), file)
-    except InputError:
-        return False
-    kind = kind_of(data)
-    return kind == "mission" or (kind is None and not MARKER_FIELDS["mission"].isdisjoint(data))
-
-
 def check_flags(args: argparse.Namespace, parser_defaults: dict[str, Any]) -> None:
     """InputError for a flag that says something of a problem only."""
     for name, flag in FOR_PROBLEMS.items():

@@ -58,11 +58,10 @@ def run(args: argparse.Namespace) -> int:
         for name in ("measures", "margins"):
             if getattr(args, name):
                 raise InputError(f"--{name}: is told in words only; expected no --json")
-    from netsp.base.files import read_text
+    from netsp.base.files import is_mission_file, read_text
     from netsp.command.plot import is_scene
-    from netsp.command.solve_mission import is_mission
 
-    if is_mission(args.problem):
+    if is_mission_file(args.problem):
         return _mission(args)
     if args.measures and args.solution is not None and is_scene(args.problem):
         return _path_in_scene(args)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import counted
+from netsp.plan.space.space_world import SpaceWorld
 from netsp.view.pictures import style
 from netsp.view.pictures.scene_picture import draw_space, save
 from netsp.view.pictures.waypoint_marks import WaypointMarks
@@ -19,9 +20,7 @@ from netsp.world.mission.anchor_track import AnchorTrack
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import Run
 from netsp.world.scene.scene import Scene
-from netsp.world.simulator.laid_tether import present_tether
-from netsp.world.simulator.mission_run import mission_grid
-from netsp.world.tether import GeodesicTether, Tether
+from netsp.world.tether import Tether
 
 DASHES = ("-", "-.")
 """Line styles of two runs side by side, which differ in grey, too."""
@@ -174,9 +173,8 @@ def tethers_along(run: Run, scene: Scene, moments: npt.NDArray[np.int64]) -> lis
         rows = np.array([row for row, _ in run.tethers])
         return [run.tethers[k][1] for k in np.searchsorted(rows, moments, side="right") - 1]
     mission = run.mission
-    field = scene.field()
-    model = GeodesicTether(field, mission.delta)
-    state = present_tether(mission, field, model, mission_grid(mission, scene, field))
+    world = SpaceWorld(mission, scene)
+    model, state = world.model, world.present_tether
     path, out, at = path_of(run), [], 0
     track = AnchorTrack.for_mission(mission)
     for row in moments:

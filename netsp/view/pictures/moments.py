@@ -13,15 +13,14 @@ from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
+from netsp.plan.space.space_world import SpaceWorld
 from netsp.plan.tour_plan import HOME
+from netsp.roadmap.plane_world import PlaneWorld
 from netsp.view.pictures.mission_picture import path_of, tethers_along
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import Run
-from netsp.world.scene.scene import Scene, scene_of
-from netsp.world.simulator.laid_tether import present_tether
-from netsp.world.simulator.mission_run import mission_grid
-from netsp.world.tether import GeodesicTether
-from netsp.world.tether.resolution import suggested_delta
+from netsp.world.scene.scene import Scene
+from netsp.world.world_protocol import World
 
 MAX_MOMENTS = 400
 """Approximate maximum number of points of the path so far in one picture."""
@@ -59,43 +58,63 @@ class Moment:
 
 
 def moments_of_plan(problem: Problem, solution: Solution, count: int) -> list[Moment]:
-    """Return the tether at even steps along the tour, by the model that follows it online.
-
-    Parameters
-    ----------
-    problem : Problem
-        The site.
-    solution : Solution
-        With a tour.
-    count : int
-        How many steps.
-
-    Returns
-    -------
-    list of Moment
-        One more than steps.
-    """
-    model = GeodesicTether(scene_of(problem).field(), suggested_delta(problem))
+    """Return `count` + 1 moments at even steps along the tour of a problem."""
     path = np.array(solution.path)
     s = polylines.along(path)
-    reached = _reached(path, problem, solution)
-    if problem.state is None:
-        state = model.start(problem.base, problem.base)
-    else:
-        state = model.lay(np.array(solution.start_tether))
-    out, at = [], 0
+    visits = [(goal, float(s[n])) for goal, n in _reached(path, problem, solution)]
+    world = PlaneWorld(problem, start_tether=solution.start_tether)
+    return _moments_along(world, path, visits, count, problem=problem)
+
+
+def moments_of_mission(mission: Mission, scene: Scene, count: int) -> list[Moment]:
+    """Return `count` + 1 moments at even steps along the tour of a mission.
+
+    Raises
+    ------
+    InputError
+        The mission has no tour.
+    """
+    if mission.tour is None:
+        raise InputError(
+            f"{mission.name}: tour: the mission has none; expected one that netsp solve has planned"
+        )
+    legs = [mission.tour.leg(k) for k in range(len(mission.tour.stops))]
+    ends = np.cumsum([polylines.length(leg) for leg in legs if leg is not None]).tolist()
+    left_out = tuple(range(len(ends), len(mission.waypoints)))
+    world = SpaceWorld(mission, scene)
+    return _moments_along(world, mission.tour.line, list(enumerate(ends)), count, left_out)
+
+
+def _moments_along(
+    world: World,
+    path: Floats,
+    visits: Sequence[tuple[int, float]],
+    count: int,
+    left_out: tuple[int, ...] = (),
+    problem: Problem | None = None,
+) -> list[Moment]:
+    """Return the tether at even steps along a path (n, 3), as the online model follows it.
+
+    `visits` are goals or waypoints in their order, each with the length of the path up to it;
+    `left_out` are those that the path does not lead to.
+    """
+    s = polylines.along(path)
+    state, units, out, at = world.present_tether, world.units, [], 0
     for u in np.linspace(0.0, s[-1], count + 1):
         robot_place = np.array([np.interp(u, s, path[:, k]) for k in range(3)])
         passed = int(np.searchsorted(s, u))
-        state = model.drive(state, np.vstack([path[at:passed], robot_place]))[0]
+        state = world.model.drive(state, np.vstack([path[at:passed], robot_place]))[0]
         at = max(at, passed)
+        visited = tuple(k for k, end in visits if end <= u + 1e-9 * s[-1])
         text = (
-            f"{u:.4g} of {s[-1]:.4g} {problem.units}; tether {state.length:.4g} of "
-            f"{problem.tether_length:g} {problem.units}"
+            f"{u:.4g} of {s[-1]:.4g} {units}; tether {state.length:.4g} of "
+            f"{world.tether_length:g} {units}"
         )
+        if problem is None:
+            text += f"; {len(visited)} of {len(visits) + len(left_out)} visited"
+        fates = {VISITED: visited, LEFT_OUT: left_out if u == s[-1] else ()}
         gone = np.vstack([path[:passed], robot_place])
-        visited = tuple(g for g, n in reached if s[n] <= u * (1.0 + 1e-12))
-        out.append(Moment(state.nodes, gone, text, problem, {VISITED: visited}))
+        out.append(Moment(state.nodes, gone, text, problem, fates))
     return out
 
 
@@ -208,56 +227,6 @@ def moments_of_flight(run: Run, scene: Scene, count: int) -> list[Moment]:
         gone = np.vstack([path[: row : max(1, row // MAX_MOMENTS)], path[row]])
         nodes = np.vstack([tether.nodes[:-1], path[row]])
         out.append(Moment(nodes, gone, text, fates=fates))
-    return out
-
-
-def moments_of_mission(mission: Mission, scene: Scene, count: int) -> list[Moment]:
-    """Moments of a planned mission, at even steps along its tour.
-
-    Parameters
-    ----------
-    mission : Mission
-        Planned.
-    scene : Scene
-        Its scene.
-    count : int
-        How many steps.
-
-    Returns
-    -------
-    list of Moment
-        One more than steps.
-
-    Raises
-    ------
-    InputError
-        The mission has no tour.
-    """
-    if mission.tour is None:
-        raise InputError(
-            f"{mission.name}: tour: the mission has none; expected one that netsp solve has planned"
-        )
-    field_of = scene.field()
-    model = GeodesicTether(field_of, mission.delta)
-    state = present_tether(mission, field_of, model, mission_grid(mission, scene, field_of))
-    legs = [mission.tour.leg(k) for k in range(len(mission.tour.stops))]
-    ends = np.cumsum([polylines.length(leg) for leg in legs if leg is not None])
-    path = mission.tour.line
-    s = polylines.along(path)
-    units, all_of, out, at = scene.units, len(mission.waypoints), [], 0
-    for u in np.linspace(0.0, s[-1], count + 1):
-        robot_place = np.array([np.interp(u, s, path[:, k]) for k in range(3)])
-        passed = int(np.searchsorted(s, u))
-        state = model.drive(state, np.vstack([path[at:passed], robot_place]))[0]
-        at = max(at, passed)
-        visited = tuple(range(int((ends <= u + 1e-9 * s[-1]).sum())))
-        left = tuple(range(len(ends), all_of)) if u == s[-1] else ()
-        text = (
-            f"{u:.4g} of {s[-1]:.4g} {units}; tether {state.length:.4g} of "
-            f"{mission.tether_length:g} {units}; {len(visited)} of {all_of} visited"
-        )
-        gone = np.vstack([path[:passed], robot_place])
-        out.append(Moment(state.nodes, gone, text, fates={VISITED: visited, LEFT_OUT: left}))
     return out
 
 

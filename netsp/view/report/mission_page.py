@@ -7,14 +7,13 @@ import base64
 import html
 import io
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from netsp.base.arrays import Floats
-from netsp.base.errors import InputError, counted
-from netsp.base.files import read_text, write_text
+from netsp.base.errors import counted
+from netsp.base.files import read_text
 from netsp.base.geometry import polylines
 from netsp.base.validated import parse_json_object
 from netsp.model.bound_scope import LowerBound, Scope, above_shortest
@@ -24,61 +23,22 @@ from netsp.view.pictures import style
 from netsp.view.pictures.scene_picture import figure_of
 from netsp.view.pictures.waypoint_marks import WaypointMarks
 from netsp.view.report import briefing, run_page
-from netsp.view.report.page import STYLE
+from netsp.view.report.html_document import document
+from netsp.view.report.opened import OpenedMission
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.planned_tour import PlannedTour
 from netsp.world.scene.scene import Scene
 
 
-def report_mission(source: str | Path, output: str | Path) -> None:
-    """Write the page about a planned mission, or about the folder of a run.
-
-    Parameters
-    ----------
-    source : str or Path
-        Mission file, or folder of `netsp simulate` or `netsp execute`.
-    output : str or Path
-        The page.
+def page(what: OpenedMission) -> str:
+    """Return the page as HTML.
 
     Raises
     ------
-    InputError
-        Files that cannot be read; a mission without a tour that was not flown either.
+    InputError, KeyError, IndexError, ValueError, TypeError
+        A file of the flight is damaged.
     """
-    place = Path(source)
-    run = place if place.is_dir() else None
-    mission = Mission.load(source if run is None else run / "mission.json")
-    if run is None and mission.tour is None:
-        raise InputError(
-            f"{source}: tour: the mission has none; expected one that `netsp solve` has planned, "
-            "or the folder of a run"
-        )
-    try:
-        text = page(mission, mission.load_scene(), run)
-    except (KeyError, IndexError, ValueError, TypeError) as error:
-        raise InputError(
-            f"{source}: a file of the run is damaged: {type(error).__name__}: {error}"
-        ) from None
-    write_text(output, text)
-
-
-def page(mission: Mission, scene: Scene, run: Path | None) -> str:
-    """Return the page as HTML.
-
-    Parameters
-    ----------
-    mission : Mission
-        Planned, or as it was flown.
-    scene : Scene
-        Its scene.
-    run : Path or None
-        Folder of the run.
-
-    Returns
-    -------
-    str
-        The page.
-    """
+    mission, scene, run = what.mission, what.scene, what.run
     title = f"{mission.name}: {'a planned mission' if run is None else 'a flight'}"
     summary: dict[str, Any] = {}
     rows: list[dict[str, str]] = []
@@ -109,14 +69,7 @@ def page(mission: Mission, scene: Scene, run: Path | None) -> str:
             run_page.over_time(times, lengths, limit, scene.units),
         ]
         parts += ["<h2>What happened</h2>", _repairs(summary)]
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f'<title>{html.escape(title)}</title><link rel="icon" href="data:,">'
-        f"<style>{STYLE}{briefing.STYLE}</style></head><body>"
-        + "\n".join(parts)
-        + "</body></html>\n"
-    )
+    return document(title, briefing.STYLE, "\n".join(parts))
 
 
 def _stops(mission: Mission) -> int:

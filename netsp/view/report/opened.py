@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,16 +15,24 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
-from netsp.base.files import read_text
+from netsp.base.files import is_mission_file, read_text
 from netsp.base.geometry import polylines
 from netsp.base.validated import parse_json
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
 from netsp.plan.tour_plan import HOME
-from netsp.view.pictures.film import Film, film_of_plan, film_of_run
+from netsp.view.pictures.film import (
+    Film,
+    film_of_flight,
+    film_of_mission,
+    film_of_plan,
+    film_of_run,
+)
 from netsp.view.pictures.moments import CANCELLED, LEFT_OUT, VISITED
 from netsp.view.report import run_page
-from netsp.world.mission.run_log import check_log
+from netsp.world.mission.mission import Mission
+from netsp.world.mission.run_log import check_log, read_run
+from netsp.world.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -142,6 +151,66 @@ class Opened:
                 ):
                     return time
         return math.inf
+
+
+@dataclass(frozen=True)
+class OpenedMission:
+    """Mission that a report is about.
+
+    Attributes
+    ----------
+    mission
+        Planned, or as it was flown.
+    run
+        Folder of the flight; None if it was not flown.
+    """
+
+    mission: Mission
+    run: Path | None = None
+
+    @cached_property
+    def scene(self) -> Scene:
+        """Scene of the mission."""
+        return self.mission.load_scene()
+
+    def film(self, count: int) -> Film:
+        """Return the film of the tour or flight, of about `count` moments.
+
+        Raises
+        ------
+        InputError
+            A file of the flight is damaged; a mission without a tour that was not flown either.
+        """
+        if self.run is None:
+            return film_of_mission(self.mission, self.scene, count)
+        flight = read_run(self.run)
+        try:
+            return film_of_flight(flight, self.scene, count)
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(
+                f"{self.run}: a summary of the run is damaged: {type(error).__name__}: {error}"
+            ) from None
+
+
+def open_result(
+    source: str | Path, problem_file: str | Path | None = None
+) -> Opened | OpenedMission:
+    """Return a solution, a planned mission, or the folder of a run in the plane or in space.
+
+    `problem_file` is the problem of a solution file.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be read, or do not belong together.
+    """
+    place = Path(source)
+    if not place.is_dir():
+        is_solution = not is_mission_file(source)
+        return opened(source, problem_file) if is_solution else OpenedMission(Mission.load(source))
+    if (place / "solution.json").exists() or not (place / "mission.json").exists():
+        return opened(source, problem_file)
+    return OpenedMission(Mission.load(place / "mission.json"), place)
 
 
 def opened(source: str | Path, problem_file: str | Path | None) -> Opened:

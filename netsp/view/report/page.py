@@ -16,6 +16,7 @@ from netsp.base.files import write_text
 from netsp.study.compare.rows import TrialRow, read_rows
 from netsp.view.pictures import style
 from netsp.view.report import figures
+from netsp.view.report.html_document import STYLE
 from netsp.view.report.stats import (
     Cell,
     best_lengths,
@@ -27,17 +28,6 @@ from netsp.view.report.stats import (
     over_best,
     summary,
 )
-
-STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #1b2631; margin: 2em auto; max-width: 72em;
-       padding: 0 1em }
-h1 { font-size: 1.5em } h2 { font-size: 1.15em; margin-top: 2em }
-table { border-collapse: collapse; font-size: 13px } th, td { padding: .2em .7em; text-align: right;
-  border-bottom: 1px solid #d5dbe1 } th:first-child, td:first-child { text-align: left }
-figure { margin: 1em 0; overflow-x: auto } figcaption { color: #566573; font-size: 13px }
-svg { max-width: 100%; height: auto } details { font-size: 13px }
-code { font-size: 12px; word-break: break-all } .note { color: #566573 }
-"""
 
 CAPTIONS = {
     "length": "Path length over the best known tour of the same problem (median, 95 % interval of "

@@ -8,7 +8,7 @@ from netsp.study.compare.path_comparison import ComparedPath, PathComparison
 from netsp.view.pictures import style
 from netsp.view.pictures.path_picture import draw_path_map, draw_tether_along
 from netsp.view.report import briefing
-from netsp.view.report.page import STYLE
+from netsp.view.report.html_document import document
 from netsp.view.report.path_wording import figures_of
 
 PAGE_STYLE = """
@@ -42,14 +42,7 @@ def page(found: PathComparison) -> str:
     ]
     for path in found.paths:
         parts += [f"<h2>{html.escape(path.name)}</h2>", *_path(found, path)]
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f'<title>{html.escape(title)}</title><link rel="icon" href="data:,">'
-        f"<style>{STYLE}{briefing.STYLE}{PAGE_STYLE}</style></head><body>"
-        + "\n".join(parts)
-        + "</body></html>\n"
-    )
+    return document(title, briefing.STYLE + PAGE_STYLE, "\n".join(parts))
 
 
 def _introduction(found: PathComparison) -> str:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from netsp.base.files import write_text
 from netsp.view.report import chart, moving
+from netsp.view.report.html_document import document
 from netsp.view.report.opened import Opened
-from netsp.view.report.page import STYLE
 
 BESIDE = """
 body { max-width: none } .beside { display: flex; flex-wrap: wrap; gap: 1em 2em }
@@ -43,16 +43,10 @@ def save_beside(opened: Sequence[Opened], output: str | Path) -> None:
         "</section>"
         for one, film, view in zip(opened, films, views, strict=True)
     )
-    write_text(
-        output,
-        (
-            '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-            '<meta name="viewport" content="width=device-width, initial-scale=1">'
-            f'<title>{html.escape(title)}</title><link rel="icon" href="data:,">'
-            f"<style>{STYLE}{moving.STYLE}{BESIDE}</style></head><body>"
-            f"<h1>{html.escape(title)}</h1>{moving.CONTROLS}"
-            f'<div class="beside">{sections}</div>'
-            f"{chart.legend(run=any(one.run for one in opened))}"
-            f"{moving.script(films, views)}</body></html>\n"
-        ),
+    body = (
+        f"<h1>{html.escape(title)}</h1>{moving.CONTROLS}"
+        f'<div class="beside">{sections}</div>'
+        f"{chart.legend(run=any(one.run for one in opened))}"
+        f"{moving.script(films, views)}"
     )
+    write_text(output, document(title, moving.STYLE + BESIDE, body))

@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats
-from netsp.base.errors import InputError, counted
-from netsp.base.files import write_text
+from netsp.base.errors import counted
 from netsp.hsignature.signature_measures import measure
 from netsp.judge import verify
 from netsp.model.problem import Problem
@@ -20,8 +19,8 @@ from netsp.model.solution import Solution, Status
 from netsp.online.execute.tether_limits import describe_limits, limit_periods, overruns
 from netsp.plan.tour_plan import HOME
 from netsp.view.report import briefing, chart, moving, run_page
-from netsp.view.report.opened import Opened, json_of, opened
-from netsp.view.report.page import STYLE
+from netsp.view.report.html_document import document
+from netsp.view.report.opened import Opened, json_of
 
 TOUR_STYLE = """
 .chart { max-width: 900px; width: 100% }
@@ -38,25 +37,6 @@ TOUR_STYLE = """
   h2 { font-size: 12px; margin: .9em 0 .3em; break-after: avoid } tr, svg { break-inside: avoid }
 }
 """
-
-
-def report_tour(source: str | Path, problem_file: str | Path | None, output: str | Path) -> None:
-    """Write the page about a solution file (its problem is named, or lies in a run's folder) or the
-    folder of a run.
-
-    Raises
-    ------
-    InputError
-        Files that cannot be read, or do not belong together.
-    """
-    what = opened(source, problem_file)
-    try:
-        text = page(what)
-    except (KeyError, IndexError, ValueError, TypeError, OverflowError) as error:
-        raise InputError(
-            f"{source}: a file of the run is damaged: {type(error).__name__}: {error}"
-        ) from None
-    write_text(output, text)
 
 
 def page(what: Opened) -> str:
@@ -113,15 +93,8 @@ def page(what: Opened) -> str:
         parts += ["<h2>The map</h2>", briefing.imported(problem.site)]
     if what.rows:
         parts += ["<h2>Log</h2>", _over_time(what.rows, problem.units), _events(run)]
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{html.escape(title)}"
-        f'</title><link rel="icon" href="data:,"><style>{STYLE}{briefing.STYLE}'
-        f"{moving.STYLE}{TOUR_STYLE}</style></head><body>"
-        + "\n".join(parts)
-        + f"{moving.script([film], [view])}</body></html>\n"
-    )
+    style = briefing.STYLE + moving.STYLE + TOUR_STYLE
+    return document(title, style, "\n".join(parts) + moving.script([film], [view]))
 
 
 def _proof(solution: Solution) -> str:
