@@ -1,7 +1,7 @@
-"""Temperature schedule.
+"""Cooling schedule.
 
-The papers say only that θ decreases. Here it falls geometrically from `hot` to `cold`, in mean legs
-of the start state, over the iterations or the time allowed.
+The papers only say that θ decreases. Here it falls geometrically from `hot` to `cold` over the
+iterations or the time allowed. Its unit is the mean length of a leg of the first tour.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ class Cooling:
     Attributes
     ----------
     hot, cold
-        First and last temperature, in mean legs of the start state.
+        First and last temperature, as multiples of the mean length of a leg of the first tour.
     """
 
     hot: float = 1.0
@@ -33,10 +33,10 @@ class Cooling:
 
 
 class Schedule:
-    """Temperature as a function of progress: the larger of the used shares of iterations and time.
+    """Temperature as a function of progress, the used share of iterations or time, if larger.
 
-    Without a limit, `default` iterations are made. The same seed gives the same result only if the
-    iteration limit is reached first.
+    Without any limit, the iteration limit is `default`. One seed gives one result only if the
+    iteration limit is reached before the time limit.
     """
 
     def __init__(self, cooling: Cooling, run: SolverRun, leg: float, default: int) -> None:
@@ -48,7 +48,7 @@ class Schedule:
 
     @property
     def progress(self) -> float:
-        """Progress, from 0 at the start to 1 at the end."""
+        """Progress, 0 at the start and 1 at the end."""
         run = self.run
         by_clock = 0.0
         if run.clock.limit is not None:
@@ -58,10 +58,10 @@ class Schedule:
 
     @property
     def temperature(self) -> float:
-        """Present θ, as a length."""
+        """Current θ, in units of length."""
         c = self.cooling
         return float(self.unit * c.hot * (c.cold / c.hot) ** self.progress)
 
     def chunk(self, limit: int) -> int:
-        """Return the number of iterations to make at this temperature."""
+        """Return the number of iterations at the current temperature, at most `limit`."""
         return int(min(limit, self.run.iteration_limit - self.run.iterations))

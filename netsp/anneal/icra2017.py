@@ -1,12 +1,12 @@
 """`anneal`: simulated annealing over orders and classes.
 
-McCammon & Hollinger 2017, section IV-D. A state is an augmented trajectory: an order of the goals
-and a homotopy class for each. Two mutations, chosen at random: goal-swapping exchanges two goals
-(each keeps its class), path-inversion gives one goal another of its classes. Both change at most
-four legs, so a proposal costs a few look-ups, whatever the number of goals.
+Source: McCammon & Hollinger 2017, section IV-D. A state is an augmented trajectory: an order of the
+goals, and a homotopy class for each. A proposal is one of two mutations: goal-swapping exchanges
+two goals, which keep their classes, and path-inversion changes the class of one goal. Both replace
+at most four legs, so the time of a proposal does not depend on the number of goals.
 
-The paper says that a mutation may raise the entanglement of the path. With the state on the
-covering space it cannot: every state is a non-entangling tour, and only its length is annealed.
+In the paper a mutation may raise the entanglement of the path. Here it cannot: each state is a
+non-entangling tour of the covering space, and the only cost is its length.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ from netsp.gtsp.travel.result import Result
 
 @dataclass(frozen=True)
 class Params(Cooling):
-    """Options of the solver, besides those of `Cooling`.
+    """Options of the solver, in addition to those of `Cooling`.
 
     Attributes
     ----------
     swaps
         Share of proposals that swap goals; the others change a class.
     max_vertices
-        Maximum number of classes, those of shortest tether; all their legs are measured.
+        Maximum number of classes, chosen by tether length; all their legs are measured.
     proposals_per_goal
-        Proposals for each goal if neither time nor iterations are limited.
+        Number of proposals for each goal if neither time nor iterations are limited.
     chunk
-        Proposals between two checks of the clock, some milliseconds.
+        Number of proposals between two checks of the clock; 100,000 take some milliseconds.
     """
 
     swaps: float = 0.5
@@ -59,7 +59,7 @@ class Params(Cooling):
 
 
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
-    """Anneal as in the 2017 paper, from a random tour or the warm start; there is no bound.
+    """Anneal as in the 2017 paper, from a random tour or the warm start, without a lower bound.
 
     An iteration is one proposal. Source: McCammon & Hollinger 2017, section IV-D.
     """
@@ -137,7 +137,7 @@ def anneal(
     Returns
     -------
     tuple of float
-        Lengths of the present tour and of the best, which is in `best`.
+        Lengths of the current tour and of the best one, which is in `best`.
     """
     n = len(tour)
     for _ in range(count):
@@ -180,7 +180,7 @@ def anneal(
             best_length = length
             for k in range(n):
                 best[k] = tour[k]
-    # summed afresh, so that rounding does not accumulate
+    # computed from scratch, so that rounding errors do not accumulate
     length = 0.0
     for k in range(n):
         length += costs[tour[k], tour[k + 1 if k + 1 < n else 0]]

@@ -1,19 +1,19 @@
-"""`anneal-2016`: simulated annealing over free paths, priced by what they entangle.
+"""`anneal-2016`: simulated annealing over free paths, with a cost for entangled obstacles.
 
-McCammon & Hollinger 2016, section III. A configuration (the paper's state) is an order of the
-goals and a path for each leg: the shortest path (the paper's A*) or one through a sub-goal.
-Goal-swapping exchanges two goals and plans the legs at them anew; path-inversion plans one leg
-through a sub-goal on the far side of an obstacle. Cost (3): ``C(T) = k (E + 1) L`` with E the
-number of obstacles that the trajectory entangles, read off its reduced word.
+Source: McCammon & Hollinger 2016, section III. A configuration (the paper's state) is an order of
+the goals and a path for each leg: the shortest path (the paper's A*) or one through a sub-goal.
+Goal-swapping exchanges two goals and plans their legs again; path-inversion leads one leg through a
+sub-goal on the far side of an obstacle. Equation (3) is the cost ``C(T) = k (E + 1) L`` with E the
+number of obstacles that the trajectory entangles, by its reduced word.
 
-Where the paper is silent or assumes too much:
+Differences from the paper:
 
 - E counts the obstacles that the path winds around, and those that keep the word from cancelling
   without them (`netsp.hsignature.entangled`), not the letters of the word.
-- the paper's tether has no end. Ours has: a goal reached in a class that the tether does not admit
-  counts like an entanglement, so that with a long tether the cost is the paper's.
-- the trajectory returned is the best *valid* one met, each leg pulled taut in its class (the leg
-  of the travel graph), not the last configuration.
+- the tether of the paper is unlimited. Here, a goal that is reached in a class beyond the tether's
+  length counts like an entangled obstacle. With a long tether the cost is that of the paper.
+- the result is the best *valid* trajectory found, not the last one, and its legs are pulled taut
+  within their classes.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ from netsp.gtsp.travel.result import Result
 
 @dataclass(frozen=True)
 class Params(Cooling):
-    """Options of the solver, besides those of `Cooling`.
+    """Options of the solver, in addition to those of `Cooling`.
 
     Attributes
     ----------
     k
-        The paper's factor; the larger it is, the sooner entanglements go.
+        Factor k of equation (3), above 0. With a larger one, entanglement disappears sooner.
     swaps
         Share of proposals that swap goals; the others invert a path.
     proposals_per_goal
@@ -50,7 +50,7 @@ class Params(Cooling):
     chunk
         Maximum number of proposals between two checks of the clock.
     max_reports
-        Maximum number of rows of the trace if chunks are short.
+        Maximum number of progress reports under an iteration limit.
     """
 
     k: float = 1.0
@@ -71,8 +71,8 @@ class Params(Cooling):
 
 
 class Table(NamedTuple):
-    """Tables that do not change: those of `netsp.gtsp.travel.tether_blind_legs.Detours` (planar,
-    height, letters, row, far, near), and those of `_admissible` words (trie, vertex)."""
+    """Constant tables of a run: those of `netsp.gtsp.travel.tether_blind_legs.Detours` (planar to
+    near), and those of `_admissible` words (trie, vertex)."""
 
     planar: Floats
     height: Floats
@@ -85,9 +85,19 @@ class Table(NamedTuple):
 
 
 class Configuration(NamedTuple):
-    """Order of the clusters (legs + 1,), and via (legs,), the sub-goal through which each leg goes,
-    or -1; the vertices at its visits (legs,), and those of the best valid configuration; room for
-    words: stack (3, letters), turns (obstacles + 1,)."""
+    """Trajectory, and workspace of the kernels.
+
+    Attributes
+    ----------
+    order
+        Clusters (legs + 1,) in the order of their visits.
+    via
+        Sub-goal (legs,) of each leg, -1 for none.
+    visits, best
+        Vertices (legs,) of the visits, now and in the best valid configuration.
+    stack, turns
+        Workspace (3, letters) and (obstacles + 1,) for words.
+    """
 
     order: Ints
     via: Ints
@@ -98,15 +108,15 @@ class Configuration(NamedTuple):
 
 
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
-    """Anneal as in the 2016 paper, from a random order or that of the warm start, all legs direct.
+    """Anneal as in the 2016 paper, from direct legs in a random order or that of the warm start.
 
     An iteration is one proposal. Source: McCammon & Hollinger 2016, section III.
 
     Returns
     -------
     Result
-        Best tour met; `no_solution_found` if no configuration was free of entanglement with every
-        goal within the tether.
+        Best tour found; `no_solution_found` if each configuration entangled an obstacle or reached
+        a goal beyond the tether.
 
     Raises
     ------
@@ -175,14 +185,14 @@ def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
 
 
 def _admissible(graph: TravelGraph) -> tuple[Ints, Ints]:
-    """Return a trie of all words in the graph.
+    """Return a trie of the words of all vertices.
 
     Returns
     -------
     trie
-        (nodes, 2 n + 1) child by letter + n, -1 if none.
+        Child (nodes, 2 n + 1) by letter + n, -1 for none.
     vertex
-        (nodes, clusters) vertex with that word, -1 if none.
+        Vertex (nodes, clusters) with that word in each cluster, -1 for none.
     """
     n = max((abs(x) for w in graph.signatures for x in w), default=0)
     children = [[-1] * (2 * n + 1)]
@@ -207,7 +217,7 @@ def _detour_length(a: int, b: int, via: int, planar: Floats, height: Floats) -> 
 
 @kernel
 def _push(letter: int, size: int, stack: Ints, trie: Ints) -> int:
-    """Append a letter to the reduced word on the stack, with its trie node, and return the size."""
+    """Append a letter to the reduced word on the stack, with its trie node; return the new size."""
     if size > 0 and stack[0, size - 1] == -letter:
         return size - 1
     node = 0 if size == 0 else stack[1, size - 1]
@@ -222,8 +232,8 @@ def _push(letter: int, size: int, stack: Ints, trie: Ints) -> int:
 
 @kernel
 def evaluate(now: Configuration, table: Table) -> tuple[float, int, int]:
-    """Write the vertices of a configuration into `now.visits`, and return its length, entangled
-    obstacles, and goals in a class that the tether does not admit."""
+    """Write the vertices of a configuration into `now.visits`; return its length, its number of
+    entangled obstacles, and its number of goals beyond the tether."""
     order, via, visits = now.order, now.via, now.visits
     stack, turns = now.stack, now.turns
     planar, height, letters, row = table.planar, table.height, table.letters, table.row
@@ -295,8 +305,8 @@ def anneal(
     Returns
     -------
     tuple
-        Length and entangled obstacles of the present configuration, and length of the best valid
-        one, whose vertices are in `now.best`.
+        Length and number of entangled obstacles of the current configuration, and length of the
+        best valid one, whose vertices are in `now.best`.
     """
     order, via, visits, best = now.order, now.via, now.visits, now.best
     planar, far, near = table.planar, table.far, table.near

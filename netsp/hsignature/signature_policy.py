@@ -9,14 +9,14 @@ from netsp.base.number_ranges import check_positive
 
 @dataclass(frozen=True)
 class CompletionPolicy:
-    """Limits of a completion of rules (Knuth & Bendix). Beyond them a group is no longer exact.
+    """Limits of the completion of rules (Knuth & Bendix). A group that reaches one is not exact.
 
     Attributes
     ----------
     max_rules
         Maximum number of rules.
     max_side
-        Maximum number of letters in the longer side of a rule; longer rules are left out.
+        Maximum number of letters in the longer side of a rule; longer rules are dropped.
     max_overlaps
         Maximum number of overlaps of two rules that are examined.
     """
@@ -39,10 +39,10 @@ class MeasurePolicy:
         Depth by which a tether may enter an obstacle that it touches, as a share of the problem's
         size.
     sagitta
-        Distance by which two drawings of one arc may differ, as a share of the largest obstacle. A
-        path that retraces an arc drawn with chords would else seem to cross itself.
+        Distance between an arc and its chords, as a share of the largest obstacle. Within it, a
+        path that retraces an arc does not count as crossing itself.
     visibility_points
-        Points along a tether, besides its vertices, between which lines of sight are tried.
+        Number of points along a tether, besides its vertices, that lines of sight may join.
     """
 
     contact_depth: float = 1e-6

@@ -1,9 +1,9 @@
-"""Protocol of signatures: words that tell homotopy classes of paths apart.
+"""Protocol of signatures: words that distinguish homotopy classes of paths.
 
-In the plane and among prisms letters are crossings of rays (`PlanarSignature`); in any scene they
-come from a cubical complex (`netsp.plan.space.space_signature.SpaceSignature`). In both cases the
-words of loops at one point form a group, so callers that ask whether a tether is as planned, or
-free, need not know which.
+In the plane and among prisms, letters are crossings of rays (`PlanarSignature`). In other scenes
+they come from a cubical complex (`netsp.plan.space.space_signature.SpaceSignature`). Either way,
+the words of loops at one point form a group, so callers can compare words, or test whether one is
+empty, without knowing which signature it is.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ class Signature(Protocol):
 
     @property
     def exact(self) -> bool:
-        """True if paths between the same ends are of one class exactly when their words are equal.
+        """True if two paths with the same ends are homotopic exactly when their words are equal.
 
-        If not, equal words still mean one class, and different words may mean one, too.
+        If False, paths with equal words are homotopic, but homotopic paths may differ in words.
         """
 
     def word(self, path: npt.ArrayLike, *, closed: bool = False) -> Word:
@@ -38,14 +38,14 @@ class Signature(Protocol):
         """Return the word of paths one after the other."""
 
     def windings(self, word: Word) -> tuple[int, ...]:
-        """Return how often a path of a word winds, with signs: its class in the abelianisation.
+        """Return the winding numbers of a word, its class in the abelianisation.
 
-        All numbers are 0 for a contractible path, but also for some others.
+        All are 0 for a contractible path, but also for some other paths.
         """
 
 
 class PlanarSignature:
-    """Words of the rays of obstacles: the free group, one generator for each obstacle.
+    """Words by ray crossings: a free group with a generator for each obstacle.
 
     Parameters
     ----------

@@ -58,7 +58,7 @@ def invert(word: Iterable[int]) -> Word:
 def is_looping(word: Word) -> bool:
     """Return whether a signed letter occurs twice in a reduced word.
 
-    The tether then passes the same gap twice in the same sense, so it wraps something.
+    If so, the tether passes the same gap twice in the same direction and wraps something.
     ``(1, -2, -1)`` does not loop, ``(1, 2, 1)`` does. This is the non-looping constraint of
     McCammon & Hollinger 2017, section IV-A, in the form of the authors' later code.
     """
@@ -66,9 +66,9 @@ def is_looping(word: Word) -> bool:
 
 
 def cyclically_reduced(word: Iterable[int]) -> Word:
-    """Return the reduced word without letters that cancel between its end and its beginning.
+    """Return the reduced word without letters at its end that cancel letters at its beginning.
 
-    This is the class of a loop that may slide off its base.
+    It is the class of a loop that is free to leave its base point.
 
     Examples
     --------
@@ -85,13 +85,14 @@ def cyclically_reduced(word: Iterable[int]) -> Word:
 def entangled(word: Iterable[int]) -> tuple[int, ...]:
     """Return the obstacles, numbered from 1, that a closed path of this word is wrapped around.
 
-    They are the obstacles that it winds around and, if the word does not cancel without them, those
-    of the remaining word. There are none exactly when the word is empty.
+    These are the obstacles with a winding number other than 0 and, if the rest of the word does not
+    cancel without their letters, the obstacles in that rest. There are none exactly if the word is
+    empty.
 
-    McCammon & Hollinger 2016, section II-A, speak of the obstacles in the interior of the loop.
-    Letters alone do not tell: in ``(1, 2, -1)`` the path only crosses the ray of obstacle 1 on its
-    way to obstacle 2 and back. Nor do windings: ``(1, 2, -1, -2)`` encloses nothing and is
-    entangled with both.
+    McCammon & Hollinger 2016, section II-A, define them as the obstacles in the interior of the
+    loop. Letters alone do not decide: in ``(1, 2, -1)`` the path crosses the ray of obstacle 1 only
+    to get to obstacle 2 and back. Nor do winding numbers: they are 0 for ``(1, 2, -1, -2)``, which
+    is entangled with both obstacles.
 
     Examples
     --------

@@ -1,8 +1,7 @@
-"""Words of a group as numbers, for compiled loops.
+"""Numbered words of a group, for kernels.
 
-A table is a tree of normal forms: number 0 is the empty word, and the parent of any other word is
-the word without its last letter, which is a normal form, too. The product of a word and a letter is
-computed once and kept.
+A table is a tree of normal forms. Word 0 is the empty word; the parent of any other word is the
+word without its last letter, which is a normal form, too. Products of words and letters are cached.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ class Rules(NamedTuple):
     left, right
         Letters of all left and right sides.
     left_at, right_at
-        (r + 1,) start of each side, and the end of the last.
+        Start of each side (r + 1,), and the end of the last one.
     """
 
     left: Ints
@@ -42,7 +41,7 @@ class Rules(NamedTuple):
 
 
 class Table(NamedTuple):
-    """Words seen so far.
+    """Known words and products.
 
     Attributes
     ----------
@@ -60,7 +59,7 @@ class Table(NamedTuple):
 
 
 def packed(rules: Sequence[tuple[Word, Word]]) -> Rules:
-    """Return the rules of a `netsp.hsignature.groups.Group` for kernels."""
+    """Return the rules of a `netsp.hsignature.groups.Group` as arrays for kernels."""
 
     def side(k: int) -> tuple[Ints, Ints]:
         flat = np.array([x for r in rules for x in r[k]], dtype=np.int64)
@@ -86,7 +85,7 @@ def word_of(table: Table, number: int) -> Word:
 
 
 def number_of(table: Table, rules: Rules, word: Iterable[int]) -> tuple[int, Table]:
-    """Return the number of a word's normal form, and the table, which may have grown."""
+    """Return the number of a word's normal form, and the table, which may be a larger copy."""
     number = 0
     for x in word:
         number, table = times_letter(table, rules, number, x)
@@ -95,7 +94,7 @@ def number_of(table: Table, rules: Rules, word: Iterable[int]) -> tuple[int, Tab
 
 @kernel
 def _product(table: Table, number: int, letter: int) -> int:
-    """Return the known product of a word and a letter, -1 for none."""
+    """Return the cached product of a word and a letter, or -1."""
     at = table.words[number, FIRST]
     while at >= 0:
         if table.products[at, BY] == letter:
@@ -119,7 +118,7 @@ def _keep(table: Table, number: int, letter: int, gives: int) -> Table:
 
 @kernel
 def _longer_by(table: Table, number: int, letter: int) -> tuple[int, Table]:
-    """Return the word with one more letter, to which no rule applies, and the table."""
+    """Append a letter that gives a normal form, and return the longer word and the table."""
     found = _product(table, number, letter)
     if found >= 0:
         return found, table
@@ -135,7 +134,7 @@ def _longer_by(table: Table, number: int, letter: int) -> tuple[int, Table]:
 
 @kernel
 def times_letter(table: Table, rules: Rules, number: int, letter: int) -> tuple[int, Table]:
-    """Return the normal form of a word and one more letter, and the table."""
+    """Return the product of a word and a letter, and the table."""
     found = _product(table, number, letter)
     if found >= 0:
         return found, table
@@ -149,9 +148,9 @@ def times_letter(table: Table, rules: Rules, number: int, letter: int) -> tuple[
 
 @kernel
 def _rewritten(table: Table, rules: Rules, number: int, letter: int) -> tuple[int, Table]:
-    """Return the normal form of a word and one more letter, by the rules.
+    """Return the product of a word and a letter by the rules, and the table.
 
-    As in `netsp.hsignature.groups`, rules can only apply to the end of the letters kept.
+    As in `netsp.hsignature.groups`, rules can only apply at the end of the letters so far.
     """
     n = table.words[number, LENGTH]
     kept = np.empty(n + 64, dtype=np.int64)

@@ -1,10 +1,11 @@
 """Exact length of a taut path among disks, from the corners of a path around polygons.
 
-A taut path has corners at inscribed polygons. Consecutive corners on one disk that turn the same
-way are one contact with that disk. For contacts with given senses there is one alternation of
-common tangents and arcs, whose length has a closed form. A contact whose arc runs backwards is an
-artefact of the polygon and is removed; a disk that a tangent enters (by less than the polygon lies
-inside of it) becomes a contact. Without either, it is the taut path among the disks themselves.
+The taut path around inscribed polygons has corners. Consecutive corners on one disk that turn in
+one direction are one contact with the disk. Contacts in a given order and sense determine a chain
+of common tangents and arcs, whose length has a closed form. If an arc runs backwards, its contact
+is an artefact of the polygon and is removed. If a tangent enters another disk, which the polygon
+allows, that disk becomes a contact. Once neither happens, the chain is the taut path among the
+disks.
 """
 
 from __future__ import annotations
@@ -19,17 +20,17 @@ from netsp.base.arrays import Floats
 from netsp.judge.judge_policy import JudgePolicy
 
 TURN_TOLERANCE = 1e-9
-"""Tolerance of turning backwards at a contact, radians."""
+"""Tolerance for an arc that runs backwards, radians."""
 
 
 @dataclass(frozen=True)
 class Contact:
-    """Disk that a path bends around.
+    """Disk that a path bends around: centre, radius and sense, in the problem's units.
 
     Attributes
     ----------
     sense
-        1 if the disk is on the left, -1 if it is on the right.
+        1 if the disk is on the left of the path, -1 if it is on the right.
     turn
         Approximate angle by which the path turns, radians.
     """
@@ -72,18 +73,18 @@ def exact_length(
     slack: float,
     max_changes: int = JudgePolicy.max_contact_changes,
 ) -> tuple[float, float] | None:
-    """Return the length of the taut path from a to b among disks, and the angle of its turns.
+    """Return the length of the taut path from a to b among disks, and its total turning, radians.
 
-    Return None if no consistent set of contacts is found.
+    Return None if no consistent contacts are found after `max_changes` changes.
 
     Parameters
     ----------
     contacts
-        Contacts to begin with.
+        First guess of the contacts.
     disks
         (d, 3) x, y, radius.
     slack
-        Depth in a disk that is ignored.
+        Depth up to which a tangent may enter a disk.
     """
     chain = list(contacts)
     for _ in range(max_changes):
@@ -106,9 +107,9 @@ def exact_length(
         if entered is None:
             arcs = sum(c.radius * t for c, t in zip(chain, turns, strict=True))
             return length + arcs, sum(turns)
-        at, contact = entered
+        index, contact = entered
         chain = [Contact(c.x, c.y, c.radius, c.sense, t) for c, t in zip(chain, turns, strict=True)]
-        chain.insert(at, contact)
+        chain.insert(index, contact)
     return None
 
 
@@ -136,7 +137,8 @@ def _entered(
     disks: Floats,
     slack: float,
 ) -> tuple[int, Contact] | None:
-    """Return the disk that a tangent enters deepest, as a contact, and its place in the chain."""
+    """Return where in the chain to insert the disk that a tangent enters deepest, and its
+    contact."""
     if len(disks) == 0:
         return None
     deepest, found = slack, None

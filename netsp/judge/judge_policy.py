@@ -1,4 +1,4 @@
-"""Policy of the judge: how it draws obstacles, and how long it searches for contacts."""
+"""Policy of the judge: polygons that stand for obstacles, and the search for contacts."""
 
 from __future__ import annotations
 
@@ -9,27 +9,26 @@ from netsp.base.number_ranges import check_positive, check_shares
 
 @dataclass(frozen=True)
 class JudgePolicy:
-    """Policy of the judge's geometry. It changes no tolerance.
+    """Policy of the judge's geometry; tolerances do not depend on it.
 
     Attributes
     ----------
     max_inset_share
-        Maximum part of a radius, or of the room at a corner, by which an inset obstacle is smaller.
-        The rest, three fifths of a thin wall, still stops every path.
+        Maximum distance by which an inset obstacle is smaller, as a share of a radius or of the
+        room at a corner. A thin wall keeps three fifths of its thickness.
     circle_sides
-        Edges of the polygon that stands for a circle. They decide on which side a path passes;
-        lengths come from the circles themselves.
+        Number of edges of the polygon that stands for a circle. The polygon decides on which side a
+        path passes; lengths come from the circle itself.
     corner_sides
-        Edges of the polygon that stands for the whole circle around a corner at the distance of the
-        clearance.
+        Number of edges of a full circle in the rounded corners of a grown polygon.
     min_clearance_ratio
-        Ratio of the clearance to the place tolerance up to which polygons are not grown: their
-        rounded corners would consist of rounding errors.
+        Ratio of the clearance to the place tolerance up to which polygons are not grown, because
+        rounding errors would shape their rounded corners.
     phase
-        Rotation of the polygons that stand for circles, as a part of an edge. An odd number keeps
-        symmetric worlds from degenerate triangles.
+        Rotation of the polygons that stand for circles, as a share of an edge. An irregular value
+        avoids degenerate triangles in symmetric worlds.
     max_contact_changes
-        Maximum number of contacts that are added or removed before an exact length is given up.
+        Maximum number of contacts that are added or removed; then bounds replace the exact length.
     """
 
     max_inset_share: float = 0.2

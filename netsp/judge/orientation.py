@@ -1,10 +1,9 @@
 """Exact orientation of three points of the plane.
 
-The sign of the cross product decides on which side of a line a point lies. Rounding may turn that
-sign where the points lie nearly in a line, and two tests that round in different ways may then
-contradict each other. Here the sign is that of the real numbers that the floats stand for: floats
-decide where the error bound of Shewchuk (1997, "Adaptive precision floating-point arithmetic and
-fast robust geometric predicates") allows it, and fractions decide the rest.
+The sign of a cross product says on which side of a line a point lies. For nearly collinear points,
+rounding may flip that sign, and two tests may contradict each other. Here the sign is exact: floats
+decide if the error bound of Shewchuk (1997, "Adaptive precision floating-point arithmetic and fast
+robust geometric predicates") allows it, and fractions otherwise.
 """
 
 from __future__ import annotations
@@ -18,11 +17,10 @@ from netsp.base.arrays import Floats, Ints
 Point = tuple[float, float]
 
 ERROR_BOUND = (3.0 + 16.0 * 2.0**-53) * 2.0**-53
-"""Tolerance of the cross product: its largest rounding error, relative to the sum of its two
-absolute products."""
+"""Tolerance of the cross product p - q: its largest rounding error, as a share of |p| + |q|."""
 
 UNDERFLOW_BOUND = 1e-280
-"""Tolerance of the sum of the two products, below which digits may be lost to underflow."""
+"""Tolerance of |p| + |q|: below it, underflow may lose digits of the products."""
 
 
 def orientation(a: Point, b: Point, c: Point) -> int:

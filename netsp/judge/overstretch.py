@@ -1,11 +1,11 @@
-"""Check of the taut tether's limit everywhere along a path.
+"""Check that the taut tether keeps its limit everywhere along a path.
 
 Lemma. Let T(s) be the length of the taut tether at the point s of a path, in the class that the
-path gives it. Between two neighbouring vertices of the path T is at most the larger of its values
+path gives it. Between two neighbouring vertices of the path, T is at most the larger of its values
 at the two. So T keeps a limit along the whole path if it keeps the limit at every vertex.
 
 Proof. A point of the cover is a position together with the class of the tether there, and T is the
-distance in the cover from the base with no tether out. In the plane the cover is CAT(0), and with
+distance in the cover from the base with the empty class. In the plane the cover is CAT(0), and with
 heights it is the product of that and a line, which is CAT(0), too (docs/theory.md, facts 1 and 4).
 In a CAT(0) space the distance to a fixed point is convex along geodesics. A straight segment in
 free space lifts to a geodesic, so T is convex along it, and a convex function on an interval is
@@ -44,26 +44,26 @@ def first_overstretch(
     allowance: Callable[[Floats], float],
     start: int = 0,
 ) -> Overstretch | None:
-    """Return the first vertex of a path at which the taut tether is too long, None if it fits.
+    """Return the first vertex of a path at which the taut tether is over the limit, or None.
 
-    A tether that is too long at the start may stay so until it fits, but may not grow meanwhile.
+    A tether that is over the limit at the start may stay so until it fits, but may not grow.
 
     Parameters
     ----------
     puller
-        Triangles of the free space.
+        Triangulated free space.
     path
         Points (n, 3), from the base.
     pieces
-        Edges of triangles that each segment of the path crosses.
+        Triangle edges that each segment of the path crosses, in order.
     limit
-        Length of the tether.
+        Limit of the tether length, in the problem's units.
     known
-        Tether lengths at some vertices, the last one included; none exceeds the limit.
+        Tether lengths by vertex, with the last vertex among them; none exceeds the limit.
     allowance
-        Takes a point (3,) of the path and returns the allowed excess of the tether there.
+        Function from a point (3,) of the path to the excess of the tether that is allowed there.
     start
-        Vertex at which the robot begins to move; the part before it is the tether out at the start.
+        Vertex at which the robot begins to move; the path up to it is its tether at the start.
     """
     steps: Floats = np.linalg.norm(np.diff(path, axis=0), axis=1)
     sleeve: list[tuple[int, bool]] = []
@@ -95,7 +95,7 @@ def first_overstretch(
 
 
 def _carry(sleeve: list[tuple[int, bool]], piece: list[tuple[int, bool]]) -> None:
-    """Append crossings to a reduced sequence in place, and cancel edges that are crossed back."""
+    """Append crossings to a reduced sequence in place; crossing an edge back cancels it."""
     for crossing in piece:
         if sleeve and sleeve[-1][0] == crossing[0]:
             sleeve.pop()

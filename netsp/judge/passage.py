@@ -14,9 +14,8 @@ from netsp.judge.solid_distances import Bridge
 def passes(bridge: Bridge, path: Floats, reach: float) -> bool:
     """Return whether a path (n, 2) passes a bridge from one side to the other.
 
-    The path is cut where it crosses the bridge, and sides alternate from piece to piece. A piece
-    that stays within `reach` of the contact is ignored: the robot stands there, or rounding put it
-    on the other side.
+    Crossings of the bridge cut the path into pieces on alternating sides. A piece that stays within
+    `reach` of the contact is ignored: the robot waits there, or rounding put it on the other side.
     """
     cuts = _cuts(bridge.line, path)
     if not cuts:
@@ -32,7 +31,7 @@ def passes(bridge: Bridge, path: Floats, reach: float) -> bool:
 
 
 def _cuts(line: Floats, path: Floats) -> list[tuple[int, Floats]]:
-    """Return where a path crosses a polyline, in order: the segment of the path, and the point.
+    """Return the crossings of a path and a polyline in order: segment of the path, and point.
 
     Points of the path on the line count as above it, in the sense of `netsp.judge.stringpull`.
     """

@@ -1,11 +1,11 @@
-"""Obstacles as the judge draws them: slightly smaller than they are.
+"""Obstacles of the judge: slightly smaller than in the problem.
 
-A path may touch an obstacle, and rounding may put it slightly inside. So the judge forbids an
-*inset* obstacle: each circle's radius, and each corner of a polygon, is drawn in by the judge's
-tolerance, or by a fifth of the room at that place, if that is less. A wall thinner than the
-tolerance keeps three fifths of its thickness, so nothing passes through it. Where two obstacles
-touch, their insets do not, and a *bridge* closes the gap. A path may reach the contact of two
-obstacles and stop there, but not pass from one side of it to the other.
+A path may touch an obstacle, and rounding may put it slightly inside. So the judge forbids only the
+*inset* of an obstacle: the radius of a circle, and each corner of a polygon, is moved inwards by
+the judge's tolerance, or by a fifth of the room there if that is less. A wall thinner than the
+tolerance keeps three fifths of its thickness, so no path passes through it. The insets of two
+obstacles that touch are apart, and a *bridge* closes the gap between them. A path may reach the
+contact of two obstacles, but not pass from one side of it to the other.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from netsp.judge.judge_policy import JudgePolicy
 from netsp.model.problem import Circle, Polygon, Problem
 
 TOUCHING_TOLERANCE = 2e-10
-"""Tolerance of the gap between two obstacles that touch, as a share of the problem's size. The free
-space of the theory is that among obstacles grown by half of this gap."""
+"""Tolerance of the gap between obstacles that touch, as a share of the problem's size. Theory
+assumes obstacles that are grown by half of this gap."""
 
 Outline = tuple[shapely.Geometry, float]
-"""Polygon and 0, or centre and radius of a circle."""
+"""Outline of an obstacle: a polygon and 0, or the centre and radius of a circle."""
 
 
 @dataclass(frozen=True)
 class Inset:
-    """Obstacle that is smaller by the tolerance, relative to an origin.
+    """Obstacle that is smaller by the tolerance, in coordinates relative to an origin.
 
     Attributes
     ----------
     shape
-        Polygon that a path must not enter; inscribed, if the obstacle is a circle.
+        Polygon that a path must not enter; it is inscribed in a circle.
     ring
         (k, 2) corners of the polygon.
     owner
@@ -60,7 +60,8 @@ def inset(
     origin: Floats,
     policy: JudgePolicy = JudgePolicy(),
 ) -> Inset:
-    """Return an obstacle that is grown by the clearance and drawn in by the tolerance `place`."""
+    """Return the inset of an obstacle: grown by the clearance, and smaller by the tolerance
+    `place`."""
     c, share = problem.clearance, policy.max_inset_share
     if isinstance(obstacle, Circle):
         radius = obstacle.radius + c
@@ -75,7 +76,7 @@ def inset(
     if c <= policy.min_clearance_ratio * place:
         back = np.minimum(place, share * room(v, place / share))
         shape = shapely.Polygon(v + back[:, None] * _inward(v))
-        if not shape.is_valid:  # needles from rounding: rather too strict
+        if not shape.is_valid:  # needles from rounding: the full polygon is stricter
             shape = shapely.Polygon(v)
         ring = shapely.get_coordinates(shape)[:-1]
         by = min(place, share * c) if c else float(back.max())
@@ -87,7 +88,7 @@ def inset(
 
 
 def _nearest(v: Floats, ring: Floats) -> Ints:
-    """Return the nearest corner of each point of a ring, the first of two at equal distance."""
+    """Return the index of the corner nearest to each point of a ring; ties take the first."""
     from scipy.spatial import cKDTree
 
     away, index = cKDTree(v).query(ring, k=2)
@@ -96,18 +97,18 @@ def _nearest(v: Floats, ring: Floats) -> Ints:
 
 
 def room(v: Floats, limit: float) -> Floats:
-    """Return the distance (k,) from the edges at each corner (k, 2) to the rest of the polygon.
+    """Return, for each corner (k, 2), the distance from its edges to the rest of the polygon.
 
     Parameters
     ----------
     limit : float
-        Distances above it are infinite, so that not all pairs need to be measured.
+        Distances above the limit may be returned as infinite, which saves measuring all pairs.
     """
     k = len(v)
     edges = shapely.linestrings(np.stack([v, np.roll(v, -1, axis=0)], axis=1))
     corners = shapely.points(v)
     edge, corner = shapely.STRtree(corners).query(edges, predicate="dwithin", distance=limit)
-    other = (corner != edge) & (corner != (edge + 1) % k)  # the ends of an edge are its own
+    other = (corner != edge) & (corner != (edge + 1) % k)  # an edge touches its own ends
     edge, corner = edge[other], corner[other]
     far = shapely.distance(edges[edge], corners[corner])
     by_edge, by_corner = np.full(k, np.inf), np.full(k, np.inf)
@@ -123,23 +124,23 @@ def _inward(v: Floats) -> Floats:
     behind = np.roll(ahead, 1, axis=0)
     left = np.column_stack([-ahead[:, 1] - behind[:, 1], ahead[:, 0] + behind[:, 0]])
     size = np.hypot(*left.T)
-    # at a corner that turns by 180 degrees the normals cancel: there, point behind the tip
+    # where the outline turns by 180 degrees the normals cancel: point away from the tip
     out = np.where(size[:, None] > 1e-6, left / np.maximum(size, 1e-300)[:, None], ahead - behind)
     return np.asarray(out / np.maximum(np.hypot(*out.T), 1e-300)[:, None])
 
 
 @dataclass(frozen=True)
 class Bridge:
-    """Contact of two obstacles, and the line between their insets that closes it.
+    """Contact of two obstacles, and the line that closes the gap between their insets.
 
     Attributes
     ----------
     first, second
         Indices of the obstacles.
     contact
-        (2,) place where they touch.
+        Point (2,) where they touch.
     line
-        (k, 2) polyline from inside one inset, through the contact, to inside the other.
+        Polyline (k, 2) from inside one inset, through the contact, to inside the other.
     """
 
     first: int
@@ -149,16 +150,16 @@ class Bridge:
 
 
 def bridges(problem: Problem, insets: list[Inset], origin: Floats, place: float) -> list[Bridge]:
-    """Return the contacts of obstacles that are grown by the clearance.
+    """Return the bridges between obstacles that touch when grown by the clearance.
 
-    Two obstacles may touch in several places. Where the insets touch, too, no bridge is needed.
+    Two obstacles may touch in several places. Insets that touch need no bridge.
     """
     if len(insets) < 2:
         return []
     outlines = [_outline(o, origin) for o in problem.obstacles]
     shapes = np.array([o if isinstance(o, shapely.Polygon) else o.buffer(r) for o, r in outlines])
     reach = 2.0 * problem.clearance + TOUCHING_TOLERANCE * problem.scale + 2.0 * place
-    # the polygon in place of a circle lies inside of it by this distance
+    # distance between a circle and the polygon that stands for it
     back = max(r for _, r in outlines) * (1.0 - np.cos(np.pi / 32.0))
     pairs = shapely.STRtree(shapes).query(shapes, predicate="dwithin", distance=reach + 2.0 * back)
 
@@ -187,7 +188,7 @@ def _outline(obstacle: Circle | Polygon, origin: Floats) -> Outline:
 def _contacts(
     problem: Problem, a: Outline, b: Outline, inset_a: Inset, inset_b: Inset, place: float
 ) -> list[tuple[Floats, Floats]]:
-    """Return the contacts of two obstacles, each as a point (2,) of both."""
+    """Return the contacts of two obstacles, each as a pair of points (2,), one on each obstacle."""
     gap = 2.0 * problem.clearance + TOUCHING_TOLERANCE * problem.scale
     (one, r), (other, q) = a, b
     if r and q:
@@ -206,14 +207,14 @@ def _contacts(
 def _contacts_with_circle(
     circle: shapely.Geometry, radius: float, polygon: shapely.Geometry, gap: float, place: float
 ) -> list[tuple[Floats, Floats]]:
-    """Return the contacts of a circle and a polygon, as points of both."""
+    """Return the contacts of a circle and a polygon as pairs of points, on circle and polygon."""
     centre = shapely.get_coordinates(circle)[0]
     v = shapely.get_coordinates(polygon)
     step = np.diff(v, axis=0)
     along = ((centre - v[:-1]) * step).sum(1) / np.maximum((step * step).sum(1), 1e-300)
     feet = v[:-1] + np.clip(along, 0.0, 1.0)[:, None] * step
     far = np.hypot(*(feet - centre).T)
-    # deeper in the circle the insets overlap, too
+    # at a greater depth the insets overlap, too
     touched = (far - radius <= gap) & (far - radius >= -4.0 * place)
     out = []
     for foot in np.unique(feet[touched], axis=0):
@@ -230,7 +231,7 @@ def _contacts_of_polygons(
     gap: float,
     place: float,
 ) -> list[tuple[Floats, Floats]]:
-    """Return a contact of two polygons, as points of both, in each region that is near to both."""
+    """Return a contact of two polygons, a pair of points, in each region near both polygons."""
     if one.distance(other) > gap:
         return []
     near = 0.5 * gap + place

@@ -1,19 +1,19 @@
 """String pulling: taut lengths within a homotopy class, by triangulation and the funnel algorithm.
 
-This is independent of the roadmaps. Circles become inscribed polygons, and free space is
-triangulated. A path is the sequence of triangle edges that it crosses; cancelling an edge that is
-crossed back at once gives the *reduced* sequence, which is the path's homotopy class. The funnel
-algorithm finds the shortest path through a sequence of edges (Lee & Preparata 1984; Chazelle 1982;
-Hershberger & Snoeyink 1994). Its corners show which disks the taut path touches, and so give its
-exact length (`netsp.judge.chain`).
+The method shares nothing with the roadmaps. Circles become inscribed polygons, and free space is
+triangulated. A path crosses a sequence of triangle edges. Removing edges that are crossed back at
+once gives the *reduced* sequence, which identifies the homotopy class. The funnel algorithm finds
+the shortest path through a sequence of edges (Lee & Preparata 1984; Chazelle 1982; Hershberger &
+Snoeyink 1994). Its corners show which disks the taut path touches, and thus give the exact length
+(`netsp.judge.chain`).
 
-Degenerate positions need no special case. Every side is decided by exact orientation
+Degenerate positions need no special case, because orientations are exact
 (`netsp.judge.orientation`). If a point of a path lies on the line of an edge, or a segment runs
-through the end of an edge, the side is that of the whole path moved by (-δ², δ) for an
-infinitesimal δ > 0 (Edelsbrunner & Mücke 1990, "Simulation of simplicity"). The moved path lies in
-general position, so its sequence of edges is a walk from triangle to triangle: the same for a
-segment and, reversed, for the segment run backwards. Start and end of a path lie in the closed
-first and last triangle of its walk, which is all that the funnel needs.
+through the end of an edge, sides are those of the path shifted by (-δ², δ) for an infinitesimal
+δ > 0 (Edelsbrunner & Mücke 1990, "Simulation of simplicity"). The shifted path is in general
+position, so the edges that it crosses are a walk from triangle to triangle, and the reversed path
+takes the reversed walk. Start and end of a path lie in the closed first and last triangle of its
+walk, as the funnel algorithm requires.
 """
 
 from __future__ import annotations
@@ -35,24 +35,25 @@ from netsp.judge.solid_distances import inset
 from netsp.model.problem import Problem
 
 PLACE_TOLERANCE = 1e-7
-"""Tolerance of a path's points, as a share of the problem's size: by how much it may miss a goal or
-enter an obstacle."""
+"""Tolerance of positions, as a share of the problem's size: distance by which a path may miss a
+goal, and depth to which it may enter an obstacle."""
 
 
 @dataclass(frozen=True)
 class Pulled:
-    """Taut planar length, between two bounds.
+    """Length of a taut path in plan, as two bounds.
 
-    The bounds agree if the contacts with the disks themselves were found.
+    The bounds are equal if the contacts with the disks were found.
 
     Attributes
     ----------
     low
-        Lower bound: the length among inscribed polygons.
+        Lower bound: the length around inscribed polygons.
     high
-        Estimated upper bound: adds by how much the circles exceed their polygons along the bends.
+        Estimated upper bound: the lower bound and an allowance at each bend for the distance
+        between polygon and circle.
     turning
-        Angle by which the path turns, radians; a lower bound if contacts were not found.
+        Total angle by which the path turns, radians; a lower bound if contacts were not found.
     """
 
     low: float
@@ -66,9 +67,9 @@ class StringPuller:
     Parameters
     ----------
     reach
-        Distance from base, goals and obstacles within which triangles cover free space.
+        Distance around base, goals and obstacles that the triangles cover, in the problem's units.
     place
-        Tolerance of the judge.
+        Tolerance of positions, in the problem's units.
     path
         Points (n, 2 or more) that the triangles must also cover.
     policy
@@ -129,10 +130,10 @@ class StringPuller:
         return box.difference(shapely.union_all(shapes)) if shapes else box
 
     def crossings(self, path: npt.ArrayLike) -> list[list[tuple[int, bool]]]:
-        """Return for each segment of a polyline the triangle edges crossed, in order.
+        """Return the triangle edges that each segment of a polyline crosses, in order.
 
-        Each crossing states whether it comes from the left. The sequence of a whole path is the
-        concatenation of the sequences of its parts.
+        A crossing is an edge and whether it is crossed from the left. The crossings of a path are
+        those of its segments, one after the other.
         """
         xy = np.asarray(path, dtype=float)[:, :2] - self.origin
         out: list[list[tuple[int, bool]]] = [[] for _ in range(len(xy) - 1)]
@@ -149,7 +150,7 @@ class StringPuller:
         p, q, u, v = p[hit], q[hit], u[hit], v[hit]
         a, b = _cross(u, v, p), _cross(u, v, q)
         apart_by = np.where(a == b, 1.0, a - b)
-        # near the end of an edge rounding may swap crossings, which triangles put in order
+        # rounding may swap crossings near the end of an edge; `_as_walk` restores the order
         order = np.lexsort((a / apart_by, seg))
         bounds = np.flatnonzero(np.diff(seg[order])) + 1
         for group in np.split(order, bounds) if len(order) else []:
@@ -158,9 +159,9 @@ class StringPuller:
         return out
 
     def _as_walk(self, hits: list[tuple[int, bool]]) -> list[tuple[int, bool]]:
-        """Return crossings in an order in which each leaves the triangle that the last one entered.
+        """Return crossings so ordered that each leaves the triangle that the one before entered.
 
-        A segment through an obstacle has several such runs, in the order given.
+        A segment through an obstacle has several such runs; their order is kept.
         """
         enters = {self._to(h) for h in hits}
         leaves = {self._from(h): h for h in hits}
@@ -190,7 +191,7 @@ class StringPuller:
         portals = []
         for edge, from_left in sleeve:
             u, v = self._ends[edge]
-            # for who comes from the left of u→v, v is on the left
+            # seen by a path that crosses u→v from the left, v is on the left
             portals.append((v, u) if from_left else (u, v))
         corners = _funnel((float(a[0]), float(a[1])), (float(b[0]), float(b[1])), portals)
         inner = [(float(x), float(y)) for x, y in corners[1:-1]]
@@ -202,7 +203,7 @@ class StringPuller:
         return self._estimated(corners)
 
     def _estimated(self, corners: Floats) -> Pulled:
-        """Return bounds on the length of a taut path from its corners at polygons."""
+        """Return bounds on the length of a taut path, given its corners at inscribed polygons."""
         d = np.diff(corners, axis=0)
         low = float(np.hypot(d[:, 0], d[:, 1]).sum())
         heading = np.unwrap(np.arctan2(d[:, 1], d[:, 0])) if len(d) > 1 else np.zeros(1)
@@ -215,7 +216,7 @@ class StringPuller:
 
 
 def reduce_sleeve(crossings: list[tuple[int, bool]]) -> list[tuple[int, bool]]:
-    """Return a sequence of crossings without edges that are crossed back at once."""
+    """Return a reduced sequence of crossings: edges that are crossed back at once are removed."""
     out: list[tuple[int, bool]] = []
     for edge, side in crossings:
         if out and out[-1][0] == edge:
@@ -226,9 +227,9 @@ def reduce_sleeve(crossings: list[tuple[int, bool]]) -> list[tuple[int, bool]]:
 
 
 def _interior_edges(triangles: npt.NDArray[np.object_]) -> tuple[Floats, Ints]:
-    """Return the edges (k, 4) between two triangles, and the triangles (k, 2) left and right.
+    """Return the edges (k, 4) that two triangles share, and the triangles (k, 2) left and right.
 
-    Edges go from the end with the smaller x (then y) to the other.
+    Edges run from the end with the smaller x (then y) to the other end.
     """
     ring = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
     turned = orientations(ring[:, 0], ring[:, 1], ring[:, 2])
@@ -247,8 +248,8 @@ def _interior_edges(triangles: npt.NDArray[np.object_]) -> tuple[Floats, Ints]:
 def _left_of_edge(u: Floats, v: Floats, p: Floats) -> Bools:
     """Return the mask of rows in which p lies left of the edge from u to v.
 
-    A point on the line of the edge counts as left: moved by (-δ², δ), it lies left of any edge that
-    runs to the right or, if vertical, up.
+    A point on the line of the edge counts as left: shifted by (-δ², δ), it lies left of any edge
+    that runs to the right or, if vertical, up.
     """
     return np.asarray(orientations(u, v, p) >= 0)
 
@@ -256,8 +257,8 @@ def _left_of_edge(u: Floats, v: Floats, p: Floats) -> Bools:
 def _left_of_segment(p: Floats, q: Floats, u: Floats) -> Bools:
     """Return the mask of rows in which u lies left of the segment from p to q.
 
-    A point on the line of the segment lies right of a segment that runs to the right (or up), which
-    moves to its left, and left of a segment in the opposite direction.
+    A point on the line counts as right of a segment that runs to the right (or up), because the
+    segment is shifted to its left, and as left of a segment in the opposite direction.
     """
     onward = (p[:, 0] < q[:, 0]) | ((p[:, 0] == q[:, 0]) & (p[:, 1] < q[:, 1]))
     side = orientations(p, q, u)
@@ -281,7 +282,7 @@ def _funnel(a: Point, b: Point, portals: list[tuple[Point, Point]]) -> Floats:
     right: deque[Point] = deque()
 
     def narrow(side: deque[Point], other: deque[Point], p: Point, sense: int) -> None:
-        """Take p as the new end of one side; `sense` is 1 for the left one."""
+        """Make p the new end of one side; `sense` is 1 for the left side, -1 for the right."""
         while side:
             before = side[-2] if len(side) > 1 else corners[-1]
             if sense * orientation(before, side[-1], p) > 0:
@@ -308,5 +309,5 @@ def _funnel(a: Point, b: Point, portals: list[tuple[Point, Point]]) -> Floats:
 
 
 def _beyond(a: Point, b: Point, c: Point) -> bool:
-    """Return whether c, on the line through a and b, does not lie before b."""
+    """Return whether c, on the line through a and b, lies at b or beyond it."""
     return (c[0] - b[0]) * (b[0] - a[0]) + (c[1] - b[1]) * (b[1] - a[1]) >= 0.0

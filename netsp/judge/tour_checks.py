@@ -1,8 +1,8 @@
-"""Independent judge of a solution, which imports no roadmap and no solver.
+"""Independent judge of a solution: it imports no roadmap and no solver.
 
-Words come from the rays (`netsp.hsignature`). Whether the tour is contractible and each tether fits
-is checked a second time over a triangulation (`netsp.judge.stringpull`), and the clearance from
-obstacles by plain distances (Shapely).
+Words come from ray crossings (`netsp.hsignature`). A triangulation (`netsp.judge.stringpull`)
+checks a second time that the tour is contractible and that each tether fits. Plain distances
+(Shapely) check the clearance from obstacles.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ from netsp.model.problem import Circle, Problem
 from netsp.model.solution import Solution, Status, solution_scope, tension_ratio
 
 STAND_OFF_ALLOWANCE = 3e-8
-"""Tolerance of lengths along boundaries, as a share of the problem's size: offline geometry stands
-off from what it touches."""
+"""Tolerance of lengths along boundaries, as a share of the problem's size: paths of a roadmap keep
+a small distance from the obstacles that they touch."""
 
 GAP_TOLERANCE = 1e-6
-"""Tolerance between a stated gap and the gap of the stated lengths; files round both."""
+"""Tolerance of a stated gap, compared with the gap of the stated lengths; files round both."""
 
 CLOSED_GAP_TOLERANCE = 1e-5
-"""Tolerance of the gap of a tour with an optimal status; tours from a robot's state are proven to
-this accuracy only."""
+"""Tolerance of the gap of a tour with an optimal status; the least accurate proofs are those of
+tours from a robot's state."""
 
 LENGTH_TOLERANCE = 1e-3
-"""Tolerance, relative, of the length of the drawn path, which circumscribes arcs."""
+"""Tolerance of the length of a drawn path, as a share of it; its polyline circumscribes arcs."""
 
 TAUT_TOLERANCE = 1e-7
-"""Tolerance of stated lengths, as a share of the tether: offline geometry stands off from what it
-touches by some 1e-8 of the problem's size."""
+"""Tolerance of stated lengths, as a share of the tether: paths of a roadmap keep about 1e-8 of the
+problem's size from the obstacles that they touch."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Check:
     passed : bool
         Whether it holds.
     detail : str
-        Measured values, or the reason why it fails.
+        Measured values, or the reason for the failure.
     """
 
     name: str
@@ -68,7 +68,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """Checks of a solution, in order; true if all passed."""
+    """Checks of a solution, in order; its truth value is `passed`."""
 
     checks: tuple[Check, ...]
 
@@ -97,11 +97,10 @@ def verify(
 ) -> Verification:
     """Judge a solution against its problem.
 
-    Check that the files belong together; that the path is a closed polyline from the base through
-    every goal in the order of the tour, clear of obstacles and within bounds; that its word at
-    every goal is the stated one and its whole word is empty; that the tether, pulled taut again by
-    another method, fits the tether length and has the stated length; and that length, bound, gap
-    and status are consistent.
+    The checks are: the solution belongs to the problem; the path is a closed polyline from the base
+    through every goal in the order of the tour, clear of obstacles and within bounds; its word is
+    as stated at every goal, and empty at the end; the tether, pulled taut by another method, is
+    within the tether length and as long as stated; length, bound, gap and status are consistent.
 
     Raises
     ------
@@ -111,15 +110,15 @@ def verify(
     for name, value, kind in (("problem", problem, Problem), ("solution", solution, Solution)):
         if not isinstance(value, kind):
             raise InputError(f"{name}: expected a {kind.__name__}, got {value!r}")
-    # copies of a model may hold what its validation would have turned into a status
+    # copies of a model are not validated: the status may be a plain string
     solution = solution.model_copy(update={"status": Status(solution.status)})
     return Verification(tuple(_Judge(problem, solution, policy).run()))
 
 
 def checked(problem: Problem, solution: Solution) -> Solution:
-    """Return a solution if it passes the judge, else raise.
+    """Return a solution if it passes the judge, and raise otherwise.
 
-    Solutions without a tour pass, as do solutions with the status `invalid`.
+    Solutions without a tour or with the status `invalid` are not judged.
 
     Raises
     ------
@@ -138,14 +137,14 @@ def checked(problem: Problem, solution: Solution) -> Solution:
 
 
 NOT_OF_PROBLEMS = frozenset({Scope.TRAVEL_GRAPH, Scope.PART, Scope.STATES, Scope.STATES_IN_ORDER})
-"""Scopes of bounds on travel graphs, on parts of them and on missions in space."""
+"""Scopes that no solution of a planar problem has: of travel graphs, and of missions in space."""
 
 MAX_TURNING_ERROR = 1e-6
 """Tolerance of the turning of a tether, radians; contacts with obstacles are found exactly."""
 
 CONTACT_REACH = 8.0
-"""Tolerance, in place tolerances, of the distance by which a path may pass a contact of two
-obstacles and come back."""
+"""Tolerance of the distance by which a path may pass a contact of two obstacles before it comes
+back, as a multiple of the place tolerance."""
 
 
 @dataclass
@@ -180,11 +179,11 @@ class _Judge:
     def __init__(self, problem: Problem, solution: Solution, policy: JudgePolicy) -> None:
         self.policy = policy
         self.sha256 = problem.sha256
-        # a solution that is planned with a margin is right among obstacles grown by it
+        # a solution with a margin is valid among obstacles that are grown by it
         if solution.margin or solution.slack:
             problem = problem.grown(solution.margin, solution.slack)
         self.problem, self.solution = problem, solution
-        # before a path that starts on the way comes the tether that is out already
+        # a path that starts from a state continues its tether
         before: Floats = np.array(solution.start_tether, dtype=float).reshape(-1, 3)
         walked: Floats = np.array(solution.path, dtype=float).reshape(-1, 3)
         self.path: Floats = np.vstack([before, walked])
@@ -194,13 +193,13 @@ class _Judge:
         xy = problem.points[:, :2]
         near = [float(o.signed_distance(xy).min()) - problem.clearance for o in problem.obstacles]
         if min(near, default=np.inf) < self.place:
-            # the offline geometry stands off from boundaries, which moves the ends of its paths
+            # near a boundary, roadmaps move the ends of their paths off it
             self.tiny += STAND_OFF_ALLOWANCE * problem.scale
         self.visits: list[int] = []
 
     @cached_property
     def puller(self) -> StringPuller:
-        """Triangles of the free space, which cover the path."""
+        """Triangulated free space that covers the path."""
         problem = self.problem
         return StringPuller(problem, problem.tether_length, self.place, self.path, self.policy)
 
@@ -313,24 +312,24 @@ class _Judge:
         return Check("names every goal once", True, f"{len(order)} goals{kept}")
 
     def _goal(self, k: int) -> str:
-        """Return the label of a goal that the solution names, also if the problem lacks it."""
+        """Return the label of a goal of the solution, also if the problem has no such goal."""
         return self.problem.goal_label(k) if k < len(self.problem.goals) else f"goal #{k}"
 
     def _visited(self) -> Check:
-        """Find the path vertex of each visit, in order, and put it on the goal.
+        """Find the path vertex of each visit, in order, and move it to the goal.
 
-        Of several vertices at a goal, the first with the stated word counts. The path is moved to
-        the goal itself, so that words and lengths are those of exact places.
+        Of several vertices at a goal, the first with the stated word counts. Words and lengths are
+        then those of the exact position.
         """
         name = "visits every goal in order"
         rays = self.problem.representative_points
-        at = 0
+        vertex = 0
         word: Word = ()
         visits: list[tuple[int, Floats]] = []
-        if self.out:  # goals that the tether passes at the start do not count as visited
-            at = self.out
-            word = reduce(crossings(self.path[: at + 1], rays))
-        place = self.path[at]
+        if self.out:  # goals along the tether at the start do not count as visited
+            vertex = self.out
+            word = reduce(crossings(self.path[: vertex + 1], rays))
+        place = self.path[vertex]
         for visit in self.solution.tour:
             label = self.problem.goal_label(visit.goal)
             target = self.problem.points[visit.goal + 1]
@@ -338,20 +337,20 @@ class _Judge:
                 np.linalg.norm(np.array(visit.position) - target) > self.place
             ):
                 return Check(name, False, f"{label} is not at {list(visit.position)}, as stated")
-            gaps = np.linalg.norm(self.path[at:] - target, axis=1)
-            candidates = at + np.flatnonzero(gaps <= self.place)
+            gaps = np.linalg.norm(self.path[vertex:] - target, axis=1)
+            candidates = vertex + np.flatnonzero(gaps <= self.place)
             if len(candidates) == 0:
-                detail = f"no path point at {label} after point {at}; nearest misses by "
+                detail = f"no path point at {label} after point {vertex}; nearest misses by "
                 return Check(name, False, f"{detail}{gaps.min():.3g}")
             words = [
                 concatenate(
-                    word, crossings(np.vstack([place, self.path[at + 1 : k], target]), rays)
+                    word, crossings(np.vstack([place, self.path[vertex + 1 : k], target]), rays)
                 )
                 for k in candidates
             ]
             pick = next((i for i, w in enumerate(words) if w == reduce(visit.signature)), 0)
-            at, word, place = int(candidates[pick]), words[pick], target
-            visits.append((at, target))
+            vertex, word, place = int(candidates[pick]), words[pick], target
+            visits.append((vertex, target))
         self._run_through(visits)
         return Check(name, True, f"{len(self.path)} path points")
 
@@ -401,7 +400,7 @@ class _Judge:
     def _room(self, i: int, line: shapely.LineString) -> float:
         """Return the distance from the path to an obstacle that is grown by the clearance.
 
-        It is negative inside, but not below minus the clearance inside a polygon.
+        It is negative inside the grown obstacle, but at least minus the clearance for a polygon.
         """
         o, origin = self.problem.obstacles[i], self.puller.origin
         if isinstance(o, Circle):
@@ -461,7 +460,7 @@ class _Judge:
         return Check("total word is empty", True, "nothing is wrapped")
 
     def _tethers(self) -> list[Check]:
-        """Check tethers a second time: triangulate, and pull each prefix and each leg taut."""
+        """Check tethers a second time: pull each prefix and each leg taut over the triangles."""
         limit = self.problem.tether_length
         pulled = self._pulled()
         self.pulled_total = pulled.total
@@ -496,7 +495,7 @@ class _Judge:
         problem, puller = self.problem, self.puller
         pieces = puller.crossings(self.path)
         points = problem.points
-        # the tether that is out at the start is no leg
+        # the tether at the start is not a leg
         sleeve = reduce_sleeve([c for piece in pieces[: self.out] for c in piece])
         before, place = self.out, 0
         if problem.state is not None:
@@ -547,14 +546,14 @@ class _Judge:
         return Check(name, False, f"{found.length:.6g} of {limit:g} on the way, at {at}")
 
     def _arc_distance(self, point: Floats) -> float:
-        """Return the distance of a point of a path from the arc around which it is circumscribed.
+        """Return the distance from a corner of the drawn path to the arc that the path
+        circumscribes.
 
-        The tether fits on the arc itself, which is part of a taut leg. A corner of the
-        circumscribed polyline lies outside of the arc, straight away from the disk, and the tether
-        there is longer by that distance. The polyline is longer than its arc by the share
-        `LENGTH_TOLERANCE` at most. So its corners lie outside by at most 1.5 times that share of
-        the radius: for half the angle x between two contacts, tan x = x (1 + x²/3 + …) and sec x =
-        1 + x²/2 + ….
+        The arc is part of a taut leg, so the tether fits on it. At a corner of the circumscribed
+        polyline the tether is longer by the distance of the corner from the arc. The polyline is
+        longer than its arc by at most the share `LENGTH_TOLERANCE`, so its corners are off by at
+        most 1.5 times that share of the radius: with x half the angle between two contacts,
+        tan x = x (1 + x²/3 + …) and sec x = 1 + x²/2 + ….
         """
         disks = self.puller.disks
         if not len(disks):
@@ -565,7 +564,7 @@ class _Judge:
         return max(float(out[on_arc].max(initial=0.0)), 0.0)
 
     def _tension(self, turning: float, label: str) -> list[Check]:
-        """Check the tension ratio by the capstan equation, if it has a limit."""
+        """Check the limit on the tension ratio, if any, by the capstan equation."""
         s = self.solution
         if s.max_tension_ratio is None:
             return []
@@ -602,7 +601,7 @@ class _Judge:
         )
 
     def _fault_of_bound(self) -> str | None:
-        """Return the fault in the bound, gap and status that the solution states; None if none."""
+        """Return what is inconsistent in the stated bound, gap and status, or None."""
         s = self.solution
         length, gap, status = float(s.length or 0.0), s.gap, s.status
         if status in (Status.INFEASIBLE, Status.NO_SOLUTION_FOUND):
@@ -618,9 +617,9 @@ class _Judge:
             return f"bound {bound:g} above length {length:g}"
         if gap is None or abs(gap - s.bound.gap(length)) > GAP_TOLERANCE:
             return f"the stated gap is not that of the bound, {s.bound.percent(length, 6)}"
-        able = solution_scope(s.roadmap, s.classes, kept_order=s.kept_order)
-        if not able.includes(scope) or scope.keeps_order != s.kept_order:
-            return f"a bound on {scope.tours}, but a run like this can bound {able.tours}"
+        provable = solution_scope(s.roadmap, s.classes, kept_order=s.kept_order)
+        if not provable.includes(scope) or scope.keeps_order != s.kept_order:
+            return f"a bound on {scope.tours}, but a run like this can bound {provable.tours}"
         closed = gap <= CLOSED_GAP_TOLERANCE
         if status.is_optimal and status is not Status.OPTIMAL_OF_KEPT and not closed:
             return f"{status.value}, but the gap is {s.bound.percent(length, 6)}"
