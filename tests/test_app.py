@@ -27,7 +27,7 @@ from netsp.app.state import Document
 from netsp.app.view_box import Frame
 from netsp.base.geometry import polylines
 from netsp.exchange.maps.path_file import read_paths
-from netsp.exchange.maps.read_map import read_site
+from netsp.exchange.maps.site_import import read_site
 from netsp.exchange.missions.mission_files import export
 from netsp.model.problem import Origin
 from netsp.online.execute.events import Event, Surprises

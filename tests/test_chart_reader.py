@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from netsp import InputError
 from netsp.exchange.maps.options import InspectionOptions, SiteOptions
 from netsp.exchange.maps.projection import Projection
-from netsp.exchange.maps.read_map import import_site, read_map
+from netsp.exchange.maps.read_map import read_map
 from netsp.exchange.maps.sea_floor import Danger, DepthArea, sea_floor
 from netsp.exchange.maps.selection import Selection
+from netsp.exchange.maps.site_import import import_site
 from tests.chart_writer import write_cell
 
 pytest.importorskip("pyogrio")

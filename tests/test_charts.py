@@ -13,15 +13,16 @@ from netsp import InputError, Problem
 from netsp.base.errors import UnansweredError
 from netsp.command.main import main
 from netsp.exchange.maps import chart_classes
-from netsp.exchange.maps import read_map as read
+from netsp.exchange.maps import site_import as read
 from netsp.exchange.maps.chart_classes import REASONS, chart_kind, chart_radius, chart_width
 from netsp.exchange.maps.crop import CropWindow, cropped
 from netsp.exchange.maps.feature import Feature, Map
+from netsp.exchange.maps.map_context import area_of
 from netsp.exchange.maps.options import InspectionOptions, SiteOptions
 from netsp.exchange.maps.projection import Projection
-from netsp.exchange.maps.read_map import import_site
 from netsp.exchange.maps.sea_floor import DepthArea, sea_floor
 from netsp.exchange.maps.selection import Selection
+from netsp.exchange.maps.site_import import import_site
 from netsp.plan.sizing.base_placement import best_base
 
 pyogrio = pytest.importorskip("pyogrio")
@@ -208,7 +209,7 @@ def test_a_crop_changes_nothing_within_the_reach_of_any_base(seed):
     assert len(dropped) + len({id(t) for t in kept if t in things}) + len(cut_off) == len(things)
     reach = shapely.union_all(shapely.points(bases)).buffer(15.0)
     before, after = (
-        shapely.union_all([read._shape(t) for t in some]).intersection(reach)
+        shapely.union_all([area_of(t) for t in some]).intersection(reach)
         for some in (things, kept)
     )
     assert before.symmetric_difference(after).area < 1e-6

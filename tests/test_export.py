@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from netsp import Circle, InputError, Polygon, Problem, Solution, solve
 from netsp.command.main import main
-from netsp.exchange.maps.read_map import read_site
+from netsp.exchange.maps.site_import import read_site
 from netsp.exchange.missions import Projection, export, waypoints_of
 from netsp.hsignature import reduce, signature
 from netsp.model.solution import ProblemReference, Status, Visit

@@ -16,7 +16,7 @@ from netsp.exchange.maps.ledger import Ledger
 from netsp.exchange.maps.line_work import outlines, widened
 from netsp.exchange.maps.options import SiteOptions
 from netsp.exchange.maps.projection import Projection
-from netsp.exchange.maps.read_map import import_site
+from netsp.exchange.maps.site_import import import_site
 from netsp.model.import_record import LayerRecord, OmittedFeatures, Site
 
 pytest.importorskip("pyogrio")

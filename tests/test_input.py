@@ -17,7 +17,7 @@ from netsp import Circle, InputError, Problem, Solution, solve, verify
 from netsp.base.errors import brief
 from netsp.base.files import csv_cell, read_gzip, write_text
 from netsp.command.main import main
-from netsp.exchange.maps.read_map import read_site
+from netsp.exchange.maps.site_import import read_site
 from netsp.exchange.missions import Projection, export
 from netsp.exchange.missions.mission_files import ExportSettings
 from netsp.online.execute import ExecutionOptions, Surprises, execute

@@ -18,7 +18,7 @@ from netsp.exchange.maps.mission_commands import (
 )
 from netsp.exchange.maps.options import SiteOptions
 from netsp.exchange.maps.projection import Projection
-from netsp.exchange.maps.read_map import import_site
+from netsp.exchange.maps.site_import import import_site
 from netsp.exchange.missions import export
 from netsp.exchange.missions.mission_files import ExportSettings
 from netsp.model.problem import Goal

@@ -15,7 +15,7 @@ from netsp.base.arrays import ComparesArrays
 from netsp.base.files import csv_rows
 from netsp.base.polyline_file import read_path
 from netsp.command.main import main
-from netsp.exchange.maps.read_map import read_site
+from netsp.exchange.maps.site_import import read_site
 from netsp.model.problem import State
 from netsp.model.solution import LARGEST, tension_ratio
 from netsp.online.guard.plane import PlaneSite

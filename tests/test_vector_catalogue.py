@@ -15,8 +15,8 @@ from netsp.app.served_files import imported as read_upload
 from netsp.base.errors import UnansweredError
 from netsp.exchange.maps.contract import words_in
 from netsp.exchange.maps.options import InspectionOptions, SiteOptions
-from netsp.exchange.maps.read_map import import_site
 from netsp.exchange.maps.selection import Selection
+from netsp.exchange.maps.site_import import import_site
 
 pyogrio = pytest.importorskip("pyogrio")
 shapely = pytest.importorskip("shapely")

@@ -186,8 +186,8 @@ def chart() -> tuple[str, bool]:
     from netsp import Status, solve, verify
     from netsp.exchange.maps.options import InspectionOptions, SiteOptions
     from netsp.exchange.maps.projection import Projection
-    from netsp.exchange.maps.read_map import import_site
     from netsp.exchange.maps.selection import Selection
+    from netsp.exchange.maps.site_import import import_site
     from netsp.roadmap.reachable_goals import keep_reachable_goals
 
     file = DATA / "charts" / "US5MIACB.000"

@@ -85,14 +85,14 @@ class Session:
 
     def everything(self) -> list[dict[str, Any]]:
         """Return the messages that a newly opened page needs."""
-        told = [self._state()]
+        messages = [self._state()]
         if self.answer is not None:
-            told.append({"tour": self.answer})
+            messages.append({"tour": self.answer})
         if self.facts is not None:
-            told.append({"facts": self.facts})
+            messages.append({"facts": self.facts})
         if self.drawn:
-            told.append({"drawn_points": self.drawn})
-        return told
+            messages.append({"drawn_points": self.drawn})
+        return messages
 
     def tell(self, message: Mapping[str, Any]) -> None:
         """Tell all pages."""
@@ -100,8 +100,8 @@ class Session:
         for page in self.pages:
             page.put_nowait(text)
 
-    def asked(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
-        """Do what a page asks; what is to be said to that page alone, if anything."""
+    def answer_to(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
+        """Carry out a message, and return the answer to its page alone, or None."""
         number = message.get("id")
         if number is not None and not is_index(number, MAX_MESSAGE_ID + 1):
             return {"id": None, "error": f"id: expected a whole number, got {shown(number)}"}
@@ -204,13 +204,13 @@ class Session:
             figures["tether"] = end_tether(self._cursor.tethers, points, figures)
         return figures
 
-    def _target(self, asked: object) -> Path | None:
+    def _target(self, name: object) -> Path | None:
         """Return the path to save to: in the opened folder, and over no other file."""
-        if asked is True:
+        if name is True:
             return None
-        if not isinstance(asked, str):
-            raise InputError(f"save: expected the name of a file, got {shown(asked)}")
-        name = bare_name(asked)
+        if not isinstance(name, str):
+            raise InputError(f"save: expected the name of a file, got {shown(name)}")
+        name = bare_name(name)
         opened = self.document.file
         target = (opened.parent if opened is not None else Path()) / (
             name if name.endswith(".json") else f"{name}.json"
@@ -230,21 +230,21 @@ class Session:
         """Solids, path and tether in space."""
         from netsp.app.space_preview import figure
 
-        told = self._along(share) or {}
+        answer = self._along(share) or {}
         if self.shown is not None:
-            nodes = told.get("path") or []
+            nodes = answer.get("path") or []
             return figure(
                 self.shown.scene,
                 self.shown.data,
                 self.shown.answer["path"],
-                nodes if self.shown.frames else _in_space(told),
+                nodes if self.shown.frames else _in_space(answer),
             )
         from netsp.world.scene.scene import scene_of
 
         path = (self.answer or {}).get("path", [])
         problem = self.document.problem()
         data = json.loads(problem.to_json())
-        return figure(scene_of(problem), data, path, _in_space(told))
+        return figure(scene_of(problem), data, path, _in_space(answer))
 
     def _classes(self, goal: object) -> dict[str, Any]:
         if self._cursor is None:
@@ -308,18 +308,18 @@ class Session:
         self.tell({"tour": answer_message})
 
 
-def _in_space(told: Mapping[str, Any]) -> list[list[float]]:
+def _in_space(answer: Mapping[str, Any]) -> list[list[float]]:
     """Return the taut tether of an answer in the plane, with heights in proportion to its
     length."""
     import numpy as np
 
     from netsp.base.geometry import polylines
 
-    flat = np.array(told.get("path") or [], dtype=float).reshape(-1, 2)
+    flat = np.array(answer.get("path") or [], dtype=float).reshape(-1, 2)
     if len(flat) < 2:
         return []
     s = polylines.along(flat)
-    low, high = told.get("base_z", 0.0), told.get("z", 0.0)
+    low, high = answer.get("base_z", 0.0), answer.get("z", 0.0)
     rise = low + (high - low) * (s / s[-1] if s[-1] else s)
     return np.column_stack([flat, rise]).round(4).tolist()  # type: ignore[no-any-return]
 

@@ -1,4 +1,4 @@
-"""What the server answers: the page, its files, imports, and messages over a WebSocket."""
+"""Answers of the server: the page, its files, imports, and messages over a WebSocket."""
 
 from __future__ import annotations
 
@@ -139,8 +139,8 @@ class Routes:
             notes = await self._import(request, content)
         except UnansweredError as error:  # the page asks for what is missing
             if error.asks:
-                asked = {"said": list(error.plain), "asks": list(error.asks)}
-                return JSONResponse(asked, status_code=422)
+                questions = {"said": list(error.plain), "asks": list(error.asks)}
+                return JSONResponse(questions, status_code=422)
             return PlainTextResponse(f"netsp: {'; '.join(error.plain)}", status_code=422)
         except NetspError as error:
             return PlainTextResponse(f"netsp: {error}", status_code=422)
@@ -194,13 +194,13 @@ class Routes:
             sending.cancel()
 
     async def _answer_all(self, socket: WebSocket, queue: asyncio.Queue[str]) -> None:
-        """Queue the answers to all messages of a page, in order except for those that take long."""
+        """Queue the answers to all messages of a page, in order except for slow ones."""
         session = self.session
         later: set[asyncio.Task[None]] = set()
 
         async def solve_order(message: dict[str, Any]) -> None:
             """Answer a message that may take seconds, while other messages are answered."""
-            queue.put_nowait(json.dumps(await asyncio.to_thread(session.asked, message)))
+            queue.put_nowait(json.dumps(await asyncio.to_thread(session.answer_to, message)))
 
         # a page that is gone may be found out by sending to it
         while socket.application_state is WebSocketState.CONNECTED:
@@ -212,7 +212,7 @@ class Routes:
                 later.add(task := asyncio.create_task(solve_order(message)))
                 task.add_done_callback(later.discard)
                 continue
-            answer = session.asked(message) if isinstance(message, dict) else {"error": message}
+            answer = session.answer_to(message) if isinstance(message, dict) else {"error": message}
             if answer is not None:
                 queue.put_nowait(json.dumps(answer))
 

@@ -248,7 +248,7 @@ def _site(
 ) -> Problem:
     from netsp.exchange.maps.options import InspectionOptions, SiteOptions
     from netsp.exchange.maps.projection import Projection
-    from netsp.exchange.maps.read_map import import_site
+    from netsp.exchange.maps.site_import import import_site
     from netsp.roadmap.reachable_goals import UNREACHED, keep_reachable_goals, unreached_note
 
     about = Projection.parse(answers.base, name="base") if answers.base else None

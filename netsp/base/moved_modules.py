@@ -157,7 +157,7 @@ MOVED = {
     "roadmap.within_reach": "roadmap.reachable_goals",
     "shorthand": "model.shorthand",
     "site": "exchange.maps",
-    "site.read": "exchange.maps.read_map",
+    "site.read": "exchange.maps.site_import",
     "site.shapes": "exchange.maps.drawn_shapes",
     "site.table": "exchange.maps.csv_table",
     "sizing": "plan.sizing",

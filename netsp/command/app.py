@@ -61,7 +61,7 @@ def _document(name: str | None) -> tuple[Document, list[str]]:
     from netsp.app.served_files import import_warnings, is_map, without_options
     from netsp.app.state import Document
     from netsp.command.import_site import show_table
-    from netsp.exchange.maps.read_map import import_site
+    from netsp.exchange.maps.site_import import import_site
 
     path = Path(name or "")
     is_problem = path.suffix.lower() == ".json" and not (

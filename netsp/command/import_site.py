@@ -15,8 +15,8 @@ from netsp.command.types import check_writable, depth, length, option, positive
 if TYPE_CHECKING:
     import shapely
 
+    from netsp.exchange.maps.imported_site import ImportedSite
     from netsp.exchange.maps.options import InspectionOptions
-    from netsp.exchange.maps.read_map import ImportedSite
     from netsp.exchange.maps.sea_floor import SeaFloor
     from netsp.model.problem import Problem
 
@@ -365,7 +365,7 @@ def show_table(site: str, found: ImportedSite) -> None:
 def _of_map(args: argparse.Namespace) -> ImportedSite:
     from netsp.exchange.maps.options import SiteOptions
     from netsp.exchange.maps.projection import Projection
-    from netsp.exchange.maps.read_map import import_site
+    from netsp.exchange.maps.site_import import import_site
 
     projection = Projection.parse(args.base, name="--base") if args.base else None
     options = SiteOptions(
