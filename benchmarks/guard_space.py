@@ -29,11 +29,10 @@ def beside_flight(
 ) -> tuple[list[int], float, list[float], bool]:
     """Stops told as planned, otherwise and not at all, longest tether (m), updates (ms), and
     whether the end is free."""
-    guard = Guard(
-        SpaceSite(mission, scene), GuardOptions(max(noise, 0.02), max(drift, 0.02), SPEED)
-    )
+    site = SpaceSite(mission, scene)
+    guard = Guard(site, GuardOptions(max(noise, 0.02), max(drift, 0.02), SPEED))
     rng, off, longest, updates = np.random.default_rng(0), np.zeros(3), 0.0, []
-    ends = np.array([stop.path[-1] for stop in guard.site.mission.tour.stops])
+    ends = np.array([stop.path[-1] for stop in site.mission.tour.stops])
     said: dict[int, set[bool | None]] = {}
     last = -math.inf
     for r in log:
@@ -56,7 +55,7 @@ def beside_flight(
     for k in range(len(ends)):
         answers = said.get(k, {None})
         counts[0 if True in answers else 1 if False in answers else 2] += 1
-    free = report.classes[0].word == guard.site.start_word() and not report.loops
+    free = report.classes[0].word == site.start_word() and not report.loops
     return counts, longest, updates, free
 
 

@@ -97,7 +97,7 @@ def beside() -> None:
             mesh.vertices, mesh.faces, voxel=0.1, memory_limit=8.0, policy=policy
         )
         fields.append(DistanceField.build([], [], np.empty((0, 4)), [], grid, 0.0))
-    models = [TETHERS["geodesic"](f, delta=0.2) for f in fields]
+    models = [TETHERS["geodesic"](f, 0.2) for f in fields]
     medians: list[list[float]] = [[], []]
     # by turns, so that both see the same machine
     for _ in range(3):

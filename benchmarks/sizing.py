@@ -13,6 +13,7 @@ import tempfile
 import time
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from perturbed import violations
@@ -72,13 +73,14 @@ def formats() -> None:
     sys.path.insert(0, str(PROBLEMS.parent))
     from tests.test_site import PLANE, feature, rows, write_geojson, write_vector
 
+    plane: dict[str, Any] = PLANE
     print("### One site in every format\n")
     head("format", "goals off by at most, mm", "obstacles differ by, cm²", "read in ms",
          name="sizing-formats")  # fmt: skip
-    goals = {p["name"]: s.coords[0] for s, p in PLANE["goal"]}
+    goals = {p["name"]: s.coords[0] for s, p in plane["goal"]}
     shapes = {
         p["name"]: s.buffer(p["radius_m"], quad_segs=64) if "radius_m" in p else s
-        for s, p in PLANE["obstacle"]
+        for s, p in plane["obstacle"]
     }
     for label, name, driver in FORMATS:
         with tempfile.TemporaryDirectory() as folder:

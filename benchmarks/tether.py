@@ -26,6 +26,7 @@ from netsp.roadmap.paths import TautPaths
 from netsp.world import GeodesicTether, ReactTether, Scene
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.voxels import grid_of_cloud_file
+from netsp.world.tether import TetherModel
 
 SCENES = ROOT / "scenes"
 
@@ -134,7 +135,7 @@ def closed_forms() -> None:
 
 
 def prism_world(
-    family: str, seed: int, make: Callable[[DistanceField], object] | None = None
+    family: str, seed: int, make: Callable[[DistanceField], TetherModel] | None = None
 ) -> tuple[list[float], int, float, list[float]]:
     """Errors in per cent at every 20th of 400 updates, wrong classes, what is left on the way back,
     and microseconds of each update, in a world whose truth the offline geometry knows."""
