@@ -36,7 +36,7 @@ from netsp.mip.mip_solver import MipRun, solve_merged
 from netsp.mip.mip_solver import Params as MipParams
 from netsp.mip.mip_solver import solve as prove
 from netsp.model.bound_scope import LowerBound, strongest
-from netsp.plan import exact
+from netsp.plan import exact, scheduled
 from netsp.plan.solve_policy import SolvePolicy
 
 
@@ -48,11 +48,15 @@ class Params:
     ----------
     backend
         Backend of `mip`.
+    scheduler
+        Whether a scheduler gives time to what closes the gap fastest, instead of a route by size
+        (`netsp.plan.scheduled`). Experimental.
     policy
         Routes by size, and policies of the solvers.
     """
 
     backend: str = "highs"
+    scheduler: bool = False
     policy: SolvePolicy = field(default_factory=SolvePolicy)
 
     def __post_init__(self) -> None:
@@ -62,7 +66,10 @@ class Params:
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Solve by size; iterations are those of the solver chosen."""
     chosen = params or Params()
-    found = _solve_by_size(graph, chosen, limits or Limits())
+    if chosen.scheduler:
+        found = scheduled.solve(graph, chosen.backend, chosen.policy, limits or Limits())
+    else:
+        found = _solve_by_size(graph, chosen, limits or Limits())
     if not found.lower_bound:
         bound_by_one_trees(graph, chosen.policy.mip.goals)
     return found

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from netsp.base.number_ranges import check_not_negative, check_positive, check_shares
 from netsp.gtsp.gtsp_policy import GtspPolicy
+from netsp.gtsp.scheduler import SchedulerPolicy
 from netsp.mip.mip_policy import MipPolicy
 from netsp.plan.search_effort import SearchEffort
 
@@ -70,8 +71,11 @@ class SubsetPolicy:
         Sums that take as long as one call of NumPy; each set is extended by each goal in one call.
     max_vertices
         Maximum number of vertices, among which all legs are measured.
+    s_per_sum
+        Estimated time of a sum, s, for the scheduler.
     """
 
+    s_per_sum: float = 5e-9
     max_sums: float = 5e7
     sums_per_call: int = 1500
     max_vertices: int = 1000
@@ -159,6 +163,40 @@ class BaselessPolicy:
 
 
 @dataclass(frozen=True)
+class TaskTimePolicy:
+    """Estimated times of the tasks of the scheduler: an order of magnitude is enough.
+
+    Attributes
+    ----------
+    s_per_round
+        Time of a round of ruin and recreate, s.
+    s_per_goal_pair
+        Time of the bound over goals for each pair of goals, s.
+    s_per_covered_pair
+        Time of covers for each pair of goals, s.
+    s_per_label
+        Time of walks for each triple of goals and each vertex, s.
+    s_per_priced_leg
+        Time of cutting planes for each pair of vertices, s.
+    s_per_cut_pair
+        Additional time of cutting planes for each pair of goals, s.
+    min_core_ratio
+        Ratio of all vertices to those of a core above which the core is a task.
+    """
+
+    s_per_round: float = 3e-4
+    s_per_goal_pair: float = 1e-4
+    s_per_covered_pair: float = 2e-3
+    s_per_label: float = 2.5e-7
+    s_per_priced_leg: float = 5e-6
+    s_per_cut_pair: float = 5e-4
+    min_core_ratio: float = 2.0
+
+    def __post_init__(self) -> None:
+        check_positive(self)
+
+
+@dataclass(frozen=True)
 class SolvePolicy:
     """Policy of `solve` and of its solver `auto`.
 
@@ -166,6 +204,8 @@ class SolvePolicy:
     ----------
     routes
         Solver by size, and time of its parts.
+    scheduler, task_times
+        Slices of time for solvers that share it (`netsp.plan.scheduled`), and estimates of theirs.
     subsets
         Dynamic programming over sets of goals.
     search_effort
@@ -185,6 +225,8 @@ class SolvePolicy:
     """
 
     routes: RoutePolicy = RoutePolicy()
+    scheduler: SchedulerPolicy = SchedulerPolicy()
+    task_times: TaskTimePolicy = TaskTimePolicy()
     subsets: SubsetPolicy = SubsetPolicy()
     search_effort: SearchEffort = field(default_factory=SearchEffort)
     mip: MipPolicy = field(default_factory=MipPolicy)

@@ -1,0 +1,303 @@
+"""`auto` by a scheduler: every source of a bound or a tour is a task, and none is chosen by size.
+
+The tasks are dynamic programming over sets of goals, a search that never ends, the bound over
+goals, covers, ng-walks, cutting planes over a core of the classes, and cutting planes with branch
+and cut over all classes. They share one incumbent and one bound. Which of them runs next is decided
+by what they have closed of the gap (`netsp.gtsp.scheduler`); estimates of their time take the place
+of the sizes at which `netsp.plan.auto` changes its route.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from netsp.base.clock import Clock
+from netsp.gtsp.cost_matrix import CostMatrix
+from netsp.gtsp.cost_oracle import Estimate
+from netsp.gtsp.dp.dp_solver import fits as walks_fit
+from netsp.gtsp.dp.dp_solver import walk_steps
+from netsp.gtsp.limits import Limits
+from netsp.gtsp.resumable import Steps
+from netsp.gtsp.scheduler import Scheduler, Task
+from netsp.gtsp.solver_run import RunStopped
+from netsp.gtsp.travel.graph import TravelGraph, least_tethers
+from netsp.gtsp.travel.result import Result
+from netsp.mip.cover_bounds import GoalBound
+from netsp.mip.goal_relaxation import CoverCosts, goal_bound_steps
+from netsp.mip.lp_warm_start import WarmStart
+from netsp.mip.merging import merge
+from netsp.mip.mip_solver import MipRun
+from netsp.mip.mip_solver import Params as MipParams
+from netsp.mip.mip_solver import solve as prove
+from netsp.model.bound_scope import LowerBound
+from netsp.plan import exact
+from netsp.plan.solve_policy import SolvePolicy
+
+
+def solve(graph: TravelGraph, backend: str, policy: SolvePolicy, limits: Limits) -> Result:
+    """Solve by tasks that share the time; an iteration is one that a task counts as its own."""
+    run = ScheduledRun(graph, limits, policy)
+    with run.until_stopped():
+        run.update_incumbent(limits.warm_start)
+        if not run.solve_if_trivial():
+            for _ in Portfolio(run, backend).steps():
+                pass
+    return run.finish("proven" if run.is_done else "open")
+
+
+class ScheduledRun(MipRun):
+    """Run whose incumbent and bound all tasks share."""
+
+    def __init__(self, graph: TravelGraph, limits: Limits, policy: SolvePolicy) -> None:
+        rounds = policy.search_effort.rounds(graph.goal_count)
+        super().__init__(graph, limits, search_rounds=rounds, policy=policy.mip)
+        self.solve_policy = policy
+
+    def update_incumbent(
+        self,
+        tour: Sequence[int] | None,
+        walk: Sequence[int] | None = None,
+        length: float | None = None,
+    ) -> bool:
+        """Update the incumbent with a tour below the cutoff.
+
+        A tour above it may use legs that another task has fixed out.
+        """
+        if tour is not None and self.tour is not None and self.graph.is_tour(tour):
+            if length is None:
+                length = self.graph.walk_length(walk) if walk else self.graph.tour_length(tour)
+            if not length < self.cutoff:
+                return False
+        return super().update_incumbent(tour, walk, length)
+
+    def run_over(self, graph: TravelGraph, limits: Limits) -> ScheduledRun:
+        """Return a run over another graph with the same settings."""
+        return ScheduledRun(graph, limits, self.solve_policy)
+
+    def gap(self) -> float:
+        """Return the gap to the bound that holds for the problem; 0 once it is closed."""
+        if self.tour is None:
+            return math.inf
+        bound = LowerBound(max(self.bound or 0.0, 0.0), self.graph.scope)
+        asked = self.graph.bound_as_asked(bound)
+        if asked is None:
+            return self.length
+        return 0.0 if asked.proves(self.length) else self.length - asked.length
+
+
+class Portfolio:
+    """Tasks over the tours of one run.
+
+    Parameters
+    ----------
+    run : ScheduledRun
+        Run that the tasks share.
+    backend : str
+        Backend of the cutting planes.
+    """
+
+    def __init__(self, run: ScheduledRun, backend: str) -> None:
+        self.run, self.graph, self.backend = run, run.graph, backend
+        self.policy = run.solve_policy
+        self.times = run.solve_policy.task_times
+        self.costs: CostMatrix | None = None
+        self.core: ScheduledRun | None = None
+        self.goal_bound: GoalBound | None = None
+        self.tasks = self._tasks()
+
+    def steps(self) -> Steps[None]:
+        """Run the tasks until the gap is closed, or none is left but a search without end."""
+        run = self.run
+        scheduler = Scheduler(run, self.tasks, run.gap, self.policy.scheduler)
+        for _ in scheduler.steps():
+            yield
+            if all(t.is_over for t in self.tasks if t.name != "search") and run.clock.limit is None:
+                return
+
+    def _tasks(self) -> list[Task]:
+        graph, policy = self.graph, self.policy
+        tasks = [Task("search", self._search, self._estimate_of_search())]
+        if exact.fits(graph, policy.subsets):
+            tasks.append(Task("subsets", self._subsets, exact.estimate(graph, policy.subsets)))
+        if len(graph.before):
+            if walks_fit(graph, policy.gtsp.walks):
+                tasks.append(Task("walks", self._walks, self._estimate_of_walks()))
+            tasks.append(Task("free", self._without_order, self._estimate_of_cuts(len(graph))))
+            return tasks
+        pairs = (graph.goal_count + 1) ** 2
+        tasks.append(Task("goals", self._goals, Estimate(self.times.s_per_goal_pair * pairs, 0.0)))
+        if graph.roadmapped:
+            tasks.append(Task("covers", self._covers, self._estimate_of_covers()))
+        if walks_fit(graph, policy.gtsp.walks):
+            tasks.append(Task("walks", self._walks, self._estimate_of_walks()))
+        if graph.roadmapped:
+            core = self.run.core_classes_per_goal * graph.goal_count
+            if self.times.min_core_ratio * core < len(graph):
+                tasks.append(Task("core", self._core, self._estimate_of_cuts(core)))
+        tasks.append(Task("cuts", self._cuts, self._estimate_of_cuts(len(graph))))
+        return tasks
+
+    def _estimate_of_search(self) -> Estimate:
+        run = self.run
+        count = min(len(run.graph), run.searched_classes_per_goal * run.graph.goal_count)
+        seconds = self.times.s_per_round * run.search_rounds
+        return Estimate(seconds, run.graph.estimate(count).bytes)
+
+    def _estimate_of_walks(self) -> Estimate:
+        graph, legs = self.graph, self.graph.estimate(len(self.graph))
+        seconds = self.times.s_per_label * graph.goal_count**3 * len(graph)
+        return Estimate(legs.seconds + seconds, 2.0 * legs.bytes)
+
+    def _estimate_of_cuts(self, count: int) -> Estimate:
+        legs = self.graph.estimate(count)
+        seconds = self.times.s_per_priced_leg * count**2
+        seconds += self.times.s_per_cut_pair * self.graph.goal_count**2
+        return Estimate(legs.seconds + seconds, 2.0 * legs.bytes)
+
+    def _estimate_of_covers(self) -> Estimate:
+        pairs = (self.graph.goal_count + 1) ** 2
+        return Estimate(self.times.s_per_covered_pair * pairs, 0.0)
+
+    def _subsets(self) -> Steps[None]:
+        exact.solve(self.run)
+        yield
+
+    def _search(self) -> Steps[None]:
+        """Search near the incumbent while that helps, then from scratch, and merge the tours."""
+        run, graph = self.run, self.graph
+        policy = run.gtsp_policy.proof_search
+        run.find_first_tour()
+        yield
+        core = least_tethers(graph.costs_to_base, graph.cluster, run.searched_classes_per_goal)
+        vain = 0
+        while True:
+            before = run.length
+            core = np.union1d(core, np.array(run.tour or (0,), dtype=np.int64))
+            yield from run.search_steps(run._among(core), run.clock)
+            run.report("begun", vertices=len(graph))
+            yield
+            if run.tour is None:
+                return
+            vain = 0 if run.length < before else vain + 1
+            core = run._near_incumbent() if len(graph) > len(core) else core
+            if vain == policy.max_vain_searches:
+                vain = 0
+                yield from self._merge()
+
+    def _merge(self) -> Steps[None]:
+        """Search from scratch, and merge the tours found."""
+        run, merging = self.run, self.policy.mip.merging
+        tours = []
+        for _ in range(merging.searches):
+            tours += run.search_afresh(1, run.clock)
+            yield
+        if run.iteration_limit == math.inf and run.graph.goal_count >= merging.min_goals:
+            merge(run, list(dict.fromkeys(tours)), run._solve_merged, Clock.from_limit(run.clock))
+            yield
+
+    def _goals(self) -> Steps[None]:
+        """Bound tours by one over the goals alone."""
+        run, policy = self.run, self.policy.mip
+
+        def prove_goals(graph: TravelGraph, limits: Limits) -> tuple[Result, Sequence[object]]:
+            goal_run = MipRun(graph, limits, policy=policy)
+            return goal_run.solve(self.backend, None), goal_run.cuts
+
+        limits = Limits(run.clock, rng=run.rng)
+        yield from goal_bound_steps(self.graph, prove_goals, limits, policy=policy)  # type: ignore[arg-type]
+        self._adopt_bound_in_any_class()
+
+    def _covers(self) -> Steps[None]:
+        """Bound tours by covers, and search among the classes that they visit."""
+        run, policy = self.run, self.policy.mip
+        if run.tour is None:
+            return
+        self._adopt_bound_in_any_class()
+
+        def prove_nothing(graph: TravelGraph, limits: Limits) -> tuple[Result, Sequence[object]]:
+            return prove(graph, MipParams(policy=policy), replace(limits, iterations=0)), ()
+
+        anyway = replace(policy, covers=replace(policy.covers, min_classes=0))
+        limits = Limits(run.clock, rng=run.rng)
+        costs = run._cover_costs() if run._uses_sparse_costs else CoverCosts()
+        found = yield from goal_bound_steps(
+            self.graph,
+            prove_nothing,
+            limits,
+            run.tour,
+            costs,
+            run.on_cover_bound,
+            anyway,  # type: ignore[arg-type]
+        )
+        self._adopt_bound_in_any_class()
+        run.raise_bound(found.bound)
+        self.goal_bound = found
+
+    def _adopt_bound_in_any_class(self) -> None:
+        self.run.raise_bound(self.graph.bound_in_any_class)
+
+    def _walks(self) -> Steps[None]:
+        """Bound tours by ng-walks, which leave fewer vertices to the cuts."""
+        run = self.run
+        costs = CostMatrix(self.graph, policy=self.policy.gtsp.costs)
+        yield
+        yield from walk_steps(run, costs, self.policy.mip.handover)
+        self.costs = costs
+
+    def _core(self) -> Steps[None]:
+        """Prove over a core of the classes; its bound holds with twice the tether of the others."""
+        run, graph = self.run, self.graph
+        near = run._near_incumbent() if run.tour is not None else None
+        core = least_tethers(graph.costs_to_base, graph.cluster, run.core_classes_per_goal)
+        core = core if near is None else np.union1d(core, near)
+        core = np.union1d(core, np.array(run.tour or (0,), dtype=np.int64))
+        inner = self.core = run.run_over(graph.subgraph(core), Limits(run.clock, rng=run.rng))
+        inner.iteration_limit = run.iteration_limit - run.iterations
+        inner.outer = run, core
+        if run.tour is not None:
+            inner.update_incumbent(np.searchsorted(core, np.array(run.tour)).tolist())
+        others = np.ones(len(graph), dtype=bool)
+        others[core] = False
+        elsewhere = graph.least_by_way_of(float(graph.tethers[others].min(initial=np.inf)))
+        costs = CostMatrix(inner.graph, policy=self.policy.gtsp.costs)
+        yield
+        for _ in inner.cut_steps(costs, self.backend, None):
+            inner.known_length = min(inner.known_length, run.length)
+            run.raise_bound(min(inner.bound or 0.0, elsewhere))
+            yield
+        run.raise_bound(min(inner.bound or 0.0, elsewhere))
+
+    def _cuts(self) -> Steps[None]:
+        """Prove by cutting planes, then by branch and cut, over what walks and covers have left."""
+        run = self.run
+        warm: WarmStart | None = self.core.program() if self.core is not None else None
+        run._goal_bound = self.goal_bound
+        costs, self.costs = self.costs, None
+        if costs is None:
+            costs = run._costs or CostMatrix(self.graph, policy=self.policy.gtsp.costs)
+        yield
+        if costs.rows is None:
+            yield from run.search_steps(run.instance(costs, np.zeros(0, dtype=np.int64)), run.clock)
+        yield from run.cut_steps(costs, self.backend, warm)
+        while not run.is_done and run.root is not None:
+            # many legs are left: each search may find a tour that fixes more of them out
+            before = run.length
+            yield
+            run.search(costs)
+            if not run.length < before:
+                raise RunStopped
+            yield from run.root.steps()
+
+    def _without_order(self) -> Steps[None]:
+        """Bound tours by those in any order."""
+        run = self.run
+        free = run.run_over(self.graph.unordered(), Limits(run.clock, rng=run.rng))
+        free.iteration_limit = run.iteration_limit - run.iterations
+        for _ in Portfolio(free, self.backend).steps():
+            run.raise_bound(free.bound or 0.0)
+            yield
+        run.raise_bound(free.bound or 0.0)
