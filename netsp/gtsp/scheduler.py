@@ -6,9 +6,10 @@ measures what the slice has closed of the gap between the incumbent and the boun
 
 The promise of a task is a length per second. A task that has closed nothing yet promises the whole
 gap in the time of its estimate; once it has had more, the promise falls with the square of the
-time. So tasks of little work come first, and a large task is not judged while it prepares. After its first success the
-promise is what the last slices have closed per second. A task that no longer closes anything is not
-forgotten: it promises a share (`SchedulerPolicy.hope`) of the gap in as much time as it has had.
+time. So tasks of little work come first, and a large task is not judged while it prepares. After
+its first success the promise is what the last slices have closed per second. A task that no longer
+closes anything is not forgotten: it promises a share (`SchedulerPolicy.hope`) of the gap in as much
+time as it has had.
 
 Under a limit of iterations a step counts as a fixed time, so that a seed always gives the same
 result.
@@ -135,7 +136,8 @@ class Scheduler:
     run : SolverRun
         Run with the incumbent and the bound that all tasks share.
     tasks : sequence of Task
-        Tasks; among equal promises the first comes first.
+        Tasks, those that find a first tour before the others; among equal promises, too, the first
+        comes first.
     gap : callable
         Returns the gap, a length; inf while there is no tour.
     policy : SchedulerPolicy
@@ -171,10 +173,14 @@ class Scheduler:
                 task.close()
 
     def next_task(self) -> Task | None:
-        """Return the task that promises most; None if none is left that fits into the memory."""
+        """Return the task that promises most; None if none is left that fits into the memory.
+
+        Before the first tour there is no gap, and tasks come in their order.
+        """
         gap = self.gap()
-        gap = gap if gap < math.inf else 1.0  # before the first tour, tasks of little work lead
         left = [t for t in self.tasks if not t.is_over and (t.spent or self._fits(t))]
+        if gap == math.inf:
+            return next(iter(left), None)
         return max(left, key=lambda t: t.promise(gap, self.policy), default=None)
 
     def _fits(self, task: Task) -> bool:

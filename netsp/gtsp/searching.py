@@ -307,12 +307,16 @@ class SearchingRun(SolverRun):
     def search_steps(
         self, instance: Instance, clock: Clock, *, rounded: bool = False
     ) -> Steps[None]:
-        """Search an instance from the incumbent, with a step for each chunk of rounds."""
+        """Search an instance from the incumbent, with a step for each temperature."""
         start = None if self.tour is None else self.graph.cluster[list(self.tour)]
         search = Search(instance, self.rng, start, clock)
         search.settle()
-        for _ in search.chunks(self.search_rounds, clock):
-            yield
+        done, temperature_steps = 0, self.gtsp_policy.local_search.temperature_steps
+        rounds_per_step = max(1, self.search_rounds // temperature_steps)
+        for count in search.chunks(self.search_rounds, clock):
+            done += count
+            if done % rounds_per_step == 0:
+                yield
         self.offer_incumbent_from(search, rounded=rounded)
         length, tour = search.best()
         if np.isfinite(length) and tour not in self.local_optima:

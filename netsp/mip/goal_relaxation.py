@@ -97,7 +97,7 @@ def goal_bound_steps(
     """Do what `bound_over_goals` does, with a step for each LP of a cover."""
     clock = Clock.from_limit(limits.time)
     least = graph.between_goals(lambda: clock.is_up)
-    bound = one_tree_bound(least, lambda: clock.is_up, policy.goals)
+    bound = one_tree_bound(_finite(least), lambda: clock.is_up, policy.goals)
     cuts: tuple[Cut, ...] = ()
     cells: CellBound | None = None
     _raise_bound_in_any_class(graph, bound * (1.0 - PATH_ROUNDING))

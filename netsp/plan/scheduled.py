@@ -27,6 +27,7 @@ from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.gtsp.travel.result import Result
 from netsp.mip.cover_bounds import GoalBound
+from netsp.mip.cuts import Cut
 from netsp.mip.goal_relaxation import CoverCosts, goal_bound_steps
 from netsp.mip.lp_warm_start import WarmStart
 from netsp.mip.merging import merge
@@ -203,12 +204,12 @@ class Portfolio:
         """Bound tours by one over the goals alone."""
         run, policy = self.run, self.policy.mip
 
-        def prove_goals(graph: TravelGraph, limits: Limits) -> tuple[Result, Sequence[object]]:
+        def prove_goals(graph: TravelGraph, limits: Limits) -> tuple[Result, Sequence[Cut]]:
             goal_run = MipRun(graph, limits, policy=policy)
             return goal_run.solve(self.backend, None), goal_run.cuts
 
         limits = Limits(run.clock, rng=run.rng)
-        yield from goal_bound_steps(self.graph, prove_goals, limits, policy=policy)  # type: ignore[arg-type]
+        yield from goal_bound_steps(self.graph, prove_goals, limits, policy=policy)
         self._adopt_bound_in_any_class()
 
     def _covers(self) -> Steps[None]:
@@ -218,20 +219,14 @@ class Portfolio:
             return
         self._adopt_bound_in_any_class()
 
-        def prove_nothing(graph: TravelGraph, limits: Limits) -> tuple[Result, Sequence[object]]:
+        def prove_nothing(graph: TravelGraph, limits: Limits) -> tuple[Result, Sequence[Cut]]:
             return prove(graph, MipParams(policy=policy), replace(limits, iterations=0)), ()
 
         anyway = replace(policy, covers=replace(policy.covers, min_classes=0))
         limits = Limits(run.clock, rng=run.rng)
         costs = run._cover_costs() if run._uses_sparse_costs else CoverCosts()
         found = yield from goal_bound_steps(
-            self.graph,
-            prove_nothing,
-            limits,
-            run.tour,
-            costs,
-            run.on_cover_bound,
-            anyway,  # type: ignore[arg-type]
+            self.graph, prove_nothing, limits, run.tour, costs, run.on_cover_bound, anyway
         )
         self._adopt_bound_in_any_class()
         run.raise_bound(found.bound)
