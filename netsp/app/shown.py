@@ -11,11 +11,14 @@ import numpy as np
 
 from netsp.app.solving import bound_message
 from netsp.base.errors import InputError
-from netsp.base.files import csv_rows, read_text
 from netsp.base.geometry import polylines
-from netsp.base.validated import parse_json_object
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
+from netsp.plan.space.space_world import SpaceWorld
+from netsp.view.report.opened import Opened, OpenedMission, json_of, open_result, reading_run
+from netsp.view.report.run_page import rows_of
+from netsp.world.mission.anchor_track import AnchorTrack
+from netsp.world.mission.run_log import check_log
 from netsp.world.scene.scene import Scene, scene_of
 
 SHOWN_FRAMES = 240
@@ -108,25 +111,16 @@ def read_shown(source: str | Path, problem_file: str | Path | None = None) -> Sh
     InputError
         Files that cannot be read or do not belong together.
     """
-    place = Path(source)
-    if not place.is_dir():
-        if problem_file is None:
-            raise InputError(f"{source}: does not hold its problem; expected --problem FILE")
-        return _of_plan(Problem.load(problem_file), Solution.load(place), str(source))
-    if (place / "solution.json").exists():
-        file = place / "problem.json"
-        problem = Problem.from_run(read_text(file), str(file))
-        return _of_execution(place, problem, Solution.load(place / "solution.json"))
-    if (place / "mission.json").exists():
-        return _of_mission(place)
-    raise InputError(f"{source}: expected the folder of a run of netsp execute or netsp simulate")
+    what = open_result(source, problem_file)
+    with reading_run(source):
+        if isinstance(what, Opened):
+            return _of_execution(what) if what.run else _of_plan(what.problem, what.solution)
+        if what.run is None:
+            raise InputError(f"{source}: is a mission; expected the folder of a flight")
+        return _of_mission(what, what.run)
 
 
-def _of_plan(problem: Problem, solution: Solution, source: str) -> Shown:
-    if problem.sha256 != solution.problem.sha256:
-        raise InputError(f"{source}: solves another problem (sha256 differs)")
-    if solution.length is None:
-        raise InputError(f"{source}: has no tour (status {solution.status.value})")
+def _of_plan(problem: Problem, solution: Solution) -> Shown:
     return Shown(
         json.loads(problem.to_json()), _answer(problem, solution), scene_of(problem), solution
     )
@@ -147,14 +141,12 @@ def _answer(problem: Problem, solution: Solution) -> dict[str, Any]:
     }
 
 
-def _of_execution(place: Path, problem: Problem, solution: Solution) -> Shown:
+def _of_execution(what: Opened) -> Shown:
     """Read a tour that was carried out: its path, tethers and events."""
-    rows = _rows(place / "log.csv", ("time", "x", "y", "z", "tether", "mode"))
+    problem, solution, rows = what.problem, what.solution, what.rows
+    assert what.run is not None
     stamps = np.array([float(r["time"]) for r in rows])
-    kept = parse_json_object(
-        '{"frames": ' + read_text(place / "tethers.json") + "}", str(place / "tethers.json")
-    )["frames"]
-    frames = []
+    frames, kept = [], what.tethers or []
     for frame in kept[:: max(1, len(kept) // SHOWN_FRAMES)]:
         k = min(int(np.searchsorted(stamps, frame["time"])), len(rows) - 1)
         frames.append(_frame(np.array(frame["nodes"], dtype=float), rows[k]))
@@ -169,25 +161,20 @@ def _of_execution(place: Path, problem: Problem, solution: Solution) -> Shown:
             for v in solution.tour
             if v.goal < len(problem.goals)
         ],
-        "summary": parse_json_object(read_text(place / "summary.json"), "summary.json"),
+        "summary": json_of(what.run / "summary.json"),
     }
     events = [
         {"time": r["time"], "event": r["event"], "text": f"{r['response']}: {r['reason']}"}
-        for r in _rows(place / "events.csv", ("time", "event", "response", "reason"), min_count=0)
+        for r in rows_of(what.run / "events.csv")
     ]
     return Shown(json.loads(problem.to_json()), answer, scene_of(problem), solution, frames, events)
 
 
-def _of_mission(place: Path) -> Shown:
+def _of_mission(what: OpenedMission, run: Path) -> Shown:
     """Read a mission that was flown; its tether is computed again along the path."""
-    from netsp.plan.space.space_world import SpaceWorld
-    from netsp.world.mission.anchor_track import AnchorTrack
-    from netsp.world.mission.mission import Mission
-
-    mission = Mission.load(place / "mission.json")
-    scene = mission.load_scene()
-    summary = parse_json_object(read_text(place / "summary.json"), "summary.json")
-    rows = _rows(place / "log.csv", ("time", "x", "y", "z", "tether", "mode"))
+    mission, scene = what.mission, what.scene
+    rows = rows_of(run / "log.csv")
+    check_log(rows, run / "log.csv")
     path = np.array([[float(r[k]) for k in "xyz"] for r in rows])
     world = SpaceWorld(mission, scene)
     state = world.present_tether
@@ -213,7 +200,7 @@ def _of_mission(place: Path) -> Shown:
         "length": polylines.length(path),
         "path": path.tolist(),
         "visits": [],
-        "summary": summary,
+        "summary": json_of(run / "summary.json"),
     }
     return Shown(data, answer, scene, None, frames)
 
@@ -229,14 +216,3 @@ def _frame(nodes: Any, row: dict[str, str]) -> dict[str, Any]:
         "path": np.round(nodes, 3).tolist(),
         "word": [],
     }
-
-
-def _rows(file: Path, columns: tuple[str, ...], min_count: int = 1) -> list[dict[str, str]]:
-    text = read_text(file)
-    rows = csv_rows(text, str(file))
-    if len(rows) < min_count:
-        raise InputError(f"{file}: holds no row")
-    missing = [c for c in columns if rows and c not in rows[0]]
-    if missing:
-        raise InputError(f"{file}: lacks the column {missing[0]!r}")
-    return rows

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -33,6 +34,17 @@ from netsp.view.report import run_page
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import check_log, read_run
 from netsp.world.scene.scene import Scene
+
+
+@contextmanager
+def reading_run(source: str | Path | None) -> Iterator[None]:
+    """Raise InputError, which names the source, for errors that files of a damaged run cause."""
+    try:
+        yield
+    except (KeyError, IndexError, ValueError, TypeError, OverflowError) as error:
+        raise InputError(
+            f"{source}: a file of the run is damaged: {type(error).__name__}: {error}"
+        ) from None
 
 
 @dataclass(frozen=True)
@@ -89,14 +101,11 @@ class Opened:
         damaged."""
         if self.run is None:
             return {}
-        s = json_of(self.run / "summary.json")
-        try:
+        file = self.run / "summary.json"
+        with reading_run(file):
+            s = json_of(file)
             left_out = {int(x["goal"]): LEFT_OUT for x in s["left_out"]}
             return left_out | {int(g): CANCELLED for g in s["cancelled"]}
-        except (KeyError, ValueError, TypeError) as error:
-            raise InputError(
-                f"{self.run / 'summary.json'}: is damaged: {type(error).__name__}: {error}"
-            ) from None
 
     def film(self, count: int) -> Film:
         """Return the film of the tour or run.
@@ -118,12 +127,8 @@ class Opened:
         """
         if not self.tethers:
             return film_of_plan(self.problem, self.solution, count)
-        try:
+        with reading_run(self.run):
             return film_of_run(self.maps, self.rows, self.tethers, self._since(), count)
-        except (KeyError, IndexError, ValueError, TypeError, OverflowError) as error:
-            raise InputError(
-                f"{self.run}: a file of the run is damaged: {type(error).__name__}: {error}"
-            ) from None
 
     def _since(self) -> dict[str, dict[int, float]]:
         """Times in seconds at which the fates of goals in a run were decided, by fate."""
@@ -184,12 +189,8 @@ class OpenedMission:
         if self.run is None:
             return film_of_mission(self.mission, self.scene, count)
         flight = read_run(self.run)
-        try:
+        with reading_run(self.run):
             return film_of_flight(flight, self.scene, count)
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(
-                f"{self.run}: a summary of the run is damaged: {type(error).__name__}: {error}"
-            ) from None
 
 
 def open_result(
