@@ -3,17 +3,18 @@ problem."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field
 
 from netsp.base.errors import InputError
-from netsp.base.field_types import NonNegative, Point2, Point3, Positive, checked_integer, index_of
+from netsp.base.field_types import Point2, Point3, Positive, checked_integer, index_of
 from netsp.base.files import FileModel
 from netsp.base.validated import Model, shown
 from netsp.model.problem import MAX_EXTENT_RATIO, Circle, GoalLike, Obstacle, Polygon, Problem
 from netsp.online.execute.execute_policy import ExecutePolicy
+from netsp.world.simulator.timed_events import TimedEvent, check_in_turn
 
 
 def _which(value: Any) -> Any:
@@ -39,10 +40,9 @@ class Move(Model):
     by: Annotated[Point2, Field(description="(x, y) to move it by, in the problem's units")]
 
 
-class Event(Model):
+class Event(TimedEvent):
     """Event at a time after the start; one of the other fields says what happens."""
 
-    time: Annotated[NonNegative, Field(description="seconds after the start")]
     appear: Annotated[
         Obstacle | None, Field(description="an obstacle that is there from now on")
     ] = None
@@ -61,23 +61,6 @@ class Event(Model):
     tether_length: Annotated[
         Positive | None, Field(description="tether length from now on, in the problem's units")
     ] = None
-
-    @model_validator(mode="after")
-    def _one(self) -> Self:
-        given = [k for k in type(self).model_fields if k != "time" and getattr(self, k) is not None]
-        if len(given) != 1:
-            raise ValueError(
-                "expected one of appear, vanish, move, add_goal, cancel_goal, push, "
-                f"tether_length, got {', '.join(given) or 'none'}"
-            )
-        return self
-
-    @property
-    def kind(self) -> str:
-        """Name of the field that says what happens."""
-        return next(
-            k for k in type(self).model_fields if k != "time" and getattr(self, k) is not None
-        )
 
 
 class Surprises(FileModel):
@@ -106,12 +89,7 @@ class Surprises(FileModel):
         source : str
             Name of these surprises in messages; nothing if it is empty.
         """
-        for k, event in sorted(enumerate(self.events), key=lambda e: e[1].time):
-            try:
-                problem = problem_after(problem, event)
-            except InputError as error:
-                where = f"{source}: " if source else ""
-                raise InputError(f"{where}events[{k}]: {error}") from None
+        check_in_turn(self.events, problem, problem_after, source)
 
 
 def problem_after(

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field
 
 from netsp.base.errors import InputError
-from netsp.base.field_types import Name, NonNegative, Point3, Positive
+from netsp.base.field_types import Name, Point3, Positive
 from netsp.base.files import FileModel
 from netsp.base.validated import Model
 from netsp.world.mission.mission import Mission, WaypointLike
 from netsp.world.mission.mission_limits import check_bounds
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene, Solid
-
-KINDS = ("appear", "vanish", "move", "add_waypoint", "cancel_waypoint", "push", "tether_length")
-"""Fields of an event, of which it has one."""
+from netsp.world.simulator.timed_events import TimedEvent, check_in_turn
 
 
 class SolidMove(Model):
@@ -27,14 +25,13 @@ class SolidMove(Model):
     by: Annotated[Point3, Field(description="(x, y, z) to move it by, m")]
 
 
-class SceneEvent(Model):
+class SceneEvent(TimedEvent):
     """Event at a time after the start; one of the other fields says what happens.
 
     What happens at 0 s was so from the beginning. Waypoints are numbered as in the mission file;
     added ones come after all others.
     """
 
-    time: Annotated[NonNegative, Field(description="seconds after the start")]
     appear: Annotated[Solid | None, Field(description="a solid that is there from now on")] = None
     vanish: Annotated[Name | None, Field(description="name of a solid that is gone")] = None
     move: Annotated[SolidMove | None, Field(description="a solid that moves")] = None
@@ -56,15 +53,6 @@ class SceneEvent(Model):
     def changes_scene(self) -> bool:
         """True if a solid appears, vanishes or moves."""
         return any(v is not None for v in (self.appear, self.vanish, self.move))
-
-    @model_validator(mode="after")
-    def _one(self) -> Self:
-        given = [k for k in KINDS if getattr(self, k) is not None]
-        if len(given) != 1:
-            raise ValueError(
-                f"expected one of {', '.join(KINDS)}, got {', '.join(given) or 'none'}"
-            )
-        return self
 
 
 class SceneSurprises(FileModel):
@@ -98,20 +86,21 @@ class SceneSurprises(FileModel):
         waypoints : int, optional
             Number of waypoints in the mission.
         """
-        solids = scene.all_solids()
-        for k, event in sorted(enumerate(self.events), key=lambda e: e[1].time):
-            try:
-                solids = solids_after(solids, event)
-                if waypoints is not None:
-                    waypoints += event.add_waypoint is not None
-                    if (event.cancel_waypoint or 0) >= waypoints:
-                        raise InputError(
-                            f"cancel_waypoint: no waypoint #{event.cancel_waypoint}; expected #0 "
-                            f"to #{waypoints - 1}"
-                        )
-            except InputError as error:
-                where = f"{source}: " if source else ""
-                raise InputError(f"{where}events[{k}]: {error}") from None
+
+        def after(
+            known: tuple[tuple[Solid, ...], int | None], event: SceneEvent
+        ) -> tuple[tuple[Solid, ...], int | None]:
+            solids, count = solids_after(known[0], event), known[1]
+            if count is not None:
+                count += event.add_waypoint is not None
+                if (event.cancel_waypoint or 0) >= count:
+                    raise InputError(
+                        f"cancel_waypoint: no waypoint #{event.cancel_waypoint}; expected #0 to "
+                        f"#{count - 1}"
+                    )
+            return solids, count
+
+        check_in_turn(self.events, (scene.all_solids(), waypoints), after, source)
 
     def check_places(
         self, mission: Mission, scene: Scene, field: DistanceField, source: str = ""
