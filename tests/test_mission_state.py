@@ -9,10 +9,10 @@ import pytest
 from netsp.base.errors import InputError, LimitReachedError
 from netsp.base.geometry import polylines
 from netsp.command.main import main
+from netsp.online.execute.mission_repair import RepairPlanner
 from netsp.plan.cover import cover
 from netsp.plan.space.flown import words_of_flight
 from netsp.plan.space.judge import verify_mission
-from netsp.plan.space.mission_repair import RepairPlanner
 from netsp.plan.space.mission_solver import solve_mission
 from netsp.plan.space.path_bound import bound_all_tours
 from netsp.plan.space.planning_context import PlanningContext, keeps_clearance

@@ -13,8 +13,8 @@ from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.command.main import main
 from netsp.command.solve_mission import summary
+from netsp.online.execute.mission_repair import _gaps_named
 from netsp.plan.space.mission_policy import GapPolicy
-from netsp.plan.space.mission_repair import _gaps_named
 from netsp.plan.space.mission_solver import solve_mission
 from netsp.plan.space.passages import GapGrid, find_hidden_gaps, resolve_gaps
 from netsp.plan.space.space_plan import candidate_plans, plan_given_order, prepare_context

@@ -185,7 +185,7 @@ MOVED = {
     "space.measures": "plan.space.mission_measures",
     "space.order": "plan.space.visit_order",
     "space.plan": "plan.space.space_plan",
-    "space.repair": "plan.space.mission_repair",
+    "space.repair": "online.execute.mission_repair",
     "space.search": "plan.space.word_search",
     "space.signature": "plan.space.space_signature",
     "space.solve": "plan.space.mission_solver",

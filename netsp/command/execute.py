@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from netsp.base.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 from netsp.command import json_output
@@ -138,12 +138,8 @@ def _mission(args: argparse.Namespace) -> int:
         options=options,
         seed=args.seed,
     )
-    s = run.summary
-    if s["defects"]:
-        return EXIT_DEFECT
-    if s["exceedance_s"] > 0.0 or (s["home"]["reached"] and not s["home"]["tether_free"]):
-        return EXIT_NOT_VERIFIED
-    return EXIT_NOT_ALL if s["left_out"] or s["status"] != "done" else 0
+    home = run.summary["home"]
+    return _exit_code(run.summary, home["reached"] and not home["tether_free"])
 
 
 def _problem(args: argparse.Namespace) -> int:
@@ -196,12 +192,16 @@ def _problem(args: argparse.Namespace) -> int:
             json_output.tell(done.summary)
         if not args.quiet:
             print(describe_execution(done), file=sys.stderr)
-    s = done.summary
-    if s["defects"]:
+    return _exit_code(done.summary, done.summary["home"] and not done.summary["tether_free"])
+
+
+def _exit_code(summary: dict[str, Any], is_caught_at_home: bool) -> int:
+    """Return the exit code of a run, which may have ended at home with its tether caught."""
+    if summary["defects"]:
         return EXIT_DEFECT
-    if s["exceedance_s"] > 0.0 or (s["home"] and not s["tether_free"]):
+    if summary["exceedance_s"] > 0.0 or is_caught_at_home:
         return EXIT_NOT_VERIFIED
-    return EXIT_NOT_ALL if s["left_out"] or s["status"] != "done" else 0
+    return EXIT_NOT_ALL if summary["left_out"] or summary["status"] != "done" else 0
 
 
 def show_execution(

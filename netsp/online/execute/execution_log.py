@@ -16,6 +16,7 @@ from netsp.hsignature import Word
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
 from netsp.online.execute.execute_policy import ExecutePolicy, RepairPolicy
+from netsp.online.execute.repair_rule import HOMEWARD, LOCAL, REPLANNED
 from netsp.online.execute.tether_limits import (
     LimitPeriod,
     Overrun,
@@ -289,7 +290,7 @@ class Execution(Drawn):
             "home": bool(self.arrivals and self.arrivals[-1].goal == HOME),
             "tether_free": self.free,
             "defects": sum(e.response == "defect" for e in self.entries),
-            "repairs": sum(e.response in ("local", "replan", "home") for e in self.entries),
+            "repairs": sum(e.response in (LOCAL, REPLANNED, HOMEWARD) for e in self.entries),
             "planning_worst_s": max((e.planning_s for e in self.entries), default=0.0),
             "wall_s": self.wall_s,
         }

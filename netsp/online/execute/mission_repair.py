@@ -1,11 +1,8 @@
-"""Planner `repair`: flies the planned tour, and repairs it when the map changes so that it no
-longer holds.
+"""Planner `repair`: flies the planned tour in space, and repairs it when the map changes.
 
 The rest of the tour still holds if its paths keep off solids, the tether fits on them, and it comes
-home free (as in the plane, `netsp.online.execute.tour_repair`). If not, the order is kept, and the
-shortest paths around the obstacles are found. If there are none, or they take longer than planning
-does, the rest is planned anew from the present place and tether; the robot holds its place
-meanwhile.
+home free. If not, `netsp.online.execute.repair_rule` decides what is done. In the same order the
+robot takes the shortest paths around the obstacles.
 """
 
 from __future__ import annotations
@@ -20,6 +17,7 @@ from netsp.base.arrays import Floats
 from netsp.base.errors import InputError, LimitReachedError, is_interrupt
 from netsp.base.field_types import Point3
 from netsp.base.geometry import polylines
+from netsp.online.execute.repair_rule import BY_LEGS, KEPT, choose_repair
 from netsp.plan.space.mission_policy import MissionPolicy
 from netsp.plan.space.planning_context import DIP_RATIO, drive_step
 from netsp.plan.space.space_plan import SpacePlan, plan
@@ -30,18 +28,6 @@ from netsp.world.planner.planner import HOLD, Command, Tethers
 from netsp.world.planner.predictive import PredictivePlanner
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.tether import Tether
-
-KEPT = "kept"
-"""Response of a repair: the rest of the tour is kept."""
-
-LOCAL = "local"
-"""Response of a repair: the order is kept, with legs around obstacles."""
-
-REPLANNED = "replan"
-"""Response of a repair: the rest of the tour is planned anew."""
-
-BY_LEGS = "legs"
-"""Response of a repair: no tour was found, so the planner searches leg by leg."""
 
 
 @dataclass(frozen=True)
@@ -212,18 +198,22 @@ class RepairPlanner(PredictivePlanner):
             self._note(KEPT, "the rest of the tour still holds", rest.length, begin)
             return
         worth = rest.planned_length + self.options.planning_limit * self.mission.speed
-        found, added = None, self._has_new_waypoint
-        self._has_new_waypoint = False
-        if not self.is_homeward and (added or not rest.is_complete or rest.length > worth):
-            found = self._replan(robot, tether, rest, added)
-        if found is not None:
-            self._follow_plan(found)
-            self._note(REPLANNED, f"{rest.reason}{_gaps_named(found)}", found.length, begin)
-        elif rest.is_complete:
-            self._follow_rest(rest)
-            self._note(LOCAL, rest.reason, rest.length, begin)
+        added, self._has_new_waypoint = self._has_new_waypoint, False
+        is_worthwhile = added or not rest.is_complete or rest.length > worth
+        is_worthwhile &= not self.is_homeward
+        response, chosen = choose_repair(
+            rest if rest.is_complete else None,
+            lambda: self._replan(robot, tether, rest, added) if is_worthwhile else None,
+            BY_LEGS,
+        )
+        if isinstance(chosen, SpacePlan):
+            self._follow_plan(chosen)
+            self._note(response, f"{rest.reason}{_gaps_named(chosen)}", chosen.length, begin)
+        elif chosen is not None:
+            self._follow_rest(chosen)
+            self._note(response, rest.reason, chosen.length, begin)
         else:
-            self._note(BY_LEGS, f"{rest.reason}, and no tour was found", 0.0, begin)
+            self._note(response, f"{rest.reason}, and no tour was found", 0.0, begin)
 
     def _note(self, response: str, reason: str, length: float, begin: float) -> None:
         """Record a repair."""

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from netsp.base.arrays import Floats
 from netsp.base.deprecated import renamed_parameters
 from netsp.base.errors import InputError, is_interrupt
 from netsp.base.field_types import LARGEST, checked_argument, checked_instance, index_of
 from netsp.base.geometry import polylines
-from netsp.hsignature import signature
 from netsp.judge import verify
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution, Status
@@ -28,6 +28,7 @@ from netsp.online.execute.execution_log import (
     ExecutionOptions,
     ExecutionRow,
 )
+from netsp.online.execute.repair_rule import KEPT
 from netsp.online.execute.repair_warm_up import should_warm_up_repair, warm_up_repair
 from netsp.online.execute.run_record import LeftOut, ResumePoint, RunRecord, RunState
 from netsp.online.execute.tether_limits import TETHER_TOLERANCE
@@ -41,10 +42,10 @@ from netsp.online.execute.tour_repair import (
     split_reachable,
 )
 from netsp.plan.tour_plan import HOME, Leg, legs_of
-from netsp.world.scene.field import DistanceField, pushed_out
-from netsp.world.scene.scene import scene_of
+from netsp.roadmap.plane_world import PlaneWorld
+from netsp.world.scene.field import pushed_out
 from netsp.world.simulator.current import Water
-from netsp.world.tether import GeodesicTether, Tether
+from netsp.world.tether import Tether
 from netsp.world.tether.resolution import coarsest_delta, suggested_delta
 from netsp.world.vehicle import Vehicle, make_vehicle
 
@@ -106,15 +107,16 @@ class _Run:
         self.out = Execution(problem, solution, options)
         self.problem, self.options = problem, options
         self.legs: list[Leg] = [] if resume_point is not None else legs_of(problem, solution)
-        self.start = np.array(problem.base if problem.state is None else problem.state.position)
         self.delta = options.delta or suggested_delta(problem)
         self.now = 0.0
-        self._enter_problem(problem)
-        if resume_point is not None:
-            self.start = resume_point.tether[-1]
-        self.tether = self._first_tether(solution, resume_point)
+        self._enter_problem(problem, solution.start_tether)
+        start = self.world.start if resume_point is None else resume_point.tether[-1]
+        if resume_point is None:
+            self.tether = self.world.present_tether
+        else:
+            self.tether = self._tether_along(resume_point.tether)
         self.live = live
-        self.vehicle = live or make_vehicle(options.vehicle, self.start, options.speed)
+        self.vehicle = live or make_vehicle(options.vehicle, start, options.speed)
         self.policy = options.policy
         self.step = self._step_s()
         self.water = Water(options.current, options.gusts, options.seed)
@@ -129,14 +131,10 @@ class _Run:
         self.unreachable: set[int] = set()
         self.path = self.legs[0].path if self.legs else np.array([self.vehicle.position])
 
-    def _first_tether(self, solution: Solution, resume_point: ResumePoint | None) -> Tether:
-        """Return the tether at the beginning."""
-        if resume_point is not None:
-            anchor = self.model.start(resume_point.tether[0], resume_point.tether[0])
-            return self.model.refine(self.model.drive(anchor, resume_point.tether[1:])[0])
-        if self.problem.state is None:
-            return self.model.start(self.problem.base, self.problem.base)
-        return self.model.lay(np.array(solution.start_tether))
+    def _tether_along(self, line: Floats) -> Tether:
+        """Return the tether that a robot has pulled along a line (k, 3) from the anchor."""
+        model = self.world.model
+        return model.refine(model.drive(model.start(line[0], line[0]), line[1:])[0])
 
     def _step_s(self) -> float:
         """Return the time of a step; a kinematic vehicle travels the tether's resolution in it."""
@@ -146,12 +144,11 @@ class _Run:
             return self.policy.dynamic_step_s
         return self.delta / self.options.speed
 
-    def _enter_problem(self, problem: Problem) -> None:
-        """Enter the scene of a problem."""
+    def _enter_problem(self, problem: Problem, start_tether: npt.ArrayLike | None = None) -> None:
+        """Enter the world of a problem."""
         self.problem = self.out.problem = problem
         self.out.maps.append((round(self.now, 6), problem))
-        self.scene: DistanceField = scene_of(problem).field()
-        self.model = GeodesicTether(self.scene, self.delta)
+        self.world = PlaneWorld(problem, self.delta, start_tether)
 
     def resume(self, resume_point: ResumePoint) -> None:
         """Plan the rest of a run from where the robot is."""
@@ -231,17 +228,17 @@ class _Run:
     def _follow(self, points: Iterable[Floats]) -> None:
         """Move the tether along the points that the robot has passed."""
         for point in points:
-            if float(self.scene.distance(point)) < -0.2 * self.delta:
-                point = pushed_out(self.scene, point, 0.0)[0]
+            if float(self.world.field.distance(point)) < -0.2 * self.delta:
+                point = pushed_out(self.world.field, point, 0.0)[0]
                 self.vehicle.stop_at(point)
             self.out.walked += float(np.linalg.norm(point - self.tether.robot))
-            self.tether = self.model.update(self.tether, point)
+            self.tether = self.world.model.update(self.tether, point)
 
     def _arrive(self) -> None:
         leg = self.legs.pop(0)
         # the class at the goal itself counts, although a vehicle with dynamics stops near it
         line = np.vstack([self.tether.nodes, leg.path[-1]])
-        word = signature(line[:, :2], self.problem.representative_points)
+        word = self.world.word_of(line)
         self.out.arrivals.append(
             Arrival(round(self.now, 6), leg.goal, word, leg.word, self.tether.length, leg.tether)
         )
@@ -298,7 +295,7 @@ class _Run:
                 self.legs = legs
                 self.path, self.leg_s = self.legs[0].path[1:], 0.0
         if reason is None:
-            self._log_event(event.kind, "kept", "the rest of the plan still holds", 0.0)
+            self._log_event(event.kind, KEPT, "the rest of the plan still holds", 0.0)
         elif not self.options.repair:
             self._log_event(event.kind, "ignored", reason, 0.0)
             for goal in set(left) - set(self.left):
@@ -375,8 +372,7 @@ class _Run:
         line = pushed_aside(problem, self.tether.nodes, 1e-2 * self.delta)
         if not np.array_equal(line[-1], self.vehicle.position):
             self.vehicle.stop_at(line[-1])
-        anchor = self.model.start(line[0], line[0])
-        self.tether = self.model.refine(self.model.drive(anchor, line[1:])[0])
+        self.tether = self._tether_along(line)
         if self.tether.length > problem.tether_length:
             self.shorten = True  # the event has made it longer
 
@@ -388,9 +384,9 @@ class _Run:
         by = by * min(1.0, far / max(float(np.linalg.norm(by)), 1e-300))
         points = polylines.dense(np.array([start, start + by]), 0.5 * self.delta)
         for point in points:
-            if float(self.scene.distance(point)) < 0.0:
+            if float(self.world.field.distance(point)) < 0.0:
                 break
-            tether = self.model.update(self.tether, point)
+            tether = self.world.model.update(self.tether, point)
             if tether.length > max(self.problem.tether_length, self.tether.length):
                 break  # held by its tether
             self.tether = tether
@@ -491,7 +487,7 @@ class _Run:
         """Log the last tether, and whether it is free."""
         self.out.tethers.append((round(self.now, 6), self.tether.nodes.copy()))
         # the few rounds of an update may have left the tether at a corner
-        self.out.free = tether_is_free(self.model.refine(self.tether), self.delta)
+        self.out.free = tether_is_free(self.world.model.refine(self.tether), self.delta)
 
     def _log_event(self, event: str, response: str, reason: str, spent: float) -> None:
         self.out.entries.append(Entry(round(self.now, 6), event, response, reason, spent))

@@ -1,10 +1,9 @@
-"""Check and repair of a plan.
+"""Check and repair of a plan in the plane.
 
 The robot is at a state of the covering space: its position and the word of its tether. The rest of
 the plan holds if its paths are free, its tethers fit and the tether comes home free; otherwise the
-remaining NE-TSP is solved from that state. First the order of the goals is kept and only their
-classes are chosen again (a local repair, exact for that order and quick); the tour is planned anew
-if that promises to save more time than planning takes.
+remaining NE-TSP is solved from that state, and `netsp.online.execute.repair_rule` decides what is
+done. In the same order only the classes are chosen again, which is exact for that order and quick.
 """
 
 from __future__ import annotations
@@ -25,6 +24,7 @@ from netsp.hsignature import concatenate, crossings, signature
 from netsp.model.problem import Circle, Goal, Problem, State
 from netsp.model.solution import Status
 from netsp.online.execute.execute_policy import RepairPolicy
+from netsp.online.execute.repair_rule import HOMEWARD, choose_repair
 from netsp.online.execute.tether_reserve import ReservedLimit
 from netsp.plan.answer import to_solution
 from netsp.plan.solve_problem import solve_graph
@@ -202,7 +202,7 @@ def _repaired(
     order, left_out = split_reachable(problem, left)
     if not order:
         home, reason = _home(problem, state, tether, why)
-        return Repair("home", reason, [home], tuple(left_out), home.length, clock.elapsed)
+        return Repair(HOMEWARD, reason, [home], tuple(left_out), home.length, clock.elapsed)
     reserved = reserved_limit(problem, order, options.reserve)
     rest = _rest(problem, order, state, reserved.length)
     graph = graph_from_state(
@@ -212,7 +212,8 @@ def _repaired(
         local = _keeping_order(graph, len(order))
     assert local.length is not None
     new, words = _better_order(problem, graph, local, len(order), options, clock)
-    chosen, kind = (local, "local") if new is None else (new, "replan")
+    kind, chosen = choose_repair(local, lambda: new, HOMEWARD)
+    assert chosen is not None
     reason = f"{why}; {local.length:.4g} {problem.units} to go in the same order, {words}"
     if kept := reserved.describe(problem):
         reason += f"; {kept}"

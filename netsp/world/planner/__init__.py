@@ -23,7 +23,7 @@ PLANNERS: Registry[Callable[..., Planner]] = Registry(
     "netsp.planners",
     {
         "predictive": PredictivePlanner,
-        "repair": later("repair", "netsp.plan.space.mission_repair:RepairPlanner"),
+        "repair": later("repair", "netsp.online.execute.mission_repair:RepairPlanner"),
         "react": ReactPlanner,
         "react-draft": ReactDraftPlanner,
         "react-thresholds": ReactThresholdsPlanner,
