@@ -12,11 +12,10 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import counted
-from netsp.model.problem import Problem
 from netsp.online.guard.guard_policy import RecordingPolicy, TrackPolicy
 from netsp.online.guard.telemetry import Fix
+from netsp.online.link.geo_frame import Frame
 from netsp.online.link.link_policy import ClockPolicy
-from netsp.world.mission.mission import Mission
 
 
 def in_order_of_time(fixes: list[Fix], policy: RecordingPolicy) -> list[Fix]:
@@ -31,7 +30,7 @@ def in_order_of_time(fixes: list[Fix], policy: RecordingPolicy) -> list[Fix]:
 
 
 def plausibility_notes(
-    fixes: Sequence[Fix], site: Problem | Mission, policy: RecordingPolicy = RecordingPolicy()
+    fixes: Sequence[Fix], frame: Frame, policy: RecordingPolicy = RecordingPolicy()
 ) -> list[str]:
     """Return notes on what is implausible in a recording, one line each.
 
@@ -39,25 +38,23 @@ def plausibility_notes(
     """
     places = np.array([fix.position for fix in fixes], dtype=float).reshape(-1, 3)
     times = np.array([fix.time for fix in fixes])
-    units = site.units if isinstance(site, Problem) else "m"
+    units = frame.units
     steps = np.diff(times)
     return [
-        *_reach_notes(places, site, units, policy),
+        *_reach_notes(places, frame, policy),
         *_time_notes(times, steps),
         *_speed_notes(places, steps, units, policy),
     ]
 
 
-def _reach_notes(
-    places: Floats, site: Problem | Mission, units: str, policy: RecordingPolicy
-) -> Iterator[str]:
-    base = np.asarray(site.base if isinstance(site, Problem) else site.start, dtype=float)
-    distance = np.linalg.norm(places[:, :2] - base[:2], axis=1)
-    far = int((distance > site.tether_length).sum())
+def _reach_notes(places: Floats, frame: Frame, policy: RecordingPolicy) -> Iterator[str]:
+    units, tether_length = frame.units, frame.site.tether_length
+    distance = np.linalg.norm(places[:, :2] - frame.base[:2], axis=1)
+    far = int((distance > tether_length).sum())
     if far > policy.max_far_share * len(places):
         yield (
             f"{far:,} of {len(places):,} positions are farther from the base than the tether "
-            f"reaches ({site.tether_length:g} {units}), the farthest {distance.max():.4g} {units}; "
+            f"reaches ({tether_length:g} {units}), the farthest {distance.max():.4g} {units}; "
             "check the frame, the units and the order of the columns"
         )
 

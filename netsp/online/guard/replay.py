@@ -75,5 +75,5 @@ def read_fixes(
         yield fix
     if not placed:
         raise InputError(f"--replay: {file}: has no positions")
-    for text in (*tally.notes, *plausibility_notes(placed, frame.site, policy)):
+    for text in (*tally.notes, *plausibility_notes(placed, frame, policy)):
         note(f"--replay: {file}: {text}")

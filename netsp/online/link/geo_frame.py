@@ -36,6 +36,12 @@ class Frame:
     ----------
     is_given : bool
         Whether the kind was given.
+    is_planar : bool
+        Whether the site is a problem in the plane, where heights matter little.
+    has_origin : bool
+        Whether the site has a place on the earth.
+    units : str
+        Unit of lengths.
 
     Raises
     ------
@@ -47,13 +53,16 @@ class Frame:
         if kind not in (None, "local", "global"):
             raise InputError(f"--frame: expected local or global, got {kind!r}")
         self.site, self.is_given = site, kind is not None
-        projection = Projection.for_problem(site) if isinstance(site, Problem) else None
+        problem = site if isinstance(site, Problem) else None
+        projection = None if problem is None else Projection.for_problem(problem)
         if kind == "global" and projection is None:
             raise InputError("--frame: global needs an origin, and the site has none")
         self.projection = None if kind == "local" else projection
-        origin = site.origin if isinstance(site, Problem) else None
-        base = site.base if isinstance(site, Problem) else site.start
+        self.is_planar, self.units = problem is not None, problem.units if problem else "m"
+        base = site.start if isinstance(site, Mission) else site.base
         self.base = np.asarray(base, dtype=float)
+        origin = None if problem is None else problem.origin
+        self.has_origin = origin is not None
         heading = math.radians(origin.heading) if origin else 0.0
         self._cos, self._sin = math.cos(heading), math.sin(heading)
 
@@ -61,16 +70,6 @@ class Frame:
     def is_global(self) -> bool:
         """Return whether places are in degrees."""
         return self.projection is not None
-
-    @property
-    def has_origin(self) -> bool:
-        """Return whether the site has a place on the earth."""
-        return isinstance(self.site, Problem) and self.site.origin is not None
-
-    @property
-    def is_planar(self) -> bool:
-        """Return whether the site is a problem in the plane, where heights matter little."""
-        return isinstance(self.site, Problem)
 
     def local(self) -> Frame:
         """Return the frame of the same site for places in metres."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from netsp.base.arrays import Floats
-from netsp.base.errors import InputError, counted
+from netsp.base.errors import counted
 from netsp.base.files import read_text
 from netsp.base.geometry import polylines
 from netsp.base.validated import parse_json_object
@@ -36,15 +36,9 @@ def page(what: OpenedMission) -> str:
     Raises
     ------
     InputError, KeyError, IndexError, ValueError, TypeError
-        A file of the flight is damaged, or a mission has no tour and was not flown either.
+        A file of the flight is damaged.
     """
-    mission, run = what.mission, what.run
-    if run is None and mission.tour is None:
-        raise InputError(
-            f"{mission.name}: tour: the mission has none; expected one that `netsp solve` has "
-            "planned, or the folder of a run"
-        )
-    scene = what.scene
+    mission, scene, run = what.mission, what.scene, what.run
     title = f"{mission.name}: {'a planned mission' if run is None else 'a flight'}"
     summary: dict[str, Any] = {}
     rows: list[dict[str, str]] = []
