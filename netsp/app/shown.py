@@ -53,58 +53,23 @@ class Shown:
     events: list[dict[str, str]] = field(default_factory=list)
 
     def facts(self) -> dict[str, Any]:
-        """Profile of a run, as of `netsp.app.facts.facts`.
-
-        Returns
-        -------
-        dict
-            Tether out and height over the share of the time.
-        """
+        """Return tether out and height over the share of the time, as `netsp.app.facts.facts`."""
         last = max(len(self.frames) - 1, 1)
         rows = [[k / last, f["length"], f["z"]] for k, f in enumerate(self.frames)]
         return {"sufficient": None, "margins": None, "profile": rows, "visits": []}
 
     def problem(self) -> Problem:
-        """Return the site. Goals that a run has lost lie in obstacles.
-
-        Returns
-        -------
-        Problem
-            As it is at the end.
-        """
+        """Return the problem as it is at the end; goals that a run has lost lie in obstacles."""
         return Problem.from_run(json.dumps(self.data), "the run")
 
     def along(self, share: float) -> dict[str, Any]:
-        """Return the tether at a share of the run's time.
-
-        Parameters
-        ----------
-        share : float
-            From 0 to 1.
-
-        Returns
-        -------
-        dict
-            Of a frame.
-        """
+        """Return the frame at a share of the run's time, from 0 to 1."""
         k = round(min(max(share, 0.0), 1.0) * (len(self.frames) - 1))
         return {**self.frames[k], "share": share}
 
 
 def read_shown(source: str | Path, problem_file: str | Path | None = None) -> Shown:
-    """Read a solution file with its problem, or the folder of a run of `execute` or `simulate`.
-
-    Parameters
-    ----------
-    source : str or Path
-        File or folder.
-    problem_file : str or Path, optional
-        The problem of a solution file.
-
-    Returns
-    -------
-    Shown
-        What is on the page.
+    """Return the page of a solution file with its problem, or of the folder of a run.
 
     Raises
     ------

@@ -117,22 +117,7 @@ def steps_of(films: Sequence[Film], count: int) -> tuple[str, list[Step]]:
 
 
 def film_of_plan(problem: Problem, solution: Solution, count: int) -> Film:
-    """Return the film of a tour that is to be carried out.
-
-    Parameters
-    ----------
-    problem : Problem
-        The site.
-    solution : Solution
-        With a tour.
-    count : int
-        How many steps.
-
-    Returns
-    -------
-    Film
-        With the length of the tour.
-    """
+    """Return the film of a tour that is to be carried out, of `count` steps."""
     title = f"{problem.name}: tour of {solution.length:.4g} {problem.units} by {solution.solver}"
     moments = moments_of_plan(problem, solution, count)
     length = float(polylines.length(np.array(solution.path)))
@@ -147,20 +132,8 @@ def film_of_run(
     since: Mapping[str, Mapping[int, float]],
     count: int,
 ) -> Film:
-    """Return the film of a tour that was carried out.
-
-    Parameters
-    ----------
-    maps, rows, tethers, since
-        As of `netsp.view.pictures.moments.moments_of_run`.
-    count : int
-        How many moments, about.
-
-    Returns
-    -------
-    Film
-        With its seconds.
-    """
+    """Return the film of a tour that was carried out, of about `count` moments; the arguments are
+    those of `netsp.view.pictures.moments.moments_of_run`."""
     problem = maps[-1][1]
     moments = moments_of_run(maps, rows, tethers, count, since)
     places = np.array([g.position for g in problem.goals]).reshape(-1, 3)
@@ -169,22 +142,7 @@ def film_of_run(
 
 
 def film_of_flight(run: Run, scene: Scene, count: int) -> Film:
-    """Return the film of a flight in space.
-
-    Parameters
-    ----------
-    run : Run
-        The flight.
-    scene : Scene
-        Its scene.
-    count : int
-        How many moments, about.
-
-    Returns
-    -------
-    Film
-        With its seconds.
-    """
+    """Return the film of a flight in space, of about `count` moments."""
     moments = moments_of_flight(run, scene, count)
     mission = run.mission
     title, seconds = f"{mission.name}\n{title_of(run)}", run.log[-1].time
@@ -192,21 +150,7 @@ def film_of_flight(run: Run, scene: Scene, count: int) -> Film:
 
 
 def film_of_mission(mission: Mission, scene: Scene, count: int) -> Film:
-    """Return the film of a planned mission.
-
-    Parameters
-    ----------
-    mission : Mission
-        With a tour.
-    scene : Scene
-        Its scene.
-    count : int
-        How many steps.
-
-    Returns
-    -------
-    Film
-        With the length of the tour.
+    """Return the film of a planned mission, of `count` steps.
 
     Raises
     ------

@@ -190,21 +190,9 @@ def moments_of_run(
 
 
 def moments_of_flight(run: Run, scene: Scene, count: int) -> list[Moment]:
-    """Moments of a flight in space: its tether is driven again along the path.
+    """Return about `count` moments of a flight in space, the last one among them.
 
-    Parameters
-    ----------
-    run : Run
-        The flight.
-    scene : Scene
-        Its scene.
-    count : int
-        How many, about.
-
-    Returns
-    -------
-    list of Moment
-        The last one among them.
+    The tether is driven again along the path.
     """
     path = path_of(run)
     visited = {int(stop["waypoint"]) for stop in run.summary["stops"]}
@@ -231,20 +219,7 @@ def moments_of_flight(run: Run, scene: Scene, count: int) -> list[Moment]:
 
 
 def next_of(problem: Problem, goal: int) -> str:
-    """Return the name of a run's next goal.
-
-    Parameters
-    ----------
-    problem : Problem
-        The site.
-    goal : int
-        Number of the goal; those that were added on the way have one, too.
-
-    Returns
-    -------
-    str
-        The goal's name or number, or the base.
-    """
+    """Return the name or number of a run's next goal, which may have been added on the way."""
     if goal == HOME:
         return "the base"
     return problem.goal_label(goal) if goal < len(problem.goals) else f"goal #{goal}"

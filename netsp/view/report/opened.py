@@ -108,17 +108,7 @@ class Opened:
             return left_out | {int(g): CANCELLED for g in s["cancelled"]}
 
     def film(self, count: int) -> Film:
-        """Return the film of the tour or run.
-
-        Parameters
-        ----------
-        count : int
-            Moments, about.
-
-        Returns
-        -------
-        Film
-            Of it.
+        """Return the film of the tour or run, of about `count` moments.
 
         Raises
         ------
@@ -215,19 +205,7 @@ def open_result(
 
 
 def opened(source: str | Path, problem_file: str | Path | None) -> Opened:
-    """Read a solution file, whose problem is named, or the folder of a run.
-
-    Parameters
-    ----------
-    source : str or Path
-        The file or folder.
-    problem_file : str or Path, optional
-        The problem of a solution file; a run's folder holds its own.
-
-    Returns
-    -------
-    Opened
-        What is there.
+    """Return a solution file, whose problem is named, or the folder of a run in the plane.
 
     Raises
     ------

@@ -42,16 +42,6 @@ TOUR_STYLE = """
 def page(what: Opened) -> str:
     """Return the page as HTML.
 
-    Parameters
-    ----------
-    what : Opened
-        A solution or a run.
-
-    Returns
-    -------
-    str
-        The page.
-
     Raises
     ------
     InputError, KeyError, IndexError, ValueError, TypeError, OverflowError
