@@ -19,6 +19,8 @@ from netsp.base.compiled.compile_policy import compiles
 from netsp.base.compiled.disk_cache import lock_file
 from netsp.base.compiled.tiered import TieredDispatcher
 from netsp.command import background_warm_up, main, warm_up
+from netsp.command.command_options import add_options
+from netsp.command.command_table import WARM_UP
 
 ROOT = Path(__file__).parent.parent
 
@@ -248,5 +250,5 @@ def test_the_other_processes_of_warm_up_are_waited_for_or_ended(is_interrupted, 
 def warm_up_arguments(*words):
     """Return the parsed arguments of `netsp warm-up`."""
     parser = argparse.ArgumentParser()
-    warm_up.arguments(parser)
+    add_options(parser, WARM_UP.options)
     return parser.parse_args(words)

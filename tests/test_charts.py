@@ -209,8 +209,7 @@ def test_a_crop_changes_nothing_within_the_reach_of_any_base(seed):
     assert len(dropped) + len({id(t) for t in kept if t in things}) + len(cut_off) == len(things)
     reach = shapely.union_all(shapely.points(bases)).buffer(15.0)
     before, after = (
-        shapely.union_all([area_of(t) for t in some]).intersection(reach)
-        for some in (things, kept)
+        shapely.union_all([area_of(t) for t in some]).intersection(reach) for some in (things, kept)
     )
     assert before.symmetric_difference(after).area < 1e-6
 

@@ -10,7 +10,7 @@ import pytest
 
 from netsp.command.main import COMMANDS, _parser, main
 
-MODULES = {name: module for group in COMMANDS.values() for name, (module, _) in group.items()}
+ALL = {name: command for group in COMMANDS.values() for name, command in group.items()}
 
 
 def test_help_names_every_command_by_what_it_is_for(capsys):
@@ -22,18 +22,19 @@ def test_help_names_every_command_by_what_it_is_for(capsys):
         assert all(f"    {name} " in text for name in group)
 
 
-@pytest.mark.parametrize("name", MODULES)
+@pytest.mark.parametrize("name", ALL)
 def test_the_example_of_every_command_is_one(name, capsys):
-    command = importlib.import_module(f"netsp.command.{MODULES[name]}")
-    words = shlex.split(command.EXAMPLE.split(" > ")[0])
+    command = ALL[name]
+    words = shlex.split(command.example.split(" > ")[0])
     assert words[:2] == ["netsp", name]
-    assert _parser({name}).parse_args(words[1:]).run is command.run
+    assert _parser({name}).parse_args(words[1:]).declared is command
+    assert callable(importlib.import_module(command.module).run)
     with pytest.raises(SystemExit):
         main([name, "--help"])
-    assert command.EXAMPLE in capsys.readouterr().out
+    assert command.example in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("name", MODULES)
+@pytest.mark.parametrize("name", ALL)
 def test_help_loads_nothing_heavy(name):
     code = (
         "import sys\nfrom netsp.command.main import main\n"

@@ -19,6 +19,7 @@ MOVED = {
     "arrays": "base.arrays",
     "axes": "base.axes",
     "clock": "base.clock",
+    "command.clearance_flags": "command.clearance_warning",
     "command.progress": "command.progress_table",
     "command.told": "command.json_output",
     "compare": "study.compare",

@@ -7,34 +7,6 @@ import sys
 from pathlib import Path
 
 from netsp.base.errors import InputError
-from netsp.command.types import check_writable, positive
-
-EXAMPLE = "netsp animate tour.json --problem problems/wharf.json -o tour.gif"
-
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    p.add_argument(
-        "source",
-        metavar="SOURCE",
-        nargs="+",
-        help="a solution, a planned mission, or the folder of a run of `netsp execute` or "
-        "`netsp simulate`; several stand side by side",
-    )
-    p.add_argument("--problem", metavar="FILE", help="the problem of solution files")
-    p.add_argument(
-        "-o",
-        "--output",
-        required=True,
-        metavar="FILE",
-        help="gif, mp4 (extra video), or a page (html) with a slider",
-    )
-    p.add_argument(
-        "--seconds", type=positive, default=12, metavar="N", help="how long it is; default 12"
-    )
-    p.add_argument("--fps", type=positive, default=15, metavar="N", help="default 15")
-    p.add_argument("--quiet", action="store_true", help="no progress")
-
 
 MAX_SIDE_BY_SIDE = 3
 """Maximum number of runs in one film."""
@@ -51,7 +23,6 @@ MAX_FPS = 60
 
 def run(args: argparse.Namespace) -> int:
     """Draw, and return the exit code."""
-    check_writable(args.output, inputs=(*args.source, args.problem))
     from netsp.view.pictures.animation import FORMATS, save_animation
     from netsp.view.report.opened import open_result
 

@@ -13,45 +13,9 @@ from typing import TYPE_CHECKING
 
 from netsp.base.errors import InputError
 from netsp.command import messages
-from netsp.command.types import positive
 
 if TYPE_CHECKING:
     from netsp.app.state import Document
-
-EXAMPLE = "netsp app problems/wharf.json"
-
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    p.add_argument(
-        "problem",
-        metavar="PROBLEM",
-        nargs="?",
-        help="problem file (JSON), made if there is none, or a map of a site (docs/sites.md); "
-        "default: an empty map without a file; with --show a solution file, or the folder of a run",
-    )
-    p.add_argument(
-        "--show",
-        action="store_true",
-        help="only look: at a solution (with --problem), or a run of `netsp execute` or `simulate`",
-    )
-    p.add_argument(
-        "--problem",
-        metavar="FILE",
-        dest="problem_file",
-        help="with --show: the problem of a solution file",
-    )
-    p.add_argument(
-        "--port", type=int, default=0, metavar="N", help="port to listen on; default: a free one"
-    )
-    p.add_argument(
-        "--time-limit",
-        type=positive,
-        default=60,
-        metavar="S",
-        help="seconds of solving for each version; default 60",
-    )
-    p.add_argument("--no-browser", action="store_true", help="only print the address")
 
 
 def _document(name: str | None) -> tuple[Document, list[str]]:

@@ -8,62 +8,17 @@ import sys
 from netsp.base.errors import EXIT_INFEASIBLE, EXIT_NOT_ALL
 from netsp.command import messages
 from netsp.command.command_clock import command_clock
-from netsp.command.types import check_writable, natural, positive, seconds
-
-EXAMPLE = "netsp base problems/wharf.json --grid 10,10 --plot base.png"
-
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    p.add_argument(
-        "problem", metavar="PROBLEM", help="problem file (JSON); its base does not count"
-    )
-    where = p.add_mutually_exclusive_group(required=True)
-    where.add_argument(
-        "--candidates", metavar="FILE", help="table (CSV) with the columns x, y and perhaps z, name"
-    )
-    where.add_argument("--line", metavar="X1,Y1,X2,Y2,N", help="N places along a line, as a quay")
-    where.add_argument(
-        "--grid", metavar="NX,NY", help="a grid over the bounds, or over what the problem holds"
-    )
-    p.add_argument(
-        "--every", action="store_true", help="solve from every place, also those proven worse"
-    )
-    p.add_argument(
-        "--top", type=positive, default=10, metavar="N", help="places printed; default 10"
-    )
-    p.add_argument(
-        "--time-limit",
-        type=seconds,
-        metavar="S",
-        help="seconds; the best known by then is written; default none",
-    )
-    p.add_argument("--seed", type=natural, default=0, metavar="N", help="default 0")
-    p.add_argument(
-        "-o", "--output", metavar="FILE", help="write the ranking: a table (.csv) or JSON"
-    )
-    p.add_argument(
-        "--problem-output", metavar="FILE", help="write the problem with its base at the best place"
-    )
-    p.add_argument("--plot", metavar="FILE", help="draw both maps (.png, .svg or .pdf)")
-    p.add_argument("--quiet", action="store_true", help="no progress")
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the ranking, write what is asked for, and return the exit code."""
-    check_writable(
-        args.output, args.plot, args.problem_output, inputs=(args.problem, args.candidates)
-    )
     from netsp.base.files import write_text
     from netsp.exchange.maps.csv_table import from_table
     from netsp.exchange.maps.projection import Projection
     from netsp.model.problem import Problem
     from netsp.plan.sizing.base_placement import Candidate, best_base
     from netsp.plan.sizing.candidates import along_line, over_grid
-    from netsp.view.pictures import style
 
-    if args.plot:
-        style.check_format(args.plot)
     clock = command_clock(args.time_limit)
     problem = clock.bounded("reading the problem", lambda: Problem.load(args.problem))
     names: list[str | None] | None = None
@@ -109,6 +64,8 @@ def run(args: argparse.Namespace) -> int:
     if args.output:
         search.save(args.output)
     if args.plot:
+        from netsp.view.pictures import style
+
         style.save(search.plot()[0].figure, args.plot)
         print(f"picture {args.plot}", file=sys.stderr)
     if search.best_problem is None:

@@ -10,64 +10,11 @@ from typing import TYPE_CHECKING, Any, TextIO
 from netsp.base.errors import EXIT_INTERRUPTED, InputError
 from netsp.command import json_output, messages
 from netsp.command.patience import span
-from netsp.command.types import length, natural, positive, seconds, shard
 
 if TYPE_CHECKING:
     from netsp.study.compare.rows import TrialRow
     from netsp.study.compare.study import Study
     from netsp.study.compare.study_run import Tally
-
-EXAMPLE = "netsp compare examples/study.toml -o rows.jsonl --jobs 2"
-
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    p.add_argument(
-        "study",
-        metavar="STUDY",
-        nargs="?",
-        help="study file (TOML); without one, the options below describe the study",
-    )
-    p.add_argument("-o", "--output", required=True, metavar="FILE", help="results (JSON lines)")
-    p.add_argument("--goals", type=positive, nargs="+", metavar="N", help="numbers of goals")
-    p.add_argument("--tethers", type=length, nargs="+", metavar="L", help="tether lengths")
-    p.add_argument("--solvers", nargs="+", metavar="NAME", help="solvers to compare")
-    p.add_argument(
-        "--roadmaps", nargs="+", metavar="NAME", help="roadmaps to compare; default taut"
-    )
-    p.add_argument(
-        "--worlds",
-        type=positive,
-        metavar="N",
-        help="number of worlds for each number of goals and tether length; default 10",
-    )
-    p.add_argument("--family", metavar="NAME", help="family of random worlds; default icra2017")
-    p.add_argument(
-        "--seeds",
-        type=natural,
-        nargs="+",
-        metavar="N",
-        help="random seeds of the solvers; default 0",
-    )
-    p.add_argument("--time-limit", type=seconds, metavar="S", help="seconds per trial; default 120")
-    p.add_argument(
-        "--memory-limit", type=length, metavar="GIB", help="GiB per trial; default no limit"
-    )
-    p.add_argument(
-        "--jobs",
-        type=positive,
-        default=1,
-        metavar="N",
-        help="number of worker processes; default 1",
-    )
-    p.add_argument(
-        "--shard", type=shard, default=(1, 1), metavar="I/N", help="only the I-th of N parts"
-    )
-    p.add_argument(
-        "--scheduler", metavar="ADDRESS", help="run on the Dask cluster at tcp://host:port"
-    )
-    p.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    json_output.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:

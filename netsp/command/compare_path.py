@@ -10,84 +10,14 @@ from typing import TYPE_CHECKING
 
 from netsp.base.errors import EXIT_INFEASIBLE, EXIT_NOT_ALL, InputError
 from netsp.command import json_output, messages
-from netsp.command.types import check_writable, length, natural, seconds
 
 if TYPE_CHECKING:
     from netsp.exchange.maps.path_file import FoundPath
     from netsp.model.problem import Problem
     from netsp.study.compare.path_comparison import PathComparison
 
-EXAMPLE = (
-    "netsp compare-path problems/wharf.json examples/paths/wharf-systematic-1.csv --html page.html"
-)
 
 TABLES = (".csv", ".json")
-
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command line."""
-    p.add_argument(
-        "problem",
-        metavar="PROBLEM",
-        help="problem file (JSON), or a study of paths (.toml), which names problem and paths",
-    )
-    p.add_argument(
-        "paths",
-        metavar="PATH",
-        nargs="*",
-        help="a path: table (.csv; columns x, y[, z] or lon, lat[, depth], and t), GeoJSON, GPX, a "
-        "recorded flight (.csv.gz, .tlog, .bin) or a solution",
-    )
-    p.add_argument(
-        "--solution", metavar="FILE", help="the planned tour; default: solved on the spot"
-    )
-    p.add_argument(
-        "--radius",
-        type=length,
-        metavar="R",
-        help="distance at which a goal counts as visited, in the problem's units; default 2 %% of "
-        "the problem's size",
-    )
-    p.add_argument(
-        "--speed",
-        type=length,
-        metavar="V",
-        help="speed of the tour and of paths without time stamps, in the problem's units per "
-        "second; default 0.5",
-    )
-    p.add_argument(
-        "--noise",
-        type=length,
-        metavar="M",
-        default=0.0,
-        help="straighten paths by up to M, the error of their positions; default 0",
-    )
-    p.add_argument(
-        "--frame",
-        metavar="NAME",
-        help="local (the problem's plane) or global (degrees), for recordings and GeoJSON; default "
-        "global where the problem has an origin",
-    )
-    p.add_argument(
-        "--system",
-        type=natural,
-        metavar="N",
-        help="the vehicle's system id in a .tlog; default: the only one with positions",
-    )
-    p.add_argument(
-        "--time-limit", type=seconds, metavar="S", help="seconds for the tour; default no limit"
-    )
-    p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
-    p.add_argument(
-        "-o",
-        "--output",
-        metavar="FILE",
-        help="write a row for the tour and each path: a table (.csv; - is standard output) or JSON",
-    )
-    p.add_argument("--plot", metavar="FILE", help="draw paths and tour (png, svg or pdf)")
-    p.add_argument("--html", metavar="FILE", help="write a page with pictures and tables")
-    p.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    p.add_argument("--json", action="store_true", help="print all figures as JSON on stdout")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -97,7 +27,6 @@ def run(args: argparse.Namespace) -> int:
     from netsp.study.compare.path_comparison import compare_paths
     from netsp.study.paths import PathPolicy
     from netsp.study.paths.path_measures import DEFAULT_SPEED
-    from netsp.view.pictures import style
 
     if args.json and args.output == STANDARD:
         raise InputError("--json: standard output is taken by the table; expected -o FILE")
@@ -105,11 +34,6 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"{args.output}: expected a name ending in {' or '.join(TABLES)}")
     if args.html is not None and not args.html.lower().endswith((".html", ".htm")):
         raise InputError(f"{args.html}: a page is HTML; expected a name ending in .html")
-    check_writable(
-        args.output, args.plot, args.html, inputs=(args.problem, args.solution, *args.paths)
-    )
-    if args.plot is not None:
-        style.check_format(args.plot)
     problem, paths = _inputs(args)
     solution = Solution.load(args.solution) if args.solution else None
     from netsp.command.stages import Stages
@@ -141,6 +65,7 @@ def run(args: argparse.Namespace) -> int:
         text = found.to_csv() if as_table else json.dumps(found.to_dict(), indent=1) + "\n"
         write_text(args.output, text)
     if args.plot is not None:
+        from netsp.view.pictures import style
         from netsp.view.pictures.path_picture import draw_comparison
 
         style.save(draw_comparison(found), args.plot)

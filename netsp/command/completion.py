@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-EXAMPLE = """netsp completion bash > ~/.local/share/bash-completion/completions/netsp"""
-
 
 def _names(command: str) -> dict[str, list[str]]:
     """Names that options of a command take; those of other packages are among them."""
@@ -35,14 +33,6 @@ def _names(command: str) -> dict[str, list[str]]:
         "--paths": ["tree", "bitstar", "rrtstar", "prmstar"],
         "--refine": ["none", "paper", "gradient"],
     }
-
-
-SHELLS = ("bash", "zsh", "tcsh")
-
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    p.add_argument("shell", choices=SHELLS, help="that is to complete")
 
 
 def run(args: argparse.Namespace) -> int:

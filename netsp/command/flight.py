@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import argparse
+import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from netsp.base.errors import LimitReachedError
+from netsp.base.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, LimitReachedError
 from netsp.command import json_output
+from netsp.command.command_options import Input, files_of
 from netsp.command.types import check_writable
 
 if TYPE_CHECKING:
@@ -18,7 +21,6 @@ if TYPE_CHECKING:
     from netsp.world.mission.run_log import LogRow, Run
     from netsp.world.planner import Planner
     from netsp.world.scene.scene import Scene
-    from netsp.world.simulator.surprises import SceneSurprises
 
 
 WRITTEN = ("log.csv", "summary.json", "mission.json", "run.png", "run.html")
@@ -28,44 +30,42 @@ WRITTEN = ("log.csv", "summary.json", "mission.json", "run.png", "run.html")
 def fly(
     mission: Mission,
     planners: Sequence[str],
+    args: argparse.Namespace,
     *,
-    output: str | None,
-    quiet: bool,
-    surprises: SceneSurprises | None,
-    source: str | None,
-    check: bool = False,
-    as_json: bool = False,
-    inputs: Sequence[str | None] = (),
-    **how: Any,
+    is_judged: bool = False,
+    **options: Any,
 ) -> list[Run]:
-    """Fly a mission by each of some planners, tell what came of it, and write the first run.
+    """Fly a mission with each of some planners, print the results, and write the first run.
 
-    `check` has the mission's tour judged before; `inputs` are files that must not be overwritten;
-    `how` is as of `simulate`. Ctrl-C ends the flight, and what was flown is written."""
+    Ctrl-C ends the flight, and what was flown is written.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission.
+    planners : sequence of str
+        Names of the planners.
+    args : Namespace
+        Options `output`, `quiet`, `json` and `surprise` of the command, and its inputs.
+    is_judged : bool
+        Whether the tour of the mission is judged first.
+    **options
+        Further options of `simulate`.
+    """
     from netsp.base.compiled.compile_policy import long_work
     from netsp.base.interrupt_signals import until_interrupt
 
-    if output is not None:
-        existing = [str(Path(output) / name) for name in WRITTEN if (Path(output) / name).exists()]
-        check_writable(*existing, inputs=inputs)
+    if args.output is not None:
+        files = (str(Path(args.output) / name) for name in WRITTEN)
+        check_writable(*filter(os.path.exists, files), inputs=files_of(args, Input))
     with until_interrupt(None) as clock, long_work():
         try:
-            runs = _flown(
-                mission,
-                planners,
-                clock,
-                output=output,
-                quiet=quiet,
-                surprises=surprises,
-                source=source,
-                check=check,
-                **how,
-            )
+            runs = _flown(mission, planners, clock, args, is_judged, **options)
         except LimitReachedError:
             if clock.is_stopped:
                 raise KeyboardInterrupt from None
             raise
-    if output is None or as_json:
+    if args.output is None or args.json:
         json_output.tell(runs[0].summary)
     return runs
 
@@ -74,42 +74,36 @@ def _flown(
     mission: Mission,
     planners: Sequence[str],
     clock: Clock,
-    *,
-    output: str | None,
-    quiet: bool,
-    surprises: SceneSurprises | None,
-    source: str | None,
-    check: bool,
-    **how: Any,
+    args: argparse.Namespace,
+    is_judged: bool,
+    **options: Any,
 ) -> list[Run]:
     from netsp.base.files import output_folder
-    from netsp.command.plot_scene import note_scene, tell, warn_of_scene
+    from netsp.command.plot_scene import note_mission_scene, tell
     from netsp.world.mission.run_log import describe_run, write_run
     from netsp.world.simulator.mission_run import simulate
-    from netsp.world.tether import GeodesicTether
+    from netsp.world.simulator.surprises import SceneSurprises
 
-    show = not quiet and sys.stderr.isatty()
+    surprises = SceneSurprises.load(args.surprise) if args.surprise else None
+    show = not args.quiet and sys.stderr.isatty()
     runs: list[Run] = []
-    with output_folder(output):
+    with output_folder(args.output):
         scene = clock.bounded("reading the scene", mission.load_scene)
         if surprises is not None:
-            surprises.check(scene, source or "", len(mission.waypoints))
+            surprises.check(scene, args.surprise, len(mission.waypoints))
         field = clock.bounded(
             "measuring distances in the scene", lambda: scene.field(on_progress=tell)
         )
         if surprises is not None:
-            surprises.check_places(mission, scene, field, source or "")
-        if check:
+            surprises.check_places(mission, scene, field, args.surprise)
+        if is_judged:
             from netsp.plan.space.judge import check_mission_tour
 
             clock.bounded("judging the tour", lambda: check_mission_tour(mission, scene, field))
         if clock.is_stopped:
             raise KeyboardInterrupt
-        if not quiet:
-            note_scene(scene.name, field.notes)
-            warn_of_scene(
-                GeodesicTether(field, mission.delta), mission.delta, "lower the mission's delta"
-            )
+        if not args.quiet:
+            note_mission_scene(mission, scene, field)
         for planner in planners:
             on_step = until_stopped(clock, show_mission(mission, scene.units) if show else None)
             fly_by = partial(
@@ -120,7 +114,7 @@ def _flown(
                 field=field,
                 surprises=surprises,
                 on_step=on_step,
-                **how,
+                **options,
             )
             run = clock.bounded("flying", fly_by, winds_down=True)
             runs.append(run)
@@ -128,19 +122,26 @@ def _flown(
                 from netsp.plan.space.flown import words_of_flight
 
                 run.summary["words"] = words_of_flight(run, scene=scene, field=field).to_summary()
-            if not quiet:
-                print(
-                    ("\r\n" if sys.stderr.isatty() else "") + describe_run(run, scene.units),
-                    file=sys.stderr,
-                )
+            if not args.quiet:
+                new_line = "\r\n" if sys.stderr.isatty() else ""
+                print(new_line + describe_run(run, scene.units), file=sys.stderr)
             if run.summary["status"] == "interrupted":
                 break
-    if output is not None:
-        write_run(runs[0], output)
+    if args.output is not None:
+        write_run(runs[0], args.output)
         if len(runs) > 1:
-            write_run(runs[1], Path(output) / runs[1].planner)
-        draw_runs(runs, runs[0].scene or scene, Path(output))
+            write_run(runs[1], Path(args.output) / runs[1].planner)
+        draw_runs(runs, runs[0].scene or scene, Path(args.output))
     return runs
+
+
+def exit_code(summary: Mapping[str, Any], is_home: bool, is_free: bool) -> int:
+    """Return the exit code for the summary of a run."""
+    if summary["defects"]:
+        return EXIT_DEFECT
+    if summary["exceedance_s"] > 0.0 or (is_home and not is_free):
+        return EXIT_NOT_VERIFIED
+    return EXIT_NOT_ALL if summary["left_out"] or summary["status"] != "done" else 0
 
 
 def draw_runs(runs: list[Run], scene: Scene, folder: Path) -> None:

@@ -11,137 +11,22 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from netsp.base.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
-from netsp.command import json_output as told
-from netsp.command.clearance_flags import clearance_flags, warn_of_problem
-from netsp.command.guard import GUARD_PORT
-from netsp.command.types import length, natural, seconds, system_id
+from netsp.base.errors import InputError
+from netsp.command import json_output
+from netsp.command.clearance_warning import warn_of_problem
+from netsp.command.types import load_verified_pair
 
 if TYPE_CHECKING:
     from netsp.base.clock import Clock
     from netsp.model.problem import Problem
     from netsp.model.solution import Solution
-    from netsp.online.execute.events import Event
+    from netsp.online.execute.events import Event, Surprises
     from netsp.online.execute.execution_log import Execution, ExecutionRow
     from netsp.online.fly.flight_time import FlightTime
     from netsp.online.fly.resume import BeginsAt
     from netsp.online.guard.guard_page import Page
     from netsp.online.link.geo_frame import Frame
     from netsp.online.link.session import Session
-
-EXAMPLE = "netsp fly problems/wharf.json tour.json --link udpin:14550 -o run"
-
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    p.add_argument("problem", metavar="PROBLEM", nargs="?", help="problem file (JSON)")
-    p.add_argument("solution", metavar="TOUR", nargs="?", help="its solution file (JSON)")
-    p.add_argument(
-        "--resume",
-        metavar="RUN",
-        help="resume the flight in this folder from where the vehicle is, in place of PROBLEM and "
-        "TOUR; writes RUN/resumed unless -o names another folder",
-    )
-    p.add_argument(
-        "--class",
-        dest="word",
-        metavar="WORD",
-        help="begin where the vehicle is, with its tether in this class: numbers of obstacles from "
-        "1, negative from right to left, such as --class=-1,2; '' for a straight tether",
-    )
-    p.add_argument(
-        "--class-from",
-        metavar="FILE",
-        help="begin where the vehicle is, with the tether in the state file of netsp guard",
-    )
-    p.add_argument(
-        "--link",
-        metavar="ADDRESS",
-        help="MAVLink over UDP: udpin:PORT (this machine only), udpin:HOST:PORT, udpout:HOST:PORT",
-    )
-    p.add_argument(
-        "--dry-run", action="store_true", help="show what would be sent, and send nothing"
-    )
-    p.add_argument(
-        "--system",
-        type=system_id,
-        default=1,
-        metavar="N",
-        help="system id of the vehicle; others are not listened to; default 1",
-    )
-    p.add_argument(
-        "--any-vehicle",
-        action="store_true",
-        help="command any vehicle, not only an ArduPilot submarine; for experts: others use the "
-        "same numbers for other modes",
-    )
-    p.add_argument(
-        "--frame",
-        metavar="NAME",
-        help="local (metres north, east, down of the base) or global; default global where the "
-        "problem has an origin",
-    )
-    p.add_argument(
-        "--speed",
-        type=length,
-        default=0.5,
-        metavar="V",
-        help="cruise speed of the vehicle, m/s, used to predict times and to compare repairs; "
-        "default 0.5",
-    )
-    p.add_argument(
-        "--reach",
-        type=length,
-        default=0.3,
-        metavar="R",
-        help="a vertex or goal this near is reached, m; default 0.3",
-    )
-    p.add_argument(
-        "--pace",
-        type=length,
-        default=1.0,
-        metavar="F",
-        help="seconds of the vehicle for each of ours: 1, but in simulations that run faster",
-    )
-    p.add_argument(
-        "--at-end",
-        choices=("hold", "position-hold", "surface", "leave"),
-        default="hold",
-        help="after the flight: hold the place in GUIDED, in POSHOLD, or come to the surface, "
-        "until another ground station is heard or Ctrl-C; or leave the vehicle; default hold",
-    )
-    p.add_argument("--surprise", metavar="FILE", help="surprise file (JSON): events on the way")
-    p.add_argument(
-        "--events",
-        action="store_true",
-        help='take events from standard input, a JSON object a line: {"cancel_goal": "A3"}',
-    )
-    p.add_argument(
-        "--page",
-        nargs="?",
-        type=natural,
-        const=GUARD_PORT,
-        metavar="PORT",
-        help=f"serve a page on this machine, which takes events too; default port {GUARD_PORT}",
-    )
-    p.add_argument(
-        "--planning-limit",
-        type=seconds,
-        metavar="S",
-        help="seconds that a repair may take, while the vehicle holds its place; default 2",
-    )
-    p.add_argument(
-        "--reserve",
-        type=length,
-        metavar="R",
-        help="tether that repairs keep in reserve, m; default: as the plan does, at most a tenth "
-        "of the limit",
-    )
-    p.add_argument("--seed", type=natural, default=0, metavar="N", help="of solvers; default 0")
-    p.add_argument("-o", "--output", metavar="RUN", help="folder for logs, summary and run.png")
-    clearance_flags(p)
-    p.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    told.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -150,13 +35,12 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--json: a dry run prints its targets as a table; expected no --json")
     if args.link is None and not args.dry_run:
         raise InputError("--link: missing; expected the vehicle's address, or --dry-run")
-    from netsp.online.execute.events import Surprises
+    from netsp.command.execute import checked_surprises
+    from netsp.command.flight import exit_code
     from netsp.online.link.geo_frame import Frame
 
     problem, solution, begins = _given(args)
-    surprises = Surprises.load(args.surprise) if args.surprise else None
-    if surprises is not None:
-        surprises.check(problem, args.surprise)
+    surprises = checked_surprises(args, problem)
     if problem.units != "m":
         raise InputError(f"units: a vehicle goes by metres; expected m, got {problem.units!r}")
     frame = Frame(problem, args.frame)
@@ -190,19 +74,11 @@ def run(args: argparse.Namespace) -> int:
     if failure is not None:
         raise failure
     assert not isinstance(done, BaseException)
-    s = done.summary
-    if s["defects"]:
-        return EXIT_DEFECT
-    if s["exceedance_s"] > 0.0 or (s["home"] and not s["tether_free"]):
-        return EXIT_NOT_VERIFIED
-    return EXIT_NOT_ALL if s["left_out"] or s["status"] != "done" else 0
+    return exit_code(done.summary, done.summary["home"], done.summary["tether_free"])
 
 
 def _given(args: argparse.Namespace) -> tuple[Problem, Solution, BeginsAt | None]:
     """Return problem and tour, and how the flight begins if not at the start of the tour."""
-    from netsp.judge import verify
-    from netsp.model.problem import Problem
-    from netsp.model.solution import Solution
     from netsp.online.fly.resume import (
         from_guard,
         from_record,
@@ -224,11 +100,7 @@ def _given(args: argparse.Namespace) -> tuple[Problem, Solution, BeginsAt | None
     if args.resume is None:
         if args.problem is None or args.solution is None:
             raise InputError("PROBLEM, TOUR: missing; expected two files, or --resume RUN")
-        problem, solution = Problem.load(args.problem), Solution.load(args.solution)
-        judged = verify(problem, solution)
-        if not judged:
-            failed = next(c for c in judged.checks if not c.passed)
-            raise InputError(f"{args.solution}: fails its check {failed.name!r}: {failed.detail}")
+        problem, solution = load_verified_pair(args.problem, args.solution)
         state = None
     else:
         if args.problem is not None:
@@ -285,7 +157,7 @@ def _tell(args: argparse.Namespace, done: Execution) -> None:
         write_execution(done, args.output)
         save_execution(done, Path(args.output) / "run.png")
     if args.output is None or args.json:
-        told.tell(done.summary)
+        json_output.tell(done.summary)
         sys.stdout.flush()
     if not args.quiet:
         from netsp.online.execute.execution_log import describe_execution
@@ -325,7 +197,7 @@ def _flown(
     problem: Problem,
     solution: Solution,
     frame: Frame,
-    surprises: object,
+    surprises: Surprises | None,
     begins: BeginsAt | None,
     stack: ExitStack,
     predicted: FlightTime | None,
@@ -335,7 +207,6 @@ def _flown(
     from netsp.base.files import output_folder
     from netsp.base.interrupt_signals import until_interrupt
     from netsp.command.execute import show_execution
-    from netsp.online.execute.events import Surprises
     from netsp.online.execute.execute_policy import RepairPolicy
     from netsp.online.execute.execution_log import ExecutionOptions
     from netsp.online.execute.run_record import RunRecord
@@ -347,17 +218,13 @@ def _flown(
     from netsp.online.link.session import Session
     from netsp.online.link.udp import UdpLink
 
-    planning_limit = args.planning_limit
-    if planning_limit is None:
-        planning_limit = RepairPolicy.time_limit_s
     options = ExecutionOptions(
         speed=args.speed,
         reach=args.reach,
         seed=args.seed,
-        planning_limit=planning_limit,
+        planning_limit=args.planning_limit or RepairPolicy.time_limit_s,
         reserve_policy=ReservePolicy(args.reserve),
     )
-    assert surprises is None or isinstance(surprises, Surprises)
     address = Address.parse(args.link)
     check_options(options, surprises)
     stack.enter_context(output_folder(args.output))

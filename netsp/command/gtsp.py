@@ -11,72 +11,22 @@ from typing import TYPE_CHECKING
 from netsp.base.errors import EXIT_INFEASIBLE, EXIT_NOT_ALL, InputError
 from netsp.command import json_output
 from netsp.command.command_clock import command_clock
-from netsp.command.types import check_writable, natural, option, positive, seconds
+from netsp.command.command_options import given_params
 
 if TYPE_CHECKING:
     from netsp.gtsp.gtsplib import Instance
     from netsp.gtsp.travel.result import Result
 
-EXAMPLE = "netsp gtsp examples/7ring28.gtsp -o ring.tour --plot ring.png"
-
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    p.add_argument("instance", metavar="FILE", help="file in the format of TSPLIB or GTSPLIB")
-    p.add_argument(
-        "--solver",
-        default="auto",
-        metavar="NAME",
-        help="auto (default), mip, dp, reduced-mip, lns, anneal or greedy",
-    )
-    p.add_argument(
-        "--option",
-        action="append",
-        default=[],
-        type=option,
-        metavar="NAME=VALUE",
-        help="an option of the solver, as docs/solvers.md lists them; may be repeated",
-    )
-    p.add_argument(
-        "--time-limit",
-        type=seconds,
-        metavar="S",
-        help="seconds; the best tour by then is written; default no limit",
-    )
-    p.add_argument(
-        "--iteration-limit",
-        type=positive,
-        metavar="N",
-        help="iterations of the solver; default no limit",
-    )
-    p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
-    p.add_argument(
-        "-o",
-        "--output",
-        metavar="FILE",
-        help="write the tour, in TSPLIB's format, to this file (default: stdout)",
-    )
-    p.add_argument("--plot", metavar="FILE", help="draw the tour (png, svg or pdf)")
-    p.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    json_output.json_flag(p)
-
 
 def run(args: argparse.Namespace) -> int:
     """Solve, write, and return the exit code."""
-    json_output.check_stdout(args)
-    check_writable(args.output, args.plot, inputs=(args.instance,))
-    from netsp.base.files import write_text
+    from netsp.base.files import STANDARD, write_text
     from netsp.command.progress_table import ProgressTable
     from netsp.gtsp.gtsplib import load
     from netsp.gtsp.gtsplib.tour_file import tour_text
     from netsp.plan.solve_problem import solve_graph
 
-    if args.plot:
-        from netsp.view.pictures import style
-
-        style.check_format(args.plot)
-    if len(dict(args.option)) < len(args.option):
-        raise InputError("--option: the same option is given twice")
+    params = given_params(args)
     clock = command_clock(args.time_limit)
     instance = clock.bounded("reading the instance", lambda: load(args.instance))
     if args.plot and instance.places is None:
@@ -95,11 +45,11 @@ def run(args: argparse.Namespace) -> int:
             time_limit=clock,
             iteration_limit=args.iteration_limit,
             seed=args.seed,
-            params=dict(args.option),
+            params=params,
             on_progress=table,
         )
     if result.tour is not None:
-        write_text(args.output or "-", tour_text(instance, result))
+        write_text(args.output or STANDARD, tour_text(instance, result))
     if args.plot:
         from netsp.view.pictures import style
         from netsp.view.pictures.gtsp_picture import draw_gtsp

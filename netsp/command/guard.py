@@ -10,93 +10,11 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from netsp.base.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 from netsp.command import messages
-from netsp.command.types import check_writable, length, natural, system_id
 
 if TYPE_CHECKING:
     from netsp.online.guard.guard_report import Report
     from netsp.online.guard.site import Site
     from netsp.online.guard.telemetry import Fix
-
-EXAMPLE = "netsp guard problems/wharf.json --link udpin:14550 --page"
-
-GUARD_PORT = 8650
-"""Default port of the guard's page."""
-
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    p.add_argument(
-        "site",
-        metavar="SITE",
-        help="problem file or mission file (JSON); one of a planned mission also tells whether the "
-        "tether is as planned",
-    )
-    source = p.add_argument_group("where it listens; the vehicle is never commanded to move")
-    source.add_argument(
-        "--link",
-        metavar="ADDRESS",
-        help="MAVLink over UDP: udpin:PORT (this machine only), udpin:HOST:PORT, udpout:HOST:PORT",
-    )
-    source.add_argument("--replay", metavar="LOG", help="a recording: .csv, .csv.gz, .tlog or .bin")
-    source.add_argument(
-        "--frame",
-        metavar="NAME",
-        help="local (metres north, east, down of the base) or global; default global where the "
-        "site has an origin",
-    )
-    source.add_argument(
-        "--system",
-        type=system_id,
-        metavar="N",
-        help="the vehicle's system id; default: the first one heard; in a recording, the only one "
-        "with positions",
-    )
-    vehicle = p.add_argument_group("what is known of the vehicle")
-    vehicle.add_argument(
-        "--noise",
-        type=length,
-        default=0.3,
-        metavar="M",
-        help="standard deviation of one position, m; default 0.3",
-    )
-    vehicle.add_argument(
-        "--drift",
-        type=length,
-        default=0.5,
-        metavar="M",
-        help="standard deviation of how far positions are off for minutes, m; default 0.5",
-    )
-    vehicle.add_argument(
-        "--speed", type=length, default=0.5, metavar="V", help="fastest speed, m/s; default 0.5"
-    )
-    p.add_argument(
-        "--state", metavar="FILE", help="keep the class here, and go on from it when started again"
-    )
-    p.add_argument(
-        "--publish",
-        action="store_true",
-        help="send tether, slack and alarms to the link (NAMED_VALUE_FLOAT, STATUSTEXT)",
-    )
-    p.add_argument(
-        "--ask-rates",
-        action="store_true",
-        help="ask the vehicle to send its position ten times a second (SET_MESSAGE_INTERVAL)",
-    )
-    p.add_argument(
-        "--page",
-        nargs="?",
-        type=natural,
-        const=GUARD_PORT,
-        metavar="PORT",
-        help=f"serve a page on this machine; default port {GUARD_PORT}",
-    )
-    p.add_argument(
-        "-o",
-        "--output",
-        metavar="FILE",
-        help="write every report as a line of JSON to this file; - is standard output",
-    )
-    p.add_argument("--quiet", action="store_true", help="no status line and no alarms in words")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -105,17 +23,14 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--link, --replay: expected one of them")
     if args.replay is not None and (args.publish or args.state or args.ask_rates):
         raise InputError("--publish, --state, --ask-rates: are for links; a recording is over")
-    output = None if args.output == "-" else args.output
-    check_writable(output, args.state, inputs=(args.site, args.replay))
     from netsp.base.files import is_mission_file
     from netsp.model.problem import Problem
     from netsp.online.guard.tether_guard import Guard, GuardOptions
     from netsp.online.link.geo_frame import Frame
     from netsp.world.mission.mission import Mission
 
-    guarded_site = (
-        Mission.load(args.site) if is_mission_file(args.site) else Problem.load(args.site)
-    )
+    kind = Mission if is_mission_file(args.site) else Problem
+    guarded_site = kind.load(args.site)
     options = GuardOptions(args.noise, args.drift, args.speed)
     frame = Frame(guarded_site, args.frame)
     fixes: list[Fix] = []

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 from netsp.base.errors import InfeasibleError, InputError
 from netsp.command import json_output, messages
+from netsp.command.command_options import names_of, refuse
+from netsp.command.command_table import IMAGES
 from netsp.command.patience import Patience
-from netsp.command.types import check_writable, depth, length, option, positive
 
 if TYPE_CHECKING:
     import shapely
@@ -20,165 +21,17 @@ if TYPE_CHECKING:
     from netsp.exchange.maps.sea_floor import SeaFloor
     from netsp.model.problem import Problem
 
-EXAMPLE = "netsp import examples/site.geojson -o problem.json"
 
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command line."""
-    p.add_argument(
-        "site",
-        metavar="SITE",
-        help="map: GeoJSON, KML, KMZ, shapefile, GeoPackage, DXF, S-57, GPX, .plan or .waypoints; "
-        "or an occupancy image: YAML, PNG, PGM (docs/sites.md)",
-    )
-    p.add_argument(
-        "--base",
-        metavar="LAT,LON[,HEADING]",
-        help="position of the base, and compass heading of the y axis; default: from the file; "
-        "X,Y (m) in an occupancy image",
-    )
-    p.add_argument(
-        "--tether", type=length, metavar="L", help="tether length (m); default: from the file"
-    )
-    p.add_argument(
-        "--clearance",
-        type=length,
-        metavar="C",
-        help="clearance from obstacles (m); default: from the file, or 0",
-    )
-    p.add_argument(
-        "--radius",
-        type=length,
-        metavar="R",
-        help="radius (m) of point obstacles that have none in the file",
-    )
-    p.add_argument(
-        "--map",
-        action="append",
-        type=option,
-        default=[],
-        metavar="OURS=THEIRS",
-        help="what a layer holds (base, goal, obstacle, bounds, path, ignore=LAYER) or what a "
-        "property is called (name, radius, depth, tether_length, clearance, heading=PROPERTY)",
-    )
-    p.add_argument(
-        "--crs",
-        metavar="SYSTEM",
-        help="coordinate system of a file that names none, as EPSG:32632; local for a plane",
-    )
-    p.add_argument(
-        "--units",
-        metavar="UNIT",
-        help="unit of lengths and of local coordinates in the file: m, km, cm, mm, ft, us-ft, in, "
-        "yd, fathom; default: the unit that the file states, or m",
-    )
-    p.add_argument(
-        "--line-width",
-        type=length,
-        metavar="W",
-        help="width (m) of open lines that are obstacles and have none in the file",
-    )
-    p.add_argument(
-        "--join-tolerance",
-        type=length,
-        metavar="T",
-        help="join lines to an outline where their ends are no farther apart (m); default 0.01",
-    )
-    p.add_argument(
-        "--crop",
-        action=argparse.BooleanOptionalAction,
-        help="leave out obstacles beyond the reach of the tether; default: in charts only",
-    )
-    p.add_argument(
-        "--inspect", type=positive, metavar="N", help="N goals about every obstacle, at every depth"
-    )
-    p.add_argument(
-        "--standoff", type=length, metavar="S", help="distance (m) of those goals from its surface"
-    )
-    p.add_argument(
-        "--of",
-        action="append",
-        type=option,
-        default=[],
-        metavar="WORD=VALUE",
-        help="inspect these obstacles only: layer=NAME, name=NAME (with * and ?), "
-        "box=XMIN,YMIN,XMAX,YMAX (m), earth=SOUTH,WEST,NORTH,EAST (degrees); repeat a word for "
-        "alternatives, different words must all match",
-    )
-    p.add_argument(
-        "--depths", default="0", metavar="D[,D…]", help="depths (m) of those goals; default 0"
-    )
-    p.add_argument(
-        "--depth", type=depth, metavar="D", help="depth of all goals (m), instead of their own"
-    )
-    p.add_argument(
-        "--skip-unreachable",
-        action="store_true",
-        help="leave out goals that the tether cannot reach, and say which and why",
-    )
-    p.add_argument(
-        "--goals",
-        metavar="TABLE",
-        help="more goals: CSV with the columns x, y (m) or lat, lon, and perhaps z or depth, name",
-    )
-    p.add_argument(
-        "--candidates",
-        metavar="TABLE",
-        help="places where the base may stand (columns as for --goals); a cropped map keeps the "
-        "reach from each of them",
-    )
-    charts = p.add_argument_group("charts")
-    charts.add_argument(
-        "--draught",
-        type=depth,
-        metavar="D",
-        help="areas that may be shallower than this (m), or are not surveyed, become obstacles",
-    )
-    charts.add_argument(
-        "--floor",
-        metavar="FILE",
-        help="write the sea floor of the chart's depths (.asc, .tif), for scenes",
-    )
-    charts.add_argument(
-        "--floor-cell",
-        type=length,
-        metavar="C",
-        help="size of its cells (m); default: 256 along a side",
-    )
-    images = p.add_argument_group("occupancy images")
-    images.add_argument(
-        "--resolution",
-        type=length,
-        metavar="R",
-        help="size of a cell (m), of an image without YAML",
-    )
-    images.add_argument(
-        "--tolerance",
-        type=length,
-        metavar="T",
-        help="how far obstacles may go beyond occupied cells (m); default: a cell",
-    )
-    images.add_argument(
-        "--unknown-free",
-        action="store_true",
-        help="take cells that the map does not know as free, not as obstacles",
-    )
-    p.add_argument(
-        "--plot", metavar="FILE", help="draw the problem, what was left out dashed: PNG, SVG or PDF"
-    )
-    p.add_argument(
-        "-o", "--output", metavar="FILE", help="write the problem to this file (default: stdout)"
-    )
-    json_output.json_flag(p)
+FOR_MAPS = (
+    "--map --crs --radius --inspect --standoff --line-width --join-tolerance --crop --of "
+    "--candidates --draught --floor --floor-cell --units"
+)
+"""Options that do not apply to occupancy images."""
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the problem, and return the exit code."""
-    json_output.check_stdout(args)
-    check_writable(
-        args.output, args.plot, args.floor, inputs=(args.site, args.goals, args.candidates)
-    )
-    from netsp.base.files import write_text
+    from netsp.base.files import STANDARD, write_text
     from netsp.exchange.maps.sea_floor import check_suffix
 
     if args.floor is not None:
@@ -234,10 +87,7 @@ def run(args: argparse.Namespace) -> int:
         messages.warning(text)
     if (text := height_warning(problem, HEIGHTS_REMEDY)) is not None:
         messages.warning(text)
-    if args.output is None:
-        sys.stdout.write(problem.to_json())
-    else:
-        write_text(args.output, problem.to_json())
+    write_text(args.output or STANDARD, problem.to_json())
     if floor is not None:
         floor.save(args.floor)
     if args.plot is not None:
@@ -278,33 +128,16 @@ def _extent(problem: Problem) -> str:
 
 def _is_image(args: argparse.Namespace) -> bool:
     """Return whether the site is an occupancy image; refuse options of the other kind."""
-    from netsp.exchange.maps.occupancy import FILES, IMAGES
+    from netsp.exchange.maps.occupancy import FILES
+    from netsp.exchange.maps.occupancy import IMAGES as IMAGE_FILES
 
-    image: bool = args.site.lower().endswith((*FILES, *IMAGES))
-    wrong = (
-        (
-            "map",
-            "crs",
-            "radius",
-            "inspect",
-            "standoff",
-            "line_width",
-            "join_tolerance",
-            "crop",
-            "of",
-            "candidates",
-            "draught",
-            "floor",
-            "floor_cell",
-            "units",
+    image: bool = args.site.lower().endswith((*FILES, *IMAGE_FILES))
+    if image:
+        refuse(args, FOR_MAPS, f"expected a map with features, got {args.site}")
+    else:
+        refuse(
+            args, names_of(IMAGES), f"expected an occupancy image (YAML, PNG, PGM), got {args.site}"
         )
-        if image
-        else ("resolution", "tolerance", "unknown_free")
-    )
-    for name in wrong:
-        if getattr(args, name):
-            kind = "a map with features" if image else "an occupancy image (YAML, PNG, PGM)"
-            raise InputError(f"--{name.replace('_', '-')}: expected {kind}, got {args.site}")
     return image
 
 
@@ -395,9 +228,7 @@ def _inspection(args: argparse.Namespace) -> InspectionOptions | None:
     from netsp.exchange.maps.selection import Selection
 
     if args.inspect is None:
-        for name in ("standoff", "of"):
-            if getattr(args, name):
-                raise InputError(f"--{name}: expected --inspect N with it")
+        refuse(args, "--standoff --of", "expected --inspect N with it")
         return None
     if args.standoff is None:
         raise InputError("--inspect: expected --standoff S with it")

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections.abc import Mapping
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from netsp.base.errors import InfeasibleError, InputError
+from netsp.base.errors import InfeasibleError
 
 if TYPE_CHECKING:
     from netsp.judge import Verification
@@ -17,21 +16,6 @@ if TYPE_CHECKING:
     from netsp.model.solution import Solution
     from netsp.plan.space.mission_solver import SolvedMission
     from netsp.world.mission.mission import Mission
-
-
-def json_flag(p: argparse.ArgumentParser) -> None:
-    """Add `--json` to a command whose other arguments are known."""
-    data = any("--output" in action.option_strings for action in p._actions)
-    more = " (data then needs -o FILE)" if data else ""
-    p.add_argument("--json", action="store_true", help=f"print the summary as JSON on stdout{more}")
-
-
-def check_stdout(args: argparse.Namespace) -> None:
-    """InputError where the summary and the data would both go to standard output."""
-    from netsp.base.files import STANDARD
-
-    if args.json and args.output in (None, STANDARD):
-        raise InputError("--json: standard output is taken by the data; expected -o FILE")
 
 
 def tell(summary: Mapping[str, Any]) -> None:

@@ -11,62 +11,11 @@ from typing import TYPE_CHECKING
 from netsp.base.errors import EXIT_NOT_VERIFIED, InputError, counted
 from netsp.command import json_output, messages
 from netsp.command.patience import span
-from netsp.command.types import check_writable, natural, seconds
+from netsp.command.types import check_writable
 from netsp.model.bound_scope import Scope
 
 if TYPE_CHECKING:
     from netsp.study.library import Library
-
-EXAMPLE = "netsp library rank --solver lns --time-limit 5 --only 'jetty-*' -o rows.jsonl"
-
-FOLDER = "problems/library"
-
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    p.add_argument(
-        "action",
-        choices=("list", "check", "rank"),
-        help="list the problems with the best known of each; check solutions against them; rank "
-        "solvers",
-    )
-    p.add_argument("files", nargs="*", metavar="FILE", help="check: solution files (JSON)")
-    p.add_argument(
-        "--folder", default=FOLDER, metavar="DIR", help=f"where the library is; default {FOLDER}"
-    )
-    p.add_argument(
-        "--only", default="*", metavar="PATTERN", help="list, rank: only problems named so"
-    )
-    p.add_argument("--keep", action="store_true", help="check: write better tours to the records")
-    p.add_argument("--by", default="a contributor", metavar="NAME", help="check: who found them")
-    who = p.add_mutually_exclusive_group()
-    who.add_argument(
-        "--solver",
-        metavar="NAME",
-        help="rank: a solver, or a function of a travel graph as module:function",
-    )
-    who.add_argument(
-        "--command",
-        metavar="CMD",
-        help="rank: a command with {problem}, {solution} and perhaps {seconds} in it",
-    )
-    p.add_argument("--label", metavar="NAME", help="rank: what the solver is called")
-    p.add_argument(
-        "--time-limit",
-        type=seconds,
-        default=10.0,
-        metavar="S",
-        help="rank: seconds for each problem; default 10",
-    )
-    p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
-    p.add_argument(
-        "-o",
-        "--output",
-        metavar="FILE",
-        help="rank: file of rows; those that are there are ranked, too, and not run again",
-    )
-    p.add_argument("--quiet", action="store_true", help="no progress")
-    p.add_argument("--json", action="store_true", help="print the answer as JSON on stdout")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -179,7 +128,7 @@ def _rank(args: argparse.Namespace, library: Library) -> int:
     output = args.output or f"{args.folder}/ranking.jsonl"
     rows = rank.read_rows(output)
     if args.solver or args.command:
-        check_writable(args.output)
+        check_writable(*filter(None, (args.output,)))
         solve = (
             rank.by_name(args.solver, args.seed) if args.solver else rank.by_command(args.command)
         )

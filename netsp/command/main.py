@@ -29,6 +29,8 @@ from netsp.base.errors import (
 )
 from netsp.command import background_warm_up, messages
 from netsp.command.command_clock import begin_command
+from netsp.command.command_options import add_options, check_files
+from netsp.command.command_table import COMMANDS
 from netsp.command.interrupts import resending_lost_interrupts
 from netsp.command.status_line import status_line
 
@@ -81,7 +83,8 @@ def _main(argv: Sequence[str] | None) -> int:
             raise
         preparing = _preparation_messages(wanted, getattr(args, "quiet", False))
         with resending_lost_interrupts(), messages.warnings_in_one_line(), preparing:
-            code = int(args.run(args))
+            check_files(args)
+            code = int(importlib.import_module(args.declared.module).run(args))
         sys.stdout.flush()
         if argv is None and wanted is not None and wanted != "warm-up":
             background_warm_up.begin(wanted)
@@ -174,48 +177,6 @@ def _joined(argv: Sequence[str]) -> list[str]:
     return out
 
 
-COMMANDS = {
-    "plan": {
-        "solve": ("solve", "find the shortest non-entangling tour of a problem or a mission"),
-        "app": ("app", "plan on a map in the browser"),
-        "cover": ("cover", "place waypoints that see a structure"),
-        "verify": ("verify", "judge a solution independently of what found it"),
-        "margins": ("margins", "find how far the world may be off before a tour does not fit"),
-        "plot": ("plot", "draw a problem or a scene, with a solution or a tether"),
-        "animate": ("animate", "show a tour or a run as a moving picture"),
-        "base": ("base", "find where to stand, among candidates for the base"),
-        "tether": ("tether", "find how long a tether is needed, and what more of it saves"),
-        "gtsp": ("gtsp", "solve any generalised TSP, in the format of GTSPLIB"),
-        "world": ("world", "draw a random problem; same seed, same problem on every machine"),
-    },
-    "carry out": {
-        "simulate": ("simulate", "run a mission in a scene with a taut tether"),
-        "execute": ("execute", "carry a tour out online, and repair it on the way"),
-        "order": ("order", "another name of solve, for missions"),
-        "fly": ("fly", "carry a tour out with a vehicle, over MAVLink"),
-        "guard": ("guard", "watch the tether of a vehicle that somebody else drives"),
-    },
-    "hand over": {
-        "export": ("export", "write a tour as a mission file of a ground station"),
-        "import": ("import_site", "make a problem from a map"),
-    },
-    "compare": {
-        "compare": ("compare", "solvers side by side over random worlds, resumable"),
-        "compare-path": ("compare_path", "paths made by hand or recorded, beside the planned tour"),
-        "library": ("library", "list, check and rank on the library of problems"),
-        "combine": ("combine", "join the results of shards of one study"),
-        "report": ("report", "one page about a comparison, a solution or a run"),
-    },
-    "tools": {
-        "schema": ("schema", "print the JSON Schema of a file format"),
-        "warm-up": ("warm_up", "compile everything ahead of the first use"),
-        "completion": ("completion", "print what a shell needs to complete netsp's commands"),
-    },
-}
-"""By what they are for: name → module of this package, and a line of help. Each module has
-`arguments`, `run` and an `EXAMPLE`."""
-
-
 def _parsed(words: list[str], wanted: str | None) -> argparse.Namespace:
     """Return the arguments. Unknown words get one line that names the word and the command whose
     help lists the options; argparse's own message does neither."""
@@ -233,13 +194,7 @@ def _parsed(words: list[str], wanted: str | None) -> argparse.Namespace:
 
 
 def parser_of_all() -> argparse.ArgumentParser:
-    """Return the parser of all commands with all of their arguments.
-
-    Returns
-    -------
-    argparse.ArgumentParser
-        It imports every command's module.
-    """
+    """Return the parser of all commands with all of their arguments."""
     return _parser({name for group in COMMANDS.values() for name in group})
 
 
@@ -249,7 +204,7 @@ def _parser(wanted: Container[str | None]) -> argparse.ArgumentParser:
     lines = ["commands, by what they are for:"]
     for purpose, group in COMMANDS.items():
         lines.append(f"\n  {purpose}")
-        lines += [f"    {name:<{width}}  {text}" for name, (_, text) in group.items()]
+        lines += [f"    {name:<{width}}  {command.text}" for name, command in group.items()]
     parser = _Parser(
         prog="netsp",
         usage="netsp [--version] COMMAND …",
@@ -262,18 +217,17 @@ def _parser(wanted: Container[str | None]) -> argparse.ArgumentParser:
         prog="netsp", metavar="COMMAND", required=True, help=argparse.SUPPRESS, parser_class=_Parser
     )
     for group in COMMANDS.values():
-        for name, (module, text) in group.items():
+        for name, command in group.items():
             p = commands.add_parser(
                 name,
-                help=text,
-                description=f"{text[0].upper()}{text[1:]}.",
+                help=command.text,
+                description=f"{command.text[0].upper()}{command.text[1:]}.",
                 formatter_class=argparse.RawDescriptionHelpFormatter,
             )
             if name in wanted:
-                command = importlib.import_module(f"netsp.command.{module}")
-                command.arguments(p)
-                p.epilog = f"example:\n  {command.EXAMPLE}"
-                p.set_defaults(run=command.run)
+                add_options(p, command.options)
+                p.epilog = f"example:\n  {command.example}"
+                p.set_defaults(declared=command)
     return parser
 
 

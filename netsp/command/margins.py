@@ -6,33 +6,15 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
-from netsp.command.types import check_writable, friction, load_pair
+from netsp.command.types import load_pair
 
 if TYPE_CHECKING:
     from netsp.model.problem import Problem
     from netsp.plan.sizing.tether_margins import Margins
 
-EXAMPLE = "netsp margins problems/wharf.json solution.json --friction 0.2"
-
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
-    p.add_argument("solution", metavar="SOLUTION", help="solution file (JSON)")
-    p.add_argument(
-        "--friction",
-        type=friction,
-        default=0.0,
-        metavar="MU",
-        help="coefficient of friction of tether on obstacle, 0 to 10, for the tension ratios; "
-        "default 0",
-    )
-    p.add_argument("-o", "--output", metavar="FILE", help="write the margins (JSON)")
-
 
 def run(args: argparse.Namespace) -> int:
     """Print the margins, and return the exit code."""
-    check_writable(args.output, inputs=(args.problem, args.solution))
     from netsp.base.files import write_text
     from netsp.plan.sizing.tether_margins import margins
 

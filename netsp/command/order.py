@@ -5,14 +5,7 @@ from __future__ import annotations
 import argparse
 
 from netsp.base.errors import InputError
-from netsp.command import solve
-
-EXAMPLE = "netsp order missions/basin.json -o better.json"
-
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of `netsp solve` that apply to missions."""
-    solve.for_all(p)
+from netsp.command import solve_mission
 
 
 def run(args: argparse.Namespace) -> int:
@@ -24,4 +17,4 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(
             f"{args.problem}: is no mission; expected one, or netsp solve for problems"
         )
-    return solve.run_mission(args)
+    return solve_mission.run(args)

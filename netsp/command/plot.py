@@ -7,63 +7,16 @@ import sys
 from typing import TYPE_CHECKING
 
 from netsp.base.errors import InputError
+from netsp.command.command_options import refuse
 from netsp.command.patience import Patience
-from netsp.command.types import (
-    check_writable,
-    length,
-    load_pair,
-    natural,
-    positive,
-    roadmap_options,
-)
+from netsp.command.types import load_pair
 
 if TYPE_CHECKING:
     from netsp.model.problem import Problem
 
-EXAMPLE = "netsp plot problems/wharf.json solution.json -o wharf.svg"
-
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    p.add_argument("problem", metavar="PROBLEM", help="problem, scene or mission file (JSON)")
-    p.add_argument(
-        "solution",
-        metavar="SOLUTION",
-        nargs="?",
-        help="solution; for a scene, a path that begins at the anchor (CSV x,y,z or JSON), along "
-        "which the tether is laid",
-    )
-    p.add_argument(
-        "-o",
-        "--output",
-        required=True,
-        metavar="FILE",
-        help="png, svg or pdf; a scene or a mission also html, interactive",
-    )
-    p.add_argument(
-        "--tether-model",
-        default="geodesic",
-        metavar="NAME",
-        help="scene: geodesic (default) or react",
-    )
-    p.add_argument(
-        "--delta",
-        type=length,
-        metavar="L",
-        help="scene: resolution of the tether; default: by the scene",
-    )
-    p.add_argument("--roadmap", metavar="NAME", help="draw this roadmap: taut or prm")
-    p.add_argument("--samples", type=positive, metavar="N", help="prm: milestones; default 1000")
-    p.add_argument("--seed", type=natural, default=0, metavar="N", help="prm: random seed")
-    p.add_argument(
-        "--tethers-to", metavar="GOAL", help="draw all taut tethers to this goal (name or #index)"
-    )
-    p.set_defaults(shortcut=False, max_classes=None, classes_rule=None)
-
 
 def run(args: argparse.Namespace) -> int:
     """Draw, and return the exit code."""
-    check_writable(args.output, inputs=(args.problem, args.solution))
     with Patience(sys.stderr, f"drawing {args.output}"):
         return _drawn(args)
 
@@ -92,7 +45,7 @@ def _drawn(args: argparse.Namespace) -> int:
     elif args.roadmap:
         if args.solution:
             raise InputError("--roadmap: draws a problem alone; give no solution")
-        options = roadmap_options(args)
+        options = {} if args.samples is None else {"samples": args.samples}
         if args.roadmap == "prm":
             options["seed"] = args.seed
         plotting.save_roadmap(Problem.load(args.problem), args.roadmap, options, args.output)
@@ -115,13 +68,8 @@ def _drawn(args: argparse.Namespace) -> int:
 
 def _mission(args: argparse.Namespace) -> int:
     """Draw a mission: its waypoints in their order, and its tour if it has one."""
-    for name, flag in (
-        ("solution", "SOLUTION"),
-        ("roadmap", "--roadmap"),
-        ("tethers_to", "--tethers-to"),
-    ):
-        if getattr(args, name) is not None:
-            raise InputError(f"{flag}: {args.problem} is a mission; expected nothing beside it")
+    reason = f"{args.problem} is a mission; expected nothing beside it"
+    refuse(args, "SOLUTION --roadmap --tethers-to", reason)
     from netsp.view.pictures import style
     from netsp.view.pictures.mission_picture import save_mission
     from netsp.view.pictures.scene_picture import INTERACTIVE

@@ -15,6 +15,7 @@ from netsp.base.polyline_file import read_path
 from netsp.command import messages
 from netsp.view.pictures import scene_picture as pictures
 from netsp.view.pictures import style
+from netsp.world.mission.mission import Mission
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
 from netsp.world.simulator.simulation_policy import MissionLimits
@@ -56,6 +57,13 @@ def note_scene(name: str, notes: Sequence[str]) -> None:
     """Print what was left out or assumed when the files of a scene were read."""
     for note in notes:
         messages.note(f"{name}: {note}")
+
+
+def note_mission_scene(mission: Mission, scene: Scene, field: DistanceField) -> None:
+    """Print what was left out or assumed in the scene of a mission, and where it is too coarse."""
+    note_scene(scene.name, field.notes)
+    model = GeodesicTether(field, mission.delta)
+    warn_of_scene(model, mission.delta, "lower the mission's delta")
 
 
 def warn_of_scene(model: GeodesicTether, delta: float, remedy: str) -> None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 
-EXAMPLE = "netsp schema problem > problem.schema.json"
-
 FORMATS = {
     "problem": "netsp.model.problem:Problem",
     "solution": "netsp.model.solution:Solution",
@@ -18,11 +16,6 @@ FORMATS = {
     "study": "netsp.study.compare.study:Study",
 }
 """Format → where its model lives."""
-
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    p.add_argument("format", choices=tuple(FORMATS), help="of a file that netsp reads or writes")
 
 
 def run(args: argparse.Namespace) -> int:

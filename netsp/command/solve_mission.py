@@ -13,13 +13,13 @@ import os
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from netsp.base.errors import EXIT_NOT_ALL, InputError, counted
+from netsp.base.errors import EXIT_NOT_ALL, counted
 from netsp.command import json_output
-from netsp.command.clearance_flags import warn_of_clearance
+from netsp.command.clearance_warning import warn_of_clearance
 from netsp.command.command_clock import command_clock
-from netsp.command.types import check_writable
+from netsp.command.command_options import given_params
 
 if TYPE_CHECKING:
     from netsp.plan.space.mission_solver import SolvedMission
@@ -29,113 +29,68 @@ if TYPE_CHECKING:
 MISSION_TIME_LIMIT_S = 60.0
 """Default time limit for missions, s."""
 
-FOR_PROBLEMS = {
-    "roadmap": "--roadmap",
-    "classes_rule": "--classes",
-    "samples": "--samples",
-    "shortcut": "--shortcut",
-    "max_classes": "--max-classes",
-    "keep_order": "--keep-order",
-    "slack": "--slack",
-    "friction": "--friction",
-    "max_tension_ratio": "--max-tension-ratio",
-    "margin": "--margin",
-    "warm_start": "--warm-start",
-    "plot_trace": "--plot-trace",
-}
-"""Flags of `netsp solve` that say something of a problem only."""
 
-
-def check_flags(args: argparse.Namespace, parser_defaults: dict[str, Any]) -> None:
-    """InputError for a flag that says something of a problem only."""
-    for name, flag in FOR_PROBLEMS.items():
-        if getattr(args, name) != parser_defaults[name]:
-            raise InputError(
-                f"{flag}: is for problems, and {args.problem} is a mission; expected none"
-            )
-
-
-def solve(
-    file: str,
-    *,
-    solver: str,
-    params: dict[str, str],
-    time_limit: float | None,
-    iteration_limit: int | None,
-    seed: int,
-    output: str | None,
-    plot: str | None,
-    quiet: bool,
-    as_json: bool = False,
-    position_error: float = 0.0,
-    current: float = 0.0,
-) -> int:
-    """Plan the mission, write it, and return the exit code."""
-    check_writable(output, plot, inputs=(file,))
-    from netsp.base.files import read_text, write_text
-    from netsp.world.mission.mission import Mission
-
-    if plot:
-        from netsp.view.pictures import style
-
-        style.check_format(plot)
+def run(args: argparse.Namespace) -> int:
+    """Plan a mission, write it, and return the exit code."""
+    from netsp.base.files import read_text
+    from netsp.command.plot_scene import note_mission_scene, tell
     from netsp.command.stages import Stages
     from netsp.plan.space.mission_policy import MissionPolicy
     from netsp.plan.space.mission_solver import solve_mission
+    from netsp.world.mission.mission import Mission
 
-    clock = command_clock(time_limit or MISSION_TIME_LIMIT_S)
+    params = given_params(args)
+    clock = command_clock(args.time_limit or MISSION_TIME_LIMIT_S)
     begin = time.monotonic()
-    mission = clock.bounded("reading the mission", lambda: Mission.load(file))
-    stages = None if quiet else Stages(sys.stderr, clock.left)
+    mission = clock.bounded("reading the mission", lambda: Mission.load(args.problem))
+    stages = None if args.quiet else Stages(sys.stderr, clock.left)
     with stages or contextlib.nullcontext():
-        from netsp.command.plot_scene import note_scene, tell, warn_of_scene
-
         with clock.with_min_cpu(MissionPolicy().first_tour_s):
             scene = clock.bounded("reading the scene", mission.load_scene)
             field = clock.bounded(
                 "measuring distances in the scene",
-                lambda: scene.field(on_progress=None if quiet else tell),
+                lambda: scene.field(on_progress=None if args.quiet else tell),
             )
-        if not quiet:
-            from netsp.world.tether import GeodesicTether
-
-            note_scene(scene.name, field.notes)
-            warn_of_scene(
-                GeodesicTether(field, mission.delta), mission.delta, "lower the mission's delta"
-            )
+        if not args.quiet:
+            note_mission_scene(mission, scene, field)
         found = solve_mission(
             mission,
             scene=scene,
             field=field,
-            solver=solver,
+            solver=args.solver,
             params=params,
             time_limit=clock,
-            iteration_limit=iteration_limit,
-            seed=seed,
+            iteration_limit=args.iteration_limit,
+            seed=args.seed,
             on_progress=stages,
         )
-    placed = Mission.from_json(read_text(file)).scene
-    if output is not None and not Path(placed).is_absolute():
-        # a mission file names its scene from where it lies itself
-        placed = Path(os.path.relpath(Path(file).parent / placed, Path(output).parent)).as_posix()
-    full = found.mission.model_copy(update={"scene": placed})
-    text = json.dumps(full.model_dump(mode="json", exclude_none=True), indent=1) + "\n"
-    if output is None:
-        sys.stdout.write(text)
-        sys.stdout.flush()
-    else:
-        write_text(output, text)
-    if plot:
-        draw(found, scene, plot)
-    if not quiet:
-        print(
-            summary(mission, found, time.monotonic() - begin, output, plot, scene.units),
-            file=sys.stderr,
-        )
-        warn_of_clearance(position_error, current, mission.clearance, scene.units)
-    if as_json:
+    placed = Mission.from_json(read_text(args.problem)).scene
+    if args.output is not None and not Path(placed).is_absolute():
+        placed = relative_to_file(Path(args.problem).parent / placed, args.output)
+    write_mission(found.mission, placed, args.output)
+    if args.plot:
+        draw(found, scene, args.plot)
+    if not args.quiet:
+        spent = time.monotonic() - begin
+        text = summary(mission, found, spent, args.output, args.plot, scene.units)
+        print(text, file=sys.stderr)
+        warn_of_clearance(args.position_error, args.current, mission.clearance, scene.units)
+    if args.json:
         json_output.tell(json_output.of_mission(mission, found, scene.units))
     return EXIT_NOT_ALL if found.left_out else 0
+
+
+def relative_to_file(path: str | Path, file: str) -> str:
+    """Return a path as seen from the folder of a file."""
+    return Path(os.path.relpath(path, Path(file).parent)).as_posix()
+
+
+def write_mission(mission: Mission, scene: str, output: str | None) -> None:
+    """Write a mission and the place of its scene to a file, or to standard output."""
+    from netsp.base.files import STANDARD, write_text
+
+    data = mission.model_copy(update={"scene": scene}).model_dump(mode="json", exclude_none=True)
+    write_text(output or STANDARD, json.dumps(data, indent=1) + "\n")
 
 
 def draw(found: SolvedMission, scene: Scene, file: str) -> None:

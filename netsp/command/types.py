@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import importlib.metadata
 import math
 import os
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from netsp.base.errors import InputError
 
@@ -16,52 +17,56 @@ if TYPE_CHECKING:
     from netsp.model.solution import Solution
 
 
-def choices(builtin_names: str, group: str) -> str:
-    """Help for a choice of names: ours, then those that other packages add to a group of entry
-    points."""
-    others = sorted({e.name for e in importlib.metadata.entry_points(group=group)})
-    return f"{builtin_names}; from other packages: {', '.join(others)}" if others else builtin_names
+@dataclass(frozen=True)
+class Number:
+    """Reader of a number in a range, for argparse.
 
+    Parameters
+    ----------
+    expected : str
+        Words for the range in messages.
+    minimum, maximum : float
+        The range; by default, finite numbers above 0.
+    is_whole : bool
+        Whether only whole numbers are read.
+    """
 
-def _above_zero(what: str) -> Callable[[str], float]:
-    def read(text: str) -> float:
+    expected: str = "a positive number"
+    minimum: float = math.ulp(0.0)
+    maximum: float = sys.float_info.max
+    is_whole: bool = False
+
+    def __call__(self, text: str) -> Any:
+        """Return the number that a text is."""
         try:
-            value = float(text)
+            value: float = int(text) if self.is_whole else float(text)
         except ValueError:
-            value = -1.0
-        if not 0.0 < value < float("inf"):
-            raise argparse.ArgumentTypeError(f"expected a positive number{what}, got {text!r}")
+            value = math.nan
+        if not self.minimum <= value <= self.maximum:
+            raise argparse.ArgumentTypeError(f"expected {self.expected}, got {text!r}")
         return value
 
-    return read
+
+length = Number()
+seconds = Number("a positive number of seconds")
+depth = Number("a depth of 0 or more", 0.0)
+natural = Number(f"a whole number from 0 to {2**62}", 0, 2**62, is_whole=True)
+system_id = Number("a system id from 1 to 255", 1, 255, is_whole=True)
+whole_bytes = Number("a whole number of bytes", -math.inf, math.inf, is_whole=True)
 
 
-def depth(text: str) -> float:
-    """Return a depth, 0 or more."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"expected a depth of 0 or more, got {text!r}")
-    return value
+def positive(text: str) -> int:
+    """Parse a whole number from 1."""
+    if (value := natural(text)) == 0:
+        raise argparse.ArgumentTypeError("expected a whole number from 1 on, got '0'")
+    return int(value)
 
 
-def friction(text: str) -> float:
-    """Return a coefficient of friction, 0 to 10."""
+def friction_coefficient(text: str) -> float:
+    """Parse a coefficient of friction, 0 to 10."""
     from netsp.model.solution import MAX_FRICTION
 
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0.0 <= value <= MAX_FRICTION:
-        raise argparse.ArgumentTypeError(f"expected 0 to {MAX_FRICTION:g}, got {text!r}")
-    return value
-
-
-seconds, length = _above_zero(" of seconds"), _above_zero("")
-"""A positive number."""
+    return float(Number(f"0 to {MAX_FRICTION:g}", 0.0, MAX_FRICTION)(text))
 
 
 def shard(text: str) -> tuple[int, int]:
@@ -80,66 +85,15 @@ def option(text: str) -> tuple[str, str]:
     return name, value
 
 
-MAX_SYSTEM_ID = 255
-"""Highest system id of MAVLink."""
-
-MAX_WHOLE_NUMBER = 2**62
-"""Maximum whole number of an option."""
-
-
-def natural(text: str) -> int:
-    """Parse a whole number from 0."""
-    try:
-        value = int(text)
-    except ValueError:
-        value = -1
-    if not 0 <= value <= MAX_WHOLE_NUMBER:
-        raise argparse.ArgumentTypeError(
-            f"expected a whole number from 0 to {MAX_WHOLE_NUMBER}, got {text!r}"
-        )
-    return value
-
-
-def system_id(text: str) -> int:
-    """Parse the MAVLink system id of a vehicle, from 1 to 255."""
-    try:
-        value = int(text)
-    except ValueError:
-        value = 0
-    if not 1 <= value <= MAX_SYSTEM_ID:
-        raise argparse.ArgumentTypeError(
-            f"expected a system id from 1 to {MAX_SYSTEM_ID}, got {text!r}"
-        )
-    return value
-
-
-def whole_bytes(text: str) -> int:
-    """Parse a number of bytes; the caller checks its range."""
-    try:
-        return int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"expected a whole number of bytes, got {text!r}"
-        ) from None
-
-
 def count_or_range(text: str) -> int | tuple[int, int]:
     """Parse a whole number from 0 on, or two of them as in ``1-20``."""
     min_text, dash, max_text = text.partition("-")
     if not (min_text and dash):
-        return natural(text)
-    numbers = natural(min_text), natural(max_text)
+        return int(natural(text))
+    numbers = int(natural(min_text)), int(natural(max_text))
     if numbers[0] > numbers[1]:
         raise argparse.ArgumentTypeError(f"expected minimum-maximum, got {text!r}")
     return numbers
-
-
-def positive(text: str) -> int:
-    """Parse a whole number from 1."""
-    value = natural(text)
-    if value == 0:
-        raise argparse.ArgumentTypeError("expected a whole number from 1 on, got '0'")
-    return value
 
 
 def vector(text: str, name: str) -> tuple[float, float, float]:
@@ -166,22 +120,21 @@ def margins(text: str) -> tuple[float, float]:
     return numbers[0], numbers[-1] if len(numbers) == 2 else DEFAULT_EXPORT.min_clearance
 
 
-def check_writable(*paths: str | None, inputs: Sequence[str | None] = ()) -> None:
-    """InputError before the work starts rather than after it; what is read is never written to."""
+def check_writable(*paths: str, inputs: Sequence[str] = ()) -> None:
+    """Raise InputError before the work starts, rather than after it, for a file that cannot be
+    written or is an input."""
     from netsp.base.files import STANDARD
 
     paths = tuple(p for p in paths if p != STANDARD)
-    read = {os.path.realpath(p) for p in inputs if p is not None}
+    read = {os.path.realpath(p) for p in inputs}
     for path in paths:
-        if path is not None and os.path.realpath(path) in read:
+        if os.path.realpath(path) in read:
             raise InputError(f"{path}: would be overwritten, and it is an input")
-    given = [os.path.realpath(p) for p in paths if p is not None and not p.startswith("/dev/")]
+    given = [os.path.realpath(p) for p in paths if not p.startswith("/dev/")]
     twice = [name for name in given if given.count(name) > 1]
     if twice:
         raise InputError(f"{twice[0]}: is named for two different files")
     for path in paths:
-        if path is None:
-            continue
         folder = os.path.dirname(os.path.abspath(path))
         if len(os.path.basename(path).encode(errors="replace")) > 250:
             raise InputError(f"{path}: cannot be written: the name is too long")
@@ -193,20 +146,20 @@ def check_writable(*paths: str | None, inputs: Sequence[str | None] = ()) -> Non
             raise InputError(f"{path}: cannot be written: permission denied")
 
 
-def roadmap_options(args: argparse.Namespace) -> dict[str, object]:
-    """Return the options of a roadmap that were given."""
-    options = {
-        "samples": args.samples,
-        "shortcut": args.shortcut or None,
-        "max_classes": args.max_classes,
-        "classes": args.classes_rule,
-    }
-    return {name: value for name, value in options.items() if value is not None}
-
-
 def load_pair(problem: str, solution: str) -> tuple[Problem, Solution]:
     """Load a problem file and a solution file."""
     from netsp.model.problem import Problem
     from netsp.model.solution import Solution
 
     return Problem.load(problem), Solution.load(solution)
+
+
+def load_verified_pair(problem: str, solution: str) -> tuple[Problem, Solution]:
+    """Load a problem and a solution that passes all checks; InputError if one fails."""
+    from netsp.judge import verify
+
+    pair = load_pair(problem, solution)
+    failed = next((c for c in verify(*pair).checks if not c.passed), None)
+    if failed is not None:
+        raise InputError(f"{solution}: fails its check {failed.name!r}: {failed.detail}")
+    return pair

@@ -7,57 +7,18 @@ from typing import TYPE_CHECKING
 
 from netsp.base.errors import EXIT_NOT_VERIFIED, InputError
 from netsp.command import json_output, messages
-from netsp.command.types import load_pair, natural
+from netsp.command.command_options import refuse
+from netsp.command.types import load_pair
 
 if TYPE_CHECKING:
     from netsp.judge import Verification
     from netsp.model.problem import Problem
 
-EXAMPLE = "netsp verify problems/wharf.json solution.json"
-
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    p.add_argument(
-        "problem",
-        metavar="PROBLEM",
-        help="problem file, or a mission that was planned; for a path, also a scene (JSON)",
-    )
-    p.add_argument(
-        "solution", metavar="SOLUTION", nargs="?", help="solution file (JSON) of the problem"
-    )
-    p.add_argument(
-        "--measures",
-        action="store_true",
-        help="print measures of entanglement; SOLUTION may then be any path "
-        "(a file that netsp compare-path reads, or a JSON list of points)",
-    )
-    p.add_argument(
-        "--margins",
-        action="store_true",
-        help="print how far the world may be off, too (netsp margins)",
-    )
-    p.add_argument(
-        "--frame",
-        metavar="NAME",
-        help="frame of a path to measure: local (the problem's plane) or global (degrees)",
-    )
-    p.add_argument(
-        "--system",
-        type=natural,
-        metavar="N",
-        help="the vehicle's system id in a .tlog to measure; default: the only one with positions",
-    )
-    p.add_argument("--quiet", action="store_true", help="exit code only")
-    json_output.json_flag(p)
-
 
 def run(args: argparse.Namespace) -> int:
     """Judge, print, and return the exit code."""
     if args.json:
-        for name in ("measures", "margins"):
-            if getattr(args, name):
-                raise InputError(f"--{name}: is told in words only; expected no --json")
+        refuse(args, "--measures --margins", "is told in words only; expected no --json")
     from netsp.base.files import is_mission_file, read_text
     from netsp.command.plot import is_scene
 
@@ -129,18 +90,14 @@ def _path_in_scene(args: argparse.Namespace) -> int:
 
 def _mission(args: argparse.Namespace) -> int:
     """Judge a planned mission."""
-    if args.solution:
-        raise InputError(f"SOLUTION: {args.problem} is a mission; expected nothing beside it")
-    for name, flag in (("measures", "--measures"), ("margins", "--margins")):
-        if getattr(args, name):
-            raise InputError(f"{flag}: is for problems, and {args.problem} is a mission")
+    refuse(args, "SOLUTION", f"{args.problem} is a mission; expected nothing beside it")
+    refuse(args, "--measures --margins", f"is for problems, and {args.problem} is a mission")
     from netsp.command.interrupts import until_interrupted
     from netsp.plan.space.judge import verify_mission
     from netsp.world.mission.mission import Mission
 
-    verdict = until_interrupted(
-        "judging the tour", lambda: verify_mission(Mission.load(args.problem))
-    )
+    mission = Mission.load(args.problem)
+    verdict = until_interrupted("judging the tour", lambda: verify_mission(mission))
     _tell(args, verdict)
     return 0 if verdict else EXIT_NOT_VERIFIED
 

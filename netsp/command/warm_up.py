@@ -10,10 +10,6 @@ import time
 from collections.abc import Callable, Iterator
 from functools import partial
 
-from netsp.command.types import positive
-
-EXAMPLE = "netsp warm-up"
-
 Step = tuple[str, Callable[[], object]]
 """Name of a step, and the step."""
 
@@ -25,26 +21,6 @@ STEP_WORDS = {
     "guard": "guard",
 }
 """Word in the names of the steps that a command needs, by command; other commands need `solver`."""
-
-
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    p.add_argument("--quiet", action="store_true", help="no progress")
-    p.add_argument(
-        "--list",
-        action="store_true",
-        help="print all functions and the CPU seconds of compiling each, without the functions "
-        "that it calls; - if it was on disk already, or another process compiled it",
-    )
-    p.add_argument(
-        "--jobs",
-        type=positive,
-        default=1,
-        metavar="N",
-        help="processes that compile at the same time (default: 1)",
-    )
-    p.add_argument("--part", type=int, default=0, help=argparse.SUPPRESS)
-    p.add_argument("--after", default=None, metavar="COMMAND", help=argparse.SUPPRESS)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -289,20 +265,8 @@ def steps() -> Iterator[Step]:
 
     def voxelled() -> None:
         corners = np.array(np.meshgrid((0, 12), (0, 0.5), (0, 0.5), indexing="ij"))
-        faces = [
-            (0, 1, 3),
-            (0, 3, 2),
-            (4, 6, 7),
-            (4, 7, 5),
-            (0, 4, 5),
-            (0, 5, 1),
-            (2, 3, 7),
-            (2, 7, 6),
-            (0, 2, 6),
-            (0, 6, 4),
-            (1, 5, 7),
-            (1, 7, 3),
-        ]
+        triangles = "013 032 467 475 045 051 237 276 026 064 157 173"
+        faces = [tuple(map(int, corners_of)) for corners_of in triangles.split()]
         # along the diagonal of its box, most of which is empty: with little memory only what is
         # near surfaces is held, by kernels of its own
         turn = np.linalg.qr(np.ones((3, 1)), mode="complete")[0].T

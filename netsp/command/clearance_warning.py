@@ -1,5 +1,4 @@
-"""Flags on the vehicle's position and the current, and the warning of a clearance that is too small
-for them."""
+"""Warning of a clearance that is too small for the vehicle's position error and the current."""
 
 from __future__ import annotations
 
@@ -7,29 +6,10 @@ import argparse
 from typing import TYPE_CHECKING
 
 from netsp.command import messages
-from netsp.command.types import length
 
 if TYPE_CHECKING:
     from netsp.model.problem import Problem
     from netsp.plan.sizing.clearance_advice import ClearanceRoom
-
-
-def clearance_flags(p: argparse.ArgumentParser) -> None:
-    """Add the flags to a command."""
-    p.add_argument(
-        "--position-error",
-        type=length,
-        default=0.0,
-        metavar="M",
-        help="error of the vehicle's position (m): the clearance should be larger; default 0",
-    )
-    p.add_argument(
-        "--current",
-        type=length,
-        default=0.0,
-        metavar="V",
-        help="speed of the current (m/s), which pushes the vehicle off its path; default 0",
-    )
 
 
 def warn_of_problem(args: argparse.Namespace, problem: Problem, margin: float) -> None:
@@ -38,7 +18,7 @@ def warn_of_problem(args: argparse.Namespace, problem: Problem, margin: float) -
     Parameters
     ----------
     args : Namespace
-        Parsed flags of `clearance_flags`.
+        Values of `command_options.CLEARANCE`.
     problem : Problem
         The problem.
     margin : float
