@@ -22,7 +22,7 @@ DEFINITIONS = (
 def describe_path(problem: Problem, path: npt.ArrayLike, times: npt.ArrayLike | None = None) -> str:
     """Return all measures of one path, a line each."""
     figures = measure_path(problem, path, times=times)
-    m = measure(problem, figures.route if figures.is_closed else _open_route(figures))
+    m = measure(problem, figures.loop if figures.is_closed else _open_loop(figures))
     rows = [
         *path_rows(figures),
         ("winding numbers", _winding(problem, m)),
@@ -39,9 +39,9 @@ def aligned(rows: list[tuple[str, str]]) -> str:
     return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
 
 
-def _open_route(figures: PathMeasures) -> npt.NDArray[np.float64]:
-    """Return the part of the route up to the end of the path."""
-    return figures.route[: figures.route_end + 1]
+def _open_loop(figures: PathMeasures) -> npt.NDArray[np.float64]:
+    """Return the part of the loop up to the end of the path."""
+    return figures.loop[: figures.loop_end + 1]
 
 
 def visit_table(m: PathMeasures) -> str:

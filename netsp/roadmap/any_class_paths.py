@@ -1,9 +1,10 @@
 """Detours in any class between base, goals and sub-goals beside the obstacles.
 
 McCammon & Hollinger 2016, section III-B, change the class of a path by planning it again "through
-an additional sub-goal placed on the opposite side of an obstacle", and leave open where exactly.
-Here every obstacle offers those of eight places around it that are free, a little off its boundary.
-The far side of a path is the place most opposite to where the path comes nearest to the obstacle.
+an additional sub-goal placed on the opposite side of an obstacle"; they do not say where exactly.
+Here each obstacle has eight places around it, slightly off its boundary, and those in free space
+are sub-goals. The sub-goal for a path is the one most opposite to the point where the path comes
+nearest to the obstacle.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ def taut_detours(
     clock: Clock | None = None,
     policy: RoadmapPolicy | None = None,
 ) -> Detours:
-    """Return the detours over tangents and arcs, which are exact shortest paths.
+    """Return the exact detours: shortest paths over tangents and arcs.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Tangent graph in the form over which paths are pulled: by pairs of nodes, obstacle by obstacle.
+"""Tangent graph for string pulling: departures by pair of nodes, arcs by obstacle.
 
-`netsp.roadmap.tangents` holds the departures of a node in order, which is what a search needs. A
-path that is pulled needs the tangent between two given nodes, the arcs of an obstacle, and the
-letters between two departures of an arc.
+The graph of `netsp.roadmap.tangents` lists the departures of a node in order, for a search. Pulling
+a path taut needs the tangent between two given nodes, the arcs of an obstacle, and the letters
+between two departures of an arc.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def build_arcs(
     slits: Slits,
     policy: PathPolicy | None = None,
 ) -> Arcs:
-    """Return the tangent graph in the form over which paths are pulled."""
+    """Return a tangent graph in the form that string pulling needs."""
     policy = policy or PathPolicy()
     arcs, nodes = len(graph.arcs), len(graph.start) - 1
     disk = np.zeros((nodes, 5))

@@ -41,7 +41,7 @@ class AugmentedGraph:
     start, target, cost
         Edges in both directions, in compressed rows.
     complete
-        Whether the time sufficed for all vertices.
+        Whether all vertices were found before the time was up.
     """
 
     points: Floats
@@ -71,8 +71,7 @@ class AugmentedGraph:
     def distances(
         self, sources: Ints, targets: Ints, check: Callable[[], None] = lambda: None
     ) -> Floats:
-        """Return the (sources, targets) shortest lengths within the graph; inf if they are not
-        joined.
+        """Return the shortest lengths (sources, targets) within the graph; inf if there is no path.
 
         Parameters
         ----------
@@ -97,8 +96,10 @@ class AugmentedGraph:
         return np.asarray(before, dtype=np.int64)
 
     def path(self, u: int, v: int, method: Literal["astar", "dijkstra"] = "astar") -> list[int]:
-        """Return the vertices of a shortest path from u to v. A* is guided by the straight
-        distance, which never exceeds the path, so both methods find the same length."""
+        """Return the vertices of a shortest path from u to v.
+
+        The heuristic of A* is the straight distance, so both methods find the same length.
+        """
         goal = self.points[self.milestone[v]]
         guide = np.zeros(len(self.points))
         if method == "astar":

@@ -1,11 +1,10 @@
 """All legs at once: one taut leg gives all legs between two branches of the tree of tethers.
 
 A leg leaves the tether of its start at a bend p, crosses over, and joins the tether of its end at a
-bend q. Take any other class beyond p and any other class beyond q: back along the first tether,
-over the same crossing and on along the second tether leads a path of tangents, too. It slides
-forwards on every arc except perhaps at p and q, where the angle is known. If it slides forwards
-there, it is taut, and a class holds one taut path (docs/theory.md). So, with T the lengths of
-tethers,
+bend q. For any two other classes, one beyond p and one beyond q, the same crossing gives a path of
+tangents: back along the first tether, across, and along the second tether. It slides forwards on
+every arc, except perhaps at p and q, where the angle is known. If it slides forwards there, too, it
+is taut, and a class has one taut path (docs/theory.md). So, with T the lengths of tethers,
 
     leg(u, v) = T(u) + T(v) - c(p, q)
 
@@ -29,11 +28,11 @@ from netsp.roadmap.taut_by_word import NODE, SAME_ANGLE, SLID, Path, empty_path,
 from netsp.roadmap.tethertree import TetherTree
 
 SLIDE_TOLERANCE = 1e-9
-"""Tolerance of the angle slid on an arc, radians. A path that slides backwards by so little is
-longer than the taut one by the square of the angle."""
+"""Tolerance of the angle slid on an arc, radians. A path that slides backwards by an angle is
+longer than the taut one by the square of that angle only."""
 
 OPEN = -1.0
-"""Sentinel: a length that is not known yet."""
+"""Sentinel: a length that is still unknown."""
 
 
 class Branches(NamedTuple):
@@ -163,9 +162,9 @@ def fill(
     i: int,
     j: int,
 ) -> tuple[int, int]:
-    """Find the legs between different goals in all rows: from places i and j in the order on, what
-    is still open. Return the next pair of places whose leg cannot be pulled, or more places than
-    there are.
+    """Find the open legs between different goals, from places i and j of the order on.
+
+    Return the next pair of places whose leg cannot be pulled, or numbers beyond the last place.
 
     Entries within a goal and legs of the base (point 0) stay undefined.
 
@@ -175,7 +174,7 @@ def fill(
         (k,) point at which each vertex is.
     """
     order, out, row = branches.order, lengths.out, lengths.row
-    whole = len(out) == len(order)  # then what comes before is known from the other end
+    whole = len(out) == len(order)  # then legs to earlier places are known from their other ends
     longest = max_word_length(ends.row)
     room, path = empty_workspace(longest, slits), empty_path(longest, arcs.max_bends)
     while i < len(order) and stop[0] == 0:
@@ -244,7 +243,7 @@ def fill_parallel(
     i0, i1, j0, j1 = _parallel_ranges(u, v, count, path, branches)
     order, planar, row = branches.order, lengths.planar, lengths.row
     saved = planar[u] + planar[v] - length
-    # row by row, for memory's sake
+    # row by row, to save memory
     for x in range(i0, i1):
         if row[x] >= 0:
             _write_legs(lengths.out[row[x]], order[x], j0, j1, saved, order, lengths)
@@ -257,8 +256,8 @@ def fill_parallel(
 def _write_legs(
     out: Floats, a: int, begin: int, end: int, saved: float, order: Ints, lengths: Lengths
 ) -> None:
-    """Write the legs from vertex a to the vertices at places begin … end - 1 into its row: `saved`
-    less than both tethers."""
+    """Write the legs from vertex a to the vertices at places begin … end - 1: both tethers less
+    `saved`."""
     planar, height, share = lengths.planar, lengths.height, lengths.share
     for y in range(begin, end):
         b = order[y]

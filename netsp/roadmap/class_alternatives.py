@@ -1,4 +1,4 @@
-"""Travel graph of a problem in which goals have alternatives."""
+"""Travel graph of a problem with choices among goals."""
 
 from __future__ import annotations
 
@@ -15,28 +15,30 @@ from netsp.roadmap.reachable_goals import REACH_TOLERANCE
 
 
 def nearest_places(problem: Problem) -> list[int]:
-    """Return the indices, in order, of the alternative of each goal that the shortest tether
-    reaches. Solvers that cannot choose among places visit these."""
+    """Return, for each choice, the index of the goal that the shortest tether reaches, in order.
+
+    Solvers that cannot choose among goals visit these.
+    """
     tethers, clusters = shortest_tethers(problem), problem.clusters
     members = (np.flatnonzero(clusters == c) for c in range(1, problem.visits + 1))
     return sorted(int(m[np.argmin(tethers[m])]) for m in members)
 
 
 def graph_of_choices(problem: Problem, build: Callable[[Problem], TravelGraph]) -> TravelGraph:
-    """Return the travel graph over all places in reach, with alternatives in one cluster.
+    """Return the travel graph over all goals in reach, with the goals of a choice in one cluster.
 
     Parameters
     ----------
     build : callable
-        Makes the travel graph of a problem without alternatives.
+        Function that makes the travel graph of a problem without choices.
 
     Raises
     ------
     InfeasibleError
-        Some goal is out of the tether's reach with all its alternatives.
+        All goals of some choice are out of the tether's reach.
     InputError
-        The robot is already out. It is then known which alternatives were visited, and the others
-        should be left out.
+        The problem starts from a state. It is then known which goals were visited, and the others
+        of their choices should be removed from the problem.
     """
     if problem.state is not None:
         raise InputError(
@@ -46,7 +48,7 @@ def graph_of_choices(problem: Problem, build: Callable[[Problem], TravelGraph]) 
     clusters = problem.clusters
     for c in range(1, problem.visits + 1):
         if not within[clusters == c].any():
-            within |= clusters == c  # out of reach altogether: that will be said
+            within |= clusters == c  # out of reach, but kept: an error then reports it
     kept = np.flatnonzero(within)
     goals = [problem.goals[k].model_copy(update={"choice": None, "after": ()}) for k in kept]
     try:

@@ -1,10 +1,9 @@
 """Classes that reach each goal: all whose taut tether fits, or the shortest if there are too many.
 
-All classes come from one search from the base up to the tether length. Thin obstacles or a long
-tether can make their number explode. Then each goal is searched for by itself, guided by the exact
-shortest length that is left to it. The limit of length is adapted to the number of classes of this
-goal. The classes found are its shortest, and no class left out has a shorter tether than the
-longest of them.
+One search from the base, up to the tether length, finds all classes. With thin obstacles or a long
+tether their number may explode. Then there is a search for each goal, guided by the exact shortest
+remaining length, and its length limit is adapted until it yields the wanted number of classes. They
+are the shortest classes of the goal: none that is left out has a shorter tether.
 """
 
 from __future__ import annotations
@@ -76,7 +75,7 @@ class _Search:
         self.within[0] = -1.0
 
     def load_kernel(self) -> None:
-        """Load the kernel, or compile it, so that this takes none of the share of time."""
+        """Load or compile the kernel before the time of a search starts to count."""
         run_explore(
             self.paths.tangents, 0, Trie.root(0.0), margin=self.paths.outline.margin, max_states=0
         )
@@ -109,8 +108,10 @@ class _Search:
         return _collect(rows, math.inf)
 
     def find_shortest(self) -> Classes:
-        """Return the shortest classes of every goal, about as many for each. Each goal has one at
-        least, whatever the time."""
+        """Return the shortest classes of each goal, about equally many for each.
+
+        Each goal has at least one, even if the time is up.
+        """
         share = max(1, self.max_classes // self.goals)
         contacts = self.paths.contacts
         planar, before = contacts.tree(0)
@@ -140,7 +141,7 @@ class _Search:
         min_length, max_length = float(rest.source), float(self.within[g])
         known: list[tuple[float, Word]] = []
         known_to = min_length
-        low, high = 0.0, math.inf  # excesses known to give too few, too many
+        low, high = 0.0, math.inf  # excess lengths that gave too few and too many classes
         excess = self.policy.first_excess * max(max_length - min_length, 0.0)
         for _ in range(self.policy.max_searches):
             reach = min(min_length + excess + self.paths.margin, max_length)
@@ -190,7 +191,7 @@ class _Search:
         if found.capped:
             return None, []
         nearest = sorted((length, w) for (_, w), length in self._shortest_by_class(found).items())
-        # one more than can be kept tells how long the shortest is that is not
+        # one class more than are kept: its length is the bound on classes left out
         rows = [(length, trie.word(w)) for length, w in nearest[: share + 1]]
         return found, sorted(rows)
 

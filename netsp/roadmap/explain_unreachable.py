@@ -1,4 +1,4 @@
-"""Tether that each goal needs, and why a goal is out of reach."""
+"""Tether length that each goal needs, and the reason why a goal is out of reach."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def shortest_tethers(
     Parameters
     ----------
     outline : Outline, optional
-        Outline of the problem, if it is at hand.
+        Outline of the problem; built if None.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def shortest_tethers(
         )
         local = build_outline(problem.model_copy(update={"obstacles": near_obstacles}), clock)
         planar = ContactGraph(local, clock=clock, policy=policy).lengths([0])[0, 1:]
-        # a path no longer than that does not get to the others
+        # paths up to this length reach no other goal
         longest = float(planar[np.isfinite(planar)].max(initial=0.0))
         if longest <= within:
             break
@@ -111,8 +111,7 @@ def unreached_error(problem: Problem, needed: Floats, missing: list[int]) -> Inf
 
 
 def _enclosure(problem: Problem, g: int) -> tuple[str, tuple[int, ...]]:
-    """Return what stands between the base and a goal that no path joins: a phrase, and
-    obstacles."""
+    """Return a phrase for what separates a goal from the base, and the obstacles that do."""
     import shapely
 
     grown = [

@@ -1,8 +1,8 @@
 """Depth-first search for taut paths over the tangent graph, guided by words.
 
-One kernel serves two questions. *Which classes reach a goal within the tether?* The trie of words
-grows with the search and holds all words, or all that do not loop. *How long are the legs between
-given classes?* The trie is given and holds their words with all prefixes. These words are the
+One kernel answers two questions. *Which classes reach a goal within the tether?* The trie of words
+grows during the search; it holds all words, or all that do not loop. *How long are the legs between
+given classes?* The trie is given; it holds their words with all prefixes. These words are the
 *core* of the trie. Each taut path is generated once, and is the only one of its class
 (docs/theory.md).
 
@@ -30,9 +30,9 @@ from netsp.roadmap.tangents import TangentGraph
 from netsp.roadmap.trie import CORE, LETTER, PARENT, Trie, add_child, trie_child
 
 ARRIVAL_TOLERANCE = 1e4
-"""Tolerance of the lengths of two arrivals at a directed arc with one word, in margins of the
-outline (1e-6 of the size): within it they are one path. Where outlines touch from inside, hopping
-between them takes no length but rounding, and would go on for ever with a smaller tolerance."""
+"""Tolerance of the lengths of two arrivals at a directed arc with one word that count as one path,
+as a multiple of the outline's margin (1e-6 of the size). Where outlines touch from inside, a path
+may switch between them at no cost but rounding, forever if the tolerance were smaller."""
 
 Letters = npt.NDArray[np.int32]
 
@@ -207,8 +207,11 @@ def _follow_letters(
 
 @kernel
 def _is_new_arrival(code: int, mark: float, same: float, key: Ints, length: Floats) -> bool:
-    """Return whether no arrival with this code (word and directed arc) had this length, and record
-    it. Collinear tangents give one path several spellings."""
+    """Return whether an arrival with this code (word and directed arc) and length is new; record
+    it.
+
+    Collinear tangents give several spellings of one path.
+    """
     slots = len(key)
     slot = (code * 0x9E3779B1) % slots
     while key[slot] >= 0:
@@ -233,8 +236,7 @@ def explore(
     size: int,
     stop: Ints,
 ) -> tuple[tuple[Ints, Floats, int], tuple[Ints, Floats], tuple[Ints, Floats], bool]:
-    """Find all taut paths from node `source` whose words stay in the core of the trie, or pend from
-    it.
+    """Find all taut paths from node `source` whose words are in the core of the trie, or pending.
 
     Parameters
     ----------
@@ -250,7 +252,7 @@ def explore(
         slid before the departure); the search tree as rows of states; whether the search was cut
         short.
     """
-    # taken out once: to take an array out of a tuple costs a count of its references
+    # unpacked once, because each access to an array in a tuple changes a reference count
     start, target, length, ends = net.start, net.target, net.length, net.ends
     first, turn, gap, radius = net.first, net.turn, net.gap, net.radius
     segment_row, arrival_row, gap_row = net.segment_row, net.arrival_row, net.gap_row
@@ -287,7 +289,7 @@ def explore(
         while True:
             visited += 1
             if visited > request.max_states or hits >= request.max_hits or stop[0] != 0:
-                # the state that is being looked at counts as kept
+                # the state that is being expanded is in the tree
                 tree = state[: count + 1], real[: count + 1]
                 return (trie, limit, size), (hit[:hits], hit_real[:hits]), tree, True
             departed = so_far + radius[node] * slid

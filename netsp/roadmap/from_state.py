@@ -1,11 +1,12 @@
-"""Travel graph of a problem that starts in the middle: from the robot's present state.
+"""Travel graph of a problem whose tour starts from a state of the robot.
 
-The state is one more augmented goal, with the one class that the tether has now. Wanted is a path
-from it through all goals to the base; solvers look for closed tours through the base. So the edge
-between base and state costs nothing, and every other edge at either of them costs a surcharge more.
-A tour takes two edges at the base and two at the state: with the free edge it pays the surcharge
-twice, without it four times. Twice the surcharge is more than some path costs, so the shortest tour
-has the free edge, and is the shortest path plus twice the surcharge.
+The state is one more augmented goal, with a single class: that of the tether now. The solution is a
+path from the state through all goals to the base, but solvers find closed tours through the base.
+So the leg between base and state costs 0, and a surcharge is added to each other leg at either of
+them. A tour has two legs at the base and two at the state. With the free leg it pays the surcharge
+twice, without it four times. Twice the surcharge is more than the cost of some path, so the
+shortest tour has the free leg, and its length is that of the shortest path plus twice the
+surcharge.
 """
 
 from __future__ import annotations
@@ -43,15 +44,14 @@ PATH_GAP_TOLERANCE = 10.0 * OPTIMALITY_TOLERANCE
 
 
 class GraphFromState(TravelGraph):
-    """Travel graph whose tours start at the base, go on to the state for nothing, and from there
-    through the goals.
+    """Travel graph whose tours lead from the base to the state at no cost, then through the goals.
 
     Attributes
     ----------
     start
         Vertex of the state.
     surcharge
-        Added cost of the other edges at base and state.
+        Added cost of the other legs at base and state.
     within
         Travel graph without the surcharge.
     start_tether
@@ -81,8 +81,7 @@ class GraphFromState(TravelGraph):
         self.declared_scope = within.declared_scope
 
     def as_tour(self, order: tuple[int, ...]) -> tuple[int, ...]:
-        """Return a closed tour with the state right after the base, in whichever sense it was
-        found."""
+        """Return a closed tour in the direction in which the state follows the base."""
         if len(order) > 1 and order[-1] == self.start and order[1] != self.start:
             return (0, *reversed(order[1:]))
         return order
@@ -106,7 +105,7 @@ class GraphFromState(TravelGraph):
         goal = int(self.cluster[self.start])
         base, start = (ways.ends == 0).any(axis=1), (ways.ends == goal).any(axis=1)
         length = ways.length + self.surcharge * (base.astype(np.float64) + start)
-        # the one between them is for nothing, however long
+        # the leg between base and state is free
         rest = ~(base & start)
         odd = np.zeros((1, ways.odd.shape[1]), dtype=np.uint64)
         for a in self.signatures[self.start]:
@@ -174,8 +173,10 @@ class GraphFromState(TravelGraph):
         return shortest + 2.0 * self.surcharge
 
     def least_by_way_of(self, tether: float) -> float:
-        """Return a lower bound on paths by way of a class whose tether is at least so long: the
-        path home from there, with the surcharge of every tour."""
+        """Return a lower bound on paths through a class whose tether is at least `tether` long.
+
+        It is the path home from there, with the surcharge of every tour.
+        """
         return tether + 2.0 * self.surcharge
 
     def progress_listener(self, listener: OnProgress | None) -> OnProgress | None:
@@ -255,7 +256,7 @@ class _SurchargedLegs(Legs):
         ends = np.isin(vertices, (0, self.start))
         with self.within.on_clock(clock or self.within.clock):
             for block_rows, costs in self.within.costs_in_blocks(vertices, rows):
-                # row by row of these two, and what the others have to them
+                # the rows of base and state, and the columns of both in the other rows
                 for k, columns in (ends[block_rows], slice(None)), (~ends[block_rows], ends):
                     sources, targets = vertices[block_rows[k]], vertices[columns]
                     part = costs[k][:, columns].astype(np.float64)
@@ -309,7 +310,7 @@ def graph_from_state(
     plain = problem.model_copy(update={"state": None})
     placed = plain.model_copy(update={"goals": (*plain.goals, Goal(position=state.position))})
     word = reduce(state.signature)
-    # a tether that is out may be far longer than a limit that was lowered since
+    # the tether may be far longer than a limit that was lowered after the robot went out
     around = max([np.hypot(*(np.array(state.position[:2]) - plain.base[:2])), plain.scale])
     within = clock if limits_paths else None
     far = TautPaths(placed, policy.max_state_ratio * max(limit, float(around)), within, policy)
@@ -320,7 +321,7 @@ def graph_from_state(
             f"state.signature: no taut tether to the robot has the word {list(state.signature)}"
         ) from None
     start_tether = far.path(0, last, word)
-    # the goals' classes as ever; the state's own may be one that no tour would choose
+    # the goals have the usual classes, but that of the state may be one that no tour would use
     roadmap = TautRoadmap(
         plain,
         policy,

@@ -1,7 +1,7 @@
-"""Ray crossings of segments and arcs, compiled; the same rules as `netsp.hsignature.rays`.
+"""Ray crossings of segments and arcs, for kernels, by the rules of `netsp.hsignature.rays`.
 
-Sides are decided by comparing the stored x of both ends of a piece with the x of the ray, so that
-the letters of consecutive pieces that share an end fit together exactly.
+Sides come from comparing the stored x of both ends of a piece with the x of the ray, so consecutive
+pieces, which share an end, agree about its side.
 """
 
 from __future__ import annotations

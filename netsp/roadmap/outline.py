@@ -1,13 +1,13 @@
-"""Outline of free space: what blocks a segment, and the arcs around which a taut path can bend.
+"""Outline of free space: blockers of segments, and arcs around which a taut path can bend.
 
 A circle grown by the clearance is a disk. A polygon grown by the clearance has a disk at each
 convex vertex, of which only the part between the normals of the two edges shows. So a circle is the
 one-vertex polygon, and every bend of a taut path is an arc of some disk. Where grown obstacles
 overlap, the covered part of an arc is cut away.
 
-Coordinates are relative to the base. Every obstacle is grown by a further `margin`: what touches,
-overlaps, so that no path slips through a gap of no width, and a polygon without clearance still has
-arcs. Lengths change by at most the margin times the turning.
+Coordinates are relative to the base. Each obstacle is grown by a further `margin`. Obstacles that
+touch then overlap, so no path slips between them, and a polygon without clearance has arcs, too.
+Lengths change by at most the margin times the turning.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ COVER_TOLERANCE = 1e-12
 """Tolerance of the test whether an obstacle covers a point, as a share of the problem's size."""
 
 OUTLINING = "outlining the obstacles"
-"""Name of the stage in messages about the time limit."""
+"""Name of the stage, in messages about the time limit."""
 
 STAND_OFF = 1e-8
 """Tolerance of a point on a grown boundary: the distance to which it is moved off, as a share of
@@ -175,7 +175,7 @@ def _vertex_disks(v: Floats, growth: float) -> list[tuple[float, float, float, f
 
 
 def push_out(point: Floats, blockers: Blockers, distance: float) -> Floats:
-    """Return a point moved off a grown boundary to a distance, if it lies on it, or nearly."""
+    """Return a point, moved to a distance from a grown boundary if it is nearer."""
     p = np.array(point, dtype=float)
     for _ in range(32):
         depth = depths(p[0], p[1], blockers)
@@ -234,7 +234,7 @@ def _visible_arcs(disks: Floats, blockers: Blockers, bounds: Floats, stop: Ints)
     circles, edges, grow, eps = blockers.circles, blockers.edges, blockers.grow, blockers.eps
     part, part_box, skip = blockers.part, blockers.part_box, blockers.tree.skip
     tree_box, tree_first, tree_stop = blockers.tree.box, blockers.tree.first, blockers.tree.stop
-    arcs = np.empty((16, 6))  # the sixth column tells a whole circle
+    arcs = np.empty((16, 6))  # the sixth column is 1 for a whole circle
     zero = int(np.int64(0))  # no literal: numba would compile every callee for it once more
     count = zero
     cuts = np.empty(64)

@@ -35,10 +35,10 @@ class TautPaths:
     Parameters
     ----------
     longest
-        Largest planar length of a path; by default that of a leg between two admissible classes,
-        and then only what the tether can touch is looked at.
+        Largest planar length of a path. By default it is that of a leg between two admissible
+        classes, and obstacles that the tether cannot touch are ignored.
     clock
-        Clock of the run; without a clock, no work is cut short.
+        Clock of the run; None for no time limit.
 
     Raises
     ------
@@ -59,7 +59,7 @@ class TautPaths:
         reach = problem.tether_length if longest is None else longest
         self.tangents: TangentGraph = build_tangents(self.outline, reach, clock, self.policy.sight)
         self._longest = 2.0 * problem.tether_length if longest is None else longest
-        # what rounding and the extra growth of obstacles can add to a length
+        # the most that rounding and the extra growth of obstacles add to a length
         self.margin = 100.0 * self.outline.margin
         self._z = problem.points[:, 2]
         self._cache: dict[tuple[int, int, Word], tuple[float, list[tuple[int, float]]]] = {}
@@ -117,8 +117,8 @@ class TautPaths:
         return np.asarray(np.hypot(out, self._z[to] - self._z[from_]))
 
     def planar_length(self, a: int, b: int, word: Word, longest: float | None = None) -> float:
-        """Return the planar length of the taut path of a word from point a to point b, which is
-        known not to exceed `longest`."""
+        """Return the planar length, at most `longest`, of the taut path of a word from point a to
+        point b."""
         return self.pieces(a, b, word, longest)[0]
 
     def planar_length_within(self, a: int, b: int, word: Word, longest: float) -> float | None:
@@ -219,7 +219,7 @@ class TautPaths:
     def _find(
         self, a: int, b: int, word: Word, longest: float | None, stop: Flag = NEVER
     ) -> tuple[float, list[tuple[int, float]]] | None:
-        """Return length and pieces; None if there is no path so short."""
+        """Return length and pieces; None if the path is longer than `longest`."""
         if not self._has_obstacles_of(word):
             return None
         length, edges, slid = self._pull(a, b, word)
@@ -297,12 +297,12 @@ class TautPaths:
         found = run_explore(
             self.tangents, 0, trie, keeps_tree=True, margin=self.outline.margin, stop=stop
         )
-        # of several spellings of one path the shortest comes last
-        hit = {
+        # longest first, so that the shortest spelling of a path replaces the others
+        shortest = {
             (int(found.goal[k]), int(found.word[k])): int(k)
             for k in np.argsort(-found.length, kind="stable").tolist()
         }
-        hits = [hit.get((goal, hits)) for goal, hits in zip(goals, node, strict=True)]
+        hits = [shortest.get(key) for key in zip(goals, node, strict=True)]
         return [None if k is None else found.pieces(k) for k in hits]
 
     def _has_obstacles_of(self, word: Word) -> bool:

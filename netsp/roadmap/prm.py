@@ -4,8 +4,8 @@ McCammon & Hollinger 2017, section IV-A: milestones are sampled uniformly in fre
 the PRM* rule (Karaman & Frazzoli 2011), and augmented with the homotopy class of the path from the
 base (Bhattacharya et al. 2012). Words come from the projection on the plane, lengths are 3D.
 
-OMPL samples motions at a resolution, so it checks the ends only, and every edge is checked exactly
-here. Base and goals join the milestones by the same k-nearest rule.
+OMPL would check motions at sampled points. Here it checks their ends only, and each edge is then
+checked exactly. Base and goals join the milestones by the same k-nearest rule.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class PrmRoadmap(Legs):
     augmented
         Graph over (milestone, word).
     complete
-        Whether the time sufficed for all samples and all of the augmented graph.
+        Whether sampling and augmenting were complete before the time was up.
 
     Raises
     ------
@@ -214,7 +214,7 @@ class PrmRoadmap(Legs):
         rows = np.flatnonzero((g.milestone >= 1) & (g.milestone <= goals))
         missing = sorted(set(range(1, goals + 1)) - set(g.milestone[rows].tolist()))
         if missing:
-            # a sample proves nothing; the exact shortest tether does
+            # sampling proves nothing about reach, but the exact shortest tether does
             reach = self.paths.contacts.lengths([0])[0]
             points = self.problem.points
             needs = np.hypot(reach, points[:, 2] - points[0, 2])[: len(points)]

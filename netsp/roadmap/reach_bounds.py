@@ -1,8 +1,8 @@
-"""Paths between goals, told apart by the rays that they cross an odd number of times.
+"""Shortest paths between goals by parity: by the rays that they cross an odd number of times.
 
-A search from every goal (`netsp.roadmap.explore`) finds all taut paths up to a length. Of those
-that cross the same rays an odd number of times the shortest counts. Thousands of classes are few
-such paths, because going round an obstacle twice counts as not going round it.
+A search from every goal (`netsp.roadmap.explore`) finds all taut paths up to a length. Of the paths
+with one parity only the shortest is kept. Thousands of classes have few parities, because going
+round an obstacle twice counts as not going round it.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.trie import LETTER, PARENT, Trie
 
 ParityRows = tuple[Ints, Floats, npt.NDArray[np.uint64]]
-"""(k,) other goals, (k,) planar lengths, (k, w) bits."""
+"""Paths from a goal: other goals (k,), planar lengths (k,), and parity bits (k, w)."""
 
 
 def find_parity_paths(paths: TautPaths, up: Callable[[], bool]) -> WaysByParity | None:
-    """Return the paths between goals up to a length that yields not too many, and those from the
-    base up to the tether length; None if that takes too long."""
+    """Return paths between goals, up to a length at which there are not too many, and all paths
+    from the base up to the tether length; None if the time is up first."""
     points, tether = paths.outline.points, paths.problem.tether_length
     apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
     np.fill_diagonal(apart, np.inf)

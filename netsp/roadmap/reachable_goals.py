@@ -15,17 +15,17 @@ UNREACHED = "out of the tether's reach among the obstacles"
 """Reason for leaving a goal out, in the record of an import."""
 
 REACH_TOLERANCE = 1e-6
-"""Tolerance of the tether that a goal needs, relative: nearer calls are left to the roadmap."""
+"""Tolerance of the tether length that a goal needs, as a share of it; within it, the roadmap
+decides whether the goal is in reach."""
 
 
 def keep_reachable_goals(
     problem: Problem, removable: Collection[str] | None = None, policy: RoadmapPolicy | None = None
 ) -> tuple[Problem, list[str]]:
-    """Return the problem without the goals that its tether cannot reach, and a line for each of
-    those.
+    """Return the problem without the goals out of reach of its tether, and a line for each of them.
 
-    Goals that came after a goal left out lose that condition. The same problem is returned if all
-    goals are in reach.
+    Precedences of goals that are left out are removed. The same problem is returned if all goals
+    are in reach.
 
     Parameters
     ----------
@@ -63,8 +63,8 @@ def keep_reachable_goals(
 
 
 def unreached_note(before: Sequence[Goal], after: Sequence[Goal], max_names: int = 5) -> str:
-    """Return one line on the goals of `before` that are not in `after`: their number and the first
-    of their names."""
+    """Return one line on the goals of `before` that are not in `after`: their number and some
+    names."""
     kept = {goal.name for goal in after}
     names = [str(goal.name) for goal in before if goal.name not in kept]
     shown = ", ".join(names[:max_names]) + (", …" if len(names) > max_names else "")

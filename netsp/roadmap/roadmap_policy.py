@@ -19,17 +19,17 @@ def _check_growth(policy: object, *names: str) -> None:
 
 @dataclass(frozen=True)
 class SightPolicy:
-    """Policy of how pairs of arcs that cannot see each other are ruled out.
+    """Policy that rules out pairs of arcs that cannot see each other.
 
-    Ruled out or not, a pair has the same tangents: all numbers here trade time against memory.
+    No number changes a tangent; they trade time against memory.
 
     Parameters
     ----------
     sectors : int
-        Number of sectors of each pencil; at least 8. More rule out more pairs and take more memory
-        and time themselves: 8 bytes for each arc and sector.
+        Number of sectors of each pencil; at least 8. More sectors rule out more pairs, but take
+        time and memory: 8 bytes for each arc and sector.
     min_pairs : int
-        From this many pairs on, horizons are computed; at least 0. Fewer pairs are all tested.
+        Minimum number of pairs for which horizons are computed; at least 0. Fewer are all tested.
     block : int
         Number of arcs that a thread joins at one time, and whose pairs are then in memory; at
         least 1.
@@ -38,8 +38,8 @@ class SightPolicy:
         which horizons may rule out their pair; at least 1. Nearer disks are always tested.
     min_clearance_ratio : float
         Smallest distance of a blocker from the centre of a disk, as a multiple of the sum of their
-        radii, at which it gives the disk a horizon; more than 1. Directions to what is nearly
-        touched are ill-conditioned.
+        radii, at which it gives the disk a horizon; more than 1. Directions to nearer blockers are
+        ill-conditioned.
     max_shift_share : float
         Largest shift of a direction by the radius of a disk that is bounded instead of computed, as
         a share of a sector; at least 0. A larger share saves arcsines and lowers fewer horizons.
@@ -68,7 +68,8 @@ class SightPolicy:
 
 @dataclass(frozen=True)
 class PathPolicy:
-    """Policy of how the taut path of one word is found and drawn. All numbers are positive.
+    """Policy of the search for the taut path of a word, and of its drawing. All numbers are
+    positive.
 
     Attributes
     ----------
@@ -80,15 +81,15 @@ class PathPolicy:
     min_second_share
         Smallest second limit, as a share of the longest path possible.
     max_states
-        Maximum number of departures expanded for one path in the search among the paths of all
-        words, the last resort. A million take about half a second.
+        Maximum number of departures expanded for one path in the last resort, a search among the
+        paths of all words. A million take about half a second.
     max_known
-        Maximum number of paths that are remembered; then all are forgotten.
+        Maximum number of paths in the cache, which is then emptied.
     max_bends
-        Maximum number of nodes of a path that is pulled taut. Longer paths are searched for.
+        Maximum number of nodes of a path that is pulled taut. A search finds longer paths.
     max_backward_turn
         Largest angle, radians, by which a string among slits may seem to go back on an arc at which
-        it bends twice in a row. A larger angle counts as a turn the whole way round.
+        it bends twice in a row. A larger angle counts as a full turn.
     max_chord_turn
         Largest turn of a chord of a drawn arc, radians. Chords of 3 degrees are 0.023 % longer than
         their arc.
@@ -115,8 +116,8 @@ class ContactPolicy:
     Attributes
     ----------
     limit_ratios
-        Limits of a search, as multiples of the straight distance, one after the other; the last
-        search has no limit.
+        Length limits of successive searches, as multiples of the straight distance; a last search
+        has no limit.
     sources_per_check
         Number of sources of shortest paths between two checks of the clock.
     arcs_per_check
@@ -135,22 +136,23 @@ class ContactPolicy:
 
 @dataclass(frozen=True)
 class ClassPolicy:
-    """Policy of which classes of the tether a roadmap holds. All numbers are positive.
+    """Policy of the choice of classes that a roadmap holds. All numbers are positive.
 
     Attributes
     ----------
     max_classes
-        Maximum number of classes, about; of more, the shortest of every goal are kept. All legs
-        between 22 000 classes take 1.8 GiB in single precision.
+        Approximate maximum number of classes; if there are more, the shortest of each goal are
+        kept. All legs between 22 000 classes take 1.8 GiB in single precision.
     states_per_class
-        Number of search states for each class that may be kept, after which a search is given up.
+        Maximum number of states of a search, as a multiple of the number of classes wanted.
     first_excess
-        First length of a search for the classes of one goal beyond what the goal needs, as a share
-        of the length that is left.
+        First excess length in a search for the classes of one goal, beyond the length of its
+        shortest tether, as a share of the rest of the tether.
     growth
-        Factor by which this length grows while there are too few classes; more than 1.
+        Factor by which the excess length grows while there are too few classes; more than 1.
     shrink
-        Divisor of the step by which it shrinks while there are too many classes; more than 1.
+        Divisor of the step by which the excess length shrinks while there are too many classes;
+        more than 1.
     max_searches
         Maximum number of searches for the classes of one goal.
     max_time_share
@@ -173,30 +175,30 @@ class ClassPolicy:
 
 @dataclass(frozen=True)
 class LegPolicy:
-    """Policy of how the legs between classes are measured. It changes no length.
+    """Policy of the measurement of legs between classes; it changes no length.
 
     Attributes
     ----------
     block_rows
-        Number of matrix rows worked on at one time, so that intermediate arrays stay small.
+        Number of matrix rows computed at a time, so that intermediate arrays stay small.
     bound_rows
         Number of matrix rows of lower bounds that a thread computes at one time.
     max_block_legs
-        Maximum number of legs in memory where not all are held. The default is a quarter of a GiB
-        in single precision; with fewer, a leg shared by many is pulled again in more blocks.
+        Maximum number of legs in memory if not all are held. The default is a quarter of a GiB in
+        single precision. With fewer, more blocks pull the same legs again.
     max_single_legs
-        Maximum number of legs that are pulled one by one, which takes some hundredths of a second;
-        also the number that a thread pulls at one time.
+        Maximum number of legs that are pulled one by one, which takes some hundredths of a second.
+        A thread also pulls this number at a time.
     untimed_vertices
         Number of vertices up to which legs among them are measured even if time is up; at least
         `CostPolicy.untimed_vertices`, which solvers rely on.
     max_parted_classes
-        Maximum number of classes for which it is soon known where all their tethers part. Among
-        more, a few legs are pulled one by one.
+        Maximum number of classes whose tree of tethers is quickly built. Among more classes, a few
+        legs are pulled one by one.
     s_per_leg
-        Estimated CPU time of a leg, s, where all are measured together.
+        Estimated CPU time of a leg, s, if all are measured together.
     min_joint_searches
-        From one more than this many tethers that cannot be pulled on, one search finds them all.
+        Number of tethers that cannot be pulled above which one search finds all of them.
     """
 
     block_rows: int = 256
@@ -217,20 +219,20 @@ class LegPolicy:
 
 @dataclass(frozen=True)
 class ParityPathPolicy:
-    """Policy of the search for paths told apart by the parity of their crossings.
+    """Policy of the search for paths by the parity of their crossings.
 
     All numbers are positive.
 
     Attributes
     ----------
     first_ratio
-        First limit of length, as a multiple of the largest distance of a goal to its nearest.
+        First length limit, as a multiple of the largest distance from a goal to its nearest goal.
     growth
         Factor from one limit to the next; more than 1.
     min_tether_share
         Smallest first limit, as a share of the tether.
     max_paths
-        Number of paths from which on no longer ones are sought.
+        Number of paths at which the length limit stops growing.
     max_states
         Maximum number of departures expanded from one goal.
     """
@@ -248,12 +250,12 @@ class ParityPathPolicy:
 
 @dataclass(frozen=True)
 class DetourPolicy:
-    """Policy of the sub-goals through which a path changes its class. Both numbers are positive.
+    """Policy of the sub-goals that change the class of a path. Both numbers are positive.
 
     Attributes
     ----------
     sub_goals_per_obstacle
-        Number of places around each obstacle, of which those in free space are sub-goals.
+        Number of places around each obstacle; those in free space are sub-goals.
     sub_goal_offset
         Distance of a sub-goal from the boundary, as a share of the obstacle's size.
     """
@@ -267,19 +269,19 @@ class DetourPolicy:
 
 @dataclass(frozen=True)
 class ReachPolicy:
-    """Policy of how the tether that each goal needs is found.
+    """Policy of the search for the tether length that each goal needs.
 
     Attributes
     ----------
     max_whole_obstacles
-        Maximum number of obstacles that are all looked at. Of more, only those near enough for a
-        path to touch them.
+        Maximum number of obstacles up to which all are considered. With more, only obstacles that a
+        path may touch are considered.
     first_ratio
         First guess of the longest path to a goal, as a multiple of the distance of the farthest
         goal.
     max_explained
-        Maximum number of enclosed goals whose enclosing obstacles are named: to find the obstacles
-        takes longer than to find the goals.
+        Maximum number of enclosed goals for which messages name the enclosing obstacles, because
+        finding these is slow.
     """
 
     max_whole_obstacles: int = 100
@@ -292,7 +294,7 @@ class ReachPolicy:
 
 @dataclass(frozen=True)
 class TetherPolicy:
-    """Policy of the search for the taut tethers to any place. All numbers are positive.
+    """Policy of the search for taut tethers to a place. All numbers are positive.
 
     Attributes
     ----------
@@ -326,8 +328,8 @@ class PrmPolicy:
     max_augmented
         Maximum number of vertices (milestone, word) of the augmented graph.
     s_per_search, s_per_searched_state
-        Estimated CPU time of a search for shortest paths, s: of any, and for each vertex of the
-        augmented graph.
+        Estimated CPU time of a search for shortest paths, s: a constant, and an amount for each
+        vertex of the augmented graph.
     """
 
     samples: int = 1000
@@ -349,8 +351,8 @@ class RoadmapPolicy:
     sight, paths, contacts, classes, legs, parity, detours, reach, tethers, prm
         Policies of the parts.
     max_state_ratio
-        Longest tether of a robot that is out, as a multiple of the tether length (or of the size of
-        the world, if that is larger). The limit may have been lowered since the robot went out.
+        Largest tether length of a state, as a multiple of the tether length, or of the size of the
+        world if larger. The limit may have been lowered after the robot went out.
     """
 
     sight: SightPolicy = SightPolicy()

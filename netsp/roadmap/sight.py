@@ -1,11 +1,11 @@
-"""Pairs of arcs and points that may see each other, in worlds with too many to try all pairs.
+"""Pairs of arcs and points that may see each other, in worlds too large to test all pairs.
 
-The directed tangents that leave an arc in one sense sweep the plane outside its disk once, by their
-direction. Their *pencil* is cut into sectors, and the horizon of a sector is a distance beyond
-which something blocks all of its tangents: a circle, an edge, or a connected run of edges between
-whose ends the sector lies. A pair whose common tangent ends beyond the horizon of either pencil is
-left out. Nearly all pairs are, most of them many at once, by the boxes around them. Horizons only
-rule out: who stays is tested exactly (`netsp.roadmap.tangents`).
+The directed tangents that leave an arc in one sense, its *pencil*, sweep the plane outside the disk
+once. The pencil is cut into sectors by direction. The horizon of a sector is a distance beyond
+which all its tangents are blocked: by a circle, an edge, or a chain of edges that spans the sector.
+A pair is ruled out if its common tangent ends beyond the horizon of either pencil. Boxes rule out
+many pairs at once, and nearly all pairs are ruled out. The others are tested exactly
+(`netsp.roadmap.tangents`).
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Lower bounds on leg lengths from obstacles shrunk to vertical slits.
 
-Replace every obstacle by the vertical chord through its representative point. Less stands in the
-way and the words stay the same, so the shortest path of a class gets no longer, and it is found
-without any search. The vertical lines through the points cut the plane into strips. A path of a
+Replace every obstacle by the vertical chord through its representative point. This removes
+obstruction but keeps the words, so the shortest path of a class gets no longer, and it is found
+without a search. The vertical lines through the points cut the plane into strips. A path of a
 given reduced word passes from strip to strip through *gates*: above the slit where the word has a
 letter, below it where it must pass the line without one. No strip is entered and left through the
 same gate (the word is reduced), and the strips and gates of the cover form a tree, so the gates and
@@ -12,8 +12,8 @@ Unfold the path at its turns: let s be the distance travelled in x. Then every g
 over a place s, from the slit's top up or from its bottom down, and the shortest path is the taut
 string through them, found in one sweep. Unfolding reflects strips, so it keeps lengths.
 
-On random worlds the bound is a few per cent below the leg. It costs a fraction of a microsecond
-where the leg costs a search, so most legs of a long tether never need to be measured.
+On random worlds the bound is a few per cent below the leg. It takes a fraction of a microsecond,
+and a leg takes a search, so with a long tether most legs need not be measured.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Slits(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Arrays in which the string between two ends is worked out.
+    """Scratch arrays for the string between two ends.
 
     Attributes
     ----------

@@ -1,8 +1,8 @@
 """Tangent graph: all free segments that a taut path may use, with the letters that they write.
 
-Nodes are directed arcs (arc, sense) and points (base, goals). A directed arc holds its departures
-in the order in which a robot that slides along it meets them. So a taut path repeats: arrive, slide
-on in the same sense, depart. A taut path never uses anything else (docs/theory.md).
+Nodes are directed arcs (arc, sense) and points (base, goals). The departures of a directed arc are
+in the order in which a robot that slides along the arc meets them. A taut path consists of such
+steps only: arrive, slide in the same sense, depart (docs/theory.md).
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ WRITING = "finding the rays that tangents cross"
 """Name of the stage in messages about the time limit."""
 
 ANGLE_TOLERANCE = 1e-7
-"""Tolerance of contact angles, radians: a departure so little before the arrival is straight on."""
+"""Tolerance of contact angles, radians: a departure may precede the arrival by this angle."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def build_tangents(
 ) -> TangentGraph:
     """Return all free tangents whose ends lie within `reach` of the base (inf for all).
 
-    Nothing farther from the base than the tether is ever touched: a leg between two admissible
+    A tether touches nothing farther from the base than its length: a leg between two admissible
     goals stays in the ball of that radius, which is convex in the covering space.
 
     Raises

@@ -45,10 +45,10 @@ class TautRoadmap:
         Maximum number of classes, about; by default that of the policy. If there are more, the
         shortest of every goal are kept.
     time_limit
-        Seconds, or the clock of the run. When the time is up while classes are sought, those found
-        are kept; when it is up while legs are measured, `lengths` raises.
+        Seconds, or the clock of the run. If the time is up during the search for classes, the ones
+        found so far are kept. If it is up while legs are measured, `lengths` raises.
     limits_paths
-        Whether the limit holds for outline and tangents, too, without which nothing can be planned.
+        Whether the limit also applies to outline and tangents, without which there is no plan.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class TautRoadmap:
     Raises
     ------
     InfeasibleError
-        A goal that no taut tether reaches; tells the tether that would.
+        No taut tether reaches some goal; the error states the length that would.
     InputError
         An unknown rule, or a bad number of classes.
     LimitReachedError
@@ -160,7 +160,7 @@ class TautRoadmap:
         return self.to_travel_graph()
 
     def _tether_length(self, goal: int, word: Word) -> float | None:
-        """Return the planar length of the taut tether of a class; None if it is too long."""
+        """Return the planar length of the taut tether of a class; None if it is over the limit."""
         rise = float(self._z[goal] - self._z[0])
         longest = math.sqrt(max(self.problem.tether_length**2 - rise**2, 0.0))
         bound = self.paths.slit_length(0, goal, word)

@@ -1,18 +1,18 @@
 """Taut path of a word without a search: a string among slits, pulled over the obstacles.
 
-Its class gives the strip and the side on which a path passes every obstacle, so the string among
-slits (`netsp.roadmap.slits`) is known at once, and has the right class. Its bends give obstacles
-and senses, which become directed arcs of the tangent graph. Then, from the start on:
+The class of a path determines on which side it passes each obstacle, and so the string among slits
+(`netsp.roadmap.slits`), which is of the same class. The bends of the string give obstacles and
+senses, which become directed arcs of the tangent graph. Then, from the start on:
 
 - where the tangent between two consecutive arcs is blocked, the arc that stands out farthest is
   inserted between them, on the side on which the string passes its representative point;
 - where a path would slide backwards on an arc, the arc is removed.
 
-This is a funnel (Lee and Preparata 1984) with arcs for corners. It proves nothing: what is swept
-over may end up on the wrong side, and a bay needs more care. The result is what is proven. A path
-of tangents of the graph that slides forwards on every arc is taut, a class holds one taut path
-(docs/theory.md), and its word is read off the letters of the graph. All other paths are left to the
-search (`netsp.roadmap.explore`).
+This is a funnel (Lee and Preparata 1984) with arcs for corners. The procedure may fail, because the
+path may sweep over obstacles or enter a bay, so its result is verified. A path of tangents that
+slides forwards on every arc is taut, a class has one taut path (docs/theory.md), and the letters of
+the graph give its word. If the verification fails, a search finds the path
+(`netsp.roadmap.explore`).
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ SAME_ANGLE = 1e-6
 """Tolerance of angles on an arc that count as one, radians."""
 
 SLIT_LINE_TOLERANCE = 1e-9
-"""Tolerance of a string that runs along the line of a slit: it is taken off the line by this share
+"""Tolerance of a string that runs along the line of a slit: it is moved off the line by this share
 of its length."""
 
 TOUCH_TOLERANCE = 1e-9
@@ -98,7 +98,7 @@ NODE, EDGE = range(2)
 
 
 class Path(NamedTuple):
-    """Path that is being worked out.
+    """Path that is being pulled taut.
 
     Attributes
     ----------
@@ -301,7 +301,7 @@ def _initial_arcs(
     numbers, row, disk = arcs.numbers, arcs.row, arcs.disk
     floats, ints = path.floats, path.ints
     if bends and gate[corner[bends - 1, 0], LOW] == gate[corner[bends - 1, 0], HIGH]:
-        bends -= 1  # that is its end
+        bends -= 1  # the last gate is the end of the path
     ints[0, NODE] = arcs.points + point[u]
     x, y = place[u, 0], place[u, 1]
     _set_position(0, x, y, float(cell[u]), floats)

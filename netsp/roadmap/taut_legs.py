@@ -73,7 +73,7 @@ class TautLegs(Legs):
             and len(vertices) <= self.policy.untimed_vertices
             and len(self.cluster) > self.policy.max_parted_classes
         ):
-            # one by one, whatever the time: to know where all tethers part takes a while
+            # one by one, even if time is up, because building the tree of tethers takes a while
             asked = np.ones((len(vertices), len(vertices)), dtype=bool)
         if asked is not None and asked.sum() <= max(self.policy.max_single_legs, 2 * len(vertices)):
             return self._selected(vertices, asked)
@@ -133,7 +133,7 @@ class TautLegs(Legs):
             branches = build_branches(self._tether_tree(stop), vertices)
             self._fill(vertices, share, out, stop, branches, branches.order)
 
-        # what takes a fraction of a second is measured all the same, or there would be no tour
+        # a few legs are measured even if time is up, or there would be no tour
         if (
             n <= self.policy.untimed_vertices
             and len(self.cluster) <= self.policy.max_parted_classes
@@ -146,8 +146,8 @@ class TautLegs(Legs):
         return out
 
     def _set_non_legs(self, vertices: Ints, rows: Ints, share: float, out: Floats) -> None:
-        """Write into rows (r, k) what is no leg between goals: tethers for legs of the base, inf
-        within a goal."""
+        """Write the other entries into rows (r, k): tethers for legs of the base, inf within a
+        goal."""
         point, tethers = self.cluster[vertices], share * self.to_base()[vertices]
         for base in np.flatnonzero(point == 0).tolist():
             out[rows == base] = tethers
@@ -229,7 +229,7 @@ class TautLegs(Legs):
             path = known.get(v)
             if path is None and (found := self._search_leg(0, v, stop)) is not None:
                 path = found[1]
-            # a leg left out has no taut path, so it shares no part with other legs
+            # a leg left out has no known path to share with other legs
             if path is not None:
                 growing.add(v, path, paths.arcs)
         tree = growing.tree()
@@ -304,7 +304,7 @@ class TautLegs(Legs):
     def path(self, u: int, v: int) -> Floats:
         """Return the (n, 3) polyline of the taut leg from vertex u to vertex v, with arcs
         circumscribed; height changes in proportion to planar length."""
-        if u > v:  # searched once for both senses
+        if u > v:  # one search serves both directions
             return self.path(v, u)[::-1].copy()
         word, longest = self.relative_word(u, v), self._max_length(u, v)
         try:
@@ -355,7 +355,7 @@ class TautLegs(Legs):
     def _pull_pairs(self, us: Ints, vs: Ints) -> Floats:
         """Return the (k,) planar lengths of legs, negative where they could not be pulled."""
         paths, (ends, point) = self.paths, self._ends
-        # strided arrays are another type, for which the kernel would be compiled anew
+        # strided arrays are another type, for which the kernel would be compiled again
         us, vs = np.ascontiguousarray(us), np.ascontiguousarray(vs)
         out = np.empty(len(us))
 

@@ -1,7 +1,7 @@
-"""Taut tether to any place, while somebody moves a cursor.
+"""Taut tethers to any place, fast enough to follow a cursor.
 
-The tangents between the arcs and the base are found once. For a new place only its own tangents are
-added, and a search from there (`netsp.roadmap.explore`) finds the taut paths to the base.
+The tangents between the arcs and the base are found once. For each place only its tangents are
+added, and a search from the place (`netsp.roadmap.explore`) finds the taut paths to the base.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Tethers:
     Parameters
     ----------
     problem : Problem
-        Problem whose base, obstacles, bounds and tether length count.
+        Problem with base, obstacles, bounds and tether length; its goals are ignored.
     policy : RoadmapPolicy, optional
         Policy of the search for paths.
 
@@ -80,8 +80,8 @@ class Tethers:
     def to(self, x: float, y: float, word: Word | None = None, z: float = 0.0) -> TautTether | None:
         """Return the taut tether to a place, by default the shortest of all classes.
 
-        The result is None if no tether of that class within the tether's length leads there, or if
-        the place lies in an obstacle or out of bounds.
+        Return None if no tether of that class is within the tether length, or if the place lies in
+        an obstacle or out of bounds.
 
         Parameters
         ----------
@@ -112,8 +112,8 @@ class Tethers:
     def classes(self, x: float, y: float, z: float = 0.0) -> list[TautTether]:
         """Return all taut tethers to a place within the tether's length, the shortest first.
 
-        There is one for each class; with very long tethers, those found within
-        `TetherPolicy.max_states`.
+        There is one for each class. With a very long tether, the search ends after
+        `TetherPolicy.max_states`, and some are missing.
 
         Parameters
         ----------

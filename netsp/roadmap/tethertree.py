@@ -1,7 +1,7 @@
 """Tethers as paths in a tree of bends.
 
-All tethers begin at the base, and in the cover two that have parted never meet again. So a bend of
-the tree stands for all tethers that come to it the same way.
+All tethers begin at the base, and in the cover two tethers that have parted never meet again. So
+all tethers that share a beginning share the bends of that beginning in the tree.
 """
 
 from __future__ import annotations

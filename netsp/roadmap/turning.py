@@ -1,8 +1,8 @@
 """Turning of the tether about obstacles, and the classes in which it stays within a limit.
 
-A tether on obstacles is held by friction: a pull at the anchor arrives at the robot divided by
-exp(mu * turning) (the capstan equation of Euler and Eytelwein). A limit on this ratio limits the
-turning.
+Friction on obstacles holds a tether: the tension changes by the factor exp(mu * turning) between
+the anchor and the robot (the capstan equation of Euler and Eytelwein). A limit on this factor is a
+limit on the turning.
 
 Along a leg the tether turns no farther than at one of its ends. The tethers to both ends and the
 leg bound a geodesic triangle: up to where the two tethers part they are one, and from there they
@@ -25,14 +25,14 @@ from netsp.model.problem import Problem
 from netsp.roadmap.paths import TautPaths, UnknownPathError
 
 TURNING_TOLERANCE = 1e-9
-"""Tolerance of the sum of angles by which a tether turns, radians: a rounding."""
+"""Tolerance for rounding in the sum of angles by which a tether turns, radians."""
 
 
 def tether_turnings(problem: Problem, graph: TravelGraph) -> Floats:
     """Return the sums of angles in the plan by which the tether turns in every class, radians.
 
-    With depth a tether turns no farther than in the plan. Classes whose taut path is not found are
-    NaN, with a warning.
+    In 3D a tether turns no farther than in the plan. A class whose taut path is not found gets NaN,
+    with a warning.
 
     Raises
     ------
@@ -68,9 +68,9 @@ def limit_turning(problem: Problem, graph: TravelGraph, max_turning: float) -> T
     Raises
     ------
     InfeasibleError
-        A goal is reached in no class that is left.
+        No class of some goal is left.
     LimitReachedError
-        The clock was up, or the turning is unknown in all classes of a goal that are left.
+        The clock was up, or the turning of all classes of some goal is unknown.
     """
     if math.isinf(max_turning):
         return graph

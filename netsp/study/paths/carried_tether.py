@@ -25,7 +25,7 @@ class CarriedTether:
     ----------
     puller : StringPuller
         String puller of the judge.
-    route : ndarray, shape (n, 3)
+    loop : ndarray, shape (n, 3)
         The path.
 
     Examples
@@ -33,18 +33,18 @@ class CarriedTether:
     >>> import numpy as np
     >>> from netsp import Problem
     >>> problem = Problem(base=(0, 0), goals=[(3, 4)], obstacles=[], tether_length=9)
-    >>> route = np.array([[0.0, 0, 0], [3, 4, 0], [3, 0, 0]])
-    >>> tether = CarriedTether(StringPuller(problem, 9.0), route)
+    >>> loop = np.array([[0.0, 0, 0], [3, 4, 0], [3, 0, 0]])
+    >>> tether = CarriedTether(StringPuller(problem, 9.0), loop)
     >>> tether.length(1), tether.longest(1e-6)
     (5.0, (1, 5.0))
     """
 
-    def __init__(self, puller: StringPuller, route: Floats) -> None:
-        self._puller, self._route = puller, route
+    def __init__(self, puller: StringPuller, loop: Floats) -> None:
+        self._puller, self._loop = puller, loop
         # tree of reduced sequences of crossed edges: each node has its parent and its last edge
         self._parent, self._edge = [-1], [(-1, False)]
         self._node = [0]
-        for piece in puller.crossings(route[:, :2]):
+        for piece in puller.crossings(loop[:, :2]):
             node = self._node[-1]
             for edge, side in piece:
                 node = self._after(node, edge, side)
@@ -85,7 +85,7 @@ class CarriedTether:
             In the problem's units, in 3D.
         """
         if k not in self._known:
-            self._known[k] = self._pulled(self._route[k], self._node[k])
+            self._known[k] = self._pulled(self._loop[k], self._node[k])
         return self._known[k]
 
     def length_to(self, k: int, place: Floats) -> float:
@@ -104,13 +104,13 @@ class CarriedTether:
             In the problem's units, in 3D.
         """
         node = self._node[k]
-        (piece,) = self._puller.crossings(np.array([self._route[k, :2], place[:2]]))
+        (piece,) = self._puller.crossings(np.array([self._loop[k, :2], place[:2]]))
         for edge, side in piece:
             node = self._after(node, edge, side)
         return self._pulled(place, node)
 
     def _pulled(self, place: Floats, node: int) -> float:
-        start = self._route[0]
+        start = self._loop[0]
         planar = self._puller.pull(start, place, self._sleeve(node)).low
         return math.hypot(planar, float(place[2] - start[2]))
 
@@ -130,9 +130,9 @@ class CarriedTether:
             Index of the point, and the length in the problem's units.
         """
         along = np.concatenate(
-            [[0.0], np.cumsum(np.linalg.norm(np.diff(self._route, axis=0), axis=1))]
+            [[0.0], np.cumsum(np.linalg.norm(np.diff(self._loop, axis=0), axis=1))]
         )
-        last = len(self._route) - 1
+        last = len(self._loop) - 1
         best = max((first, last), key=self.length)
 
         def bound(a: int, b: int) -> float:
@@ -166,10 +166,10 @@ class CarriedTether:
         ndarray, shape (count, 2)
             Length along the path in the plan, and the length of the taut tether there.
         """
-        s = polylines.along(self._route[:, :2])
+        s = polylines.along(self._loop[:, :2])
         out = []
-        for along_route in np.linspace(0.0, s[-1], count).tolist():
-            k = min(int(np.searchsorted(s, along_route, side="right")) - 1, len(s) - 1)
-            place = np.array([np.interp(along_route, s, self._route[:, j]) for j in range(3)])
-            out.append((along_route, self.length_to(k, place)))
+        for along_loop in np.linspace(0.0, s[-1], count).tolist():
+            k = min(int(np.searchsorted(s, along_loop, side="right")) - 1, len(s) - 1)
+            place = np.array([np.interp(along_loop, s, self._loop[:, j]) for j in range(3)])
+            out.append((along_loop, self.length_to(k, place)))
         return np.array(out)

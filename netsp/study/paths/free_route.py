@@ -69,13 +69,13 @@ class Stretch:
 
 
 @dataclass(frozen=True)
-class Route:
+class FreeLoop:
     """Path that has been led round all obstacles.
 
     Parameters
     ----------
     xy : ndarray, shape (n, 2)
-        Points of the route, in the problem's frame.
+        Points of the loop, in the problem's frame.
     along : ndarray, shape (n,)
         Length along the given path at each point.
     shut_in : float
@@ -127,7 +127,7 @@ class FreeSpace:
             return True
         return bool(shapely.covers(self.shape, shapely.LineString([a, b] - self.origin)))
 
-    def route(self, xy: Floats, along: Floats) -> Route:
+    def free_loop(self, xy: Floats, along: Floats) -> FreeLoop:
         """Lead a path round all obstacles.
 
         Parameters
@@ -139,7 +139,7 @@ class FreeSpace:
 
         Returns
         -------
-        Route
+        FreeLoop
             The path with every part outside of free space replaced.
         """
         line = xy - self.origin
@@ -167,7 +167,7 @@ class FreeSpace:
         lengths.append(along[inner])
         out, s_out = np.vstack(points), np.concatenate(lengths)
         keep = np.concatenate([[True], np.any(np.diff(out, axis=0) != 0.0, axis=1)])
-        return Route(out[keep], s_out[keep], shut_in)
+        return FreeLoop(out[keep], s_out[keep], shut_in)
 
     def _outside(self, line: Floats) -> list[tuple[float, float]]:
         """Return the parts outside of free space, each from a place to a place, in segments."""

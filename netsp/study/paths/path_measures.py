@@ -21,7 +21,7 @@ from netsp.hsignature import Word, concatenate, crossings, entangled, reduce
 from netsp.judge.stringpull import StringPuller
 from netsp.model.problem import Problem
 from netsp.study.paths.carried_tether import CarriedTether
-from netsp.study.paths.free_route import FreeSpace, Route, Stretch
+from netsp.study.paths.free_route import FreeSpace, FreeLoop, Stretch
 from netsp.study.paths.goal_visits import Passing, passings
 
 DEFAULT_SPEED = 0.5
@@ -153,17 +153,17 @@ class PathMeasures:
         Obstacles that the closed path is wrapped around.
     stretches : tuple of Stretch
         Parts of the path in obstacles, within their clearance, or out of bounds.
-    route : ndarray, shape (n, 3)
+    loop : ndarray, shape (n, 3)
         The path led round these parts, from the base and back; words and tethers are measured
         along it.
-    route_end : int
-        Index of the point of `route` at which the path ends.
-    route_lengths : ndarray, shape (route_end + 1,)
-        Length along the path at the points of `route`.
+    loop_end : int
+        Index of the point of `loop` at which the path ends.
+    loop_lengths : ndarray, shape (loop_end + 1,)
+        Length along the path at the points of `loop`.
     points : ndarray, shape (k, 3)
         The path with heights.
     carried : CarriedTether
-        Tethers at the points of `route` up to the end of the path.
+        Tethers at the points of `loop` up to the end of the path.
     """
 
     problem: Problem = field(repr=False)
@@ -185,9 +185,9 @@ class PathMeasures:
     word: Word
     entangled: tuple[int, ...]
     stretches: tuple[Stretch, ...]
-    route: Floats = field(repr=False, compare=False)
-    route_end: int
-    route_lengths: Floats = field(repr=False, compare=False)
+    loop: Floats = field(repr=False, compare=False)
+    loop_end: int
+    loop_lengths: Floats = field(repr=False, compare=False)
     points: Floats = field(repr=False, compare=False)
     carried: CarriedTether = field(repr=False, compare=False)
 
@@ -231,7 +231,7 @@ class PathMeasures:
         Parameters
         ----------
         count : int
-            Number of places, evenly along the route in the plan.
+            Number of places, evenly along the loop in the plan.
 
         Returns
         -------
@@ -240,9 +240,9 @@ class PathMeasures:
         """
         if self.longest_tether is None:
             return np.zeros((0, 2))
-        route = self.route[: self.route_end + 1]
+        loop = self.loop[: self.loop_end + 1]
         rows = self.carried.profile(count)
-        s = np.interp(rows[:, 0], polylines.along(route[:, :2]), self.route_lengths)
+        s = np.interp(rows[:, 0], polylines.along(loop[:, :2]), self.loop_lengths)
         return np.column_stack([s, rows[:, 1]])
 
     @property
@@ -330,8 +330,8 @@ def measure_path(
     if stamps is not None:
         speed = length / duration if duration > 0.0 else 0.0
 
-    route = led.lifted(heights)
-    carried = CarriedTether(led.puller, route[: led.last + 1])
+    loop = led.lifted(heights)
+    carried = CarriedTether(led.puller, loop[: led.last + 1])
     place = np.arange(len(given))
     cluster, before, visits = problem.clusters, set[int](), []
     for p in seen:
@@ -365,23 +365,23 @@ def measure_path(
         end_gap=end_gap,
         is_closed=max(start_gap, end_gap) <= radius,
         longest_tether=longest if is_reached else None,
-        longest_at=float(np.interp(led.route.along[at], led.flat, travelled)),
-        longest_place=(float(route[at, 0]), float(route[at, 1])),
+        longest_at=float(np.interp(led.loop.along[at], led.flat, travelled)),
+        longest_place=(float(loop[at, 0]), float(loop[at, 1])),
         end_tether=carried.length(led.last) if is_reached else None,
         end_word=led.word(led.last),
         word=word,
         entangled=tuple(k - 1 for k in entangled(word)),
         stretches=led.space.stretches(given[:, :2], led.flat),
-        route=route,
-        route_end=led.last,
-        route_lengths=np.interp(led.route.along[: led.last + 1], led.flat, travelled),
+        loop=loop,
+        loop_end=led.last,
+        loop_lengths=np.interp(led.loop.along[: led.last + 1], led.flat, travelled),
         points=points,
         carried=carried,
     )
 
 
 class _Led:
-    """Route of a path: the tether at the beginning, the path, and the straight line home, led round
+    """FreeLoop of a path: the tether at the beginning, the path, and the straight line home, led round
     all obstacles.
 
     Places on the path are counted in segments from its beginning. Lengths along the path are in the
@@ -407,36 +407,36 @@ class _Led:
         reach = float(np.abs(line - base).max())
         self.puller = StringPuller(problem, max(reach, problem.scale))
         self.space = FreeSpace(self.puller, reach)
-        self.route: Route = self.space.route(line[moves], along[moves])
-        s = self.route.along
+        self.loop: FreeLoop = self.space.free_loop(line[moves], along[moves])
+        s = self.loop.along
         self.first = min(int(np.searchsorted(s, 0.0)), len(s) - 1)
         self.last = max(int(np.searchsorted(s, self.flat[-1], side="right")) - 1, self.first)
         rays = problem.representative_points
         self._rays, self._base_z = rays, float(problem.base[2])
-        pairs = np.stack([self.route.xy[:-1], self.route.xy[1:]], axis=1)
+        pairs = np.stack([self.loop.xy[:-1], self.loop.xy[1:]], axis=1)
         steps = [crossings(pair, rays) for pair in pairs]
         self._begin = np.concatenate([[0], np.cumsum([len(step) for step in steps], dtype=int)])
         self._letters = [letter for step in steps for letter in step]
 
     def index(self, place: float) -> int:
-        """Return the index of the point of the route for a place on the path."""
+        """Return the index of the point of the loop for a place on the path."""
         s = float(np.interp(place, self._place, self.flat))
-        return int(np.argmin(np.abs(self.route.along - s)))
+        return int(np.argmin(np.abs(self.loop.along - s)))
 
     def sees(self, passing: Passing, goal: Floats) -> bool:
         """Return whether a goal is in sight where the path is nearest to it."""
-        return self.space.sees(self.route.xy[self.index(passing.place)], goal[:2])
+        return self.space.sees(self.loop.xy[self.index(passing.place)], goal[:2])
 
     def is_reached(self, k: int) -> bool:
-        """Return whether a free path follows the path to a point of the route."""
-        return bool(self.route.along[k] <= self.route.shut_in)
+        """Return whether a free path follows the path to a point of the loop."""
+        return bool(self.loop.along[k] <= self.loop.shut_in)
 
     def word(self, k: int, place: Floats | None = None) -> Word:
-        """Return the word of the tether at a point of the route, or at a place in sight of it."""
+        """Return the word of the tether at a point of the loop, or at a place in sight of it."""
         letters = self._letters[: self._begin[k]]
         if place is None:
             return reduce(letters)
-        return concatenate(letters, crossings([self.route.xy[k], place[:2]], self._rays))
+        return concatenate(letters, crossings([self.loop.xy[k], place[:2]], self._rays))
 
     @property
     def closed_word(self) -> Word:
@@ -444,10 +444,10 @@ class _Led:
         return reduce(self._letters)
 
     def lifted(self, heights: Floats) -> Floats:
-        """Return the route (n, 3) with the heights of the path's points."""
-        s = [self.route.along[0], *self.flat, self.route.along[-1]]
+        """Return the loop (n, 3) with the heights of the path's points."""
+        s = [self.loop.along[0], *self.flat, self.loop.along[-1]]
         z = [self._base_z, *heights, self._base_z]
-        return np.column_stack([self.route.xy, np.interp(self.route.along, s, z)])
+        return np.column_stack([self.loop.xy, np.interp(self.loop.along, s, z)])
 
 
 def _rising(given: Floats, known: list[tuple[float, float]]) -> Floats:
