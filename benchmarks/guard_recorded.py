@@ -205,7 +205,7 @@ def mission_row(folder: Path, options: GuardOptions) -> None:
             longest, last = max(longest, report.classes[0].taut), report
     free = last is not None and not last.loops and last.classes[0].word == ()
     row(
-        "auto-space-basin", "BIN", "", "", f"{as_planned} of {told} reports at stops", "", "", "",
+        "auto-space-basin", "BIN", "", "", f"{as_planned} of {told} reports at visits", "", "", "",
         f"{longest:.2f} of {mission.tether_length:g}", "free at the end" if free else "not free",
     )  # fmt: skip
 

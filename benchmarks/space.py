@@ -518,7 +518,7 @@ def shortest_way(context: PlanningContext, a: np.ndarray, b: np.ndarray) -> np.n
 
 
 def without_tether(found: SolvedMission) -> tuple[float, str]:
-    """Metres of the shortest tour along the shortest ways that are known, tether or not, and what
+    """Metres of the shortest tour along the shortest paths that are known, tether or not, and what
     becomes of the tether on it."""
     assert found.plan is not None
     ways, context = found.plan.paths, found.plan.context

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import argparse
 import ast
+import io
 import re
+import tokenize
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -36,6 +38,29 @@ PARTS = {"most", "least", "told", "way", "ways", "said", "heard", "asked"}
 """Parts of names for which there is a field's term: max, min, on, path."""
 
 PRONOUNS = re.compile(r"\b(so many|the first of these|that many|the others? of|those that)\b", re.I)
+
+UNSAID = {
+    "depot": r"depots?", "dock": r"dock(ed|ing)", "hop": r"hop(s|ping|ped)?", "rope": r"ropes?",
+    "node": r"goal nodes?", "target": r"goal targets?", "state": r"(augmented|goal) states?",
+    "edge": r"edges? (between|of) (the )?(goals|travel graph|tour)",
+    "label": r"labels? of (a |the )?(paths?|class(es)?|tethers?)", "wrap angle": r"wrap angles?",
+    "route": r"(best|closed|planned|shortest|robot's) routes?", "way": r"ways?",
+    "wound around": r"wound (a)?round",
+    "stop": r"(a|the|each|every|last|next|first|at|all|between) stops?(?! (flag|of|- 1))",
+    "too long": r"tethers?( \w+){0,3} too long", "taking in": r"(take|takes|taking) in tether",
+    "tether out": r"tether out(?! of)", "length out": r"length out",
+    "lost": r"(goals?|waypoints?)( that)?( is| are| was| were)? (lost|skipped|given up)",
+}  # fmt: skip
+"""Patterns of the terms that the glossary says not to use, each in the sense that it has there."""
+
+IDIOMS = re.compile(
+    r"`[^`]*`|<[^>]*>|\b(on|along|in) (a|the|its|your|a robot's|the anchor's) way\b|\bunder way\b"
+    r"|\bhalf[ -]way\b|\b(one|both|either|any|every|all|other|same|this|that|no|only|some|lead the)"
+    r"[ -]ways?\b|\b(the wrong|a long|the whole|out of the|all the) way\b|\bthe way (to|in|that)\b"
+    r"|\b(in|are) (two|three|several|different|many) ways\b|\bways? (of \w+ing|to \w+)\b",
+    re.I,
+)
+"""Quoted names, and idioms in which a word of `UNSAID` has another sense."""
 
 Place = tuple[str, int, str]
 """File, line and text."""
@@ -254,6 +279,27 @@ def _pronouns(tree: Tree) -> list[Place]:
     ]
 
 
+def said(text: str) -> list[str]:
+    """Return the terms of `UNSAID` that a text uses, once each."""
+    plain = IDIOMS.sub("_", " ".join(text.split()))
+    return [t for t, pattern in UNSAID.items() if re.search(rf"\b({pattern})\b", plain, re.I)]
+
+
+def _unsaid(tree: Tree) -> list[Place]:
+    found = []
+    for file, node, text in _documented(tree):
+        prose = re.sub(r"^\s*\w+(, \w+)*( : .*)?$|^\s*>>>.*$", "", text, flags=re.M)
+        found += [tree.place(file, node, f"{t}: {text.splitlines()[0]}") for t in said(prose)]
+    for file, text in tree.texts.items():
+        for token in tokenize.generate_tokens(io.StringIO(text).readline):
+            if token.type == tokenize.COMMENT:
+                name = str(file.relative_to(tree.root.parent))
+                found += [
+                    (name, token.start[0], f"{t}: {token.string}") for t in said(token.string)
+                ]
+    return found
+
+
 def _skips(tree: Tree) -> list[Place]:
     return [
         (str(file.relative_to(tree.root.parent)), k, line.strip())
@@ -277,6 +323,7 @@ ROWS: dict[str, tuple[str, Callable[[Tree], list[Place]]]] = {
     "openings": ("docstrings that open with no verb or head noun", _openings),
     "identifiers": ("names that the language rules forbid, once a file", _identifiers),
     "pronouns": ("docstrings with a pronoun for a number", _pronouns),
+    "unsaid": ("terms that the glossary says not to use", _unsaid),
     "skips": ("`# fmt: skip`", _skips),
 }
 

@@ -69,22 +69,22 @@ def test_the_problems_are_those_of_their_recipes():
 
 def test_a_first_tour_becomes_the_record_and_a_longer_one_does_not(small, tour):
     library = Library(small)
-    assert library.take(tour, by="me", bound=tour.bound).better
+    assert library.submit(tour, by="me", bound=tour.bound).better
     library.save()
     again = Library(small)
     assert again.records[SMALL].length == tour.length
     assert again.records[SMALL].proven
     worse = solve(again.problem(SMALL), "greedy-2016")
     assert worse.length > tour.length
-    assert not again.take(worse, by="you").better
+    assert not again.submit(worse, by="you").better
     assert again.records[SMALL].by == "me"
 
 
 def test_a_bound_that_a_contribution_states_is_not_taken(small, tour):
     library = Library(small)
-    library.take(tour, by="me")
+    library.submit(tour, by="me")
     assert library.records[SMALL].lower_bound is None
-    library.take(tour, by="me", bound=LowerBound(0.5 * tour.length, Scope.ALL_TOURS))
+    library.submit(tour, by="me", bound=LowerBound(0.5 * tour.length, Scope.ALL_TOURS))
     assert library.records[SMALL].lower_bound == 0.5 * tour.length
 
 
@@ -93,7 +93,7 @@ def test_a_tour_that_the_judge_refuses_is_no_record(small, tour):
     lie = tour.model_copy(update={"length": 0.9 * tour.length})
     assert not library.compared(lie).better
     with pytest.raises(VerificationError, match="did not pass: length"):
-        library.take(lie, by="me")
+        library.submit(lie, by="me")
 
 
 def test_solutions_of_other_problems_and_of_grown_obstacles_are_refused(small, tour):
@@ -134,8 +134,8 @@ def in_order_of_the_file(graph):
 
 def with_records(folder, tour):
     library = Library(folder)
-    library.take(tour, by="me", bound=tour.bound)
-    library.take(solve(library.problem("maze-5-0")), by="me")
+    library.submit(tour, by="me", bound=tour.bound)
+    library.submit(solve(library.problem("maze-5-0")), by="me")
     library.save()
 
 

@@ -463,7 +463,7 @@ def test_a_record_refuses_a_bound_on_other_tours(tmp_path, small, solved):
     (tmp_path / "pier.json").write_text(small.to_json())
     library = Library(tmp_path)
     with pytest.raises(InputError, match="tours of this roadmap"):
-        library.take(solved, by="me", bound=LowerBound(1.0, Scope.ROADMAP))
+        library.submit(solved, by="me", bound=LowerBound(1.0, Scope.ROADMAP))
 
 
 def test_words_of_a_proof_for_each_status():

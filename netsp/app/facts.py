@@ -39,8 +39,8 @@ def facts(
     -------
     dict or None
         ``sufficient`` (m, None if unknown), ``margins`` (as `Margins.to_json`, None if the tour has
-        none), ``profile`` (rows of: share of the tour, tether out, height) and ``visits`` (shares);
-        None if stopped.
+        none), ``profile`` (rows of: share of the tour, tether length, height) and ``visits``
+        (shares); None if stopped.
     """
     cursor = Cursor(problem, solution.path)
     path = np.array(solution.path)

@@ -116,7 +116,8 @@ class Document:
             ``{"set": path, "value": v}``, ``{"add": "goals", "value": v}``, ``{"delete": [path]}``,
             or ``{"replace": data}``; a path is a field, or a list's name, an index and perhaps a
             field. With ``"merge": n`` it takes the place of the version before if that came of an
-            edit of the same path with the same n, so that a slider's way is undone in one.
+            edit of the same path with the same n, so that one undo reverts a whole drag of a
+            slider.
 
         Raises
         ------

@@ -101,7 +101,7 @@ def _check(args: argparse.Namespace, library: Library) -> int:
                 f"best known, {record.length:.9g}{proven}"
             )
         if args.keep and found.better:
-            library.take(solution, args.by)
+            library.submit(solution, args.by)
             kept = True
         answers.append(
             {

@@ -409,7 +409,7 @@ class TimePolicy:
 
 @dataclass(frozen=True)
 class MipPolicy:
-    """Policy of the solver `mip`: its route by size, and the policies of its parts.
+    """Policy of the solver `mip`: what it does by size, and the policies of its parts.
 
     Attributes
     ----------

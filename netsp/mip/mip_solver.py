@@ -66,7 +66,7 @@ class Params:
     search_rounds
         Rounds of ruin and recreate at the start, and again after the root.
     policy
-        Thresholds of cuts, prices, LPs, branching, covers and merging, and the route by size.
+        Thresholds of cuts, prices, LPs, branching, covers and merging, and what to do by size.
     """
 
     backend: str = DEFAULT_BACKEND

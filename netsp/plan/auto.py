@@ -52,7 +52,7 @@ class Params:
         Whether a scheduler gives time to what closes the gap fastest, instead of a route by size
         (`netsp.plan.scheduled`). Experimental.
     policy
-        Routes by size, and policies of the solvers.
+        Choice of solvers by size, and policies of the solvers.
     """
 
     backend: str = "highs"

@@ -1,4 +1,4 @@
-"""Policy of `solve`: the routes of `auto` by size, and the policies of its parts."""
+"""Policy of `solve`: the solvers that `auto` chooses by size, and the policies of its parts."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Studies: solvers compared over many worlds, the library of problems, figures of paths."""
+"""Studies: solvers over many worlds, the library of problems, measures of paths."""

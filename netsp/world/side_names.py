@@ -225,8 +225,8 @@ def back_from(problem: Problem, runs: list[list[Passage]], names: list[str], k: 
     Returns
     -------
     str
-        Where to go back to: the latest visit at which the tether lies against less of the same, and
-        the way home along the tether.
+        Where to go back to: the latest visit at which the tether touches fewer of these obstacles,
+        and the path home along the tether.
     """
     here = [p for p in runs[k] if p.rests]
     if not here:

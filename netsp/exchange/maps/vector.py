@@ -336,7 +336,7 @@ class _Found:
             for place, area in shapes:
                 shape = area
                 if self.is_osm and tags.get("natural") == "coastline":
-                    shape = _shore(area)  # GDAL makes areas of closed ways
+                    shape = _shore(area)  # GDAL turns closed lines into areas
                 self.layers[name] += 1
                 self.features.append(Feature(place, name, "", tags, shape))
 

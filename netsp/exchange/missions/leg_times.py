@@ -9,7 +9,7 @@ direction of the previous leg.
 
 In AUTO a waypoint is reached when the reference is at its end and the vehicle within the acceptance
 radius; then comes the hold. In GUIDED the next target is sent as soon as the vehicle is within
-reach of the last, and the vehicle plans anew from where it would come to a stop.
+reach of the last one, and the vehicle plans from the position where it would come to rest.
 """
 
 from __future__ import annotations
@@ -218,7 +218,7 @@ class _Follower:
         self._begin(self.goal, goal)
 
     def plan_anew(self, goal: Point3) -> None:
-        """Begin a leg from where the vehicle would come to a stop; thrust does not jump."""
+        """Begin a leg where the vehicle would come to rest; the thrust does not jump."""
         gain, gain_z = self.motion.position_gain, self.motion.position_gain_z
         (x, y, z), (vx, vy, vz) = self.place, self.velocity
         self._begin((x + vx / gain, y + vy / gain, z + vz / gain_z), goal)

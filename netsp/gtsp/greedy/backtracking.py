@@ -40,7 +40,7 @@ class Params:
     Attributes
     ----------
     retrace
-        ``path``, home along the path of the way out as in the paper, or ``tether``, home along the
+        ``path``, home along the outward path as in the paper, or ``tether``, home along the
         taut tether from the last goal, which is never longer.
     policy
         How costs are measured.

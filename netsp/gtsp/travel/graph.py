@@ -88,7 +88,7 @@ class TravelGraph(Drawn):
     carrier : Carrier, optional
         Adds classes that were left out.
     by_parity : callable, optional
-        Makes the ways of `ways_by_parity`.
+        Function that finds the paths of `ways_by_parity`.
 
     Attributes
     ----------

@@ -367,8 +367,10 @@ class RepairPlanner(PredictivePlanner):
         waypoints: tuple[MissionWaypoint, ...],
         left: list[int],
     ) -> None:
-        """Replace the rest of the tour by stops and waypoints whose present numbers are `left`. In
-        the file of the tour, the first leg begins at the last stop."""
+        """Replace the rest of the tour by visits of the waypoints whose present numbers are `left`.
+
+        In the file of the tour, the first leg begins at the last visit.
+        """
         old, n = self.mission.tour, self.index
         file = self._as_given
         assert file is not None

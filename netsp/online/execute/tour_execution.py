@@ -77,7 +77,7 @@ class LiveVehicle(Vehicle, Protocol):
 
 @dataclass(frozen=True)
 class _Retreat:
-    """Way back along the tether, because more is out than allowed, and the plan afterwards.
+    """Retreat along the tether, because more is out than allowed, and the plan afterwards.
 
     Attributes
     ----------

@@ -30,7 +30,7 @@ class FlightPolicy:
         put into ALT_HOLD: long enough to stop, and short of where the estimate leads it away.
     max_path_error
         Largest distance in the plan from the path to the target, m: from the straight leg, and
-        after a bend from the triangle of the leg and the point where the vehicle came to a stop.
+        after a bend from the triangle of the leg and the point where the vehicle came to rest.
         ArduSub keeps within 0.2; a larger distance means that the vehicle was carried off, or that
         its estimate was reset.
     max_depth_error

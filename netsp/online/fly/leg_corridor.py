@@ -1,8 +1,9 @@
 """Corridor of a leg: places where a vehicle may be on its path to a vertex.
 
-A vehicle that gets a new target under way does not turn at once. It comes to a stop beyond the bend
-and flies straight on from there, so that it is off the leg by its stopping distance, and ever less
-towards the vertex. A vehicle that begins at rest, or goes straight on, is on the leg itself.
+A vehicle that gets a new target under way does not turn at once. It comes to rest beyond the bend
+and flies straight to the target from there. It is off the leg by its stopping distance at first,
+and less and less towards the target. A vehicle that begins at rest, or flies straight on, is on the
+leg.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Web page of a guard: map, taut tether, way home, slack over time, alarms.
+"""Web page of a guard: map, taut tether, path home, slack over time, alarms.
 
 Served from this machine only, to whoever has the token in the address; reports go out as
 server-sent events. A page can send only corrections of the class, or events of a flight.

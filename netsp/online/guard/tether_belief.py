@@ -47,7 +47,7 @@ class Strands:
     def follow(self, hypotheses: list[Hypothesis], robot: Floats, max_count: int) -> list[Strand]:
         """Return the tethers of the classes that are believed now, the likeliest first.
 
-        Classes whose tether would be too long are left out; shares are among the others.
+        Classes whose tether would be over the limit are left out; shares are among the others.
 
         Parameters
         ----------

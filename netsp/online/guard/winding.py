@@ -1,7 +1,7 @@
 """Loops of a taut tether in space.
 
-In the plane a tether that meets itself is wound around something (`netsp.online.guard.loops`). In
-space it passes itself at some distance, however often it is wound around a bar. So a piece of the
+In the plane a tether that meets itself wraps something (`netsp.online.guard.loops`). In space it
+passes itself at some distance, however often it wraps a bar. So a piece of the
 tether counts as a loop if it turns by more than half a circle (a closed curve turns by a whole one:
 Fenchel 1929), comes back near to where it began, in sight of it, and stays there when it is closed
 and pulled taut. This includes loops around bodies with free ends, which have no words.

@@ -192,8 +192,7 @@ def _around(viewer: Viewer, patches: Ints, rng: np.random.Generator) -> tuple[In
 
 
 def coarsen(patches: Patches, size: float) -> Patches:
-    """Return patches that stand for all patches in one cube of space that face the same of six
-    ways.
+    """Return one patch for all patches in a cube of space that face the same of six directions.
 
     Tubes are drawn with slivers, of which a view shows hundreds. The place of a coarse patch is
     that of the patch in the middle, and areas add up.

@@ -70,7 +70,7 @@ def verify_mission(
     """Judge a planned mission.
 
     Checks that the tour leads from the start through the first waypoints and home, clear of solids;
-    that the tether's word at every stop is the stated one and empty at the end; that the tether,
+    that the tether's word at every visit is the stated one and empty at the end; that the tether,
     driven along it once more, keeps to its limit, has the stated lengths and is free at home; and
     that length, bounds, gaps and status are consistent.
 
@@ -264,7 +264,7 @@ class _Judge:
         )
 
     def _check_words(self) -> list[Check]:
-        """Check the words at the stops, and that the word at the end is empty."""
+        """Check the words at the visits, and that the word at the end is empty."""
         mission, words = self.mission, self.context.words
         walked, wrong = self.context.present_tether.nodes, []
         for k, (stop, leg) in enumerate(zip(self.tour.stops, self.legs, strict=False)):
@@ -322,7 +322,7 @@ class _Judge:
         ]
 
     def _deviations(self, k: int, length_at: float, longest_on_leg: float) -> list[str]:
-        """Return the lengths at a stop and on the way to it that differ from the stated ones."""
+        """Return the lengths at a visit and on the way to it that differ from the stated ones."""
         stop, out = self.tour.stops[k], []
         for length, stated, relation in (
             (length_at, stop.tether_length, "at"),

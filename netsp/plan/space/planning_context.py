@@ -297,8 +297,8 @@ class PlanningContext:
         return None
 
     def drive(self, tether: Tether, path: Floats, *, is_fine: bool = False) -> tuple[Tether, float]:
-        """Return the tether after the robot has driven along a path, and its maximum length on the
-        way.
+        """Return the tether after the robot has driven along a path, and its maximum length
+        meanwhile.
 
         Around solids in space the length of the tether is not convex along a straight leg, as it is
         in the plane (docs/theory.md, fact 2): it may be longer on the leg than at both ends. So the

@@ -3,7 +3,7 @@
 Vertices of the travel graph are states (`netsp.plan.space.states`): a waypoint with a tether that
 reaches it. Legs are paths along which the tether model was driven (`netsp.plan.space.space_legs`).
 Any two states are also joined by the path back along one tether and out along the other. The graph
-is solved like any other, and the whole tour is driven. If the tether gets too long on the way, or
+is solved like any other, and the whole tour is driven. If the tether exceeds its limit, or
 is not free at the end, the first leg that did not arrive in its state is forbidden, and the graph
 is solved again: no tour is accepted that was not driven without fault.
 

@@ -1,1 +1,1 @@
-"""Solvers side by side over random worlds: studies, trials, rows."""
+"""Comparison of solvers over random worlds: studies, trials, rows."""

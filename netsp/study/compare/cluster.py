@@ -1,7 +1,8 @@
-"""Trials on a Dask cluster: the same trials, the same rows, workers that may come and go.
+"""Trials on a Dask cluster, whose workers may join and leave at any time.
 
-A trial whose worker dies is run again by another worker, `ALLOWED_FAILURES` times; then it has a
-row that says `killed`. Needs `pip install "netsp[cluster]"` here, and netsp on every worker.
+If a worker dies, another worker runs its trial again, up to `ALLOWED_FAILURES` times; then the row
+of the trial has the status `killed`. This machine needs `pip install "netsp[cluster]"`, and each
+worker needs netsp.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ QUEUED_PER_WORKER = 4
 def dask_executor(address: str) -> Executor:
     """Return an executor on the scheduler at ``tcp://host:port``.
 
-    Raises InputError if Dask is not installed or nobody answers there.
+    Raises InputError if Dask is not installed or no scheduler answers.
     """
     try:
         from distributed import Client
@@ -64,7 +65,7 @@ def _execute(client: Client, trials: list[Trial]) -> Iterator[tuple[Trial, Trial
         if trial is None:
             return None
         running[trial.id] = trial
-        # pure=False: the same trial in another run is run again if its row is not there
+        # pure=False: Dask does not reuse the result of an equal trial of an earlier run
         return client.submit(guarded, trial, key=f"netsp-{trial.id}", pure=False, retries=0)
 
     threads = max(sum(client.nthreads().values()), 1)
@@ -88,7 +89,7 @@ def _execute(client: Client, trials: list[Trial]) -> Iterator[tuple[Trial, Trial
 
 
 def guarded(trial: Trial) -> TrialRow:
-    """Run a trial on a worker; an exception becomes its row, and so does silence."""
+    """Run a trial on a worker; return a row even if it raises an error or does not answer."""
     import threading
 
     from netsp.study.compare.trial import run

@@ -54,7 +54,7 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class ComparedPath:
-    """Path with what it is compared with. Lengths are in the problem's units.
+    """Path, its measures, and the lengths to compare it with, in the problem's units.
 
     Parameters
     ----------
@@ -66,9 +66,9 @@ class ComparedPath:
         Length of the shortest tour that visits the same goals in the order of their first visits;
         None if there is none.
     order_note : str
-        Words for what `order_length` is, or why it is None.
+        Phrase that says what `order_length` is, or why it is None.
     visited_length : float, optional
-        Length of the shortest tour found of the goals that the path visits, if it misses some.
+        Length of the best tour of the goals that the path visits, if it misses some.
     """
 
     name: str
@@ -107,7 +107,7 @@ class PathComparison:
 
     @property
     def proof(self) -> str:
-        """Words for what is proven of the tour's length."""
+        """Phrase that says what is proven about the length of the tour."""
         if self.tour is None:
             return self.tour_note
         status = self.tour.status
@@ -122,17 +122,17 @@ class PathComparison:
         return None if self.tour is None else self.tour.length
 
     def longer_by(self, length: float | None) -> float | None:
-        """Return the difference of a length and that of the tour; None if either is unknown."""
+        """Return a length minus the length of the tour; None if either is unknown."""
         tour = self.tour_length
         return None if length is None or tour is None else length - tour
 
     def percent(self, length: float | None) -> float | None:
-        """Return the difference of a length and that of the tour in percent of the tour's."""
+        """Return `longer_by` in percent of the length of the tour."""
         more, tour = self.longer_by(length), self.tour_length
         return None if more is None or not tour else 100.0 * more / tour
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a row for the tour and a row for each path, with the keys `COLUMNS`."""
+        """Return a row for the tour and one for each path, with the keys `COLUMNS`."""
         out = [] if self.tour is None else [self._tour_row(self.tour)]
         return out + [self._path_row(path) for path in self.paths]
 
@@ -300,9 +300,9 @@ def compare_paths(
     speed : float
         Speed of the tour and of paths without time stamps, in the problem's units per second.
     policy : PathPolicy, optional
-        Rules of when a goal counts as visited.
+        Policy that decides when a goal counts as visited.
     time_limit : float, optional
-        Seconds for the tour; the orders of the paths are solved after it.
+        Time for the tour, s; the orders of the paths are solved afterwards.
     seed : int
         Random seed of the solver.
     on_progress : callable, optional
@@ -318,7 +318,7 @@ def compare_paths(
     Raises
     ------
     InputError
-        A path that cannot be measured; a solution of another problem, or without a tour.
+        A path cannot be measured, or the solution has no tour or is of another problem.
 
     Examples
     --------
@@ -356,7 +356,7 @@ def compare_paths(
             note, is_infeasible = str(error), isinstance(error, InfeasibleError)
 
     def left() -> float | None:
-        """Return the seconds for one more solve, at least the share `ORDER_TIME_SHARE`."""
+        """Return the remaining time, s, but at least the share `ORDER_TIME_SHARE` of the limit."""
         return None if time_limit is None else max(clock.left, ORDER_TIME_SHARE * time_limit)
 
     known: dict[tuple[int, ...], tuple[float | None, str]] = {}
@@ -373,8 +373,7 @@ def compare_paths(
 
 
 def _laid_tether(problem: Problem) -> Floats | None:
-    """Return the line of the tether out if the problem begins with the robot under way, else
-    None."""
+    """Return the line of the tether if the problem starts from a state, else None."""
     if problem.state is None:
         return None
     x, y, z = problem.state.position
@@ -385,7 +384,7 @@ def _laid_tether(problem: Problem) -> Floats | None:
 
 
 def _goals_in_order(problem: Problem, order: Sequence[int]) -> Problem:
-    """Return the problem with some goals in an order, without choices and precedences."""
+    """Return the problem with the goals of an order only, without choices and precedences."""
     free: Mapping[str, Any] = {"after": (), "choice": None}
     goals: tuple[Goal, ...] = tuple(problem.goals[g].model_copy(update=free) for g in order)
     return problem.model_copy(update={"goals": goals})
@@ -401,14 +400,14 @@ def order_length(
     problem : Problem
         Problem with the goals.
     order : sequence of int
-        Indices of some of its goals, without repetition.
+        Indices of distinct goals.
     time_limit : float, optional
         Time limit, s.
 
     Returns
     -------
     (float or None, str)
-        The length in the problem's units, and words for what it is; or None, and the reason.
+        Length in the problem's units, and a phrase that says what it is; or None, and the reason.
     """
     if not order:
         return None, "no goal is visited"
@@ -432,7 +431,7 @@ def order_length(
 def _visited_length(
     problem: Problem, order: tuple[int, ...], *, time_limit: float | None, seed: int
 ) -> float | None:
-    """Return the length of the shortest tour found of some of the goals; None if none was found."""
+    """Return the length of the best tour of the goals in `order`; None if none was found."""
     if problem.state is not None or len(problem.precedences):
         return None
     try:

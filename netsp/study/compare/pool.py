@@ -1,7 +1,7 @@
-"""Trials in worker processes that may crash, hang or run out of memory: one row lost, not a batch.
+"""Trials in worker processes. A crash, a hang or a lack of memory costs one trial, not the batch.
 
-Workers are started once and fed one trial at a time. A worker that dies or does not answer in time
-is replaced, and its trial gets a row that says so.
+Workers start once and get one trial at a time. A worker that dies or does not answer in time is
+replaced, and the row of its trial says what happened.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from netsp.study.compare.rows import LOST, TrialRow
 from netsp.study.compare.study import Trial
 
 HUNG_GRACE_S = 60.0
-"""Time after twice its limit after which a trial counts as hung, s. Roadmaps are built and kernels
-compiled in that time, too."""
+"""Time limit of a trial beyond twice its own limit, s; then it counts as hung. The time includes
+building the roadmap and compiling kernels."""
 
 
 @dataclass
@@ -36,7 +36,7 @@ class _Worker:
 
 
 def run_all(trials: list[Trial], jobs: int) -> Iterator[tuple[Trial, TrialRow]]:
-    """Run trials in so many processes, and yield each with its outcome as it finishes.
+    """Run trials in `jobs` processes, and yield each trial with its row as it finishes.
 
     Closing the iterator kills the workers.
     """
@@ -92,7 +92,7 @@ def _feed(worker: _Worker, queue: list[Trial]) -> None:
         limit = worker.trial.solver["time_limit"]
         if limit is not None:
             worker.deadline = time.monotonic() + 2.0 * limit + HUNG_GRACE_S
-        with contextlib.suppress(OSError):  # a worker that is dead already is found by its pipe
+        with contextlib.suppress(OSError):  # the closed pipe will show that the worker is dead
             worker.pipe.send(worker.trial)
 
 
@@ -113,7 +113,7 @@ def _work(pipe: Connection) -> None:
     """Run the trials that arrive, until the pipe is closed."""
     from netsp.study.compare.trial import run
 
-    for number in INTERRUPTS:  # the parent's to handle: it kills its workers
+    for number in INTERRUPTS:  # the parent handles interrupts, and kills its workers
         signal.signal(number, signal.SIG_IGN)
     limited = False
     while True:
@@ -143,7 +143,7 @@ def crashed(error: BaseException) -> TrialRow:
 
 
 def _limit_memory(gib: float) -> None:
-    """Let the process have so much more than it has now."""
+    """Limit the process to so many GiB beyond the memory that it uses now."""
     import resource
 
     with open("/proc/self/statm") as file:

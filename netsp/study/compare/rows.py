@@ -1,8 +1,8 @@
-"""The results: one line of JSON for every trial, appended when it is finished.
+"""Results files: a line of JSON for each trial, appended when the trial is finished.
 
-A line is written whole and flushed to the disk, so a kill at any moment costs the trials that were
-running. A last line without its end is what a kill in mid-write leaves: it is cut off, and its
-trial run again.
+A line is written whole and flushed to disk, so killing the process costs only the trials that were
+running. If it was killed while writing, the last line is incomplete: it is removed, and its trial
+runs again.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ SCHEMA = "netsp-trial/1"
 TrialRow = dict[str, Any]
 
 LOST = frozenset({"crashed", "killed", "timeout", "out_of_memory"})
-"""Statuses of trials that took their worker with them, or may have."""
+"""Statuses of trials whose worker ended, or may have ended."""
 
 FAILED = LOST | {"error"}
-"""Statuses of trials that came to nothing."""
+"""Statuses of trials without a result."""
 
 _BEGIN = f'{{"schema": "{SCHEMA}"'.encode()
 
@@ -36,8 +36,10 @@ _TABLES = ("world", "roadmap", "solver")
 
 
 def read_rows(path: str | Path) -> list[TrialRow]:
-    """Return all rows of a results file; a torn last line is left out. Files whose names end in .gz
-    are unpacked; InputError if the file holds no rows."""
+    """Return all rows of a results file, without an incomplete last line.
+
+    A file whose name ends in .gz is unpacked. Raises InputError if the file has no rows.
+    """
     data = read_gzip(path) if Path(path).suffix == ".gz" else read_bytes(path)
     rows = []
     *lines, torn = data.split(b"\n")
@@ -56,7 +58,7 @@ def read_rows(path: str | Path) -> list[TrialRow]:
 
 
 def _parsed(line: bytes) -> TrialRow | None:
-    """Return the row in a line, or None if it holds none."""
+    """Return the row in a line, or None if the line is no row."""
     try:
         row = json.loads(line, parse_constant=_no_constant)
     except (ValueError, RecursionError):
@@ -88,7 +90,7 @@ def _parsed(line: bytes) -> TrialRow | None:
 
 
 def _encodable(row: object) -> bool:
-    """Return whether all names can be written; half a surrogate pair cannot."""
+    """Return whether all texts can be encoded; a lone surrogate cannot."""
     try:
         json.dumps(row, ensure_ascii=False).encode()
     except UnicodeError:
@@ -119,7 +121,7 @@ _VALUES: dict[str, tuple[type, ...]] = {
     "history": (list, type(None)),
     "lower_bound_of": (str, type(None)),
 }
-"""Types that the fields of a row may have; pages rely on them."""
+"""Types of the fields of a row that pages rely on."""
 
 
 def _fits(value: object, kinds: tuple[type, ...]) -> bool:
@@ -133,17 +135,17 @@ def _no_constant(name: str) -> None:
 
 
 class RowsFile:
-    """A results file of one study, open for appending; nobody else may have it open.
+    """Results file of one study, open for appending and locked.
 
     Attributes
     ----------
     done
-        Ids of the trials that are in it.
+        Identifiers of the trials in the file.
 
     Raises
     ------
     InputError
-        The file holds anything but rows of this study.
+        The file has content other than rows of this study.
     """
 
     def __init__(self, path: str | Path, study: str) -> None:
@@ -172,7 +174,7 @@ class RowsFile:
         os.ftruncate(self._fd, whole.rfind(b"\n") + 1)
 
     def append(self, row: TrialRow) -> None:
-        """Write a row, to the disk; InputError if it cannot be, and then nothing of it is there."""
+        """Write a row to disk, or raise InputError and write nothing."""
         data = (json.dumps(row, allow_nan=False) + "\n").encode()
         end = os.fstat(self._fd).st_size
         try:
@@ -186,7 +188,7 @@ class RowsFile:
         self.done.add(row["trial"])
 
     def close(self) -> None:
-        """Let others have it."""
+        """Close the file, which unlocks it."""
         os.close(self._fd)
 
     def __enter__(self) -> RowsFile:
@@ -197,7 +199,7 @@ class RowsFile:
 
 
 def check_study(rows: Iterable[TrialRow], study: str, source: str) -> None:
-    """InputError if a row belongs to another study (by its sha256)."""
+    """Raise InputError if a row belongs to another study, by its sha256."""
     for number, row in enumerate(rows, start=1):
         if row["study"] != study:
             raise InputError(
@@ -207,10 +209,11 @@ def check_study(rows: Iterable[TrialRow], study: str, source: str) -> None:
 
 
 def combine(sources: list[str], target: str) -> int:
-    """Add the rows of shards of one study to a results file, each trial once; how many that makes.
+    """Add the rows of several shards to a results file, each trial once; return how many were
+    added.
 
-    Raises InputError if the sources hold no trial or rows of several studies, and if the target
-    exists and is anything but results of the same study.
+    Raises InputError if the sources hold no trial or rows of several studies, or if the target
+    exists and is not a results file of the same study.
     """
     found: list[TrialRow] = []
     for source in sources:

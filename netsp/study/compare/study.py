@@ -1,4 +1,4 @@
-"""A study: which worlds, roadmaps, solvers and seeds are tried with one another."""
+"""Studies: files that say which worlds, roadmaps, solvers and seeds to combine."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MAX_TRIALS = 500_000
 
 
 class Worlds(Model):
-    """Random worlds `first` to `first + count - 1` of a family (`netsp.plan.random_worlds`)."""
+    """Random worlds of a family (`netsp.plan.random_worlds`), with seeds from `first` on."""
 
     family: Annotated[str, Field(description="of random worlds")] = "icra2017"
     count: Annotated[Whole, Field(description="worlds per cell")] = 10
@@ -64,7 +64,7 @@ class Worlds(Model):
 
 
 class StudyRoadmap(Model):
-    """A roadmap by name, with options; `label` tells it apart in the results."""
+    """Roadmap of a study, with options; `label` identifies it in the results."""
 
     name: Annotated[str, Field(description="taut, prm or one of another package")] = "taut"
     label: Annotated[Name, Field(description="in tables; the name if empty")] = ""
@@ -82,7 +82,7 @@ class StudyRoadmap(Model):
 
 
 class StudySolver(Model):
-    """A solver by name, with options and limits of its own; `label` tells it apart."""
+    """Solver of a study, with options and limits; `label` identifies it in the results."""
 
     name: Annotated[str, Field(description="one of netsp or of another package")]
     label: Annotated[Name, Field(description="in tables; the name if empty")] = ""
@@ -113,15 +113,14 @@ class StudySolver(Model):
 
 
 class Study(Model):
-    """Everything tried with everything: goals x tether lengths x worlds x roadmaps x solvers x
-    seeds.
+    """Study of all combinations: goals x tether lengths x worlds x roadmaps x solvers x seeds.
 
     Attributes
     ----------
     time_limit
-        Seconds for a solver that has none of its own.
+        Default time limit of a solver, s.
     memory_limit
-        GiB for one trial beyond what the worker needs to start.
+        Memory of a trial, GiB, in addition to what a worker needs to start.
     """
 
     schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
@@ -171,7 +170,7 @@ class Study(Model):
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a study file; InputError with key and line for anything wrong."""
+        """Return the study in a TOML file; raise InputError with key and line if it is invalid."""
         text = read_text(path)
         try:
             data = tomllib.loads(text)
@@ -181,7 +180,7 @@ class Study(Model):
 
     @classmethod
     def checked(cls, data: dict[str, Any], source: str, text: str = "") -> Self:
-        """Return a study from plain data; `text`, its source, serves to name lines in errors."""
+        """Return a study from plain data; with `text`, the TOML text, errors name lines."""
         try:
             return cls.model_validate(data)
         except ValidationError as error:
@@ -190,11 +189,11 @@ class Study(Model):
 
     @property
     def sha256(self) -> str:
-        """Hash of what the trials depend on, without the name."""
+        """Hash of all fields that the trials depend on; the name is not one of them."""
         return _digest(self.model_dump(mode="json", exclude={"name"}))
 
     def trials(self) -> Iterator[Trial]:
-        """Yield all trials; those of one world follow one another."""
+        """Yield all trials, world by world."""
         for world in range(self.worlds.first, self.worlds.first + self.worlds.count):
             for goals in self.goals:
                 for tether in self.tether_lengths:
@@ -228,7 +227,7 @@ class Study(Model):
 
 @dataclass(frozen=True)
 class Trial:
-    """One solver on one world, as plain data that a worker anywhere can run.
+    """Trial of one solver on one world, as plain data for a worker on any machine.
 
     Attributes
     ----------
@@ -239,7 +238,7 @@ class Trial:
     solver
         Name, label, options, limits.
     seed
-        Of the solver, and of a roadmap that samples.
+        Seed of the solver, and of a sampled roadmap.
     """
 
     world: dict[str, Any]
@@ -250,15 +249,15 @@ class Trial:
 
     @property
     def id(self) -> str:
-        """Hash of all of it: the same trial anywhere."""
+        """Hash of all fields, which identifies the trial on every machine."""
         return _digest(
             {"world": self.world, "roadmap": self.roadmap, "solver": self.solver, "seed": self.seed}
         )[:16]
 
 
-def shard(trials: list[Trial], part: int, of: int) -> list[Trial]:
-    """Part 1 to `of` of the trials, dealt out in turn; together the parts are all of them."""
-    return trials[part - 1 :: of]
+def shard(trials: list[Trial], part: int, parts: int) -> list[Trial]:
+    """Return one of several parts of the trials, counted from 1: every `parts`-th trial."""
+    return trials[part - 1 :: parts]
 
 
 def _digest(data: Any) -> str:
@@ -266,7 +265,7 @@ def _digest(data: Any) -> str:
 
 
 def _line(text: str, where: tuple[int | str, ...]) -> str:
-    """Return ``line N: `` of a key, if it can be found in the text."""
+    """Return ``line N: `` for a key, or an empty string if the text does not show it."""
     lines = text.splitlines()
     at, found = 0, None
     for k, part in enumerate(where):

@@ -1,4 +1,4 @@
-"""A comparison from study to results file: what is done already is left out."""
+"""Run of a study: trials that the results file lacks are run, and their rows appended."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from netsp.study.compare.trial import check, full_row
 
 
 class Executor(Protocol):
-    """Place where trials run: processes on this machine, or a cluster."""
+    """Protocol of what runs trials: processes on this machine, or a cluster."""
 
     def __call__(self, trials: list[Trial]) -> Iterator[tuple[Trial, TrialRow]]:
         """Yield each trial with its row as it finishes."""
@@ -23,8 +23,7 @@ class Executor(Protocol):
 
 @dataclass(frozen=True)
 class Tally:
-    """Counts of a comparison: all trials, finished ones (also of earlier runs), and failures
-    now."""
+    """Counts of trials: all, finished (in earlier runs, too), failed and begun in this run."""
 
     total: int
     done: int
@@ -46,11 +45,11 @@ def compare(
     Parameters
     ----------
     jobs
-        Processes on this machine, unless an executor is given.
+        Number of processes on this machine, unless an executor is given.
     part
-        (i, n), the i-th of n shards.
+        Shard to run, as (i, n): the i-th of n.
     on_row
-        Called with every new row.
+        Called with each new row.
 
     Raises InputError if the file holds anything but rows of this study, or options of a roadmap do
     not exist. A trial that fails has a row and is not run again.

@@ -1,4 +1,4 @@
-"""One trial, run where it is: a world, a roadmap, a solver; the outcome as a row."""
+"""Run of one trial in this process: a world, a roadmap, a solver, and the outcome as a row."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from netsp.study.compare.rows import SCHEMA, TrialRow
 from netsp.study.compare.study import Trial
 
 MAX_PROGRESS_ROWS = 200
-"""Maximum number of incumbents of a trial that its row keeps."""
+"""Maximum number of incumbents in the row of a trial."""
 
 
 @functools.lru_cache(maxsize=4)
@@ -41,10 +41,10 @@ def world_of(trial: Trial) -> tuple[Problem, int]:
 
 
 def run(trial: Trial) -> TrialRow:
-    """Run a trial; whatever netsp complains of becomes the row's status `error` and its message.
+    """Run a trial and return its row; a `NetspError` becomes the status `error` and the message.
 
-    Every trial builds its own roadmap and measures its own legs, so its times are what a user would
-    see. Other exceptions are the worker's business (`netsp.study.compare.pool`).
+    Each trial builds its own roadmap and measures its own legs, so its times are those of a user.
+    The worker handles other exceptions (`netsp.study.compare.pool`).
     """
     from netsp.plan.solve_problem import solve
 
@@ -101,7 +101,7 @@ def run(trial: Trial) -> TrialRow:
 
 
 def _cpu_s() -> float:
-    """Return the CPU seconds so far of this process and of the programs that it has run."""
+    """Return the CPU time, s, of this process and of its finished child processes."""
     t = os.times()
     return t.user + t.system + t.children_user + t.children_system
 
@@ -115,7 +115,7 @@ def thinned(history: list[Any]) -> list[Any]:
 
 
 def full_row(trial: Trial, outcome: TrialRow, study: str, study_name: str) -> TrialRow:
-    """Return the row of a trial: what was tried, its result, where and when."""
+    """Return the complete row of a trial: its inputs, its outcome, the machine and the time."""
     return {
         "schema": SCHEMA,
         "study": study,
@@ -137,8 +137,10 @@ def _machine() -> str:
 
 
 def check(trial: Trial) -> None:
-    """InputError now rather than in every trial: a roadmap's options that are unknown or wrong, by
-    building it over a problem of one goal."""
+    """Raise InputError if options of the roadmap are unknown or invalid, before any trial runs.
+
+    To find out, build the roadmap of a problem with one goal.
+    """
     from netsp.plan.solve_problem import build_roadmap
 
     name, options = trial.roadmap["name"], trial.roadmap["options"]
@@ -147,6 +149,6 @@ def check(trial: Trial) -> None:
     try:
         build_roadmap(problem, name, **options)
     except InfeasibleError:
-        pass  # so few samples that nothing is joined; a trial may still have luck
+        pass  # too few samples to reach the goal here, but perhaps not in a trial
     except (TypeError, ValueError) as error:
         raise InputError(f"roadmap {name!r}: options {options}: {error}") from None

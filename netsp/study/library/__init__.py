@@ -1,4 +1,4 @@
-"""The library of problems: what is known of each, and how solvers rank on it."""
+"""Library of problems: the best known tour of each, and the ranking of solvers."""
 
 from netsp.study.library.records import Library, Record
 

@@ -1,4 +1,4 @@
-"""Runs a solver over the library, and ranks solvers by what they found."""
+"""Ranking of solvers over the library: run a solver on its problems, and compare lengths."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ MAX_OVERTIME_S = 5.0
 """Overtime above which a late result does not count, s; it allows for loading libraries."""
 
 RANK_GRACE_S = 10.0
-"""Time after twice its limit after which a command is killed, s."""
+"""Time limit of a command beyond twice its own limit, s; then it is killed."""
 
 
 class Row(Model):
@@ -57,12 +57,12 @@ class Row(Model):
 
 
 Solve = Callable[[Problem, Path, float, Callable[[], bool]], Solution]
-"""Problem, its file, seconds, and whether to stop → solution."""
+"""Function of a problem, its file, the time limit in s, and a callback that says whether to stop;
+it returns a solution."""
 
 
 def by_name(name: str, seed: int) -> Solve:
-    """Return a solver of netsp or of a plug-in, or a function ``module:attribute`` of a travel
-    graph.
+    """Return a solver by its name, or by an object reference, ``module:attribute``.
 
     Raises
     ------
@@ -90,25 +90,27 @@ def by_name(name: str, seed: int) -> Solve:
 
 
 def _guarded(function: Callable[..., Any], name: str) -> Callable[..., Any]:
-    """Return a function with the same parameters whose errors become PluginErrors, so that they
-    cost one row."""
+    """Return a function with the same parameters whose errors become PluginErrors.
+
+    An error then costs one row, not the whole run.
+    """
 
     @functools.wraps(function)
-    def call(*args: Any, **more: Any) -> Any:
+    def call(*args: Any, **options: Any) -> Any:
         with foreign(f"{name} failed"):
-            return function(*args, **more)
+            return function(*args, **options)
 
     return call
 
 
 def by_command(command: str) -> Solve:
-    """Return a solver that runs a command, in which ``{problem}``, ``{solution}`` and ``{seconds}``
-    are replaced.
+    """Return a solver that runs a command with ``{problem}``, ``{solution}`` and ``{seconds}``
+    filled in.
 
     Raises
     ------
     InputError
-        It does not say where problem and solution go.
+        The command lacks ``{problem}`` or ``{solution}``.
     """
     words = shlex.split(command)
     for place in ("{problem}", "{solution}"):
@@ -150,31 +152,32 @@ def by_command(command: str) -> Solve:
 def run(
     library: Library, names: Sequence[str], label: str, solve: Solve, limit: float
 ) -> Iterator[Row]:
-    """Run a solver over problems, one after the other. Ctrl-C ends it; what was cut short by it has
-    no row.
+    """Run a solver over problems, one after the other.
+
+    Ctrl-C ends the run, and the problem that it interrupts gets no row.
 
     Parameters
     ----------
     library : Library
-        Where the problems are.
+        Library with the problems.
     names : sequence of str
-        Which.
+        Names of the problems.
     label : str
-        What the solver is called.
+        Name of the solver in the ranking.
     solve : callable
         The solver.
     limit : float
-        Seconds for each.
+        Time limit for each problem, s.
 
     Yields
     ------
     Row
-        Of each problem; one without a tour says why.
+        Result for each problem; without a tour, it states the reason.
 
     Raises
     ------
     InputError
-        A command that cannot be run at all.
+        The command cannot be run at all.
     """
     with until_interrupt(None) as clock:
         for name in names:
@@ -216,12 +219,12 @@ def _run(library: Library, name: str, label: str, solve: Solve, limit: float, cl
 
 
 def read_rows(path: str | Path) -> list[Row]:
-    """Rows of a file, one to a line; none if there is no file.
+    """Return the rows of a file, one on each line; none if the file does not exist.
 
     Raises
     ------
     InputError
-        A line is no row.
+        A line is not a row.
     """
     if not Path(path).exists():
         return []
@@ -230,7 +233,7 @@ def read_rows(path: str | Path) -> list[Row]:
 
 
 def append_row(path: str | Path, row: Row) -> None:
-    """Add a row to a file.
+    """Append a row to a file.
 
     Raises
     ------
@@ -245,21 +248,23 @@ def append_row(path: str | Path, row: Row) -> None:
 
 
 def ranking(library: Library, rows: Iterable[Row]) -> list[dict[str, Any]]:
-    """Return one entry for each solver and limit, the best first. They are sorted by the mean share
-    above the best known length; a problem without a verified tour counts as twice that length.
+    """Return one entry for each solver and time limit, the best first.
+
+    The order is by the mean excess over the best known length, as a share of it. A problem without
+    a verified tour counts as twice the best known length.
 
     Parameters
     ----------
     library : Library
-        With the records.
+        Library with the records.
     rows : iterable of Row
-        Of problems that have a record; others do not count.
+        Results; those of problems without a record are ignored.
 
     Returns
     -------
     list of dict
-        ``solver``, ``limit``, ``problems``, ``verified``, ``best`` (as short as the best known),
-        ``above`` (mean share above it), ``worst``, ``seconds`` (median).
+        ``solver``, ``limit``, ``problems``, ``verified``, ``best`` (number of tours as
+        short as the best known), ``above`` (mean excess), ``worst``, ``seconds`` (median).
     """
     groups: dict[tuple[str, float], list[Row]] = {}
     for row in rows:

@@ -1,4 +1,4 @@
-"""Problems in a folder, and a file with the best that is known of each."""
+"""Problems in a folder, and a file with a record for each: its best known tour and bound."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
+from netsp.base.deprecated import deprecated_method
 from netsp.base.errors import InputError, VerificationError
 from netsp.base.field_types import Name, NonNegative, Total
 from netsp.base.files import FileModel, write_text
@@ -25,7 +26,7 @@ from netsp.model.solution import Solution
 RECORDS = "records.json"
 
 SAME_LENGTH_TOLERANCE = 1e-6
-"""Tolerance of two lengths that count as the same, relative."""
+"""Tolerance, relative, for two lengths that count as equal."""
 
 
 class Record(Model):
@@ -56,7 +57,7 @@ class Record(Model):
 
     @property
     def proven(self) -> bool:
-        """True if the tour is proven to be shortest."""
+        """True if the tour is proven to be the shortest."""
         return self.bound is not None and self.bound.proves(self.length)
 
     @property
@@ -66,7 +67,7 @@ class Record(Model):
 
 
 class RecordFile(FileModel):
-    """The records of a library."""
+    """File with the records of a library."""
 
     file_kind: ClassVar[str] = "records"
 
@@ -78,18 +79,18 @@ class RecordFile(FileModel):
 
 @dataclass(frozen=True)
 class Comparison:
-    """A solution beside what is known.
+    """Comparison of a solution with the record of its problem.
 
     Parameters
     ----------
     name : str
-        Of the problem.
+        Name of the problem.
     verification : Verification
-        The judge's verdict.
+        Verdict of the judge.
     length : float, optional
-        Of the solution.
+        Length of the tour, in the problem's units.
     record : Record, optional
-        What is known; None for nothing.
+        Record of the problem; None if there is none.
     """
 
     name: str
@@ -99,7 +100,7 @@ class Comparison:
 
     @property
     def above(self) -> float | None:
-        """By which share it is longer than the best known; negative if it is shorter."""
+        """Excess over the best known length, as a share of it; negative if the tour is shorter."""
         if self.length is None or self.record is None:
             return None
         return self.length / self.record.length - 1.0
@@ -113,7 +114,7 @@ class Comparison:
 
 
 class Library:
-    """A folder with problems and their records.
+    """Folder with problems and their records.
 
     Parameters
     ----------
@@ -123,7 +124,7 @@ class Library:
     Raises
     ------
     InputError
-        There is no library in it.
+        The folder has no library.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -140,29 +141,19 @@ class Library:
         self.records = {r.problem: r for r in known}
 
     def __iter__(self) -> Iterator[str]:
-        """Names of the problems, by family and size."""
+        """Iterate over the names of the problems, by family and size."""
         return iter(sorted(self.paths, key=_by_size))
 
     def __len__(self) -> int:
         return len(self.paths)
 
     def problem(self, name: str) -> Problem:
-        """Return the problem of a name.
-
-        Parameters
-        ----------
-        name : str
-            Its name.
-
-        Returns
-        -------
-        Problem
-            From its file.
+        """Return the problem with a name.
 
         Raises
         ------
         InputError
-            There is none of that name, or its file is wrong.
+            There is no such problem, or its file is invalid.
         """
         if name not in self.paths:
             raise InputError(f"problem: there is no {name!r} in {self.folder}")
@@ -170,26 +161,21 @@ class Library:
 
     @cached_property
     def names(self) -> dict[str, str]:
-        """sha256 → name."""
+        """Name of each problem by its sha256."""
         return {self.problem(name).sha256: name for name in self}
 
     def compared(self, solution: Solution) -> Comparison:
-        """Judge a solution and compare it with what is known.
+        """Judge a solution, and compare it with the record of its problem.
 
         Parameters
         ----------
         solution : Solution
-            Of one of the problems, as they are: without margin or slack.
-
-        Returns
-        -------
-        Comparison
-            The judge's verdict, and the record.
+            Solution of a problem of the library, without margin and slack.
 
         Raises
         ------
         InputError
-            It is of none of the problems, or of grown obstacles.
+            The solution is of no problem of the library, or has a margin or slack.
         """
         name = self.names.get(solution.problem.sha256)
         if name is None:
@@ -202,34 +188,34 @@ class Library:
         verification = verify(self.problem(name), solution)
         return Comparison(name, verification, solution.length, self.records.get(name))
 
-    def take(
+    def submit(
         self, solution: Solution, by: str, commit: str = "unknown", bound: LowerBound | None = None
     ) -> Comparison:
-        """Keep a solution as a record if it is better; `save` writes it.
+        """Judge a solution, and make it the record if it is better; `save` writes the records.
 
         Parameters
         ----------
         solution : Solution
-            Of one of the problems.
+            Solution of a problem of the library.
         by : str
-            Who found it.
+            Name of the contributor.
         commit : str
-            Of the solver, where it is netsp.
+            Commit of netsp that found it.
         bound : LowerBound, optional
-            Bound on all tours from a trusted solver. The judge cannot check a bound, so the bound
-            that a contribution states is ignored.
+            Lower bound on all tours by a trusted solver. The bound of the solution itself is
+            ignored, because the judge cannot check it.
 
         Returns
         -------
         Comparison
-            With the record as it was before.
+            Comparison with the record before the submission.
 
         Raises
         ------
         InputError
-            As of `compared`; a bound of another scope.
+            `compared` raises it, or the bound has another scope than all tours.
         VerificationError
-            The judge did not pass it.
+            The judge rejects the tour.
         """
         found = self.compared(solution)
         if not found.verification or solution.length is None:
@@ -259,8 +245,10 @@ class Library:
             self.records[found.name] = old.model_copy(update={"lower_bound": min(low, old.length)})
         return found
 
+    take = deprecated_method("take", "submit")
+
     def save(self) -> None:
-        """Write the records, one to a line.
+        """Write the records to the file, one on each line.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Measures of any path in the plane of a problem, whoever made it. No roadmap and no solver."""
+"""Measures of paths from any source in the plane of a problem, without roadmap and solver."""
 
 from netsp.study.paths.path_measures import GoalVisit, PathMeasures, PathPolicy, measure_path
 

@@ -1,9 +1,9 @@
 """Taut tether that a robot carries along a path.
 
 The straight segments of a free path lift to geodesics of the covering space, whose distance
-function is convex (docs/theory.md). So the tether is longest at one of the points of the path.
-Between two points its length changes by at most the length of the path between them, so points that
-cannot beat the longest tether found so far need no string pulling.
+function is convex (docs/theory.md), so the tether is longest at a point of the path. Between two
+points its length changes by at most the length of the path between them, so points that cannot beat
+the longest tether found so far need no string pulling.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class CarriedTether:
     puller : StringPuller
         String puller of the judge.
     loop : ndarray, shape (n, 3)
-        The path.
+        Points of the path, in the problem's units.
 
     Examples
     --------
@@ -52,7 +52,7 @@ class CarriedTether:
         self._known: dict[int, float] = {}
 
     def _after(self, node: int, edge: int, side: bool) -> int:
-        """Return the node after crossing an edge; crossing back at once cancels."""
+        """Return the node after crossing an edge; crossing it back at once leads to the parent."""
         if node and self._edge[node][0] == edge:
             return self._parent[node]
         self._parent.append(node)
@@ -68,7 +68,8 @@ class CarriedTether:
 
     @property
     def is_contractible(self) -> bool:
-        """True if the path crosses every edge back again, so that it can be pulled to a point."""
+        """True if the reduced sequence of crossed edges is empty, so the path contracts to a
+        point."""
         return self._node[-1] == 0
 
     def length(self, k: int) -> float:
@@ -96,7 +97,7 @@ class CarriedTether:
         k : int
             Index of the point.
         place : ndarray, shape (3,)
-            Place to which the robot goes straight from the point.
+            Place to which a straight free line leads from the point.
 
         Returns
         -------
@@ -120,7 +121,7 @@ class CarriedTether:
         Parameters
         ----------
         error : float
-            Largest amount by which another point may exceed the returned length.
+            Tolerance: no tether is longer than the returned length by more, in the problem's units.
         first : int
             Index of the first point considered.
 
@@ -159,12 +160,12 @@ class CarriedTether:
         Parameters
         ----------
         count : int
-            Number of places, evenly along the path in the plan.
+            Number of places, spaced evenly along the path in plan.
 
         Returns
         -------
         ndarray, shape (count, 2)
-            Length along the path in the plan, and the length of the taut tether there.
+            Length along the path in plan, and length of the taut tether there.
         """
         s = polylines.along(self._loop[:, :2])
         out = []

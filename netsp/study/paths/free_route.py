@@ -1,12 +1,12 @@
-"""Lead a path round obstacles and bounds, so that its homotopy class is defined.
+"""Detours of a path around obstacles and bounds, so that its homotopy class is defined.
 
 A recorded or drawn path may cut a corner of an obstacle, come closer than the clearance or leave
 the bounds. Each such part is reported, and replaced by a part of the outline of free space with the
-same two ends. There are two such parts of the outline. The one that passes every other obstacle on
-the same side as the path is chosen; if both do, the shorter one.
+same ends. Two parts of the outline have these ends. The one that passes the other obstacles on the
+same side as the path is chosen; if both do, the shorter one.
 
-Free space is that of the judge (`netsp.judge.solid_distances`): obstacles shrink by its tolerance,
-so a path that only touches an obstacle stays as it is.
+Free space is that of the judge (`netsp.judge.solid_distances`), in which obstacles are smaller by a
+tolerance, so a path that only touches an obstacle does not change.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from netsp.judge.tour_checks import CONTACT_REACH
 from netsp.model.problem import Circle, Polygon
 
 INSET_SHARE = 0.25
-"""Growth of the judge's shrunk obstacles, as a share of the distance by which they shrank. It lies
-between 0 and 1, so that a path along the outline clears the judge's obstacles, and a path along the
-true outline stays as it is."""
+"""Distance of the outline from the judge's insets, as a share of the distance of the true outline.
+With a share between 0 and 1, a path along the outline clears the insets, and a path along the true
+outline does not change."""
 
 SAME_PLACE_TOLERANCE = 1e-9
-"""Tolerance of two places on a path that count as one, in segments."""
+"""Tolerance for two places on a path that count as one, in segments."""
 
 DEPTH_SAMPLES = 64
-"""Number of places, besides corners, at which the depth of a part in an obstacle is measured."""
+"""Number of places, in addition to corners, at which the depth of a part is measured."""
 
 BOX_SHARE = 1.5
-"""Margin of the box around all points and obstacles if there are no bounds, in reaches of the path.
-At most 2, because the judge triangulates that far."""
+"""Margin of the box around all points and obstacles if there are no bounds, as a multiple of the
+reach of the path; at most 2, because the judge triangulates that far."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,13 @@ class Stretch:
     kind : str
         "obstacle", "clearance", "bounds" or "touching" (between obstacles that touch).
     obstacles : tuple of int
-        Indices of the obstacles; none for the bounds.
+        Indices of the obstacles; empty for the bounds.
     start, end : float
-        Lengths along the path, in the plan.
+        Lengths along the path in plan, in the problem's units.
     depth : float
-        Greatest depth of the part, in the problem's units.
+        Largest depth of the part, in the problem's units.
     place : (float, float)
-        Place at which the part begins.
+        Point at which the part begins.
     """
 
     kind: str
@@ -70,7 +70,7 @@ class Stretch:
 
 @dataclass(frozen=True)
 class FreeLoop:
-    """Path that has been led round all obstacles.
+    """Path with detours around all obstacles.
 
     Parameters
     ----------
@@ -79,7 +79,8 @@ class FreeLoop:
     along : ndarray, shape (n,)
         Length along the given path at each point.
     shut_in : float
-        Length along the given path from which on it cannot be reached; infinite if all of it can.
+        Length along the given path at which free space ends: no free path leads to the rest.
+        Infinite if all of the path can be reached.
     """
 
     xy: Floats
@@ -88,14 +89,14 @@ class FreeLoop:
 
 
 class FreeSpace:
-    """The part of the plane in which a tether can lie.
+    """Part of the plane in which a tether can lie.
 
     Parameters
     ----------
     puller : StringPuller
         String puller of the judge.
     reach : float
-        Greatest distance of the path from the base.
+        Largest distance of the path from the base, in the problem's units.
     """
 
     def __init__(self, puller: StringPuller, reach: float) -> None:
@@ -128,7 +129,7 @@ class FreeSpace:
         return bool(shapely.covers(self.shape, shapely.LineString([a, b] - self.origin)))
 
     def free_loop(self, xy: Floats, along: Floats) -> FreeLoop:
-        """Lead a path round all obstacles.
+        """Return a path with detours around all obstacles.
 
         Parameters
         ----------
@@ -170,7 +171,7 @@ class FreeSpace:
         return FreeLoop(out[keep], s_out[keep], shut_in)
 
     def _outside(self, line: Floats) -> list[tuple[float, float]]:
-        """Return the parts outside of free space, each from a place to a place, in segments."""
+        """Return the parts outside of free space, each as a range of places in segments."""
         if len(line) < 2:
             return []
         segments = shapely.linestrings(np.stack([line[:-1], line[1:]], axis=1))
@@ -198,8 +199,8 @@ class FreeSpace:
         rays = self.problem.representative_points[others].reshape(-1, 2) - self.origin
 
         def rank(detour: Floats) -> tuple[int, int, float, float]:
-            """Return a key to compare both parts of the outline; a path and its reverse get the
-            same part, even if both are as long."""
+            """Return a sort key for a part of the outline; ties are broken in the same way for a
+            path and its reverse."""
             turns = winding_numbers(np.vstack([part, detour[::-1], part[:1]]), rays)
             middle = shapely.LineString(detour).centroid
             return (
@@ -212,7 +213,7 @@ class FreeSpace:
         return min((forward, backward), key=rank)
 
     def _pierced(self, part: Floats) -> list[int]:
-        """Return the obstacles that a part runs through."""
+        """Return the obstacles that a part of a path runs through."""
         line = shapely.LineString(part + self.origin)
         return [
             i
@@ -312,7 +313,7 @@ class FreeSpace:
 
 
 def _shares(line: Floats, k: int, part: shapely.Geometry) -> list[tuple[float, float]]:
-    """Return pieces of segment k as places on the path, in segments."""
+    """Return the pieces of segment k as ranges of places on the path, in segments."""
     step = line[k + 1] - line[k]
     size = float(step @ step)
     out = []
@@ -327,7 +328,7 @@ def _shares(line: Floats, k: int, part: shapely.Geometry) -> list[tuple[float, f
 
 
 def _merged(parts: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Join the parts that follow one another without a gap."""
+    """Return parts with those joined that follow each other without a gap."""
     out: list[tuple[float, float]] = []
     for start, end in sorted(parts):
         if out and start <= out[-1][1] + SAME_PLACE_TOLERANCE:
@@ -338,19 +339,19 @@ def _merged(parts: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def _at(values: Floats, place: float) -> float:
-    """Return a value given at the points of a path at a place between them, in segments."""
+    """Return the value at a place of a path, in segments, by interpolation between its points."""
     return float(np.interp(place, np.arange(len(values)), values))
 
 
 def _part(line: Floats, start: float, end: float) -> Floats:
-    """Return the points of a part of a path, from a place to a place, in segments."""
+    """Return the points of the part of a path between two places, in segments."""
     inner = line[int(np.floor(start)) + 1 : int(np.ceil(end))]
     ends = [[_at(line[:, k], place) for k in range(2)] for place in (start, end)]
     return np.vstack([ends[:1], inner, ends[1:]])
 
 
 def _along_ring(ring: shapely.LinearRing, a: float, b: float) -> Floats:
-    """Return the part of a closed line between two lengths along it, forward."""
+    """Return the part of a ring from length a along it to length b, in its direction."""
     corners = shapely.get_coordinates(ring)
     s = polylines.along(corners)
     ends = [shapely.get_coordinates(ring.interpolate(v)) for v in (a, b)]
@@ -362,7 +363,7 @@ def _along_ring(ring: shapely.LinearRing, a: float, b: float) -> Floats:
 
 
 def _depth(part: Floats, obstacle: Circle | Polygon) -> float:
-    """Return the greatest depth of a part of a path in an obstacle."""
+    """Return the largest depth of a part of a path in an obstacle."""
     every = polylines.points_along(part, max(polylines.length(part) / DEPTH_SAMPLES, 1e-300))
     return float(-np.min(obstacle.signed_distance(np.vstack([part, every]))))
 

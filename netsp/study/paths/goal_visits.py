@@ -1,4 +1,4 @@
-"""Find the visits of a path to goals, in their order."""
+"""Visits of a path to goals, in order."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class Passing:
     goal : int
         Index of the goal.
     place : float
-        Place at which the path is nearest to the goal, in segments from its beginning.
+        Place at which the path is nearest to the goal, in segments from the beginning.
     miss : float
-        Distance from the goal at that place.
+        Distance from the goal at that place, in the units of the path.
     """
 
     goal: int
@@ -40,7 +40,7 @@ def passings(path: Floats, goals: Floats, radius: float, leave: float) -> list[P
     radius : float
         Distance at which a goal counts as visited.
     leave : float
-        Distance to which the path must leave a goal before another passing counts.
+        Distance by which the path must leave a goal before another passing counts.
 
     Returns
     -------

@@ -1,7 +1,6 @@
-"""Measure a path in the plane of a problem: length, time, goals, tether and word.
+"""Measures of a path in the plane of a problem: length, time, goals, tether and word.
 
-One function computes the figures that `netsp compare-path`, `netsp verify --measures` and the map
-show.
+`measure_path` computes what `netsp compare-path`, `netsp verify --measures` and the map show.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Floats
+from netsp.base.deprecated import deprecated_method
 from netsp.base.errors import InputError
 from netsp.base.field_types import checked_argument
 from netsp.base.geometry import polylines
@@ -21,17 +21,17 @@ from netsp.hsignature import Word, concatenate, crossings, entangled, reduce
 from netsp.judge.stringpull import StringPuller
 from netsp.model.problem import Problem
 from netsp.study.paths.carried_tether import CarriedTether
-from netsp.study.paths.free_route import FreeSpace, FreeLoop, Stretch
+from netsp.study.paths.free_route import FreeLoop, FreeSpace, Stretch
 from netsp.study.paths.goal_visits import Passing, passings
 
 DEFAULT_SPEED = 0.5
-"""Default speed of a path without time stamps, in the problem's units per second; the default of
-`netsp execute`, too."""
+"""Default speed of paths without time stamps, and of `netsp execute`, in the problem's units per
+second."""
 
 
 @dataclass(frozen=True)
 class PathPolicy:
-    """Rules of when a goal counts as visited, and the accuracy of tether lengths.
+    """Policy of measures: when a goal counts as visited, and the accuracy of tether lengths.
 
     Parameters
     ----------
@@ -41,8 +41,8 @@ class PathPolicy:
     radius_share : float
         Default radius as a share of the problem's size.
     leave_ratio : float
-        Distance to which a path must leave a goal before it can visit it again, in radii; above 1,
-        so that noise of the positions makes no visits.
+        Distance by which a path must leave a goal before it can visit the goal again, as a multiple
+        of the radius; above 1, so that noisy positions do not count as new visits.
     tether_error : float
         Largest error of the longest tether along the path, as a share of the problem's tether.
     """
@@ -86,13 +86,13 @@ class GoalVisit:
     goal : int
         Index of the goal.
     is_first : bool
-        Whether this is the first visit to the goal or to one of its alternatives.
+        Whether this is the first visit to any goal of the choice.
     along : float
-        Length of the path up to the visit.
+        Length of the path up to the visit, in the problem's units.
     time_s : float
-        Seconds from the beginning of the path to the visit.
+        Time from the beginning of the path to the visit, s.
     miss : float
-        Distance of the path from the goal.
+        Distance of the path from the goal, in the problem's units.
     tether : float, optional
         Length of the taut tether at the goal, in 3D; None if no free path follows the path up to
         the goal.
@@ -111,7 +111,7 @@ class GoalVisit:
 
 @dataclass(frozen=True)
 class PathMeasures:
-    """Figures of one path. Lengths are in the problem's units.
+    """Measures of a path. Lengths are in the problem's units.
 
     Parameters
     ----------
@@ -124,21 +124,21 @@ class PathMeasures:
     is_timed : bool
         Whether the duration comes from time stamps; else it comes from `speed`.
     speed : float
-        Mean speed, or the given speed of a path without time stamps.
+        Mean speed, or the given speed of a path without time stamps, in units per second.
     has_heights : bool
-        Whether the path was given with heights; else heights rise evenly between visited goals.
+        Whether the path has heights; otherwise they change evenly between visited goals.
     radius : float
         Distance at which a goal counts as visited.
     visits : tuple of GoalVisit
         Visits in their order along the path.
     start_gap, end_gap : float
-        Distance from the base, or from the end of the tether that was laid, at the beginning, and
-        from the base at the end.
+        Distance at the beginning from the base, or from the end of the given tether, and distance
+        at the end from the base.
     is_closed : bool
         Whether both gaps are within the radius.
     longest_tether : float, optional
-        Greatest length of the taut tether anywhere along the path, in the class that the path gives
-        it; None if no free path follows the path to its end.
+        Largest length of the taut tether along the path, in the class that the path gives it; None
+        if no free path follows the path to its end.
     longest_at : float
         Length along the path at which the tether is longest.
     longest_place : (float, float)
@@ -154,7 +154,7 @@ class PathMeasures:
     stretches : tuple of Stretch
         Parts of the path in obstacles, within their clearance, or out of bounds.
     loop : ndarray, shape (n, 3)
-        The path led round these parts, from the base and back; words and tethers are measured
+        Path from the base and back, with detours around these parts; words and tethers are measured
         along it.
     loop_end : int
         Index of the point of `loop` at which the path ends.
@@ -191,6 +191,10 @@ class PathMeasures:
     points: Floats = field(repr=False, compare=False)
     carried: CarriedTether = field(repr=False, compare=False)
 
+    route = deprecated_method("route", "loop")
+    route_end = deprecated_method("route_end", "loop_end")
+    route_lengths = deprecated_method("route_lengths", "loop_lengths")
+
     @property
     def order(self) -> tuple[int, ...]:
         """Goals in the order of their first visits."""
@@ -207,7 +211,7 @@ class PathMeasures:
 
     @cached_property
     def missing(self) -> tuple[int, ...]:
-        """Goals that the path misses, and whose alternatives it misses, too."""
+        """Goals that the path misses, unless it visits another goal of the choice."""
         cluster = self.problem.clusters
         seen = {int(cluster[v.goal]) for v in self.visits}
         return tuple(g for g in range(len(self.problem.goals)) if int(cluster[g]) not in seen)
@@ -231,7 +235,7 @@ class PathMeasures:
         Parameters
         ----------
         count : int
-            Number of places, evenly along the loop in the plan.
+            Number of places, spaced evenly along the loop in plan.
 
         Returns
         -------
@@ -262,26 +266,26 @@ def measure_path(
 ) -> PathMeasures:
     """Measure a path among a problem's obstacles.
 
-    Parts in an obstacle, within its clearance or out of bounds are reported; for words and tethers
-    they are replaced by a free path round the obstacle (`netsp.study.paths.free_route`). If the
-    path begins away from the base, its tether lies straight from the base to the beginning. If it
-    ends away from the base, a straight line closes it for `word` and `entangled`.
+    Parts in an obstacle, within its clearance or out of bounds are reported. For words and tethers,
+    free paths around the obstacle replace them (`netsp.study.paths.free_route`). If the path begins
+    away from the base, a straight tether leads to its beginning. If it ends away from the base, a
+    straight line closes it for `word` and `entangled`.
 
     Parameters
     ----------
     problem : Problem
         Problem with base, goals, obstacles, bounds and tether.
     path : array_like, shape (n, 2) or (n, 3)
-        The path. Without heights, its heights rise evenly between those of the visited goals, as
-        along the legs of a tour.
+        The path. If it has no heights, they change evenly between visited goals, as along the legs
+        of a tour.
     times : array_like, shape (n,), optional
         Time stamps of the points, s, in ascending order.
     speed : float
         Speed of a path without time stamps, in the problem's units per second.
     policy : PathPolicy, optional
-        Rules of when a goal counts as visited.
+        When a goal counts as visited, and the accuracy of tether lengths.
     tether : array_like, shape (k, 2) or (k, 3), optional
-        Line of the tether at the beginning, from the base on; by default straight.
+        Line of the tether at the beginning, from the base on; by default a straight line.
 
     Returns
     -------
@@ -291,8 +295,8 @@ def measure_path(
     Raises
     ------
     InputError
-        Fewer than two points, or points that are not finite; times in descending order, or another
-        number of times than points.
+        The path has fewer than two points, or points that are not finite; or times are not in
+        ascending order, or not as many as points.
 
     Examples
     --------
@@ -381,11 +385,10 @@ def measure_path(
 
 
 class _Led:
-    """FreeLoop of a path: the tether at the beginning, the path, and the straight line home, led round
-    all obstacles.
+    """Free loop along a path: the tether at the beginning, the path, and the straight line home.
 
-    Places on the path are counted in segments from its beginning. Lengths along the path are in the
-    plan; they are negative on the tether, and exceed the path's length on the line home.
+    Places on the path are in segments from its beginning. Lengths along it are in plan; they are
+    negative on the tether, and exceed the length of the path on the line home.
     """
 
     def __init__(
@@ -419,7 +422,7 @@ class _Led:
         self._letters = [letter for step in steps for letter in step]
 
     def index(self, place: float) -> int:
-        """Return the index of the point of the loop for a place on the path."""
+        """Return the index of the point of the loop nearest to a place on the path."""
         s = float(np.interp(place, self._place, self.flat))
         return int(np.argmin(np.abs(self.loop.along - s)))
 
@@ -444,14 +447,14 @@ class _Led:
         return reduce(self._letters)
 
     def lifted(self, heights: Floats) -> Floats:
-        """Return the loop (n, 3) with the heights of the path's points."""
+        """Return the loop (n, 3) with heights interpolated from those of the path's points."""
         s = [self.loop.along[0], *self.flat, self.loop.along[-1]]
         z = [self._base_z, *heights, self._base_z]
         return np.column_stack([self.loop.xy, np.interp(self.loop.along, s, z)])
 
 
 def _rising(given: Floats, known: list[tuple[float, float]]) -> Floats:
-    """Return heights that rise evenly along a path between places of known height."""
+    """Return heights that change evenly along a path between places of known height."""
     flat = polylines.along(given[:, :2])
     place = np.arange(len(given), dtype=float)
     known = sorted(known)

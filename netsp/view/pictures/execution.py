@@ -90,8 +90,10 @@ def draw_map(done: Execution, *, ax: Any = None) -> Any:
 
 
 def _draw_passing(ax: Any, maps: Maps, busy: Floats) -> None:
-    """Obstacles that stood there for a time only, by their outline and their times; these stand
-    beside it, where there is least else (n, 2), for a goal that was lost lies within."""
+    """Draw temporary obstacles: their outlines, and beside them the times for which they stood.
+
+    `busy` are points (n, 2) that the times avoid. Times are not inside, where a goal may be drawn.
+    """
     size = float(np.ptp(busy, axis=0).max())
     for p in temporary_obstacles(maps):
         rim = np.asarray(p.obstacle.shape(0.0).exterior.coords)[:, :2]

@@ -337,7 +337,7 @@ def _passing(maps: Maps, view: View) -> list[str]:
     )
     for p in temporary_obstacles(maps) if maps else ():
         rim = np.asarray(p.obstacle.shape(0.0).exterior.coords)[:, :2]
-        # above it: a goal that was lost lies within
+        # above the obstacle, because a goal that was left out lies inside
         x, y = view.point([rim[:, 0].mean(), rim[:, 1].max()])
         name = html.escape(f"{p.name}, {p.when}")
         out.append(

@@ -127,7 +127,7 @@ class PlannedTour(Model):
 
     @property
     def longest_tether(self) -> float:
-        """Length of the longest tether before the way home, metres."""
+        """Length of the longest tether before the path home, metres."""
         return max((stop.longest_tether for stop in self.stops), default=0.0)
 
     def without_bounds(self) -> PlannedTour:

@@ -92,8 +92,8 @@ class Grid:
         return len(self._kept)
 
     def tree_to(self, root: Ints, wanted: Ints) -> npt.NDArray[np.int8]:
-        """Return the step that leads on to the root from the wanted cells (n, 3) and those on their
-        way; see `grow`."""
+        """Return the step towards the root from the wanted cells (n, 3), and from all cells on the
+        way there; see `grow`."""
         kept = self._kept.get(tuple(root))
         if kept is not None:
             if all(

@@ -294,7 +294,7 @@ class Planner:
 
     @property
     def is_homeward(self) -> bool:
-        """True if all waypoints are visited or left out, so that only the way home remains."""
+        """True if all waypoints are visited or left out, so that only the path home remains."""
         return self.index >= len(self.mission.waypoints)
 
     @property
@@ -426,7 +426,7 @@ class Planner:
         return planned
 
     def may_end(self, tether: Tether) -> bool:
-        """Return whether the mission may end now that the robot is home; otherwise the way home is
+        """Return whether the mission may end now that the robot is home; otherwise the path home is
         planned again."""
         del tether
         return True

@@ -54,14 +54,15 @@ class PredictivePolicy:
     anchor_check_s
         Time between two checks that the tether lasts while the anchor moves, s.
     anchor_lag_s
-        Time by which a robot may be late while the anchor moves, s; the tether that the anchor
-        takes in that time is kept in reserve.
+        Time by which a robot may be late while the anchor moves, s. The distance that the anchor
+        moves in that time is kept in reserve as tether.
     unmapped_reserve
         Tether kept in reserve while a range sensor may find solids, metres.
     snag_tolerance
-        Tether out beyond what the map explains that is still no reason for another plan, metres.
+        Largest excess of the measured payout over what the map explains for which the plan is kept,
+        metres.
     home_check_steps
-        Steps between two checks that the tether still comes free on the way home.
+        Number of steps between two checks that the tether still comes free on the path home.
     max_home_attempts
         Maximum number of times that the robot goes back along a tether which is not free at home.
     pull_rounds

@@ -1,8 +1,8 @@
 """`predictive`: simulates the tether along the coming path before the robot moves.
 
 So the limit is never exceeded on a planned path. A waypoint is left out only if the shortest tether
-to it, in every class found, is over the limit, or if even the way back to the anchor and along that
-tether exceeds it; the reason states which, and by how much.
+to it, in every class found, is over the limit, or if even the path back to the anchor and out along
+that tether exceeds it; the reason states which, and by how much.
 """
 
 from __future__ import annotations
@@ -478,8 +478,8 @@ class PredictivePlanner(Planner):
         return path
 
     def _is_tether_lost(self, robot: Floats, tether: Tether) -> bool:
-        """Return whether the tether no longer comes free on the rest of the way home, as when a
-        vehicle that cuts corners has taken it past something. Checked at intervals."""
+        """Return whether the tether no longer comes free on the rest of the path home, for example
+        because the vehicle cut a corner. The check runs at intervals."""
         self._home_steps += 1
         if self._home_steps % self.predictive.home_check_steps or not self._is_sure_of_home:
             return False

@@ -28,7 +28,7 @@ These points are open in the listing, and are read as follows:
 - End of recovery. A recovery path to the waypoint ends in normal mode with the tether over the
   limit, and the waypoint would never count as reached. By the text normal operation goes on with
   the next waypoint "that has not yet been reached", so it counts.
-- Way home. The draft has none; it is that of `react`, back along the tether.
+- Path home. The draft has none; it is that of `react`, back along the tether.
 
 `benchmarks/draft_readings.py` flies the other readings, too (docs/reproduction.md).
 

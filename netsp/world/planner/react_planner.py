@@ -1,18 +1,17 @@
 """`react`: Algorithms 2 and 3 of Amer et al. 2025, "REACT".
 
-The paper would not run as it stands, or leaves a choice, at these points:
+The paper has an error or leaves a choice at these points:
 
-- Algorithm 2 sets mode, k and the recovery path anew at every call; they are kept here.
-- It ends recovery at the end of P_safe but follows P_recovery; one path, the refined one, is both
-  followed and ended at.
-- Its trigger is L > L_max, so the limit is exceeded before anything happens. Kept: this is the
-  paper's planner.
-- Algorithm 3 looks at the tether at the end of a recovery path, not at its longest on the path, and
-  accepts the first feasible pivot, not the cheapest. Kept; the search stops at that pivot.
-- Its pivots are the nodes of a tether of resolution δ; here they are `PlannerOptions.pivot_spacing`
-  apart, because our tether has nodes only where it bends.
-- After a recovery path that was the fallback (the limit as a soft one) the tether is still too
-  long, and the trigger would fire at every step; it fires again for the next waypoint.
+- Algorithm 2 sets mode, k and the recovery path again at each call; here they are kept.
+- It ends recovery at the end of P_safe but follows P_recovery. Here, the refined path is followed,
+  and recovery ends at its end.
+- Its trigger is L > L_max, so the limit is exceeded before the planner reacts. This is kept.
+- Algorithm 3 tests the length of the tether at the end of a recovery path, not its maximum along the
+  path, and accepts the first feasible pivot, not the cheapest. This is kept.
+- Its pivots are the nodes of a tether of resolution δ. Here they are `PlannerOptions.pivot_spacing`
+  apart, because this tether has nodes only at its bends.
+- After a recovery path that was the fallback (the limit as a soft one) the tether is still over the
+  limit, and the trigger would fire at every step; it fires again for the next waypoint.
 """
 
 from __future__ import annotations

@@ -89,8 +89,8 @@ class Simulation:
     _was: Floats | None = None
 
     def _course(self, path: Floats, yaw: float) -> float:
-        """Return the heading (rad) along the way through the water, because a vehicle is fastest
-        ahead."""
+        """Return the heading, radians, along the velocity through the water, because a vehicle is
+        fastest straight ahead."""
         leg = path[0] - self.vehicle.position
         far = float(np.linalg.norm(leg))
         if far < 1e-6:

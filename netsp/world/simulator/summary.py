@@ -29,9 +29,9 @@ def summarise(
     which friction multiplies the tension. `contacts` counts contacts of the robot with solids.
     `recovery_s` is the time to come back to the anchor afterwards, by retracing the tether, or the
     whole path (the paper does not say which). Both, `path` and coverage are those of the
-    inspection; `home` describes the way back to the start that follows it: whether it was `reached`
-    with the tether free, how much longer the tether is there than when the mission began (`left`,
-    m), and how long it took.
+    inspection; `home` describes the path back to the start that follows it: whether it was
+    `reached` with the tether free, how much longer the tether is there than when the mission began
+    (`left`, m), and how long it took.
 
     Parameters
     ----------

@@ -141,8 +141,8 @@ class Surroundings:
     def _apply_due_events(self, world: Simulation, planner: Planner) -> bool:
         """Let events happen that are due; return whether the scene has changed.
 
-        Solids wait that would stand on the tether, at home or in the anchor's way, or nearer to the
-        robot than its clearance and the way of one second.
+        A solid waits while it would stand on the tether, at home or in the anchor's way, or nearer
+        to the robot than its clearance and the distance of one second.
         """
         waiting, before = [], self.solids
         for event in self.due:
@@ -333,7 +333,7 @@ class Surroundings:
         return best
 
     def _anchor_path_back(self, world: Simulation, n: int) -> Floats:
-        """Return the way of a moving anchor back to its position at a moment."""
+        """Return the path of a moving anchor back to its position at a moment."""
         if world.track is None:
             return self.trail[:0]
         since = self._since if n == 0 else self.times[n - 1]

@@ -188,9 +188,9 @@ def probe_edge(field: Field, strand: Floats, i: int, tolerance: float) -> tuple[
         if d < low:
             low, where = d, t
         if s > 0.0:
-            # between two samples the distance is at least that of both cones: it falls by at most
-            # the way. A point at fraction t moves by (1 - t) of the first end's motion and t of
-            # the second's.
+            # between two samples the distance is at least that of both cones, because it changes
+            # by at most the distance moved. A point at fraction t moves by (1 - t) of the first
+            # end's motion and t of the second's.
             room = max(0.5 * (before + d - step) + tolerance, 0.0)
             reach0 = min(reach0, room / (1.0 - (s - step) / length))
             reach1 = min(reach1, room / t)

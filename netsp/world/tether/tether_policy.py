@@ -81,7 +81,7 @@ class TetherPolicy:
     max_tip_contacts
         Maximum number of contacts that are taken off a tip together.
     sidestep_strides
-        Length of a sidestep off a tip, strides: below one, to leave room for the way back to the
+        Length of a sidestep off a tip, strides: below one, to leave room for the step back to the
         surface.
     max_sidesteps
         Maximum number of sidesteps for a strand whose ends do not move. Strands that move make one
