@@ -53,7 +53,7 @@ class Shown:
     events: list[dict[str, str]] = field(default_factory=list)
 
     def facts(self) -> dict[str, Any]:
-        """Return tether length and height over the share of the time, as `netsp.app.facts.facts`."""
+        """Return tether length and height by share of the time, as `netsp.app.facts.facts`."""
         last = max(len(self.frames) - 1, 1)
         rows = [[k / last, f["length"], f["z"]] for k, f in enumerate(self.frames)]
         return {"sufficient": None, "margins": None, "profile": rows, "visits": []}

@@ -6,8 +6,8 @@ The paper has an error or leaves a choice at these points:
 - It ends recovery at the end of P_safe but follows P_recovery. Here, the refined path is followed,
   and recovery ends at its end.
 - Its trigger is L > L_max, so the limit is exceeded before the planner reacts. This is kept.
-- Algorithm 3 tests the length of the tether at the end of a recovery path, not its maximum along the
-  path, and accepts the first feasible pivot, not the cheapest. This is kept.
+- Algorithm 3 tests the tether's length at the end of a recovery path, not the longest on the path,
+  and accepts the first feasible pivot, not the cheapest. This is kept.
 - Its pivots are the nodes of a tether of resolution δ. Here they are `PlannerOptions.pivot_spacing`
   apart, because this tether has nodes only at its bends.
 - After a recovery path that was the fallback (the limit as a soft one) the tether is still over the
