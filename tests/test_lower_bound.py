@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from netsp import Problem, Solution, TravelGraph, solve, solve_graph, travel_graph, verify
 from netsp.app import solving
+from netsp.app.app_policy import AppPolicy
 from netsp.base.errors import InputError
 from netsp.command import gtsp as gtsp_command
 from netsp.command import json_output
@@ -422,9 +423,8 @@ def told_to_the_page(problem, time_limit, monkeypatch):
     monkeypatch.setattr(
         by_name, "travel_graph", lambda p, *name, **o: whole(p, *name, **{"max_classes": 4, **o})
     )
-    monkeypatch.setattr(solving, "TOUR_INTERVAL_S", 0.0)
     ours, theirs = Pipe()
-    solving._solve(theirs, 1, problem.to_json(), time_limit, None)
+    solving._solve(theirs, 1, problem.to_json(), time_limit, None, AppPolicy(tour_interval_s=0.0))
     said = []
     while ours.poll():
         said.append(ours.recv())

@@ -6,15 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from netsp.app.app_policy import AppPolicy
 from netsp.base.arrays import Floats
 from netsp.base.geometry import polylines
 from netsp.hsignature import concatenate
 from netsp.hsignature.rays import crossings
 from netsp.model.problem import Problem
 from netsp.roadmap.tether_classes import TautTether, Tethers
-
-MAX_DRAWN_CLASSES = 30
-"""Maximum number of a goal's classes that the page draws."""
 
 
 class Cursor:
@@ -26,10 +24,12 @@ class Cursor:
         That version.
     path : array_like, shape (n, 3)
         Of its tour; empty while there is none.
+    policy : AppPolicy
+        Number of classes that are shown.
     """
 
-    def __init__(self, problem: Problem, path: Any = ()) -> None:
-        self.problem = problem
+    def __init__(self, problem: Problem, path: Any = (), policy: AppPolicy = AppPolicy()) -> None:
+        self.problem, self._policy = problem, policy
         self.tethers = Tethers(problem)
         self._path: Floats = np.array(path, dtype=float).reshape(-1, 3)
         self._along = polylines.along(self._path) if len(self._path) > 1 else np.zeros(0)
@@ -73,7 +73,7 @@ class Cursor:
         x, y, z = self.problem.goals[goal].position
         every = self.tethers.classes(x, y, z)
         return {
-            "classes": [_shown_tether(t) for t in every[:MAX_DRAWN_CLASSES]],
+            "classes": [_shown_tether(t) for t in every[: self._policy.max_drawn_classes]],
             "count": len(every),
         }
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.app.app_policy import AppPolicy
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
 from netsp.base.field_types import checked_argument, is_index
@@ -16,14 +17,8 @@ from netsp.roadmap.tether_classes import Tethers
 from netsp.study.compare.path_comparison import order_length
 from netsp.study.paths import PathMeasures, measure_path
 
-MAX_DRAWN_POINTS = 5000
-"""Largest number of points of a drawn path; a message with 5000 points has 0.2 MB."""
 
-ORDER_LIMIT_S = 20.0
-"""Time limit for the shortest tour in a drawn order, s."""
-
-
-def drawn_points(value: object) -> list[list[float]]:
+def drawn_points(value: object, policy: AppPolicy = AppPolicy()) -> list[list[float]]:
     """Check the points of a drawn path.
 
     Parameters
@@ -41,8 +36,8 @@ def drawn_points(value: object) -> list[list[float]]:
     InputError
         Not a list of pairs of numbers, or too many.
     """
-    if not isinstance(value, list) or len(value) > MAX_DRAWN_POINTS:
-        raise InputError(f"drawn: expected a list of at most {MAX_DRAWN_POINTS} points")
+    if not isinstance(value, list) or len(value) > policy.max_drawn_points:
+        raise InputError(f"drawn: expected a list of at most {policy.max_drawn_points} points")
     out = []
     for k, point in enumerate(value):
         if not isinstance(point, list) or len(point) != 2:
@@ -122,7 +117,9 @@ def end_tether(
     return [] if found is None else [[float(x), float(y)] for x, y in found.path[:, :2]]
 
 
-def worth_of_order(problem: Problem, value: object) -> dict[str, Any]:
+def worth_of_order(
+    problem: Problem, value: object, policy: AppPolicy = AppPolicy()
+) -> dict[str, Any]:
     """Find the shortest tour that visits goals in an order.
 
     Parameters
@@ -149,7 +146,7 @@ def worth_of_order(problem: Problem, value: object) -> dict[str, Any]:
         or not all(is_index(g, len(problem.goals)) for g in value)
     ):
         raise InputError(f"order: expected numbers of goals, none twice, got {shown(value)}")
-    length, note = order_length(problem, tuple(value), time_limit=ORDER_LIMIT_S)
+    length, note = order_length(problem, tuple(value), time_limit=policy.order_limit_s)
     return {"order": value, "length": length, "note": note}
 
 

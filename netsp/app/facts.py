@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.app.app_policy import AppPolicy
 from netsp.app.dragged_tethers import Cursor
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
@@ -17,12 +18,12 @@ from netsp.model.solution import Solution
 from netsp.plan.sizing.base_placement import shortest_paths
 from netsp.plan.sizing.tether_margins import margins
 
-TETHER_SAMPLES = 120
-"""Number of places along the tour, besides its visits, at which the tether is measured."""
-
 
 def facts(
-    problem: Problem, solution: Solution, should_stop: Callable[[], bool] = lambda: False
+    problem: Problem,
+    solution: Solution,
+    should_stop: Callable[[], bool] = lambda: False,
+    policy: AppPolicy = AppPolicy(),
 ) -> dict[str, Any] | None:
     """Margins and profile of a tour, and the shortest sufficient tether.
 
@@ -34,6 +35,8 @@ def facts(
         With a tour.
     should_stop : callable
         Asked now and then; nobody waits for an answer any more.
+    policy : AppPolicy
+        Number of places at which the tether is measured.
 
     Returns
     -------
@@ -46,7 +49,7 @@ def facts(
     path = np.array(solution.path)
     visited = [cursor.share_at(p) for p in _places(problem, solution)]
     rows = []
-    for share in sorted({*np.linspace(0.0, 1.0, TETHER_SAMPLES + 1).tolist(), *visited}):
+    for share in sorted({*np.linspace(0.0, 1.0, policy.tether_samples + 1).tolist(), *visited}):
         if should_stop():
             return None
         tether_at_share = cursor.along(share)

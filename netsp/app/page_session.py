@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from netsp.app.app_policy import AppPolicy
 from netsp.app.dragged_tethers import Cursor
 from netsp.app.drawn_path import drawn_figures, drawn_points, end_tether, worth_of_order
 from netsp.app.facts import facts
@@ -22,11 +23,8 @@ from netsp.base.field_types import checked_argument, is_index
 from netsp.base.validated import shown
 from netsp.model.problem import Problem
 
-MAX_PAGE_NAME = 40
-"""Largest number of letters of the name by which a page signs its drawings."""
-
 MAX_MESSAGE_ID = 2**53 - 1
-"""Largest id of a message, the largest whole number that JavaScript holds exactly."""
+"""Format: largest id of a message, the largest whole number that JavaScript holds exactly."""
 
 
 class Session:
@@ -42,6 +40,8 @@ class Session:
         Something that is only looked at: nothing is edited or solved then.
     notes : sequence of str
         Notes of the import, if the document comes from a map: assumptions, changes, omissions.
+    policy : AppPolicy
+        Limits of what the pages send, and how much they show.
     """
 
     def __init__(
@@ -50,8 +50,9 @@ class Session:
         time_limit: float = 60.0,
         shown: Shown | None = None,
         notes: Sequence[str] = (),
+        policy: AppPolicy = AppPolicy(),
     ) -> None:
-        self.document, self.shown = document, shown
+        self.document, self.shown, self.policy = document, shown, policy
         self._notes = {_source(document.data): list(notes)}
         self.pages: set[asyncio.Queue[str]] = set()
         self.answer: dict[str, Any] | None = None
@@ -60,7 +61,9 @@ class Session:
         self.drawn: list[list[float]] = []
         self._cursor: Cursor | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._worker = Worker(self._on_solver_message, time_limit) if shown is None else None
+        self._worker = (
+            Worker(self._on_solver_message, time_limit, policy) if shown is None else None
+        )
 
     def begin(self) -> None:
         """Start the session; call it within the running event loop."""
@@ -72,9 +75,9 @@ class Session:
         if self.shown.solution is not None:
             problem = self.shown.problem()
             self.solution = self.shown.solution.to_json()
-            self._cursor = Cursor(problem, self.shown.solution.path)
+            self._cursor = Cursor(problem, self.shown.solution.path, self.policy)
             if not self.shown.frames:
-                self.facts = facts(problem, self.shown.solution)
+                self.facts = facts(problem, self.shown.solution, policy=self.policy)
         if self.shown.frames:
             self.facts = self.shown.facts()
 
@@ -159,7 +162,7 @@ class Session:
         elif "drawn" in message:
             return {"drawn": self._figures_of_drawn(message)}
         elif "order" in message:
-            return {"worth": worth_of_order(self._problem(), message["order"])}
+            return {"worth": worth_of_order(self._problem(), message["order"], self.policy)}
         else:
             raise InputError(
                 "message: expected edit, undo, redo, save, hover, along, classes, space, drawn or "
@@ -192,13 +195,14 @@ class Session:
     def _figures_of_drawn(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
         """Keep the drawn path and measure it; with a cursor, measure the path up to the cursor and
         keep the path before."""
-        points = drawn_points(message["drawn"])
+        points = drawn_points(message["drawn"], self.policy)
         if message.get("cursor") is not None:
             points = [*points, _numbers(message["cursor"], 2)]
         else:
             self.drawn = points
             # a page ignores the echo of its own drawing, which may be older than its present state
-            self.tell({"drawn_points": points, "by": str(message.get("by"))[:MAX_PAGE_NAME]})
+            author = str(message.get("by"))[: self.policy.max_page_name]
+            self.tell({"drawn_points": points, "by": author})
         figures = drawn_figures(self._problem(), points)
         if figures is not None and self._cursor is not None:
             figures["tether"] = end_tether(self._cursor.tethers, points, figures)
@@ -210,7 +214,7 @@ class Session:
             return None
         if not isinstance(name, str):
             raise InputError(f"save: expected the name of a file, got {shown(name)}")
-        name = bare_name(name)
+        name = bare_name(name, self.policy)
         opened = self.document.file
         target = (opened.parent if opened is not None else Path()) / (
             name if name.endswith(".json") else f"{name}.json"
@@ -284,7 +288,7 @@ class Session:
             problem = self.document.problem()
         except InputError:
             return
-        self._cursor = Cursor(problem)
+        self._cursor = Cursor(problem, policy=self.policy)
         assert self._worker is not None
         self._worker.solve(self.document.version, problem.to_json())
 

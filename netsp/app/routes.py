@@ -20,7 +20,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from netsp.app.downloads import download
 from netsp.app.page_session import Session
-from netsp.app.served_files import MAX_FILE_BYTES, ImportAnswers, imported
+from netsp.app.served_files import ImportAnswers, imported
 from netsp.base.errors import InputError, NetspError, UnansweredError
 from netsp.base.validated import parse_json_object
 
@@ -127,10 +127,9 @@ class Routes:
         if refusal := self._refusal(request):
             return refusal
         size = request.headers.get("content-length", "")
-        if not size.isdigit() or int(size) > MAX_FILE_BYTES:
-            return PlainTextResponse(
-                f"netsp: expected at most {MAX_FILE_BYTES} bytes", status_code=413
-            )
+        max_bytes = self.session.policy.max_file_bytes
+        if not size.isdigit() or int(size) > max_bytes:
+            return PlainTextResponse(f"netsp: expected at most {max_bytes} bytes", status_code=413)
         try:
             content = await request.body()
         except ClientDisconnect:  # nobody is left to read this answer
@@ -159,6 +158,7 @@ class Routes:
             content,
             tether if isinstance(tether, int | float) else None,
             ImportAnswers.parse(request.query_params),
+            session.policy,
         )
         notes += session.take_in(data, notes)
         return notes

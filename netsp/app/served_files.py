@@ -11,16 +11,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
+from netsp.app.app_policy import AppPolicy
 from netsp.base.errors import InputError, UnansweredError
 from netsp.base.validated import shown
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
-
-MAX_FILE_NAME = 200
-"""Maximum length of a file name, bytes. File systems accept 255; unsaved work adds an ending."""
-
-MAX_FILE_BYTES = 64 * 2**20
-"""Maximum size of an uploaded file, bytes."""
 
 MAPS = (
     ".geojson",
@@ -49,7 +44,7 @@ EXPORTS = {
 """Formats in which a tour can be written, with the names offered for them."""
 
 
-def bare_name(name: str) -> str:
+def bare_name(name: str, policy: AppPolicy = AppPolicy()) -> str:
     """Return the last part of a file name from any operating system.
 
     Parameters
@@ -70,10 +65,8 @@ def bare_name(name: str) -> str:
     last = PurePosixPath(PureWindowsPath(name).name).name
     if not last or last.startswith(".") or not last.isprintable():
         raise InputError(f"file: expected a name, got {shown(name)}")
-    if len(last.encode()) > MAX_FILE_NAME:
-        raise InputError(
-            f"file: expected a name of at most {MAX_FILE_NAME} bytes, got {len(last.encode())}"
-        )
+    if (size := len(last.encode())) > (limit := policy.max_file_name):
+        raise InputError(f"file: expected a name of at most {limit} bytes, got {size}")
     return last
 
 
@@ -188,6 +181,7 @@ def imported(
     content: bytes,
     tether_length: float | None = None,
     answers: ImportAnswers | None = None,
+    policy: AppPolicy = AppPolicy(),
 ) -> tuple[dict[str, Any], list[str]]:
     """Read the problem in a file: a problem file, or a map (docs/sites.md).
 
@@ -201,6 +195,8 @@ def imported(
         Taken where a map says none.
     answers : ImportAnswers, optional
         What the user says of a map.
+    policy : AppPolicy
+        Limits of the file and its name.
 
     Returns
     -------
@@ -216,10 +212,10 @@ def imported(
     InputError
         Too large, of no kind that is read, or not valid.
     """
-    last = bare_name(name)
+    last = bare_name(name, policy)
     ending = Path(last).suffix.lower()
-    if len(content) > MAX_FILE_BYTES:
-        raise InputError(f"{last}: {len(content)} bytes; expected at most {MAX_FILE_BYTES}")
+    if len(content) > policy.max_file_bytes:
+        raise InputError(f"{last}: {len(content)} bytes; expected at most {policy.max_file_bytes}")
     notes: list[str] = []
     with tempfile.TemporaryDirectory(prefix="netsp-") as folder:
         file = Path(folder) / last

@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     from netsp.app.page_session import Session
     from netsp.app.routes import Routes
 
-MAX_MESSAGE_BYTES = 4 * 2**20
-"""Maximum size of one message from the page, bytes."""
-
 
 def application(session: Session, token: str, port: int) -> Routes:
     """Return the ASGI application that serves a session (`Routes`).

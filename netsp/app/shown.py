@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.app.app_policy import AppPolicy
 from netsp.app.solving import bound_message
 from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
@@ -20,9 +21,6 @@ from netsp.view.report.run_page import rows_of
 from netsp.world.mission.anchor_track import AnchorTrack
 from netsp.world.mission.run_log import check_log
 from netsp.world.scene.scene import Scene, scene_of
-
-SHOWN_FRAMES = 240
-"""Number of moments of a run on the page's slider."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +66,9 @@ class Shown:
         return {**self.frames[k], "share": share}
 
 
-def read_shown(source: str | Path, problem_file: str | Path | None = None) -> Shown:
+def read_shown(
+    source: str | Path, problem_file: str | Path | None = None, policy: AppPolicy = AppPolicy()
+) -> Shown:
     """Return the page of a solution file with its problem, or of the folder of a run.
 
     Raises
@@ -79,10 +79,12 @@ def read_shown(source: str | Path, problem_file: str | Path | None = None) -> Sh
     what = open_result(source, problem_file)
     with reading_run(source):
         if isinstance(what, Opened):
-            return _of_execution(what) if what.run else _of_plan(what.problem, what.solution)
+            return (
+                _of_execution(what, policy) if what.run else _of_plan(what.problem, what.solution)
+            )
         if what.run is None:
             raise InputError(f"{source}: is a mission; expected the folder of a flight")
-        return _of_mission(what, what.run)
+        return _of_mission(what, what.run, policy)
 
 
 def _of_plan(problem: Problem, solution: Solution) -> Shown:
@@ -106,13 +108,13 @@ def _answer(problem: Problem, solution: Solution) -> dict[str, Any]:
     }
 
 
-def _of_execution(what: Opened) -> Shown:
+def _of_execution(what: Opened, policy: AppPolicy) -> Shown:
     """Read a tour that was carried out: its path, tethers and events."""
     problem, solution, rows = what.problem, what.solution, what.rows
     assert what.run is not None
     stamps = np.array([float(r["time"]) for r in rows])
     frames, kept = [], what.tethers or []
-    for frame in kept[:: max(1, len(kept) // SHOWN_FRAMES)]:
+    for frame in kept[:: max(1, len(kept) // policy.shown_frames)]:
         k = min(int(np.searchsorted(stamps, frame["time"])), len(rows) - 1)
         frames.append(_frame(np.array(frame["nodes"], dtype=float), rows[k]))
     answer = {
@@ -135,7 +137,7 @@ def _of_execution(what: Opened) -> Shown:
     return Shown(json.loads(problem.to_json()), answer, scene_of(problem), solution, frames, events)
 
 
-def _of_mission(what: OpenedMission, run: Path) -> Shown:
+def _of_mission(what: OpenedMission, run: Path, policy: AppPolicy) -> Shown:
     """Read a mission that was flown; its tether is computed again along the path."""
     mission, scene = what.mission, what.scene
     rows = rows_of(run / "log.csv")
@@ -143,7 +145,11 @@ def _of_mission(what: OpenedMission, run: Path) -> Shown:
     path = np.array([[float(r[k]) for k in "xyz"] for r in rows])
     world = SpaceWorld(mission, scene)
     state = world.present_tether
-    track, frames, every = AnchorTrack.for_mission(mission), [], max(1, len(rows) // SHOWN_FRAMES)
+    track, frames, every = (
+        AnchorTrack.for_mission(mission),
+        [],
+        max(1, len(rows) // policy.shown_frames),
+    )
     for k, row in enumerate(rows):
         anchor = None if track is None else track(float(row["time"]))
         state = world.model.update(state, path[k], anchor)

@@ -15,13 +15,12 @@ from itertools import pairwise
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 
+from netsp.app.app_policy import AppPolicy
+
 if TYPE_CHECKING:
     from netsp.model.bound_scope import LowerBound
     from netsp.model.problem import Problem
     from netsp.model.solution import Solution, Status
-
-TOUR_INTERVAL_S = 0.15
-"""Minimum time between two tours that are sent to the page, s."""
 
 OnMessage = Callable[[dict[str, Any]], None]
 
@@ -35,10 +34,14 @@ class Worker:
         Called in a thread with what the worker says: version, stage, and a tour or an error.
     time_limit : float
         Seconds for one version.
+    policy : AppPolicy
+        Time between two tours, and number of places at which the tether is measured.
     """
 
-    def __init__(self, told: OnMessage, time_limit: float = 60.0) -> None:
-        self.told, self.time_limit = told, time_limit
+    def __init__(
+        self, told: OnMessage, time_limit: float = 60.0, policy: AppPolicy = AppPolicy()
+    ) -> None:
+        self.told, self.time_limit, self._policy = told, time_limit, policy
         self._lock = threading.Lock()
         self._closed = False
         self._latest: tuple[int, str] | None = None
@@ -70,7 +73,7 @@ class Worker:
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._ours, theirs = context.Pipe()
-        self._process = context.Process(target=work, args=(theirs,), daemon=True)
+        self._process = context.Process(target=work, args=(theirs, self._policy), daemon=True)
         self._process.start()
         theirs.close()
         threading.Thread(
@@ -98,7 +101,7 @@ class Worker:
                 self._start()
 
 
-def work(connection: Connection) -> None:
+def work(connection: Connection, policy: AppPolicy = AppPolicy()) -> None:
     """Solve the versions that arrive until the other end closes."""
     last: Solution | None = None
     try:
@@ -107,13 +110,18 @@ def work(connection: Connection) -> None:
             while connection.poll():
                 job = connection.recv()
             version, text, limit = job
-            last = _solve(connection, version, text, limit, last) or last
+            last = _solve(connection, version, text, limit, last, policy) or last
     except (EOFError, OSError, KeyboardInterrupt):
         return
 
 
 def _solve(
-    connection: Connection, version: int, text: str, time_limit: float, before: Solution | None
+    connection: Connection,
+    version: int,
+    text: str,
+    time_limit: float,
+    before: Solution | None,
+    policy: AppPolicy = AppPolicy(),
 ) -> Solution | None:
     """Solve one version, and tell the tours found on the way: first what is left of the tour before
     (`netsp.plan.warm_start`), which an edit rarely changes much. Returns the solution if there is
@@ -153,7 +161,7 @@ def _solve(
         graph = graphs[-1]
         if row.tour is None or row.incumbent is None:
             return
-        if row.incumbent == told[1] or time.monotonic() < told[0] + TOUR_INTERVAL_S:
+        if row.incumbent == told[1] or time.monotonic() < told[0] + policy.tour_interval_s:
             return
         told[:] = time.monotonic(), row.incumbent
         said = bound_message(Status.FEASIBLE, row.incumbent, row.bound)
@@ -204,7 +212,7 @@ def _solve(
                 **drawn(graph, result.tour),
             }
         )
-        known = facts(problem, found, connection.poll)
+        known = facts(problem, found, connection.poll, policy)
         if known is not None:
             connection.send({"version": version, "facts": known})
         return found

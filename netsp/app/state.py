@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from netsp.app.app_policy import AppPolicy
 from netsp.base.errors import InputError
 from netsp.base.files import read_text, write_text
 from netsp.base.validated import parse_json_object, read_model, shown
@@ -35,9 +36,6 @@ LISTS = ("goals", "obstacles")
 MAPPED = ("base", "bounds", *LISTS)
 """Fields that an import takes from a map; editing one sets `site.edited`."""
 
-MAX_VERSIONS = 10_000
-"""Maximum number of versions that can be undone. Versions share what did not change."""
-
 
 class Document:
     """A problem that is being edited.
@@ -48,6 +46,8 @@ class Document:
         Problem file that it is saved to; what was edited and not saved is kept beside it.
     data : mapping, optional
         The problem as its file has it; default: the file's, or an empty map.
+    policy : AppPolicy
+        Number of versions that are kept. They share what did not change.
 
     Attributes
     ----------
@@ -56,8 +56,12 @@ class Document:
     """
 
     def __init__(
-        self, file: str | Path | None = None, data: Mapping[str, Any] | None = None
+        self,
+        file: str | Path | None = None,
+        data: Mapping[str, Any] | None = None,
+        policy: AppPolicy = AppPolicy(),
     ) -> None:
+        self._policy = policy
         self.file = None if file is None else Path(file)
         self.version = 0
         if data is None:
@@ -213,7 +217,7 @@ class Document:
         self._keep(data)
         del self._versions[self._at + 1 :]
         self._versions.append(data)
-        del self._versions[: max(0, len(self._versions) - MAX_VERSIONS)]
+        del self._versions[: max(0, len(self._versions) - self._policy.max_versions)]
         self._at = len(self._versions) - 1
         self.version += 1
 

@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     except ImportError:
         raise InputError("the map needs uvicorn: pip install 'netsp[app]'") from None
     from netsp.app.page_session import Session
-    from netsp.app.server import MAX_MESSAGE_BYTES, application
+    from netsp.app.server import application
     from netsp.app.state import Document
 
     looked_at, notes = None, list[str]()
@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
         config = uvicorn.Config(
             application(session, token, port),
             log_level="warning",
-            ws_max_size=MAX_MESSAGE_BYTES,
+            ws_max_size=session.policy.max_message_bytes,
             access_log=False,
             server_header=False,
         )
