@@ -1,4 +1,4 @@
-"""Scenes in space, tethers and vehicles in them, missions, planners and the simulator."""
+"""World of a robot in space: scenes, tethers, vehicles, missions, planners and the simulator."""
 
 from __future__ import annotations
 

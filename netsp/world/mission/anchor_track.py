@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class AnchorTrack(ComparesArrays):
-    """Positions of an anchor over time, straight and steady in between; it stays at the last one.
+    """Positions of an anchor over time; between them it moves straight at a constant speed.
 
     Parameters
     ----------
     times : ndarray, shape (n,)
-        Seconds since the mission began, ascending, the first one 0.
+        Times since the mission began, s, ascending from 0; the anchor stays at the last position.
     places : ndarray, shape (n, 3)
         Positions, metres.
     """
@@ -41,7 +41,7 @@ class AnchorTrack(ComparesArrays):
         return cls(rows[:, 0], rows[:, 1:])
 
     def __call__(self, now: float) -> Floats:
-        """Return the position (3,) at a time in seconds."""
+        """Return the position (3,), metres, at a time, s."""
         return np.array([np.interp(now, self.times, self.places[:, k]) for k in range(3)])
 
     def between(self, since: float, until: float) -> Floats:
@@ -56,7 +56,7 @@ class AnchorTrack(ComparesArrays):
 
     @property
     def end(self) -> float:
-        """Time at which the anchor stops, seconds."""
+        """Time at which the anchor stops, s."""
         return float(self.times[-1])
 
     @cached_property

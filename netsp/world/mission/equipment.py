@@ -32,8 +32,10 @@ class Camera(Model):
 
 
 class TetherPhysics(Model):
-    """Properties of a tether that need more than its taut length, zero by default; see
-    `netsp.world.tether.load` for formulas and sources."""
+    """Properties by which a tether needs more than its taut length; zero by default.
+
+    `netsp.world.tether.load` states formulas and sources.
+    """
 
     slack: Annotated[
         Annotated[NonNegative, Field(le=1.0)],
@@ -62,19 +64,19 @@ class TetherPhysics(Model):
     ] = False
 
     def load(self, water: Floats) -> Load:
-        """Return what acts on the tether in water of a velocity (3,), m/s."""
+        """Return the load on the tether in water that moves with a velocity (3,), m/s."""
         drag = 0.5 * SEA_WATER_DENSITY * self.drag_coefficient * self.diameter
         x, y, z = (float(v) for v in water)
         return Load(self.slack, drag, x, y, z, self.tension)
 
     @property
     def max_turning(self) -> float:
-        """Sum of turning angles at which friction reaches its limit, rad."""
+        """Largest sum of turning angles that the limit on friction allows, rad."""
         return max_turning(self.friction, self.max_tension_ratio)
 
 
 class PositionSensor(Model):
-    """Error and delay of the robot's position as the planner knows it, zero by default."""
+    """Error and delay of the position that the planner gets; zero by default."""
 
     noise: Annotated[
         Annotated[NonNegative, Field(le=100.0)],
@@ -86,13 +88,16 @@ class PositionSensor(Model):
     ] = 0.0
 
     def reserve(self, speed: float) -> float:
-        """Return the largest distance of a robot from where it is believed to be, metres: three
-        standard deviations, and what it travels at its speed (m/s) during the delay."""
+        """Return the largest distance of the robot from its estimated position, metres.
+
+        It is three standard deviations, plus the distance travelled during the delay at `speed`,
+        m/s.
+        """
         return 3.0 * self.noise + self.delay * speed
 
 
 class RangeSensor(Model):
-    """Forward-looking range sensor, such as a scanning sonar, which looks along the path."""
+    """Forward-looking range sensor, such as a scanning sonar, that points along the path."""
 
     range: Annotated[Positive, Field(description="farthest that it sees, m")] = 5.0
     field_of_view: Annotated[

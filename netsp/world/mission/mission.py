@@ -37,11 +37,11 @@ from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.scene.scene import Scene
 
 MAX_DWELL_S = 86400.0
-"""Format of mission files: longest dwell at a waypoint, s. A day or more is a mistake of units."""
+"""Format of mission files: longest dwell at a waypoint, s; more is likely a mistake of units."""
 
 
 class Viewpoint(Model):
-    """Place and heading that serve as well as a waypoint's own."""
+    """Alternative position and heading of a waypoint."""
 
     position: Annotated[Point3, Field(description="(x, y, z), m")]
     heading: Annotated[
@@ -63,7 +63,7 @@ class MissionState(Model):
 class MissionWaypoint(Model):
     """Place to visit, with a heading to turn to and a time to stay.
 
-    `netsp.plan.space.space_plan` chooses among the alternatives; everything else visits `position`.
+    Only `netsp.plan.space.space_plan` considers the alternatives; planners visit `position`.
     """
 
     position: Annotated[Point3, Field(description="(x, y, z) to reach, m")]
@@ -81,7 +81,7 @@ class MissionWaypoint(Model):
 
     @model_serializer(mode="wrap")
     def _plain(self, handler: SerializerFunctionWrapHandler) -> Any:
-        """Serialise as a bare position if nothing else is set."""
+        """Serialise as a bare position if no other field is set."""
         if self.heading is None and not self.dwell and not self.alternatives:
             return self.position
         data = handler(self)
@@ -90,8 +90,10 @@ class MissionWaypoint(Model):
         return data
 
     def at(self, choice: int) -> MissionWaypoint:
-        """Return the waypoint with one of its alternatives, counted from 1, in exchange for its own
-        place; 0 keeps its own."""
+        """Return the waypoint at one of its alternatives, counted from 1; 0 is its own position.
+
+        The own position then becomes an alternative.
+        """
         if choice == 0:
             return self
         replaced = Viewpoint(position=self.position, heading=self.heading)
@@ -155,10 +157,10 @@ WaypointLike = Annotated[
 class Mission(FileModel):
     """Waypoints to visit in order, in a scene, with the limits of the robot and its tether.
 
-    With a track, the robot comes home as far from the anchor as at the start where there is room,
-    else to the anchor. With a state, only the waypoints left to visit are listed. Planner
-    `predictive` keeps to a planned tour (`netsp.plan.space.mission_solver`). A kinematic vehicle
-    does not feel the current.
+    With a moving anchor, home is as far from the anchor as the start was, or at the anchor if there
+    is no room. With a state, only waypoints still to be visited are listed. The planner
+    `predictive` follows a planned tour (`netsp.plan.space.mission_solver`). The current does not
+    act on a kinematic vehicle.
     """
 
     file_kind: ClassVar[str] = "mission"
@@ -226,7 +228,7 @@ class Mission(FileModel):
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a mission file; the scene's name becomes relative to the working directory.
+        """Return the mission in a file; its scene becomes relative to the working directory.
 
         Raises
         ------
@@ -288,8 +290,8 @@ class Mission(FileModel):
 
     @property
     def every_place(self) -> Floats:
-        """Every position (n, 3) in the mission: anchor and track, start, waypoints and
-        alternatives, and the tether of a state, metres."""
+        """Positions (n, 3) of all parts of the mission, metres: anchor and its track, start,
+        waypoints, alternatives, and the tether of a state."""
         track = np.array(self.track).reshape(-1, 4)[:, 1:]
         others = [v.position for w in self.waypoints for v in w.alternatives]
         line = () if self.state is None else self.state.tether
@@ -305,17 +307,17 @@ class Mission(FileModel):
         )
 
     def checked_waypoints(self, field: DistanceField, *, snap: bool = False) -> Self:
-        """Return the mission with every waypoint outside of solids.
+        """Return the mission after checking that no waypoint lies in a solid.
 
         Parameters
         ----------
         snap : bool
-            Whether waypoints inside solids are moved out to the clearance.
+            Whether to move waypoints in solids out to the clearance instead of raising.
 
         Raises
         ------
         InputError
-            Waypoints lie inside solids, without `snap`.
+            A waypoint lies in a solid, and `snap` is false.
         """
         points = self.places
         inside = np.flatnonzero(field.distance(points) < 0.0)
@@ -335,5 +337,5 @@ class Mission(FileModel):
         return self.model_copy(update={"waypoints": moved})
 
     def load_scene(self) -> Scene:
-        """Read the scene; raise InputError, in one line, if that fails."""
+        """Return the scene of the mission; raise InputError if it cannot be read."""
         return Scene.load(self.scene)

@@ -1,4 +1,4 @@
-"""Checks of a mission before it is simulated: names that exist, and numbers that make sense."""
+"""Checks of a mission before it is simulated: names exist, and numbers make sense."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from netsp.world.vehicle import VEHICLES
 def check_names(planner: object, vehicle: object, tether: object) -> None:
     """Raise InputError for a planner, vehicle or tether model that does not exist.
 
-    This comes before a scene is read, which takes longer.
+    It is called before the scene is read, which takes longer.
     """
     for known, name in ((PLANNERS, planner), (VEHICLES, vehicle), (TETHERS, tether)):
         if not callable(name):
@@ -47,8 +47,8 @@ def check_bounds(mission: Mission, scene: Scene) -> None:
 
 
 def check_tether(mission: Mission, length: float) -> None:
-    """Raise InputError if the taut tether at the first position of the robot, of a length in
-    metres, is longer than the mission's tether."""
+    """Raise InputError if a length, metres, of the taut tether at the beginning is over the
+    limit."""
     if length > mission.tether_length:
         raise InputError(
             f"tether_length: {mission.tether_length:g} is shorter than the path from anchor to "
@@ -57,7 +57,7 @@ def check_tether(mission: Mission, length: float) -> None:
 
 
 def check_size(mission: Mission, policy: SimulationPolicy = SimulationPolicy()) -> None:
-    """Raise InputError for a mission that would take for ever, or whose numbers make no sense."""
+    """Raise InputError for a mission that would take too long, or whose numbers make no sense."""
     for name, value in (("delta", mission.delta), ("reach", mission.reach)):
         if value > mission.tether_length:
             raise InputError(

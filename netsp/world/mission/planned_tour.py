@@ -1,4 +1,4 @@
-"""Tour that was planned for a mission: the robot's path from waypoint to waypoint."""
+"""Tour that was planned for a mission: the paths of the robot from waypoint to waypoint."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class UnresolvedGap(Model):
     width: Annotated[NonNegative, Field(description="twice the distance from solids there, m")]
 
     def __str__(self) -> str:
-        """Return width and place, as in "0.24 m at (0, 1.5, -2)"."""
+        """Return width and position, as in "0.24 m at (0, 1.5, -2)"."""
         return f"{self.width:.2g} m at ({', '.join(f'{v:.3g}' for v in self.position)})"
 
 
@@ -52,10 +52,10 @@ class PlannedTour(Model):
     Waypoints that no tether reaches come after all others and have no visit. The status is
     `optimal` if `bound_of_all` (`netsp.plan.space.path_bound`) proves that no tour to these
     waypoints is shorter, in any class of the tether; `optimal_of_states` if the tour is the
-    shortest along the states and legs that were found. If `exact`, different words always belong to
-    different classes of paths through the mission's cells; that covers neither gaps that the grid
-    does not show nor the tour's length. No tour through an unresolved gap was considered;
-    `bound_of_all` holds for such tours, too.
+    shortest along the states and legs that were found. If `exact`, different words mean different
+    classes of paths through the cells of the mission; this says nothing about gaps that the grid
+    does not show, or about the length. Tours through unresolved gaps were not considered, but
+    `bound_of_all` holds for them, too.
     """
 
     stops: Annotated[
@@ -121,7 +121,7 @@ class PlannedTour(Model):
 
     @property
     def line(self) -> Floats:
-        """The whole tour (n, 3), metres."""
+        """Polyline (n, 3) of the whole tour, metres."""
         legs = [*(stop.path for stop in self.stops), self.home]
         return np.vstack([legs[0][:1], *(leg[1:] for leg in legs)])
 
@@ -131,7 +131,7 @@ class PlannedTour(Model):
         return max((stop.longest_tether for stop in self.stops), default=0.0)
 
     def without_bounds(self) -> PlannedTour:
-        """Return a feasible tour of the same paths, without bounds."""
+        """Return a copy with the status feasible and no bounds."""
         legs = [*(visit.path for visit in self.stops), self.home]
         return self.model_copy(
             update={
@@ -147,8 +147,7 @@ class PlannedTour(Model):
     def mismatch(
         self, begin: Point3, start: Point3, places: Floats, tolerance: float
     ) -> str | None:
-        """Return what does not match the mission that the tour is part of, in one line; None if all
-        does.
+        """Return in one line how the tour contradicts its mission, or None.
 
         Parameters
         ----------
@@ -157,7 +156,7 @@ class PlannedTour(Model):
         places : ndarray, shape (n, 3)
             Waypoints, metres.
         tolerance : float
-            Largest distance of the ends of paths from these, metres.
+            Largest distance between these points and the ends of paths, metres.
         """
         if len(self.stops) > len(places):
             return (

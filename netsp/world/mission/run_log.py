@@ -54,13 +54,13 @@ class LogRow:
     coverage : float
         Share of the surface seen.
     coverage_through : float
-        Share of the surface seen if nothing stood in between.
+        Share of the surface that would be seen without occlusion.
     replan_s : float
         CPU time of planning, s.
     limit : float
         Maximum payout, metres.
     shortening : bool
-        Whether the limit was lowered below the payout, which has not fitted since.
+        Whether the limit was lowered and the payout is still above it.
     """
 
     time: float
@@ -99,7 +99,7 @@ class Run(Drawn):
     scene : Scene or None
         The scene at the end, if it has changed.
     tethers : tuple of (int, Tether)
-        Rows of the log with their tethers, at intervals, if the scene has changed.
+        Indices of rows of the log and the tethers there, at intervals, if the scene has changed.
     """
 
     picture: ClassVar[str] = "netsp.view.pictures.mission_picture:draw_run"
@@ -113,7 +113,7 @@ class Run(Drawn):
     tethers: tuple[tuple[int, Tether], ...] = ()
 
     def to_frame(self) -> pandas.DataFrame:
-        """Return the log as a pandas DataFrame, with a row per step and a column per field of
+        """Return the log as a pandas DataFrame: a row for each step, a column for each field of
         `LogRow`.
 
         Raises
@@ -134,7 +134,7 @@ class Run(Drawn):
 
 
 def write_run(run: Run, folder: str | Path) -> None:
-    """Write log.csv, summary.json and mission.json into a folder, which is made.
+    """Write log.csv, summary.json and mission.json to a folder, which is created if necessary.
 
     Raises
     ------
@@ -161,12 +161,11 @@ def write_run(run: Run, folder: str | Path) -> None:
 
 
 FINITE = ("time", "x", "y", "z", "tether", "limit")
-"""Columns of every log that are drawn, and must be finite."""
+"""Columns of log.csv that must be finite, because pictures draw them."""
 
 
 def check_log(rows: Sequence[dict[str, str]], file: Path) -> None:
-    """Raise InputError, with line and column, for rows of log.csv with a missing number or times
-    that descend."""
+    """Raise InputError, with line and column, if log.csv lacks a number or its times descend."""
     before = -math.inf
     for number, row in enumerate(rows, 2):
         for column in FINITE:
@@ -187,8 +186,7 @@ def check_log(rows: Sequence[dict[str, str]], file: Path) -> None:
 
 
 def read_run(folder: str | Path) -> Run:
-    """Return a run read from its files, with a straight tether: only simulating it again would show
-    its shape.
+    """Return a run from its files; its tether is straight, because files do not store its shape.
 
     Raises
     ------
@@ -228,7 +226,7 @@ _KINDS: dict[str, Callable[[str], Any]] = {
     "mode": str,
     "shortening": _yes,
 }
-"""Types of the columns of log.csv."""
+"""Functions that parse the columns of log.csv."""
 
 
 def _short(value: Any) -> Any:
@@ -236,7 +234,7 @@ def _short(value: Any) -> Any:
 
 
 def describe_run(run: Run, units: str) -> str:
-    """Return a run in a few lines."""
+    """Return a summary of a run in a few lines."""
     s = run.summary
     return "\n".join(
         [
@@ -353,7 +351,7 @@ def _left_out_lines(s: dict[str, Any]) -> list[str]:
 
 
 def _given(summary: dict[str, Any], waypoint: int) -> int:
-    """Return the number of a waypoint in the mission before anything was planned anew."""
+    """Return the number of a waypoint in the original mission."""
     given = summary.get("given_as")
     return waypoint if given is None else int(given[waypoint])
 

@@ -1,4 +1,4 @@
-"""Policies of path search: grid, pulling taut, sampling planners, and distance from a tether."""
+"""Policies of path search: grids, pulling taut, sampling planners, and paths beside a tether."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from netsp.base.number_ranges import check_positive
 
 @dataclass(frozen=True)
 class StandoffPolicy:
-    """Policy by which a path moves off the surfaces that a tether rests on. All are positive.
+    """Policy of moving a path off the surfaces that a tether touches. All numbers are positive.
 
     Attributes
     ----------
     step_share
-        Longest step of a point, as a share of the clearance. Longer steps are undone more often.
+        Longest step of a point, as a share of the clearance. Longer steps are rejected more often.
     stencil_share
-        Arm of the stencil for the gradient, as a share of the clearance: wide enough that points
-        between two solids climb along the middle.
+        Arm of the stencil for the gradient, as a share of the clearance. It must be so wide that
+        points between two solids climb along the middle.
     max_sweeps
-        Maximum number of steps of each point.
+        Maximum number of steps of a point.
     min_scale
-        Length that replaces a smaller clearance in both shares, metres.
+        Smallest clearance from which both shares are computed, metres.
     min_gain
-        Smallest gain of distance for which a step is taken, as a share of the step.
+        Smallest gain of distance for which a step is accepted, as a share of the step.
     """
 
     step_share: float = 1 / 6
@@ -43,26 +43,28 @@ class PathPolicy:
     Attributes
     ----------
     cell
-        Cell size of the grid where a mission states none, metres.
+        Default cell size of the grid, metres.
     max_default_cells
-        Number of cells above which such a grid gets larger cells, so that a plan takes about a
+        Number of cells above which the default cell size grows, so that a plan takes about a
         second.
     max_cells
-        Number of cells that a grid may have at all; the default takes about 0.3 GiB.
+        Maximum number of cells of a grid; the default takes about 0.3 GiB.
     max_tree_bytes
-        Memory for shortest-path trees that are kept, bytes; one per target, a byte per cell.
+        Memory for cached shortest-path trees, bytes. A tree has one target and takes a byte for
+        each cell.
     pull_rounds
-        Rounds in which a path is pulled taut. More rounds gain less than a millimetre.
+        Number of rounds in which a path is pulled taut. More rounds gain less than a millimetre.
     rough_pull_rounds
-        Rounds in which a path is pulled to estimate which of several classes is the shortest.
+        Number of rounds in which a path is pulled to compare the lengths of classes.
     pull_stages
-        Number of paths offered between an untouched and a taut one.
+        Number of paths that are yielded between the original and the taut one.
     rrtstar_iterations, bitstar_iterations
-        Iterations of these planners; counts instead of times: a seed determines the path.
+        Number of iterations of these planners. Counts, unlike times, make the path depend on the
+        seed only.
     prmstar_milestones
-        Milestones of PRM*.
+        Number of milestones of PRM*.
     prmstar_neighbours
-        Nearest milestones that each end of a path is joined to.
+        Number of nearest milestones to which each end of a path is joined.
     standoff
         Policy of paths beside a tether.
     """

@@ -1,18 +1,16 @@
 """Refinement of paths, which makes them safer and smoother before they are followed.
 
 `paper`: the three steps of Amer et al. 2025, section V-B, repeated until the path is free.
-`gradient`: ours; it moves points up the distance field only, so no point's clearance gets smaller,
-and keeps the ends where they are.
+`gradient`: moves points up the distance field, so that no clearance gets smaller; not in the paper.
 
-The paper does not say how long its segments are, how far points are moved, how many trials a point
-has (all in `RefineParams`), nor that moving points away from the path's centroid pushes those
-between centroid and structure *into* the structure. The ends are kept, or the path would not lead
-from the robot to the waypoint.
+The paper does not state the length of segments, the length of moves or the number of trials of a
+point (all in `RefineParams`). Nor does it say that moving points away from the centroid of the path
+pushes points between centroid and structure *into* the structure. Here, the ends of a path stay, so
+that it still leads from the robot to the waypoint.
 
-The paper says two things about the perturbations that are kept: collision-free ones only
-"are accepted", and in the next sentence that this is "to locally increase clearance". By the first
-sentence any free move is kept (`RefineParams.keeps` "free"); by the second, one that takes the
-point farther from solids ("farther").
+About random moves the paper says that collision-free ones "are accepted", and in the next sentence
+that this is "to locally increase clearance". By the first sentence any free move is kept
+(`RefineParams.keeps` "free"), by the second only moves away from solids ("farther").
 """
 
 from __future__ import annotations
@@ -50,8 +48,8 @@ class RefineParams:
     overlap : int
         Number of points that successive segments share; fewer than `segment`.
     max_rounds : int
-        Largest number of repetitions of the three steps before the path is left as it was; 1 or
-        more.
+        Maximum number of repetitions of the three steps; if the path is still not free, it stays
+        unrefined. 1 or more.
     """
 
     keeps: str = "free"
@@ -81,7 +79,7 @@ def refined(
     rng: np.random.Generator,
     params: RefineParams | None = None,
 ) -> Floats:
-    """Return a path (k, 3) refined, or unchanged if the refined path is not free."""
+    """Return the refined path (k, 3), or the original one if the refined path is not free."""
     params = params or RefineParams()
     if name == "none" or len(path) < 3:
         return path
@@ -113,7 +111,7 @@ def stepped(
 
 
 def offset(path: Floats, by: float) -> Floats:
-    """Return a path with every point but the ends moved away from the centroid of all."""
+    """Return a path with all points but the ends moved away from the centroid of all points."""
     away = path - path.mean(axis=0)
     far = np.linalg.norm(away, axis=1, keepdims=True)
     out = path + by * away / np.maximum(far, 1e-12)
@@ -124,8 +122,8 @@ def offset(path: Floats, by: float) -> Floats:
 def perturbed(
     field: DistanceField, path: Floats, by: float, rng: np.random.Generator, params: RefineParams
 ) -> Floats:
-    """Return a path with every point but the ends moved at random, where the rule accepts a
-    move."""
+    """Return a path with random moves of all points but the ends, as far as the rule accepts
+    them."""
     out = path.copy()
     waits = np.ones(len(path) - 2, dtype=bool)
     for _ in range(params.max_trials):

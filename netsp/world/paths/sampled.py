@@ -1,6 +1,6 @@
-"""Short paths by OMPL's planners, as the paper searched them.
+"""Short paths by the planners of OMPL, which the paper uses.
 
-Sucan, Moll and Kavraki, "The Open Motion Planning Library", IEEE RAM 19(4), 2012.
+Source: Sucan, Moll and Kavraki, "The Open Motion Planning Library", IEEE RAM 19(4), 2012.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ OMPL_PLANNERS = {"rrtstar": "RRTstar", "bitstar": "BITstar", "prmstar": "PRMstar
 
 
 class SampledPaths:
-    """Paths from points (n, 3) to a target (3,) by one of `OMPL_PLANNERS`, each planned on demand.
+    """Paths from points (n, 3) to a target (3,) by a planner of OMPL; each is planned on demand.
 
     Raises
     ------
     InputError
-        An unknown name, or OMPL is not installed.
+        The name is not in `OMPL_PLANNERS`, or OMPL is not installed.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class SampledPaths:
         ou.noOutputHandler()
         ou.RNG.setSeed(self.seed + 1)
         grid = self.grid
-        # if the ends are nearer to solids than the clearance, the path may be as near
+        # a path need not keep more distance than its ends
         ends = grid.field.distance(np.array([start, self.target]))
         room = max(0.0, min(grid.clearance, float(ends.min()) - 1e-3 * grid.cell))
         field = grid.field.grown(room).arrays
@@ -70,7 +70,7 @@ class SampledPaths:
         planner.setProblemDefinition(query)
         planner.setup()
         if self.name == "prmstar":
-            # its `solve` searches in a thread of its own, which waits for Python's lock
+            # not `solve`, whose own thread would wait for the global interpreter lock
             grow = getattr(planner, "growRoadmapPtc", planner.growRoadmap)
             milestones = self.policy.prmstar_milestones
             grow(ob.PlannerTerminationCondition(lambda: planner.milestoneCount() >= milestones))

@@ -1,4 +1,4 @@
-"""Path beside a tether: off the surfaces that the tether rests on, and in its class."""
+"""Path beside a tether: in its class, but off the surfaces that the tether touches."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ def move_off_surfaces(
 ) -> Floats:
     """Return a line (n, 3) moved off surfaces to the clearance, as far as its class allows.
 
-    All points climb the distance field in small steps; a step after which neighbours no longer see
-    one another is undone. The gradient is taken over a stencil, so that points in the crotch
-    between two solids climb along its middle, out to where there is room, instead of leaping to one
-    side. The ends stay.
+    All points climb the distance field in small steps. A step is rejected if neighbours would no
+    longer see each other. The gradient is taken over a stencil, so that points between two solids
+    move along the middle to where there is room, instead of jumping to one side. The ends stay.
 
     Parameters
     ----------
@@ -58,7 +57,7 @@ def move_off_surfaces(
 
 @kernel
 def are_in_sight(field: Field, a: Floats, b: Floats, depth: float) -> Bools:
-    """Return which of the points a[k] and b[k] (n, 3) see one another, up to a depth in solids."""
+    """Return the mask (n,) of pairs a[k], b[k] that see each other, up to a depth in solids."""
     out = np.empty(len(a), dtype=np.bool_)
     for k in range(len(a)):
         low, _ = lowest_along(

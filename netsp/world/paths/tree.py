@@ -1,8 +1,7 @@
-"""Shortest paths to one place from everywhere: a tree on a grid, and its paths pulled taut.
+"""Shortest paths to one place from all others: a tree on a grid, and its paths pulled taut.
 
-The tree serves every pivot of a recovery at once. A path along the grid is up to 8 % longer than
-necessary (26 directions); pulled taut as a tether, it is the shortest of its class at the
-clearance.
+One tree serves all pivots of a recovery. A path along the grid, which has 26 directions, is up to
+8 % too long; pulled taut like a tether, it is the shortest of its class at the clearance.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ class Grid:
     Raises
     ------
     InputError
-        A box without size, or more cells than the policy allows.
+        The box has no size, or more cells than the policy allows.
     """
 
     def __init__(
@@ -76,10 +75,10 @@ class Grid:
         self._kept: dict[tuple[int, ...], npt.NDArray[np.int8]] = {}
 
     def prepare(self, targets: Sequence[Floats]) -> int:
-        """Keep the shortest-path trees to targets (3,), as many as fit into the policy's memory.
+        """Cache shortest-path trees to targets (3,), and return how many fit in the policy's
+        memory.
 
-        Shortest paths depend on the map alone, so they can be found before the robot waits for
-        one. Returns the number of trees kept.
+        Shortest paths depend on the map only, so they can be found before the robot needs one.
         """
         for target in targets:
             root = self.nearest_free_cell(target)
@@ -101,7 +100,7 @@ class Grid:
                 for cell in wanted
             ):
                 return kept
-            del self._kept[tuple(root)]  # a new solid blocks it
+            del self._kept[tuple(root)]  # a new solid blocks the target
         return grow(self.states, root, wanted)
 
     def with_changed_box(self, field: DistanceField, box: Floats) -> Grid:
@@ -117,7 +116,7 @@ class Grid:
         )
         end_if_abandoned()
         if (new.free & ~self.free).any():
-            # paths may be shorter now; otherwise, free paths stay the shortest
+            # paths may get shorter; without new free cells, paths that stay free stay shortest
             new._kept = {}
         else:
             new._kept = dict(self._kept)
@@ -158,7 +157,7 @@ class Grid:
 
 
 class Paths(Protocol):
-    """Short paths to one target from some points, however they are found."""
+    """Protocol of short paths to one target from given points."""
 
     def path(self, n: int) -> Floats | None:
         """Return the path (k, 3) from point n to the target; None if there is none."""
@@ -167,7 +166,7 @@ class Paths(Protocol):
 class ShortestTree:
     """Shortest-path tree that leads from points (n, 3) to a target (3,).
 
-    It grows until it has all points, unless `Grid.prepare` has kept it.
+    It grows until it contains all points, unless `Grid.prepare` has cached it.
     """
 
     def __init__(self, grid: Grid, target: npt.ArrayLike, points: npt.ArrayLike) -> None:
@@ -194,11 +193,11 @@ _LONG = np.sqrt((STEPS**2).sum(1).astype(float))
 
 
 def _onward() -> Ints:
-    """Return (26, 8) the number of steps that follow on a step in open water, and these steps: they
-    go on along some of its axes.
+    """Return for each step the number of steps that may follow it in open water, and these (26, 8).
 
-    Every other neighbour is reached as soon through cells about the middle one: the canonical order
-    of jump point search (Harabor & Grastien 2011), in space.
+    They go on along some of its axes. All other neighbours are reached on paths of the same length
+    through other cells: this is the canonical order of jump point search (Harabor & Grastien 2011),
+    in space.
     """
     out = np.zeros((26, 8), dtype=np.int64)
     for s, step in enumerate(STEPS):
@@ -210,7 +209,7 @@ def _onward() -> Ints:
 ONWARD = _onward()
 
 BLOCKED, FREE, OPEN = range(3)
-"""Codes of a cell: its centre is not free, is free, or is free as are all 26 cells about it."""
+"""Codes of a cell: its centre is blocked, is free, or is free like all its 26 neighbours."""
 
 
 @kernel
@@ -222,8 +221,10 @@ def free_cells(
     clearance: float,
     stop: Flag,
 ) -> Bools:
-    """Return the mask of the cells of a grid whose centre is at least the clearance from all
-    solids. Ends early once `stop` is set."""
+    """Return the mask of the cells of a grid whose centres keep the clearance from all solids.
+
+    The mask is incomplete if `stop` is set meanwhile.
+    """
     out = np.zeros(shape, dtype=np.bool_)
     for i in range(shape[0]):
         if stop[0] != 0:
@@ -266,8 +267,10 @@ def _free_cells_in_numpy(
 
 @kernel
 def states_of(free: Bools) -> npt.NDArray[np.uint8]:
-    """Return (nx + 2, ny + 2, nz + 2) the codes of cells, with a blocked border. So neighbours need
-    no check, and are at constant offsets in memory."""
+    """Return the codes (nx + 2, ny + 2, nz + 2) of cells, with a blocked border.
+
+    With the border, each cell has all 26 neighbours, at constant offsets in memory.
+    """
     nx, ny, nz = free.shape
     out = np.zeros((nx + 2, ny + 2, nz + 2), dtype=np.uint8)
     for i in range(nx):
@@ -305,10 +308,10 @@ def _states_of_in_numpy(free: Bools) -> npt.NDArray[np.uint8]:
 def grow(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> npt.NDArray[np.int8]:
     """Return shortest paths to the root from cells around it, until all wanted cells are settled.
 
-    Cells wait in buckets by the whole part of their distance. No step is shorter than 1, so the
-    cells of the first bucket are settled in any order (Dial 1969; Denardo & Fox 1979), and none is
-    as long as 2, so three buckets suffice. In open water only the neighbours further on are tried
-    (`_onward`).
+    Cells wait in buckets by the integer part of their distance. No step is shorter than 1, so the
+    cells of the first bucket can be settled in any order (Dial 1969; Denardo & Fox 1979); each step
+    is shorter than 2, so three buckets suffice. In open water only the steps of `_onward` are
+    tried.
 
     Parameters
     ----------
@@ -320,8 +323,7 @@ def grow(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> npt.NDArray
     Returns
     -------
     toward
-        (nx, ny, nz) the step that leads on to the root, 26 at the root, -1 where it is unknown, as
-        for wanted cells without a path.
+        Step (nx, ny, nz) towards the root, 26 at the root, and -1 where unknown or without a path.
     """
     row = states.shape[2]
     plane = states.shape[1] * row
@@ -380,9 +382,9 @@ def grow(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> npt.NDArray
 def _grow_in_numpy(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> npt.NDArray[np.int8]:
     """Vectorise `grow` over the cells of a bucket.
 
-    The cells of a bucket do not change one another, so their order matters only where two paths to
-    a cell have the same length: the first one stays. `grow` reads a bucket from its last entry to
-    its first, so it uses the last entry of a cell.
+    Cells of one bucket do not affect each other, so their order matters only if two paths to a cell
+    have the same length: the first one wins. `grow` reads a bucket backwards, so the last entry of
+    a cell counts.
     """
     shape = np.array(states.shape)
     strides = np.array([shape[1] * shape[2], shape[2], 1])
@@ -438,13 +440,13 @@ _NEXT_COUNTS = np.append(ONWARD[:, 0], 26)
 """Number of next steps that `grow` tries after each step; the last entry is for trying all."""
 
 _NEXT_STEPS = np.zeros((27, 26), dtype=np.int64)
-"""Next steps that `grow` tries after each step, one row a step; the last row has all steps."""
+"""Next steps that `grow` tries after each step, a row for each step; the last row has all steps."""
 _NEXT_STEPS[:26, : ONWARD.shape[1] - 1], _NEXT_STEPS[26] = ONWARD[:, 1:], np.arange(26)
 
 
 @kernel
 def tree_path(toward: npt.NDArray[np.int8], start: Ints) -> Ints:
-    """Return the cells (k, 3) from one in the tree to the root, both ends among them."""
+    """Return the cells (k, 3) from a cell of the tree to the root, including both."""
     out, count = np.empty((64, 3), dtype=np.int64), 1
     # axis by axis, because assigning a row would compile NumPy's error messages
     for axis in range(3):
@@ -479,11 +481,14 @@ def pull_taut(
     delta: float,
     policy: PathPolicy = PathPolicy(),
 ) -> Floats:
-    """Return a path (k, 3) pulled taut in its class, no nearer to solids than the clearance, or
-    than its ends are. Its points are dense enough that straight lines between them keep to it."""
+    """Return a path (k, 3) pulled taut in its class.
+
+    It keeps the clearance from solids, or as much as its ends have. Its points are so dense that
+    straight lines between them keep it, too.
+    """
     grown, room = _grown(field, path, clearance, delta)
     line = _shortcut(grown, path, max(room, delta))
-    # grown solids are at least twice as thick as the room, so a coarser delta loses none
+    # grown solids are at least twice as thick as the growth, so a coarser delta misses none
     for share in (1.0, 0.5):
         line = _relaxed(grown, line, max(delta, share * room), policy.pull_rounds)
     return line[np.r_[True, np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-9]]
@@ -522,8 +527,8 @@ def pull_in_stages(
 def _grown(
     field: DistanceField, path: Floats, clearance: float, delta: float
 ) -> tuple[DistanceField, float]:
-    """Return the field grown by the clearance, or by as much of it as the ends of a path have, and
-    that distance."""
+    """Return the field grown by the clearance, or by less if the ends of a path have less, and the
+    growth in metres."""
     ends = field.distance(path[[0, -1]])
     room = max(0.0, min(clearance, float(ends.min()) - 1e-3 * delta))
     return field.grown(room), room
@@ -542,11 +547,11 @@ def _relaxed(grown: DistanceField, line: Floats, delta: float, rounds: int) -> F
 
 @kernel
 def shortcut(field: Field, path: Floats, tolerance: float) -> Floats:
-    """Return a path without points that can be left out: from each point straight to the last
-    point that it sees without a break.
+    """Return a path with fewer points: each leads straight to the last of the points that it sees
+    in a row.
 
-    The triangles that are swept are as wide as the path's points are apart, so nothing wider is
-    passed over.
+    The triangles that the path sweeps are as wide as its points are apart, so it passes over
+    nothing wider.
     """
     out = np.empty_like(path)
     for axis in range(3):  # see `tree_path`
@@ -578,8 +583,8 @@ def shortcut(field: Field, path: Floats, tolerance: float) -> Floats:
 def are_homotopic(field: DistanceField, a: Floats, b: Floats, step: float) -> bool:
     """Return whether two paths between the same ends certainly belong to one class.
 
-    Points at most `step` apart, at the same share of both paths, must all see one another. Then
-    nothing wider than `step` can stand between the paths.
+    Pairs of points at the same share of both paths, in steps of at most `step`, must see each
+    other. Then nothing wider than `step` can stand between the paths.
     """
     k = 2 + int(max(polylines.length(a), polylines.length(b)) / step)
     return bool(are_all_in_sight(field.arrays, _shares(a, k), _shares(b, k), 0.1 * step))
@@ -593,7 +598,7 @@ def _shares(path: Floats, k: int) -> Floats:
 
 @kernel
 def are_all_in_sight(field: Field, a: Floats, b: Floats, step: float) -> bool:
-    """Return whether all points a[k] and b[k] (n, 3) see one another, in steps of `step`."""
+    """Return whether all pairs a[k], b[k] of points (n, 3) see each other, in steps of `step`."""
     for k in range(len(a)):
         low, _ = lowest_along(field, a[k, 0], a[k, 1], a[k, 2], b[k, 0], b[k, 1], b[k, 2], step)
         if low < 0.0:

@@ -1,4 +1,4 @@
-"""Pivots: the points of a tether from which a recovery path may turn off to the waypoint."""
+"""Pivots: points of a tether at which a recovery path may turn off towards the waypoint."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ class Pivots:
         return pushed_out(planner.scene, self.points[: n + 1], planner.mission.clearance)
 
     def length(self, n: int) -> float:
-        """Return the length (m) of the tether after the robot has gone from a pivot on to the
-        waypoint; inf if there is no path to the waypoint."""
+        """Return the length, metres, of the tether once the robot has gone from a pivot to the
+        waypoint; inf if there is no path."""
         if n not in self._lengths:
             self._lengths[n] = self._simulated(n)
         return self._lengths[n]

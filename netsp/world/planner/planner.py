@@ -1,4 +1,4 @@
-"""Base of all planners: the waypoints, how far the robot has come, and the path that it follows."""
+"""Base of all planners: the waypoints, the progress of the robot, and the path that it follows."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from netsp.world.tether.tether_policy import THINNEST
 
 Tethers = GeodesicTether | ReactTether
 
-# modes of a planner
+# modes of a planner, see `Command`
 NORMAL = "normal"
 RECOVERY = "recovery"
 WAIT = "wait"
@@ -47,9 +47,9 @@ class Command:
     Parameters
     ----------
     path : ndarray, shape (k, 3)
-        Points to pass in this order, the first one next; metres.
+        Points to pass in this order, metres.
     mode : {"normal", "recovery", "wait", "dwell", "home", "hold", "done"}
-        What the robot is doing.
+        Activity of the robot.
     replan_s : float
         CPU time of planning in this step, s.
     """
@@ -78,18 +78,17 @@ class PlannerOptions:
         Distance between pivots along a tether for the paper's planners, metres; more than 0. By
         default 0.25 m, or one cell if a cell is larger.
     looks : int
-        Maximum number of simulations ahead for one plan of `predictive`; then it takes the best
-        path so far, and the first if there is none yet.
+        Maximum number of simulations ahead for one plan of `predictive`, which then takes the best
+        path so far, or, if there is none, the next that it finds.
     metres : float
-        Maximum length of the paths of these simulations, likewise.
+        Maximum total length of the paths of these simulations, metres, with the same effect.
     planning_limit : float
-        Seconds that `repair` may take to plan the rest of a tour; the robot holds its place.
+        Time that `repair` may take to plan the rest of a tour, s, while the robot holds its place.
     prepared : bool
-        Whether shortest paths to all waypoints are found before the mission, which takes seconds
-        where there are many. Otherwise, and where kernels are interpreted, each is found when it is
-        needed.
+        Whether to find shortest paths to all waypoints before the mission, which takes seconds if
+        there are many. Otherwise, and if kernels are interpreted, each is found when needed.
     clock : Clock, optional
-        When it is up, planning ends as at Ctrl-C, and so does the mission.
+        Clock that ends planning and the mission when it is up, as Ctrl-C does.
     policy : PlannerPolicy
         Thresholds of the planners.
     """
@@ -126,7 +125,7 @@ class Planner:
     laid : Tether
         The tether when the mission began.
     index : int
-        The next waypoint; the number of waypoints on the way home.
+        Index of the next waypoint; the number of waypoints on the way home.
     mode : str
         See `Command`.
     path : ndarray, shape (k, 3)
@@ -140,15 +139,15 @@ class Planner:
     home : bool
         Whether the robot is back at the start.
     home_failure : str or None
-        Why the robot has given up getting home.
+        Reason why the robot cannot get home.
     now : float
-        Seconds since the start, which the simulator updates.
+        Time since the start, s; the simulator updates it.
     excess_payout : float
         Length of tether that is out beyond what the map explains, metres.
     trail : ndarray, shape (n, 3)
-        Line along which the tether was laid, if it is known.
+        Line along which the tether was laid, metres, if known.
     given : list of int
-        Number of each waypoint when the mission began; added ones come after all others.
+        Number of each waypoint in the original mission; waypoints that were added follow.
     """
 
     mission: Mission
@@ -198,8 +197,8 @@ class Planner:
         return physics.slack > 0.0 or physics.diameter > 0.0 or math.isfinite(physics.max_turning)
 
     def payout(self, tether: Tether) -> float:
-        """Return the length (m) that must be out for a tether to lie as it does; the limit applies
-        to it."""
+        """Return the payout of a tether, metres: the length that must be out. The limit applies to
+        it."""
         if not self.has_load:
             return tether.length
         if isinstance(self.tethers, GeodesicTether):
@@ -211,7 +210,7 @@ class Planner:
         self.given = list(range(len(self.mission.waypoints)))
 
     def add_waypoint(self, waypoint: MissionWaypoint) -> None:
-        """Visit another waypoint, after all others."""
+        """Add a waypoint, to be visited after all others."""
         if self.is_done:
             return
         if self.is_homeward:
@@ -239,7 +238,7 @@ class Planner:
         return k
 
     def update_limit(self, limit: float) -> None:
-        """Keep to another length of tether (m) from now on."""
+        """Set the limit of the tether, metres, from now on."""
         self.mission = self.mission.model_copy(update={"tether_length": limit})
 
     def on_push(self) -> None:
@@ -273,8 +272,11 @@ class Planner:
 
     @property
     def home_position(self) -> Floats:
-        """Position (3,) of home: the start, or for a moving anchor the place as far from it as when
-        the mission began, if that is in free water and in sight of the anchor; else the anchor."""
+        """Position (3,) of home, metres: the start, unless the anchor moves.
+
+        With a moving anchor, home keeps the distance from the anchor that the start had, if it is
+        in free water and in sight of the anchor; otherwise home is at the anchor.
+        """
         start = np.array(self.mission.start)
         if self.track is None:
             return start
@@ -299,15 +301,14 @@ class Planner:
 
     @property
     def is_done(self) -> bool:
-        """True if the robot is home, or has given up getting there."""
+        """True if the robot is home, or cannot get there."""
         return self.index > len(self.mission.waypoints)
 
     def step(self, robot: Floats, tether: Tether) -> Command:
-        """Return the next command for a robot at a position (3,) with the tether as the model has
-        it.
+        """Return the next command for a robot at a position (3,) with the modelled tether.
 
-        Never raises: if no plan is found, the robot holds its place or leaves the waypoint out,
-        with the reason.
+        The method never raises. If no plan is found, the robot holds its place, or leaves out the
+        waypoint and logs the reason.
         """
         self._advance(robot, tether)
         self._follow_home(robot)
@@ -332,14 +333,14 @@ class Planner:
     def update_map(
         self, scene: DistanceField, tethers: Tethers, box: Floats, robot: Floats, tether: Tether
     ) -> None:
-        """Plan with another map from now on, and forget a path that is no longer clear of solids.
+        """Set the map from now on, and drop the path if it is no longer clear of solids.
 
         Parameters
         ----------
         scene, tethers : DistanceField, TetherModel
             The map, and the tether model in it.
         box : ndarray, shape (2, 3)
-            Box within which the map has changed, metres.
+            Box that contains all changes of the map, metres.
         robot : ndarray, shape (3,)
             Position of the robot, metres.
         tether : Tether
@@ -351,8 +352,10 @@ class Planner:
             self.path = self.path[:0]
 
     def is_clear_of_solids(self, path: Floats) -> bool:
-        """Return whether a path (k, 3) from the robot on is clear of all solids of the map, by most
-        of the clearance, or of what its ends have of it."""
+        """Return whether a path (k, 3) from the robot is clear of all solids of the map.
+
+        It must keep most of the clearance, or of the distance that its ends have.
+        """
         line = polylines.dense(path, 0.5 * self.grid.cell)
         room = min(self.mission.clearance, float(self.scene.distance(path[[0, -1]]).min()))
         needed = self.policy.min_clearance_share * room
@@ -381,7 +384,7 @@ class Planner:
         return Command(np.array([robot]), HOLD, spent)
 
     def warm_up(self, robot: Floats, tether: Tether) -> None:
-        """Load what is compiled, so that the first plan takes no longer than the others."""
+        """Load compiled kernels, so that the first plan takes no longer than the others."""
         del tether
         self.prepare()
         path = self.paths(robot[None]).path(0)
@@ -391,15 +394,15 @@ class Planner:
     def prepare(self) -> None:
         """Find the shortest paths to all waypoints, and home, before the mission.
 
-        If kernels are interpreted, this does nothing: finding the paths that are needed takes less
-        time.
+        Do nothing if kernels are interpreted: finding only the paths that are needed is faster.
         """
         if self.options.paths == "tree" and self.options.prepared and runs_compiled(grow):
             home = [] if self.track is not None else [np.array(self.mission.start)]
             self.grid.prepare([*self.mission.places, *home])
 
     def plan(self, robot: Floats, tether: Tether) -> bool:
-        """Set `path` and `mode`, here straight on to the waypoint whatever the tether.
+        """Set `path` and `mode`; this base class goes straight to the waypoint and ignores the
+        tether.
 
         Returns
         -------
@@ -410,8 +413,8 @@ class Planner:
         return False if len(self.path) else self.plan_direct(robot)
 
     def plan_home(self, robot: Floats, tether: Tether) -> bool:
-        """Set `path` and `mode` after the last waypoint, here straight to the start whatever the
-        tether.
+        """Set `path` and `mode` after the last waypoint; this base class goes straight to the
+        start.
 
         Returns
         -------
@@ -432,8 +435,8 @@ class Planner:
         return True
 
     def back_along(self, tether: Tether) -> Floats:
-        """Return the path (k, 3) back along a tether to the anchor, and on to the start as the
-        tether was first laid. At its end the tether is free."""
+        """Return the path (k, 3) back along a tether to the anchor, and along the first tether to
+        the start. At its end the tether is free."""
         return self.off_surfaces(np.vstack([tether.nodes[::-1], self.home_tether.nodes[1:]]))
 
     def off_surfaces(self, line: Floats) -> Floats:
@@ -444,12 +447,12 @@ class Planner:
 
     @property
     def fine_spacing(self) -> float:
-        """Distance between points of a path back along a tether, metres. The tether model may miss
-        a solid of twice that thickness."""
+        """Distance between points of a path back along a tether, metres; the tether model may miss
+        solids that are thinner than twice this distance."""
         return min(self.grid.cell, 0.5 * THINNEST * self.mission.delta)
 
     def plan_direct(self, robot: Floats) -> bool:
-        """Plan a straight path to the waypoint, or the shortest path round what is between.
+        """Plan a straight path to the waypoint, or the shortest path around solids in between.
 
         Returns
         -------
@@ -468,7 +471,7 @@ class Planner:
         return True
 
     def paths(self, points: Floats) -> Paths:
-        """Return a short path to the waypoint from each of some points (n, 3)."""
+        """Return short paths to the waypoint from points (n, 3)."""
         if self.options.paths == "tree":
             return ShortestTree(self.grid, self.waypoint, points)
         seed = 1000 * self.options.seed + self.index
@@ -476,7 +479,7 @@ class Planner:
         return SampledPaths(name, self.grid, self.waypoint, points, seed, policy)
 
     def refined(self, path: Floats) -> Floats:
-        """Return a path (k, 3) refined as the options say."""
+        """Return a path (k, 3) after the refinement of the options."""
         name = self.options.refine or self.refine
         if name == "none":
             return path
@@ -486,8 +489,9 @@ class Planner:
         return refined(name, self.scene, even, self.mission.clearance, rng, params)
 
     def refined_once(self, path: Floats, number: int) -> Floats:
-        """Return a path refined once, even if the result is not free; only `paper` differs from
-        `refined`.
+        """Return a path after one round of refinement, even if the result is not free.
+
+        The result differs from `refined` for the refinement `paper` only.
 
         Parameters
         ----------
@@ -512,8 +516,8 @@ class Planner:
         return pull_taut(self.scene, path, mission.clearance, mission.delta, self.policy.paths)
 
     def is_free(self, path: Floats) -> bool:
-        """Return whether a straight path (2, 3) keeps the clearance, or what its ends have of
-        it."""
+        """Return whether a straight path (2, 3) keeps the clearance, or as much as its ends
+        have."""
         ends = float(self.scene.distance(path).min())
         room = min(self.mission.clearance, ends) - 1e-3
         return self.scene.grown(max(0.0, room)).line_of_sight(path[0], path[1], depth=1e-3)
@@ -534,7 +538,8 @@ class Planner:
             self._next()
 
     def _follow_home(self, robot: Floats) -> None:
-        """Lead the path home to where home is now; forget the path if that is not possible."""
+        """Extend the path home to the current position of home; drop the path if that is not
+        free."""
         if not self.is_homeward or self.track is None or not len(self.path):
             return
         last = np.array([self.path[-2] if len(self.path) > 1 else robot, self.waypoint])
@@ -549,8 +554,7 @@ class Planner:
         self.path = self.path[min(count, max(0, len(self.path) - 1)) :]
 
     def leave_out(self, reason: str) -> None:
-        """Leave the next waypoint out, for a reason that is logged; on the way home, end the
-        mission."""
+        """Leave out the next waypoint and log the reason; on the way home, end the mission."""
         if self.is_homeward:
             self.home_failure = reason
         else:

@@ -15,11 +15,11 @@ class PreviewPolicy:
     Attributes
     ----------
     limit_margin
-        Share of the tether's limit that plans leave unused, below 1: the simulation and the tether
-        that is flown later differ by less.
+        Share of the tether's limit that plans leave unused, below 1. The simulated and the flown
+        tether differ by less.
     floor_share
-        Share of the limit, below 1, under which lengths need not be exact, because no step reaches
-        the limit from there. A larger share measures fewer lengths exactly.
+        Share of the limit, below 1, up to which lengths need not be exact, because no step from
+        there reaches the limit. A larger share measures fewer lengths exactly.
     min_step_s
         Shortest time between two places of the simulation while the anchor moves, s.
     """
@@ -45,12 +45,12 @@ class PredictivePolicy:
         Distance from a planned tour, and difference from its tether, up to which the robot follows
         it, as a multiple of the mission's `reach` (and `reach` plus `delta`).
     min_saving
-        Share of a path that another simulation must be able to save.
+        Smallest saving for which another path is simulated, as a share of the path.
     min_pull_ratio
         Ratio of the length of a taut path to that of the roughly pulled one. Paths whose rough
         length times this ratio is no better than the best are skipped; a larger one skips more.
     release_rounds
-        Rounds of relaxation in which a tether at home must come free.
+        Number of rounds of relaxation in which a tether at home must come free.
     anchor_check_s
         Time between two checks that the tether lasts while the anchor moves, s.
     anchor_lag_s
@@ -66,7 +66,7 @@ class PredictivePolicy:
     max_home_attempts
         Maximum number of times that the robot goes back along a tether which is not free at home.
     pull_rounds
-        Rounds of relaxation in one pull of a tether whose taut length is in question.
+        Number of rounds of relaxation in one pull that estimates a taut length.
     max_pulls
         Maximum number of such pulls.
     pull_allowance
@@ -110,12 +110,11 @@ class PlannerPolicy:
         Share of the clearance that a path must keep when the map changes, at most 1; otherwise it
         is planned again.
     max_holds
-        Number of steps in which planning may fail at one waypoint before it is left out.
+        Number of steps with failed planning after which a waypoint is left out.
     max_turn_s
-        Time that a vehicle gets to turn to the heading of a waypoint, s.
+        Longest time for a turn to the heading of a waypoint, s.
     min_pivot_spacing
-        Distance between pivots along a tether where the options state none, metres; one cell if a
-        cell is larger.
+        Default distance between pivots along a tether, metres; one cell if a cell is larger.
     preview
         Policy of the simulation ahead.
     predictive

@@ -1,6 +1,6 @@
-"""`predictive`: simulates the tether along the coming path before the robot moves.
+"""`predictive`: simulates the tether along each path before the robot follows it.
 
-So the limit is never exceeded on a planned path. A waypoint is left out only if the shortest tether
+The limit is never exceeded on a planned path. A waypoint is left out only if the shortest tether
 to it, in every class found, is over the limit, or if even the path back to the anchor and out along
 that tether exceeds it; the reason states which, and by how much.
 """
@@ -26,8 +26,11 @@ from netsp.world.tether import GeodesicTether, Tether
 
 
 class Candidate(NamedTuple):
-    """Homotopy class of the tether at the waypoint: a tether in it (k, 3), a path that brings the
-    tether there (m, 3), and that path roughly pulled (n, 3)."""
+    """Candidate class of the tether at the waypoint.
+
+    It has a tether of the class (k, 3), a path that leads to it (m, 3), and that path roughly
+    pulled taut (n, 3).
+    """
 
     tether: Floats
     path: Floats
@@ -36,7 +39,7 @@ class Candidate(NamedTuple):
 
 @dataclass
 class PredictivePlanner(Planner):
-    """Planner that looks ahead."""
+    """Planner that simulates the tether ahead."""
 
     _planned: int = field(default=-1)
     _warned: int = field(default=-1)
@@ -53,11 +56,11 @@ class PredictivePlanner(Planner):
 
     @property
     def predictive(self) -> PredictivePolicy:
-        """Thresholds of the look-ahead."""
+        """Policy of the simulation ahead."""
         return self.policy.predictive
 
     def plan(self, robot: Floats, tether: Tether) -> bool:
-        """Plan one path for each waypoint when the robot sets out for it."""
+        """Plan the path to a waypoint once, when the robot sets out for it."""
         if (
             self._planned == self.index
             and len(self.path)
@@ -98,8 +101,8 @@ class PredictivePlanner(Planner):
         return True
 
     def _leg(self, robot: Floats, tether: Tether) -> Floats | None:
-        """Return the leg of the mission's tour if robot and tether are where it begins and nothing
-        on the map is in the way."""
+        """Return the leg of the mission's tour if robot and tether are at its beginning and it is
+        free."""
         leg, meant = self._planned_leg()
         tolerance = self.predictive.tour_tolerance
         if (
@@ -109,15 +112,15 @@ class PredictivePlanner(Planner):
             > tolerance * (self.mission.reach + self.mission.delta)
         ):
             return None
-        # the robot may start before the end of the leg before, and cut a corner from there
+        # the robot may be short of the end of the previous leg, and cut the corner
         for path in (np.vstack([robot, leg[1:]]), np.vstack([robot, leg])):
             if self.is_free(path[:2]) and self.is_clear_of_solids(path):
                 return path
         return None
 
     def _planned_leg(self) -> tuple[Floats | None, float | None]:
-        """Return the tour's leg to the waypoint and the length of tether where it begins; None for
-        the length if the mission begins there."""
+        """Return the tour's leg to the waypoint, and the tether length at its beginning, None if
+        the mission begins there."""
         tour = self.mission.tour
         if tour is None or self.track is not None:
             return None, None
@@ -131,7 +134,7 @@ class PredictivePlanner(Planner):
         self._planned = -1
 
     def cancel_waypoint(self, number: int) -> int | None:
-        """See `Planner`; the tour is forgotten, because its legs lead to other waypoints."""
+        """See `Planner`; drop the tour, because its legs lead to other waypoints."""
         k = super().cancel_waypoint(number)
         if k is not None:
             self._planned = -1
@@ -139,22 +142,22 @@ class PredictivePlanner(Planner):
         return k
 
     def update_limit(self, limit: float) -> None:
-        """See `Planner`; if more is out, the robot first goes back along its tether."""
+        """See `Planner`; if the payout is larger, the robot first goes back along its tether."""
         shorter = limit < self.mission.tether_length
         super().update_limit(limit)
         if shorter:
             self.path, self._planned = self.path[:0], -1
 
     def _path_to_shorten(self, tether: Tether) -> Floats | None:
-        """Return the path back along a tether that is over the limit, as far as necessary; None for
-        others."""
+        """Return the path back along a tether until it is within the limit; None if it is
+        already."""
         over = self.payout(tether) - self.limit
         if over <= 0.0 or self.payout(tether) <= self.mission.tether_length:
             return None
         return polylines.part(self.back_along(tether), 0.0, over + self.mission.reach)
 
     def _drop_visit(self, k: int) -> None:
-        """Forget the tour, because its legs would lead to other waypoints."""
+        """Drop the tour, because its legs would lead to other waypoints."""
         del k
         self.mission = self.mission.model_copy(update={"tour": None})
 
@@ -183,8 +186,8 @@ class PredictivePlanner(Planner):
         return f", of which {self._reserved:.2f} m are kept in reserve" if self._reserved else ""
 
     def _has_used_half_reserve(self, tether: Tether) -> bool:
-        """Return whether half of the reserve is used up, as in a current; true once for each
-        waypoint."""
+        """Return whether half of the reserve is used up, for example by a current; true at most
+        once for each waypoint."""
         margin = self.policy.preview.limit_margin
         if (
             self._warned == self.index
@@ -198,8 +201,8 @@ class PredictivePlanner(Planner):
     def _is_overtaken(self, robot: Floats, tether: Tether) -> bool:
         """Return whether a moving anchor requires another plan.
 
-        Checked at intervals; true for a robot that waits, and for others if the tether no longer
-        lasts for the rest of the path.
+        The check runs at intervals. It is true if the robot waits, or if the tether no longer lasts
+        for the rest of the path.
         """
         if self.mode == WAIT and not self.is_anchor_moving:
             return True
@@ -212,8 +215,8 @@ class PredictivePlanner(Planner):
     def _wait(self, robot: Floats, tether: Tether, limit: float) -> None:
         """Wait for an anchor that comes nearer.
 
-        The robot stays while the tether lasts; else it goes back along the tether, which gets
-        shorter faster than the anchor can take it along.
+        The robot holds its place while the tether lasts. Otherwise it goes back along the tether,
+        which shortens it faster than the anchor can stretch it.
         """
         self.path, self.mode = robot[None], WAIT
         wait_s = 2.0 * self.predictive.anchor_check_s
@@ -222,9 +225,11 @@ class PredictivePlanner(Planner):
             self.path = polylines.part(self.back_along(tether), 0.0, distance)[1:]
 
     def _visit_point(self, robot: Floats, waypoint: Floats) -> Floats:
-        """Return the point on the straight path at which the waypoint counts as visited, in case
-        the tether fits only there. A fifth of the reach is left for a vehicle that does not stop on
-        the spot."""
+        """Return the point on the straight path at which the waypoint counts as visited.
+
+        The tether may fit there but not at the waypoint. A fifth of the reach is left for the
+        stopping distance of the vehicle.
+        """
         path = waypoint - robot
         distance = float(np.linalg.norm(path))
         return waypoint - path * min(1.0, 0.8 * self.mission.reach / max(distance, 1e-12))
@@ -232,14 +237,14 @@ class PredictivePlanner(Planner):
     def update_map(
         self, scene: DistanceField, tethers: Tethers, box: Floats, robot: Floats, tether: Tether
     ) -> None:
-        """See `Planner`; a path on which the tether no longer fits is forgotten, too."""
+        """See `Planner`; also drop a path on which the tether no longer fits."""
         super().update_map(scene, tethers, box, robot, tether)
         self._is_sure_of_home = False
         if len(self.path) and not self._fits(tether, np.vstack([robot, self.path]), self.limit):
             self.path = self.path[:0]
 
     def on_excess_payout(self, more: float, trail: Floats) -> None:
-        """See `Planner`; a path that was planned for less tether is forgotten."""
+        """See `Planner`; drop a path that was planned for less payout."""
         if more > self._previous_excess + self.predictive.snag_tolerance:
             self._previous_excess = more
             self.path = self.path[:0]
@@ -258,7 +263,7 @@ class PredictivePlanner(Planner):
 
     @property
     def _preview(self) -> TetherPreview:
-        """Preview by the present map and time."""
+        """Preview with the current map and time."""
         return TetherPreview(
             self.mission,
             self._model,
@@ -270,7 +275,7 @@ class PredictivePlanner(Planner):
 
     @property
     def _stay_s(self) -> float:
-        """Time at the end of the path that is planned, s."""
+        """Time that the robot stays at the end of the planned path, s."""
         if self.is_homeward:
             return 0.0
         waypoint = self.mission.waypoints[self.index]
@@ -301,16 +306,17 @@ class PredictivePlanner(Planner):
     def _shortest_feasible(
         self, robot: Floats, tether: Tether, limit: float
     ) -> tuple[Floats | None, str]:
-        """Return the shortest path on which the tether fits, with its mode: on from the robot, or
-        back along the tether to a pivot and on from there. One tree serves all pivots.
+        """Return the shortest path on which the tether fits, and its mode.
 
-        A pivot decides the class of the tether at the waypoint, and so its length there.
-        Consecutive pivots that lead to one class are merged; classes over the limit are skipped. In
-        the others, the whole path is pulled taut, with the part back along the tether: no path in
-        its class is shorter. If the tether is over the limit on that path, as much as necessary of
-        the part back along the tether stays as it is.
+        It leads on from the robot, or back along the tether to a pivot and on from there. One tree
+        serves all pivots. The pivot decides the class of the tether at the waypoint, and thus its
+        length there. Consecutive pivots that lead to one class are merged, and classes over the
+        limit are skipped. In each other class, the whole path is pulled taut, including the part
+        back along the tether: it is the shortest path of its class. If the tether is over the limit
+        on it, as much of the part back along the tether as necessary is kept.
         """
-        # the path back along the tether, finely divided and off surfaces; some points are pivots
+        # the path back along the tether, finely divided and off surfaces; pivots are among its
+        # points
         nodes = tether.nodes[::-1]
         along = polylines.along(nodes)
         retreat = polylines.points_along(nodes, self.grid.cell)
@@ -330,7 +336,7 @@ class PredictivePlanner(Planner):
 
         self._preview_count, self._previewed_length, self._candidates = 0, 0.0, []
         if onward[0] is not None:
-            # if the tether fits on the shortest path of all, no other is tried
+            # if the tether fits on the shortest path of all, try no other
             path = self.pull_taut(onward[0])
             direct = Candidate(np.vstack([tether.nodes, path[1:]]), path, path)
             self._candidates.append(direct)
@@ -365,15 +371,15 @@ class PredictivePlanner(Planner):
         return best, RECOVERY
 
     def _exceeds_at_end(self, candidate: Candidate, limit: float) -> bool:
-        """Return whether even the taut tether at the end of a path is over the limit, less slack,
-        however near the anchor may have come by then."""
+        """Return whether the taut tether at the end of a path exceeds the limit less slack, even
+        with the anchor as near as it can be by then."""
         if self.track is not None and self.is_anchor_moving:
             distance = polylines.length(candidate.rough) / self.mission.speed
             limit += self.track.distance_between(self.now, self.now + distance)
         return self._exceeds(candidate.tether, limit / (1.0 + self.mission.tether.slack))
 
     def _while_in_time(self, paths: Iterator[Floats]) -> Iterator[Floats]:
-        """Yield paths while there is time."""
+        """Yield paths until enough was simulated."""
         for path in paths:
             if self.options.clock is not None and self.options.clock.is_up:
                 raise KeyboardInterrupt
@@ -381,10 +387,9 @@ class PredictivePlanner(Planner):
 
     @property
     def _has_previewed_enough(self) -> bool:
-        """True if enough was simulated to take the best path so far.
+        """True if enough was simulated, and the best path so far is taken.
 
-        Simulations and metres are counted, not seconds, so that a plan is the same on every
-        machine.
+        The limits are numbers of simulations and metres, so plans are the same on every machine.
         """
         return (
             self._preview_count >= self.options.looks
@@ -394,9 +399,11 @@ class PredictivePlanner(Planner):
     def _tautest(
         self, tether: Tether, line: Floats, limit: float, max_length: float = np.inf
     ) -> Floats | None:
-        """Return the tautest path in the class of a line on which the tether fits, by bisection of
-        ever tauter paths: the less of a retreat is saved, the more likely the tether fits. None if
-        none is shorter than `least`."""
+        """Return the tautest path in the class of a line on which the tether fits, by bisection.
+
+        The candidates are ever tauter paths; the tether is the more likely to fit the less taut the
+        path is. Return None if no path is shorter than `max_length`.
+        """
         best = None
         paths = [
             p
@@ -418,8 +425,10 @@ class PredictivePlanner(Planner):
         return best
 
     def plan_home(self, robot: Floats, tether: Tether) -> bool:
-        """Plan the shortest path home on which the tether fits and comes free: that of the class
-        back along the tether, pulled as far as both hold."""
+        """Plan the shortest path home on which the tether fits and comes free.
+
+        It is in the class of the path back along the tether, and pulled as taut as both allow.
+        """
         if (
             len(self.path)
             and not self._is_tether_lost(robot, tether)
@@ -451,7 +460,7 @@ class PredictivePlanner(Planner):
         return leg if np.isinf(far) and self._is_free(end) else None
 
     def _direct_home(self, robot: Floats, tether: Tether) -> Floats | None:
-        """Return the shortest path home of all classes, if it happens to free the tether."""
+        """Return the shortest path home of all classes, if the tether comes free on it."""
         path = self.paths(robot[None]).path(0)
         if path is None:
             return None
@@ -526,7 +535,7 @@ class PredictivePlanner(Planner):
         return pull_in_stages(self.scene, path, mission.clearance, mission.delta, self.policy.paths)
 
     def _classes(self, back: Floats, onward: Mapping[int, Floats | None]) -> list[int]:
-        """Return the last pivot of each row of pivots that lead to paths of one class."""
+        """Return the last pivot of each run of pivots that lead to paths of one class."""
         out: list[int] = []
         pivots = list(onward)
         for i, j in zip(pivots, [*pivots[1:], None], strict=True):
@@ -542,8 +551,10 @@ class PredictivePlanner(Planner):
         return out
 
     def _exceeds(self, line: Floats, limit: float) -> bool:
-        """Return whether a tether along a line is longer than a limit even when taut, as far as
-        that can be predicted: each pull takes less away than the one before."""
+        """Return whether a tether along a line probably exceeds a limit even when taut.
+
+        The prediction assumes that each pull shortens the tether by less than the one before.
+        """
         policy = self.predictive
         tether = self._model.relaxed(line, policy.pull_rounds)
         length, decrease = tether.length, np.inf
@@ -558,9 +569,11 @@ class PredictivePlanner(Planner):
         return length > limit
 
     def _path_by_anchor(self, tether: Tether, limit: float) -> Floats | None:
-        """Return a path back to the anchor and on beside the shortest tether that any class found
-        has at the waypoint. If that does not fit either, leave the waypoint out with the reason and
-        return None."""
+        """Return a path back to the anchor and on beside the shortest known tether to the waypoint.
+
+        If the tether does not fit on it either, leave out the waypoint with the reason, and return
+        None.
+        """
         shortest = self._shortest_tether(limit)
         if shortest is None:
             self.leave_out("no free path to it")
@@ -583,8 +596,7 @@ class PredictivePlanner(Planner):
         return None
 
     def _shortest_tether(self, limit: float) -> Tether | None:
-        """Return the shortest tether at the waypoint among the classes that the last search has
-        found."""
+        """Return the shortest tether at the waypoint among the classes of the last search."""
         found: list[Tether] = []
         policy = self.predictive
         for candidate in self._candidates:

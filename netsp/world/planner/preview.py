@@ -16,13 +16,13 @@ from netsp.world.tether import GeodesicTether, Tether
 from netsp.world.tether.load import Load, payout, turning
 
 CONTACT_DEPTH = 0.2
-"""Tolerance of contacts, as a multiple of delta: how deep a robot may be in a solid, because the
-tether model's nodes let paths dip in."""
+"""Tolerance for the depth of a robot in a solid, as a multiple of delta: between the nodes of the
+tether model, paths may cut into solids."""
 
 
 @dataclass(frozen=True)
 class TetherPreview:
-    """Preview of the tether along paths that are not followed yet.
+    """Preview of the tether along paths that the robot may follow.
 
     Parameters
     ----------
@@ -31,11 +31,11 @@ class TetherPreview:
     model : GeodesicTether
         The tether model, with the map.
     load : Load or None
-        Load on the tether; None if only its taut length counts.
+        Load on the tether; None if only the taut length counts.
     track : Track or None
         Track of the anchor, if it still moves.
     now : float
-        Seconds since the start of the mission.
+        Time since the start of the mission, s.
     policy : PreviewPolicy
         Steps and margins.
     """
@@ -50,7 +50,7 @@ class TetherPreview:
     def follow(
         self, tether: Tether, path: Floats, limit: float, stay_s: float
     ) -> tuple[float, Tether]:
-        """Return how far along a path the tether stays within the limit, and how it lies there.
+        """Return how far along a path the tether stays within the limit, and the tether there.
 
         Parameters
         ----------
@@ -59,16 +59,16 @@ class TetherPreview:
         path : ndarray, shape (k, 3)
             The path, metres.
         limit : float
-            Length of tether that may be out, metres; at least what is out now.
-        staying : float
-            Time that the robot stays at the end, s, for which the tether must last, too.
+            Maximum payout, metres; at least the payout now.
+        stay_s : float
+            Time that the robot stays at the end, s; the tether must last for it, too.
 
         Returns
         -------
         distance : float
-            Metres; infinite if the tether lasts to the end and through the stay.
+            Length along the path, metres; infinite if the tether lasts to the end and for the stay.
         tether : Tether
-            The tether at the end then; otherwise one on the way.
+            Tether at the end if it lasts; otherwise a tether on the way.
         """
         if self._meets_solid(path):
             return 0.0, tether
@@ -85,7 +85,7 @@ class TetherPreview:
     def _taut(self, tether: Tether, path: Floats, limit: float) -> tuple[float, Tether]:
         """Follow a path with a taut tether.
 
-        A taut tether grows by at most the path of its end, so the robot can take steps as long as
+        A taut tether grows by at most the distance that its end moves, so a step may be as long as
         the rest of the limit.
         """
         max_length = max(limit, tether.length + 1e-6)
@@ -103,11 +103,11 @@ class TetherPreview:
 
     @property
     def _fine(self) -> float:
-        """Metres between two places where little of the limit is left."""
+        """Distance between two simulated places if little of the limit is left, metres."""
         return max(0.5 * self.mission.delta, 0.02)
 
     def _meets_solid(self, path: Floats) -> bool:
-        """Return whether a path leads deep enough into a solid to end a mission."""
+        """Return whether a path leads so deep into a solid that the mission would end."""
         points = polylines.dense(path, self.mission.delta)
         depth = CONTACT_DEPTH * self.mission.delta
         return bool(len(points) and self.model.field.distance(points).min() < -depth)
@@ -117,8 +117,8 @@ class TetherPreview:
     ) -> tuple[float, Tether]:
         """Follow a path with a tether under load.
 
-        Slack and sag have no such bound as in `_taut`, because a lost contact joins two spans. So
-        all steps are small. The sum of turning angles has its limit, too.
+        All steps are small: slack and sag may jump where a lost contact joins two spans, so the
+        bound of `_taut` does not hold. The sum of turning angles has a limit, too.
         """
         points = polylines.dense(path, self._fine)
         if not len(points):
@@ -135,7 +135,7 @@ class TetherPreview:
     ) -> tuple[float, Tether]:
         """Follow a path while the anchor moves, also during the stay at the end.
 
-        A taut tether grows by at most what both of its ends travel.
+        A taut tether grows by at most the distance that both of its ends move.
         """
         max_payout, max_turning = max(limit, self._payout(tether) + 1e-6), self._max_turning(tether)
         speed, path_length = self.mission.speed, polylines.length(path)
@@ -159,7 +159,7 @@ class TetherPreview:
         return tether.length if self.load is None else payout(tether, self.load)
 
     def _max_turning(self, tether: Tether) -> float:
-        """Return the sum of turning angles that plans may use, rad: at least the present one."""
+        """Return the largest sum of turning angles of plans, rad: the limit, or the present sum."""
         limit = self.mission.tether.max_turning
         if math.isinf(limit):
             return limit

@@ -1,7 +1,7 @@
 """`react-draft`: the planner of the draft of Amer et al. 2025, as its three algorithms list it;
 `react-thresholds`: `react` with the acceptance rule of that draft.
 
-The planner follows the listing of the draft where its text, or common sense, differs:
+Where text or common sense contradict the listing of the draft, the planner follows the listing:
 
 - Algorithm 2 compares a pivot i with the candidate of the pivot i - 3 that the round *before* has
   computed. That round was of i + 1, so the neighbour is two nodes nearer to the anchor than i,
@@ -10,11 +10,11 @@ The planner follows the listing of the draft where its text, or common sense, di
   first three are tried.
 - An accepted pivot i gives a path back to i + 2 only. For the first pivot that is the position of
   the robot: there is no path to follow, and the robot goes on to the waypoint for one step.
-- The robot then goes on to the waypoint in normal mode, which may well lead along the old path
-  over the limit again. Nothing in the listing ends such a cycle; a mission gives the waypoint up
-  after `SimulationPolicy.max_waypoint_s`.
-- Every recovery path is refined once, the fallback too. One that is then not free is not followed:
-  the robot goes on to the waypoint, and the search begins anew at the next step.
+- The robot then goes on to the waypoint in normal mode, which may lead along the old path over the
+  limit again. Nothing in the listing ends such a cycle; a mission leaves the waypoint out after
+  `SimulationPolicy.max_waypoint_s`.
+- Each recovery path is refined once, the fallback, too. If it is then not free, the robot does not
+  follow it, but goes on to the waypoint, and the search starts again at the next step.
 
 These points are open in the listing, and are read as follows:
 
