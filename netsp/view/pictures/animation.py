@@ -1,4 +1,4 @@
-"""Moving pictures: the robot along its tour with the taut tether behind it."""
+"""Films: the robot moves along its tour with the taut tether behind it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from netsp.view.pictures.waypoint_marks import WaypointMarks
 FORMATS = (".gif", ".mp4")
 
 GIF_COLOURS = 64
-"""Number of colours of a GIF. Pictures have few; edges of lines need shades between them."""
+"""Number of colours of a GIF: the few colours of pictures, and shades for the edges of lines."""
 
 FILM_WIDTH = 6.4
 """Width of a panel, inches."""
@@ -54,7 +54,7 @@ CAPTION_LETTERS = 62
 """Maximum number of letters in a line of a panel's title."""
 
 HOLD_S = 1.5
-"""Time for which the last picture stays, s."""
+"""Time for which the last picture is shown, s."""
 
 
 def save_animation(
@@ -64,25 +64,26 @@ def save_animation(
     fps: int = 15,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> None:
-    """Write one film, or several side by side.
+    """Write a GIF or MP4 of one film, or of several side by side.
 
     Parameters
     ----------
     films : sequence of Film
-        From left to right.
+        Films from left to right.
     file : str or Path
-        Its ending says the format: .gif or .mp4.
+        File whose name ends in .gif or .mp4.
     seconds : float
-        How long it is, but for the last picture, which stays a little.
+        Duration without the hold of the last picture, s.
     fps : int
-        Pictures a second.
+        Pictures per second.
     on_progress : callable, optional
-        Called with how many pictures are drawn, and how many there are.
+        Called with the number of pictures drawn and the number of all pictures.
 
     Raises
     ------
     InputError
-        Another ending, a file that cannot be written, `imageio-ffmpeg` not installed (for .mp4).
+        The name has another ending, the file cannot be written, or `imageio-ffmpeg`, which .mp4
+        needs, is not installed.
     """
     suffix = Path(file).suffix.lower()
     if suffix not in FORMATS:
@@ -93,7 +94,7 @@ def save_animation(
     if target.exists() and not target.is_file():
         raise InputError(f"{file}: cannot be written: expected a file, not a device or a folder")
     try:
-        # renamed into place when it is whole: Ctrl-C leaves what was there before
+        # renamed into place when complete, so that Ctrl-C keeps an older file
         with tempfile.TemporaryDirectory(dir=target.parent, prefix=".netsp-") as folder:
             part = Path(folder) / f"film{suffix}"
             write(part, _report_frames(_pictures(films, count), count, on_progress), fps)
@@ -112,7 +113,7 @@ def _report_frames(
 
 
 def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
-    """Yield the pixels (h, w, 3) of each picture. What does not move is drawn once for each map."""
+    """Yield the pixels (h, w, 3) of each picture; fixed parts are drawn once for each map."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -155,7 +156,7 @@ def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
 
 
 def _moving(ax: Any, film: Film) -> tuple[Any, ...]:
-    """Return what is drawn again at every moment: marks, path, tether, robot and caption."""
+    """Return the artists that change with each moment: marks, path, tether, robot and caption."""
     none: tuple[list[float], ...] = ([], [], []) if film.scene else ([], [])
     size = 0.6 if film.scene else 1.0
     marks = []
@@ -195,7 +196,7 @@ def _legend(films: Sequence[Film]) -> list[Any]:
 
 
 def _draw_space(ax: Any, film: Film) -> None:
-    """Draw a scene as far as the robot goes."""
+    """Draw the part of a scene around the path of the robot."""
     assert film.scene is not None
     every = np.vstack([m.nodes for m in film.moments] + [film.moments[-1].path])
     stops = WaypointMarks(film.places, anchor=film.anchor)
@@ -207,7 +208,7 @@ def _draw_space(ax: Any, film: Film) -> None:
 
 
 def _title(film: Film) -> str:
-    """Return the title in lines that fit, with space below for the caption."""
+    """Return the title, wrapped to the panel, with space below for the caption."""
     lines = [
         part for line in film.title.split("\n") for part in textwrap.wrap(line, CAPTION_LETTERS)
     ]
@@ -215,7 +216,7 @@ def _title(film: Film) -> str:
 
 
 def _draw_maps(panels: Any, films: Sequence[Film], shown: Sequence[Problem | None]) -> None:
-    """Draw what does not move, in place of the map before."""
+    """Replace the fixed parts of each panel if its map has changed."""
     for ax, film, problem in zip(panels, films, shown, strict=True):
         if film.scene is not None:
             if not ax.collections:
@@ -240,7 +241,7 @@ def _view(film: Film) -> tuple[float, float, float, float]:
 
 
 def _height(film: Film) -> float:
-    """Inches, so that the map fills its panel."""
+    """Return the height of the panel that fits the map, inches."""
     if film.scene is not None:
         return MAX_FILM_HEIGHT
     xmin, ymin, xmax, ymax = _view(film)
@@ -248,7 +249,7 @@ def _height(film: Film) -> float:
 
 
 def _palette(picture: Any) -> Any:
-    """Return the colours of a picture, always with those of the roles."""
+    """Return the palette of a picture, which always contains the colours of the roles."""
     from PIL import Image
 
     roles = (
@@ -280,7 +281,7 @@ def _write_gif(file: Path, pictures: Iterator[Any], fps: int) -> None:
 
 
 def _check_ffmpeg(imageio_ffmpeg: Any) -> None:
-    """InputError unless there is an ffmpeg that runs: a broken one would be blamed on the film."""
+    """Raise InputError unless ffmpeg runs: a broken one would look like an error of the film."""
     try:
         program = imageio_ffmpeg.get_ffmpeg_exe()
         version_text = subprocess.run([program, "-version"], capture_output=True, timeout=30).stdout
@@ -299,7 +300,8 @@ def _write_mp4(file: Path, pictures: Iterator[Any], fps: int) -> None:
             "films in .mp4 need imageio-ffmpeg: pip install 'netsp[video]'; a .gif does not"
         ) from None
     _check_ffmpeg(imageio_ffmpeg)
-    logging.getLogger("imageio_ffmpeg").setLevel(logging.ERROR)  # what Ctrl-C cuts off is not kept
+    # after Ctrl-C, warnings about an incomplete file do not matter
+    logging.getLogger("imageio_ffmpeg").setLevel(logging.ERROR)
     first = next(pictures)
     height, width = (n - n % 2 for n in first.shape[:2])
     writer = imageio_ffmpeg.write_frames(

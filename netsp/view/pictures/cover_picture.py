@@ -12,15 +12,16 @@ from netsp.view.pictures import style
 from netsp.world.scene.scene import Scene
 
 ARROW_LENGTH = 0.5
-"""Length of the lines that show where the camera looks, metres."""
+"""Length of the lines that show the heading of the camera, metres."""
 
 MAX_DRAWN_PATCHES = 6000
 """Maximum number of patches that are drawn."""
 
 
 def save(found: Cover, scene: Scene, file: str | Path) -> None:
-    """Draw what is seen, what is left out and what cannot be seen, and the waypoints with their
-    headings: in space, and from above and one side.
+    """Draw the patches by whether they are seen, left out or invisible, and the waypoints.
+
+    There is a view in space, one from above and one from a side.
 
     Raises
     ------

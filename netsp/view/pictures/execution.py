@@ -1,4 +1,4 @@
-"""The picture of a tour that was carried out: the map with plan and path, the tether over time."""
+"""Picture of a tour that was carried out: a map with plan and path, and the tether over time."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ RESPONSES = {
 
 
 def save_execution(done: Execution, file: str | Path) -> None:
-    """Draw a run. InputError if the file cannot be written."""
+    """Draw a run to a file; raise InputError if it cannot be written."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13, 6), layout="constrained")
@@ -45,7 +45,7 @@ def save_execution(done: Execution, file: str | Path) -> None:
 
 
 def draw_map(done: Execution, *, ax: Any = None) -> Any:
-    """Obstacles, plan, path and goals, on axes of the caller or on new ones; returns the axes."""
+    """Draw obstacles, plan, path and goals on given or new axes, and return the axes."""
     from matplotlib.figure import Figure
 
     problem = done.problem
@@ -109,7 +109,8 @@ def _draw_passing(ax: Any, maps: Maps, busy: Floats) -> None:
         )
 
         def room(side: Any, half: float = half) -> float:
-            """To what is nearest to the middle of the words, which are wide and low."""
+            """Return the distance to the nearest busy point; text is wide, so vertical counts
+            more."""
             away = np.abs(busy - np.array(side[-1])) / np.array([half, 0.02 * size])
             return float(away.max(axis=1).min())
 
@@ -128,8 +129,7 @@ def _draw_passing(ax: Any, maps: Maps, busy: Floats) -> None:
 
 
 def draw_tether(done: Execution, *, ax: Any = None) -> Any:
-    """Tether length and limit over time with what happened, on axes of the caller or on new ones;
-    returns the axes."""
+    """Draw tether length, limit and events over time on given or new axes, and return the axes."""
     from matplotlib.figure import Figure
 
     if ax is None:

@@ -1,4 +1,4 @@
-"""Contents of a moving picture: moments of a tour, a run, a flight or a planned mission."""
+"""Contents of films: moments of a tour, a run, a flight or a planned mission."""
 
 from __future__ import annotations
 
@@ -27,24 +27,24 @@ from netsp.world.scene.scene import Scene
 
 @dataclass(frozen=True)
 class Film:
-    """Contents of one panel.
+    """Contents of one panel of a film.
 
     Parameters
     ----------
     title : str
-        Above it.
+        Title of the panel.
     moments : sequence of Moment
-        At even steps.
+        Moments at equal steps.
     length : float
-        Of it all: seconds of a run, or the length of a tour.
+        Duration of a run, s, or length of a tour, in the problem's units.
     places : ndarray, shape (n, 3)
-        Goals or waypoints, also those that are added on the way.
+        Goals or waypoints, including those that are added during the run.
     anchor : (x, y, z)
-        Of the tether, at first.
+        First position of the anchor.
     scene : Scene, optional
-        What stands still in a picture in space; by default, the map of each moment.
+        Scene of a film in space; None for the map of each moment.
     by_time : bool
-        Whether the length is of seconds.
+        Whether `length` is a duration.
     """
 
     title: str
@@ -57,7 +57,7 @@ class Film:
 
     @property
     def measured_in(self) -> str:
-        """Name of the measured length, with its unit."""
+        """Name of the quantity along the slider, with its unit."""
         if self.by_time:
             return "time (s)"
         problem = self.moments[0].problem
@@ -72,14 +72,14 @@ class Film:
 
 @dataclass(frozen=True)
 class Step:
-    """A moment of each of several films.
+    """Step of several films: one moment of each.
 
     Parameters
     ----------
     name : str
-        How far it is.
+        Text for the time or distance of the step.
     moments : tuple of int
-        Numbers of the films' moments.
+        Index of the moment in each film.
     """
 
     name: str
@@ -93,14 +93,14 @@ def steps_of(films: Sequence[Film], count: int) -> tuple[str, list[Step]]:
     Parameters
     ----------
     films : sequence of Film
-        One at least.
+        Films, at least one.
     count : int
-        How many steps, two at least.
+        Number of steps, at least two.
 
     Returns
     -------
     str, list of Step
-        What the names of the steps measure, and the steps.
+        Name of the quantity that the steps measure, and the steps.
     """
     alike = len({film.measured_in for film in films}) == 1
     longest = [max(film.length for film in films) if alike else film.length for film in films]
@@ -117,7 +117,7 @@ def steps_of(films: Sequence[Film], count: int) -> tuple[str, list[Step]]:
 
 
 def film_of_plan(problem: Problem, solution: Solution, count: int) -> Film:
-    """Return the film of a tour that is to be carried out, of `count` steps."""
+    """Return the film of a planned tour, of `count` steps."""
     title = f"{problem.name}: tour of {solution.length:.4g} {problem.units} by {solution.solver}"
     moments = moments_of_plan(problem, solution, count)
     length = float(polylines.length(np.array(solution.path)))
@@ -132,8 +132,10 @@ def film_of_run(
     since: Mapping[str, Mapping[int, float]],
     count: int,
 ) -> Film:
-    """Return the film of a tour that was carried out, of about `count` moments; the arguments are
-    those of `netsp.view.pictures.moments.moments_of_run`."""
+    """Return the film of a recorded run, of about `count` moments.
+
+    The arguments are those of `netsp.view.pictures.moments.moments_of_run`.
+    """
     problem = maps[-1][1]
     moments = moments_of_run(maps, rows, tethers, count, since)
     places = np.array([g.position for g in problem.goals]).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Pages of films in space: each can be turned, and a slider moves the robot and its tether."""
+"""Web page of films in space: views can be turned, and a slider moves robots and tethers."""
 
 from __future__ import annotations
 
@@ -39,22 +39,22 @@ def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
     Parameters
     ----------
     films : sequence of Film
-        In space, from left to right.
+        Films in space, from left to right.
     title : str
-        Of the page.
+        Title of the page.
     file : str or Path
-        The file; replaced when it is there.
+        File to write; an existing one is replaced.
 
     Raises
     ------
     InputError
-        Plotly is not installed, the file cannot be written.
+        Plotly is not installed, or the file cannot be written.
     """
     plotly_objects()
     from plotly.subplots import make_subplots
 
     columns = len(films)
-    # plotly reads titles as HTML, and breaks no lines
+    # plotly treats titles as HTML and does not wrap them
     titles = [
         "<br>".join(
             html.escape(part)
@@ -122,7 +122,7 @@ def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
 
 
 def _moving(film: Film, moment: Moment) -> list[dict[str, Any]]:
-    """Return what changes from moment to moment."""
+    """Return the traces that change with each moment."""
     visited, left = (list(moment.fates.get(fate, ())) for fate in (VISITED, LEFT_OUT))
     rest = sorted(set(range(len(film.places))) - {*visited, *left})
     return [
@@ -137,14 +137,16 @@ def _moving(film: Film, moment: Moment) -> list[dict[str, Any]]:
 
 
 def _marks(film: Film, name: str, which: list[int], **marker: Any) -> dict[str, Any]:
-    """Waypoints of one kind; where there are none, one that is not drawn, so that the legend
-    knows the kind."""
+    """Return the trace of waypoints of one kind.
+
+    If there are none, it has an invisible point, so that the kind is in the legend.
+    """
     x, y, z = film.places[which].T if which else ([None], [None], [None])
     return marks_trace(name, (x, y, z), marker, [f"#{k}" for k in which])
 
 
 def _play() -> dict[str, Any]:
-    """Buttons that have the frames go by."""
+    """Return the buttons that play and pause the film."""
     on = {
         "frame": {"duration": FILM_MS // PAGE_FRAMES, "redraw": True},
         "fromcurrent": True,

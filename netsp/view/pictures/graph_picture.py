@@ -1,4 +1,4 @@
-"""The picture of a travel graph: how long the tether is in every class of every goal."""
+"""Picture of a travel graph: the tether length in each class of each goal."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from netsp.view.pictures import style
 
 
 def draw_classes(graph: TravelGraph, *, ax: Any = None) -> Any:
-    """Mark each class by goal and tether length, on the given or on new axes, and return the axes.
-    Graphs of given costs have no tethers; their leg from the base is shown instead."""
+    """Draw each class by goal and tether length on given or new axes, and return the axes.
+
+    Graphs from costs have no tethers; the leg from the base is shown instead.
+    """
     from matplotlib.figure import Figure
 
     if ax is None:

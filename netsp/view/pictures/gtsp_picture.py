@@ -1,4 +1,4 @@
-"""The picture of a generalised TSP in the plane."""
+"""Picture of a generalised TSP in the plane."""
 
 from __future__ import annotations
 
@@ -15,13 +15,12 @@ if TYPE_CHECKING:
 
 
 def draw_gtsp(instance: Instance, result: Result, *, ax: Any = None) -> Any:
-    """Vertices, joined to the middle of their clusters, and the tour, on axes of the caller or on
-    new ones; returns the axes.
+    """Draw vertices, joined to the centres of their clusters, and the tour; return the axes.
 
     Raises
     ------
     InputError
-        The instance has no places.
+        The vertices of the instance have no positions.
     """
     if instance.places is None:
         raise InputError(

@@ -1,5 +1,7 @@
-"""Pages with a picture in space that can be turned in a browser (plotly). They need nothing else,
-and are packed: plotly itself is 4.8 MB of text."""
+"""Self-contained web pages with a view in space that can be turned (plotly).
+
+The pages contain plotly, 4.8 MB of text, in compressed form.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,7 @@ from netsp.world.scene.scene import Scene
 from netsp.world.scene.surfaces import Triangles, drawn_points
 
 VISIBLE_SHARE = 1e-3
-"""Smallest visible deviation of a line, as a share of the picture's size."""
+"""Smallest deviation of a line that is drawn, as a share of the size of the picture."""
 
 EYE = {"x": 1.5, "y": -1.6, "z": 1.0}
 """Point of view of a scene, in units of its size: from the south-east, as in figures."""
@@ -66,18 +68,18 @@ async function unpack(text) {{
 def write_figure(
     figure: Any, title: str, file: str | Path, frames: Sequence[dict[str, Any]] = ()
 ) -> None:
-    """Write a figure of plotly as a page.
+    """Write a figure of plotly as a self-contained page.
 
     Parameters
     ----------
     figure : plotly.graph_objects.Figure
-        Without frames.
+        Figure without frames.
     frames : sequence of dict
-        Frames as plotly's JSON has them: checking as many objects takes plotly seconds.
+        Frames in plotly's JSON: plotly would need seconds to validate them as objects.
     title : str
-        Of the page.
+        Title of the page.
     file : str or Path
-        The file; replaced when it is there.
+        File to write; an existing one is replaced.
 
     Raises
     ------
@@ -107,7 +109,7 @@ def _packed(text: str) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return what plotly draws as JSON: short numbers compress better than plotly's binary ones."""
+    """Return a value for plotly's JSON: short decimals compress better than its binary arrays."""
     if hasattr(value, "to_plotly_json"):
         value = value.to_plotly_json()
     if isinstance(value, dict):
@@ -162,7 +164,7 @@ def write_scene(
 
 
 def stop_traces(stops: WaypointMarks) -> list[dict[str, Any]]:
-    """Waypoints on an interactive page: those that were visited, and those that were not."""
+    """Return the traces of visited and other waypoints on an interactive page."""
     out = []
     left = np.isin(np.arange(len(stops.places)), stops.left_out)
     visited = {"color": style.VISITED, "size": 3}
@@ -179,7 +181,7 @@ def stop_traces(stops: WaypointMarks) -> list[dict[str, Any]]:
 
 
 def plotly_objects() -> Any:
-    """plotly's graph objects; InputError if plotly is not installed."""
+    """Return `plotly.graph_objects`; raise InputError if plotly is not installed."""
     try:
         import plotly.graph_objects as go
     except ImportError:
@@ -207,7 +209,7 @@ def mesh_trace(name: str, vertices: Floats, faces: npt.NDArray[np.int64]) -> Any
 
 
 def seen(points: Floats) -> Ints:
-    """Numbers of those points (k, 3) of a line that can be told on a picture of it."""
+    """Return the indices of the points of a line (k, 3) that make a visible difference."""
     size = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
     return np.flatnonzero(polylines.essential(points, VISIBLE_SHARE * size))
 
@@ -243,11 +245,11 @@ def marks_trace(
     name : str
         Name in the legend.
     places : sequence
-        The x, the y and the z of all points.
+        Coordinates x, y and z of all points.
     marker : dict
         Colour, size and symbol.
     texts : sequence of str, optional
-        What is shown at each point under the cursor.
+        Text that is shown at each point under the cursor.
     """
     x, y, z = places
     text = {} if texts is None else {"text": list(texts)}

@@ -14,10 +14,10 @@ Alignment = Literal["left", "center", "right"]
 """Horizontal alignment of a text."""
 
 WIDTH_PER_LETTER = 0.62
-"""Mean width of a letter as a share of the size of the font, a little more than that of digits."""
+"""Mean width of a letter as a share of the font size; slightly more than that of digits."""
 
 HEIGHT_PER_LINE = 1.25
-"""Height of a line as a share of the size of the font."""
+"""Height of a line as a share of the font size."""
 
 LABEL_GAP = 8.0
 """Distance from the middle of a marker to the near end of a label beside it, points."""
@@ -39,7 +39,7 @@ class LabelPlace:
     Attributes
     ----------
     offset
-        From the middle of the marker to the label's end or middle, points.
+        Offset from the middle of the marker to the end or middle of the label, points.
     align
         Part of the label that lies at the offset.
     """
@@ -67,7 +67,7 @@ def place_labels(
     texts : sequence of str
         One line for each marker; an empty one needs no place.
     font_size : float
-        Size of the font, points.
+        Font size, points.
     marker_radius : float
         Radius of the markers, points.
     taken : ndarray, shape (k, 2), optional

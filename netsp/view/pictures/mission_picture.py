@@ -1,5 +1,8 @@
-"""Pictures of missions: what was seen and how long the tether was over time (as in Figs. 4 and 7 of
-Amer et al. 2025), and the paths in space, of one run or of two side by side."""
+"""Pictures of missions, of one run or of two side by side.
+
+They show coverage and tether length over time, as in Figs. 4 and 7 of Amer et al. 2025, and the
+paths in space.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,7 @@ from netsp.world.scene.scene import Scene
 from netsp.world.tether import Tether
 
 DASHES = ("-", "-.")
-"""Line styles of two runs side by side, which differ in grey, too."""
+"""Line styles of two runs side by side, so that they differ in grey prints."""
 
 
 def path_of(run: Run) -> Floats:
@@ -32,7 +35,7 @@ def path_of(run: Run) -> Floats:
 
 
 def title_of(run: Run) -> str:
-    """Return a run in one line."""
+    """Return the title of a run, in one line."""
     s = run.summary
     return (
         f"{s['planner']}: {s['visited']} of {s['waypoints']} in {s['inspection_s']:.0f} s"
@@ -47,19 +50,19 @@ def title_of(run: Run) -> str:
 
 
 def stops_of(run: Run) -> WaypointMarks:
-    """Return the waypoints of a run, and which of them were not visited."""
+    """Return the marks of the waypoints of a run."""
     visited = {int(stop["waypoint"]) for stop in run.summary["stops"]}
     left = tuple(sorted(set(range(len(run.mission.waypoints))) - visited))
     return WaypointMarks(run.mission.places, left, visited=True)
 
 
 def save_mission(mission: Mission, scene: Scene, file: str | Path) -> None:
-    """Waypoints in their order, and the tour if there is one.
+    """Draw the waypoints of a mission in order, and its tour if it has one, to a file.
 
     Raises
     ------
     InputError
-        As of `netsp.view.pictures.scene_picture.save`.
+        `netsp.view.pictures.scene_picture.save` raises it.
     """
     tour, count = mission.tour, len(mission.waypoints)
     left = () if tour is None else tuple(range(len(tour.stops), count))
@@ -76,7 +79,7 @@ def save_mission(mission: Mission, scene: Scene, file: str | Path) -> None:
 
 
 def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
-    """Tether length and coverage over time, and each run in space.
+    """Draw tether length and coverage of runs over time, and each run in space, to a file.
 
     Raises
     ------
@@ -107,8 +110,10 @@ def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
 
 
 def draw_tether(runs: Sequence[Run], *, ax: Any = None, units: str = "m") -> Any:
-    """Draw the length of the taut tether over time, with slack and sag if there are any, on the
-    given or on new axes, and return the axes. For one run, tether recovery is marked."""
+    """Draw the length of the taut tether over time on given or new axes, and return the axes.
+
+    Slack and sag are drawn, if any; for a single run, tether recovery is marked.
+    """
     from matplotlib.figure import Figure
 
     if ax is None:
@@ -150,8 +155,7 @@ def draw_run(run: Run, *, ax: Any = None) -> Any:
 
 
 def draw_coverage(runs: Sequence[Run], *, ax: Any = None) -> Any:
-    """Draw the area that the camera has seen over time, on the given or on new axes, and return the
-    axes."""
+    """Draw the area seen by the camera over time on given or new axes, and return the axes."""
     from matplotlib.figure import Figure
 
     if ax is None:
@@ -167,8 +171,10 @@ def draw_coverage(runs: Sequence[Run], *, ax: Any = None) -> Any:
 
 
 def tethers_along(run: Run, scene: Scene, moments: npt.NDArray[np.int64]) -> list[Tether]:
-    """Return the tether at some rows of the log, in ascending order. The run is driven again,
-    unless its tethers were kept because the scene changed."""
+    """Return the tethers at rows of the log, given in ascending order.
+
+    The run is simulated again, unless its tethers were kept because the scene changed.
+    """
     if run.tethers:
         rows = np.array([row for row, _ in run.tethers])
         return [run.tethers[k][1] for k in np.searchsorted(rows, moments, side="right") - 1]

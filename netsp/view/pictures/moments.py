@@ -1,4 +1,4 @@
-"""Moments of a tour or a run: where the robot is, what it has gone, and how its tether lies."""
+"""Moments of a tour or a run: position of the robot, its path so far, and its tether."""
 
 from __future__ import annotations
 
@@ -23,31 +23,31 @@ from netsp.world.scene.scene import Scene
 from netsp.world.world_protocol import World
 
 MAX_MOMENTS = 400
-"""Approximate maximum number of points of the path so far in one picture."""
+"""Approximate maximum number of points that draw the path so far."""
 
 VISITED, LEFT_OUT, CANCELLED = "visited", "left out", "cancelled"
 """Fates of a goal or waypoint."""
 
 Fates = Mapping[str, tuple[int, ...]]
-"""Numbers of goals or waypoints, by what has become of them so far."""
+"""Numbers of goals or waypoints by fate."""
 
 
 @dataclass(frozen=True)
 class Moment:
-    """One of them.
+    """Moment of a tour or a run.
 
     Parameters
     ----------
     nodes : ndarray, shape (k, 3)
-        The tether, to where the robot is.
+        Nodes of the tether, from the anchor to the robot.
     path : ndarray, shape (m, 3)
-        What was gone so far.
+        Path so far.
     text : str
-        How far it is.
+        Caption: time or distance, and next goal.
     problem : Problem or None
-        The site, as it is then; None in space.
+        Map at this moment; None in space.
     fates : mapping
-        Of goals or waypoints, by then.
+        Fates of goals or waypoints at this moment.
     """
 
     nodes: Floats
@@ -58,7 +58,7 @@ class Moment:
 
 
 def moments_of_plan(problem: Problem, solution: Solution, count: int) -> list[Moment]:
-    """Return `count` + 1 moments at even steps along the tour of a problem."""
+    """Return `count` + 1 moments at equal steps along the tour of a problem."""
     path = np.array(solution.path)
     s = polylines.along(path)
     visits = [(goal, float(s[n])) for goal, n in _reached(path, problem, solution)]
@@ -67,7 +67,7 @@ def moments_of_plan(problem: Problem, solution: Solution, count: int) -> list[Mo
 
 
 def moments_of_mission(mission: Mission, scene: Scene, count: int) -> list[Moment]:
-    """Return `count` + 1 moments at even steps along the tour of a mission.
+    """Return `count` + 1 moments at equal steps along the tour of a mission.
 
     Raises
     ------
@@ -93,10 +93,10 @@ def _moments_along(
     left_out: tuple[int, ...] = (),
     problem: Problem | None = None,
 ) -> list[Moment]:
-    """Return the tether at even steps along a path (n, 3), as the online model follows it.
+    """Return the moments at equal steps along a path (n, 3), with tethers by the online model.
 
-    `visits` are goals or waypoints in their order, each with the length of the path up to it;
-    `left_out` are those that the path does not lead to.
+    `visits` are goals or waypoints in order, each with the length of the path up to it; the path
+    does not lead to those in `left_out`.
     """
     s = polylines.along(path)
     state, units, out, at = world.present_tether, world.units, [], 0
@@ -119,7 +119,7 @@ def _moments_along(
 
 
 def _reached(path: Floats, problem: Problem, solution: Solution) -> list[tuple[int, int]]:
-    """Return each goal of the tour, with the vertex of the path at which it is visited."""
+    """Return pairs of a goal of the tour and the vertex of the path at its visit."""
     out, at = [], 0
     for visit in solution.tour:
         apart = np.linalg.norm(path[at:] - np.array(problem.goals[visit.goal].position), axis=1)
@@ -135,30 +135,30 @@ def moments_of_run(
     count: int,
     since: Mapping[str, Mapping[int, float]],
 ) -> list[Moment]:
-    """Moments of a run that were recorded.
+    """Return the moments of a recorded run.
 
     Parameters
     ----------
     maps : sequence of (float, Problem)
-        The site as it is from some seconds on; the first from 0.
+        Maps, each with the time, s, from which it applied; the first from 0.
     rows : sequence of dict
-        Of log.csv.
+        Rows of log.csv.
     tethers : sequence of dict
-        Of tethers.json.
+        Entries of tethers.json.
     count : int
-        How many, about.
+        Approximate number of moments.
     since : mapping of str to mapping of int to float
-        For each fate, seconds since when goals have it.
+        Times, s, from which goals have each fate.
 
     Returns
     -------
     list of Moment
-        The last one among them.
+        Moments, the last of the run included.
 
     Raises
     ------
     KeyError, ValueError
-        Of files that are damaged.
+        A file is damaged.
     """
     times = np.array([float(r["time"]) for r in rows])
     path = np.array([[float(r[k]) for k in "xyz"] for r in rows])
@@ -190,9 +190,9 @@ def moments_of_run(
 
 
 def moments_of_flight(run: Run, scene: Scene, count: int) -> list[Moment]:
-    """Return about `count` moments of a flight in space, the last one among them.
+    """Return about `count` moments of a flight in space, including the last one.
 
-    The tether is driven again along the path.
+    The tether is simulated again along the path.
     """
     path = path_of(run)
     visited = {int(stop["waypoint"]) for stop in run.summary["stops"]}

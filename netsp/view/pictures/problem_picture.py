@@ -23,21 +23,21 @@ if TYPE_CHECKING:
 
 
 MAX_LABELLED = 40
-"""Largest number of goals whose names are drawn; more names have no room."""
+"""Maximum number of goals with names; more names would overlap."""
 
 LABEL_SIZE = 6.0
-"""Size of the font of names, points."""
+"""Font size of names, points."""
 
 MIN_VISIBLE_SHARE = 0.012
 """Minimum radius of a circle whose name is written in it, as a share of the map."""
 
 
 HIDDEN_RIM = 0.002
-"""Distance from an obstacle's outline, as a share of the picture's width, up to which an outline of
-something left out is not drawn."""
+"""Distance from an obstacle's outline within which outlines of omitted features are not drawn, as a
+share of the width of the picture."""
 
 FULL_STRENGTH_EDGES = 1000.0
-"""Number of edges of a roadmap above which edges are drawn fainter."""
+"""Number of edges of a roadmap above which they are drawn fainter."""
 
 
 def save(problem: Problem, solution: Solution | None, path: str | Path) -> None:
@@ -53,9 +53,9 @@ def save_import(problem: Problem, left_out: Sequence[shapely.Geometry], path: st
     problem : Problem
         The problem.
     left_out : sequence of shapely.Geometry
-        Shapes that are not in it, in its plane; those outside of the picture are not drawn.
+        Shapes of omitted features, in the plane of the problem.
     path : str or Path
-        PNG, SVG or PDF.
+        File to write: PNG, SVG or PDF.
     """
     import shapely
 
@@ -66,7 +66,7 @@ def save_import(problem: Problem, left_out: Sequence[shapely.Geometry], path: st
     parts = [part for shape in left_out for part in shapely.get_parts(shapely.get_parts(shape))]
     outlines = [part.boundary if part.geom_type == "Polygon" else part for part in parts]
     seen = shapely.intersection([o for o in outlines if not o.is_empty], frame)
-    # edges that areas share are drawn once, since dashes over dashes look like a full line
+    # edges that areas share are drawn once, because dashes over dashes look like a solid line
     edges = _edges(shapely.union_all([s for s in seen if s.length > 0.0]))
     rims = shapely.STRtree([o.shape().boundary for o in problem.obstacles])
     width = HIDDEN_RIM * (limits[0][1] - limits[0][0])
@@ -98,8 +98,7 @@ def _edges(lines: shapely.Geometry) -> Floats:
 
 
 def draw(problem: Problem, solution: Solution | None = None) -> Any:
-    """Return a matplotlib Figure: the map with the tour, and next to it, for each visit, the taut
-    tether from the base to the robot."""
+    """Return a matplotlib Figure with a map of the tour, and a map of the tether at each visit."""
     from matplotlib.figure import Figure
 
     visits = solution.tour if solution is not None else ()
@@ -172,7 +171,7 @@ def save_roadmap(problem: Problem, roadmap: str, options: dict[str, Any], path: 
         counted = (
             f"{len(t.arcs)} arcs, {len(lines) // 2} tangents, {len(built.cluster) - 1} classes"
         )
-    # thousands of edges are a texture, and obstacles, goals and milestones are seen through it
+    # thousands of edges must not hide obstacles, goals and milestones
     alpha = float(np.clip(FULL_STRENGTH_EDGES / max(len(lines), 1), 0.04, 0.35))
     ax.add_collection(
         LineCollection(list(lines), colors=style.PATH, lw=0.35, alpha=alpha, zorder=2)
@@ -182,9 +181,11 @@ def save_roadmap(problem: Problem, roadmap: str, options: dict[str, Any], path: 
 
 
 def save_trace(rows: Sequence[Progress], title: str, units: str, path: str | Path) -> None:
-    """Draw how a solver came to its answer: lengths and bound against iterations, and below, for
-    solvers that walk through entangled states, the number of entangled obstacles (Fig. 3 of
-    McCammon & Hollinger 2016)."""
+    """Draw the progress of a solver: lengths and bound by iteration.
+
+    For solvers that pass through entangled states, a panel below has the number of entangled
+    obstacles (Fig. 3 of McCammon & Hollinger 2016).
+    """
     from matplotlib.figure import Figure
 
     tangled = any(r.entangled for r in rows)
@@ -217,7 +218,7 @@ def save_trace(rows: Sequence[Progress], title: str, units: str, path: str | Pat
 
 
 def _mark(points: Sequence[object]) -> str | None:
-    """Return a marker if all points coincide, else None."""
+    """Return a marker if all points coincide, so that they are visible, else None."""
     return "o" if len(points) == 1 else None
 
 
@@ -265,7 +266,7 @@ def save_classes(problem: Problem, goal: int, path: str | Path) -> None:
 
 
 def _letter(i: int) -> str:
-    """Return the letter of obstacle i in words, which count from 1 so that letters have signs."""
+    """Return the letter of obstacle i in words, i + 1."""
     return str(i + 1)
 
 
@@ -286,13 +287,12 @@ def draw_map(
     ax: Axes | None = None,
     tethers: bool = False,
 ) -> Axes:
-    """Draw the map of a problem, with the path of a solution if given, on the given or on new axes,
-    and return the axes.
+    """Draw a problem, and the path of a solution, on given or new axes; return the axes.
 
     Parameters
     ----------
     tethers
-        The taut tether at every visit, too.
+        Whether to draw the taut tether at each visit.
     """
     if ax is None:
         _, ax = _single(problem)
@@ -366,7 +366,7 @@ def _label_goals(ax: Axes, problem: Problem, radius: float, *, is_numbered: bool
     radius : float
         Radius of the markers, points.
     is_numbered : bool
-        Whether the markers bear numbers, so that goals without a name need none.
+        Whether the markers have numbers, so that goals without names need no label.
     """
     low, high = (np.array(limits) for limits in zip(ax.get_xlim(), ax.get_ylim(), strict=True))
     figure = ax.get_figure(root=True)
@@ -410,8 +410,7 @@ def _label_goals(ax: Axes, problem: Problem, radius: float, *, is_numbered: bool
 
 
 def draw_path(solution: Solution, *, ax: Any = None) -> Any:
-    """Draw the path of a solution without its problem, on the given or on new axes, and return the
-    axes."""
+    """Draw the path of a solution without its problem on given or new axes; return the axes."""
     from matplotlib.figure import Figure
 
     if ax is None:
@@ -428,8 +427,7 @@ def draw_path(solution: Solution, *, ax: Any = None) -> Any:
 def draw_solution(
     solution: Solution, *, ax: Axes | None = None, problem: Problem | None = None
 ) -> Axes:
-    """Draw a solution's path, over its problem if given, on the given or on new axes, and return
-    the axes."""
+    """Draw the path of a solution, over its problem if given, on given or new axes; return them."""
     if problem is not None:
         return draw_map(problem, solution, ax=ax)
     path: Axes = draw_path(solution, ax=ax)
@@ -464,7 +462,7 @@ def draw_obstacles(
     Parameters
     ----------
     label
-        What is written on obstacle i, or beside it where it is small.
+        Function that returns the text on obstacle i, or beside it if it is small.
     wrapped
         Obstacles that a path is wrapped around.
     """
@@ -521,7 +519,7 @@ def draw_obstacles(
 
 
 def _arrows(ax: Axes, path: Any, count: int) -> None:
-    """Arrowheads along the path, one or more per leg."""
+    """Draw arrowheads along the path, at least one on each leg."""
     step = np.hypot(*np.diff(path[:, :2], axis=0).T)
     along = np.concatenate([[0.0], np.cumsum(step)])
     if along[-1] == 0.0:
@@ -544,19 +542,19 @@ def _arrows(ax: Axes, path: Any, count: int) -> None:
 
 
 def view(problem: Problem, solution: Solution | None = None) -> tuple[float, float, float, float]:
-    """Return the box that holds everything of interest, with a margin.
+    """Return the box of a map, which contains all goals, paths and nearby obstacles, with a margin.
 
     Parameters
     ----------
     problem : Problem
-        The site.
+        Problem to draw.
     solution : Solution, optional
-        Whose path is of interest, too.
+        Solution whose path must be in the box, too.
 
     Returns
     -------
     xmin, ymin, xmax, ymax : float
-        In the problem's units.
+        Bounds in the problem's units.
     """
     xy = [problem.points[:, :2]]
     if solution is not None and solution.path:

@@ -1,4 +1,4 @@
-"""Figures of a scene with path and tether; `netsp.view.pictures.interactive` has pages of it."""
+"""Figures of scenes with path and tether; `netsp.view.pictures.interactive` makes web pages."""
 
 from __future__ import annotations
 
@@ -39,13 +39,15 @@ def save(
     title: str | None = None,
     stops: WaypointMarks | None = None,
 ) -> None:
-    """Draw a scene, with a path (k, 3), a tether and waypoints if given, by the file name's ending:
-    .png, .svg and .pdf a figure, .html a page that needs nothing else.
+    """Draw a scene, with a path (k, 3), a tether and waypoints if given, to a file.
+
+    The ending of its name chooses a figure (.png, .svg, .pdf) or a self-contained page (.html).
 
     Raises
     ------
     InputError
-        Another ending, a file that cannot be written, plotly not installed.
+        The name has another ending, the file cannot be written, or plotly, which .html needs, is
+        not installed.
     """
     style.check_format(file, INTERACTIVE)
     line = np.zeros((0, 3)) if path is None else np.asarray(path, dtype=float).reshape(-1, 3)
@@ -67,11 +69,11 @@ def figure_of(scene: Scene, path: Floats, title: str, stops: WaypointMarks) -> A
     Parameters
     ----------
     scene : Scene
-        The scene.
+        Scene to draw.
     path : ndarray, shape (k, 3)
-        Of the robot, metres.
+        Path of the robot, metres.
     title : str
-        Above it.
+        Title of the figure.
     stops : WaypointMarks
         Waypoints.
 
@@ -114,7 +116,7 @@ def _figure(
     title: str,
     stops: WaypointMarks | None = None,
 ) -> Any:
-    """Return a view in space, with plans from above and from two sides."""
+    """Return a figure with a view in space, one from above and two from the sides."""
     from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
@@ -161,8 +163,8 @@ def _figure(
 def draw_space(
     scene: Scene, path: Floats, nodes: Floats, *, ax: Any = None, stops: WaypointMarks | None = None
 ) -> Any:
-    """Solids, path (k, 3), tether (n, 3) and waypoints in space, on 3D axes of the caller or on new
-    ones; returns the axes."""
+    """Draw solids, path (k, 3), tether (n, 3) and waypoints on given or new 3D axes; return
+    them."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
@@ -182,7 +184,7 @@ def draw_space(
         draw_stops(ax, stops, (0, 1, 2))
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(high - low, zoom=0.8)  # room for the labels
-    # beyond the numbers of the ticks, along the longer sides farther
+    # labels beyond the tick numbers, and farther out along longer sides
     widest = float((high - low).max())
     for name, size in zip("xyz", high - low, strict=True):
         label = getattr(ax, f"set_{name}label")
@@ -195,8 +197,7 @@ def draw_space(
 
 
 def draw_stops(ax: Any, stops: WaypointMarks, axes: tuple[int, ...]) -> None:
-    """Waypoints on two or three of the axes (0, 1, 2) of space, with their numbers in the order of
-    the tour where these are few enough to be read."""
+    """Draw waypoints on two or three of the axes (0, 1, 2), with numbers if they are few."""
     columns = list(axes)
     is_left_out = np.isin(np.arange(len(stops.places)), stops.left_out)
     to_visit = {"marker": "o", "ms": 4, "color": style.GOAL, "mec": style.PATH, "mew": 1.0}
@@ -224,7 +225,7 @@ def draw_stops(ax: Any, stops: WaypointMarks, axes: tuple[int, ...]) -> None:
 
 
 def shaded(triangles: Floats) -> Floats:
-    """Greys by how much a triangle faces the light."""
+    """Return the grey of each triangle by how much it faces the light."""
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     size = np.linalg.norm(normals, axis=1)
     light = np.array([0.4, -0.5, 0.77])
@@ -234,7 +235,7 @@ def shaded(triangles: Floats) -> Floats:
 
 
 def draw_lines(ax: Any, path: Floats, nodes: Floats, axes: tuple[int, ...]) -> None:
-    """Path and tether with its ends, on two or three of the axes (0, 1, 2) of space."""
+    """Draw path and tether, with its ends, on two or three of the axes (0, 1, 2) of space."""
     columns = list(axes)
     if len(path):
         ax.plot(*path[:, columns].T, color=style.PATH, lw=0.9, alpha=0.8, label="path")

@@ -1,4 +1,4 @@
-"""Curves and maps of what is asked before there is a problem."""
+"""Pictures of sizing: the tether curve, and maps of base candidates."""
 
 from __future__ import annotations
 
@@ -21,8 +21,7 @@ MAX_LABELS = 12
 
 
 def draw_tether_curve(curve: TetherCurve, *, ax: Axes | None = None) -> Any:
-    """Draw the shortest tour against the tether's length, on the given or on new axes, and return
-    the axes."""
+    """Draw the shortest tour by tether length on given or new axes, and return the axes."""
     if ax is None:
         from matplotlib.figure import Figure
 
@@ -79,9 +78,10 @@ CONTOUR_LEVELS = 12
 
 
 def draw_base_search(search: BaseSearch, *, ax: Any = None) -> Any:
-    """Draw two maps of the candidates, on the given or on new axes, and return both axes: the
-    shortest sufficient tether, and the shortest tour. Contours are drawn if the candidates spread
-    over the plane."""
+    """Draw maps of the shortest sufficient tether and the shortest tour at base candidates.
+
+    Contours are drawn if the candidates spread over the plane. Returns both axes.
+    """
     problem = search.problem
     if ax is None:
         from matplotlib.figure import Figure
@@ -142,7 +142,7 @@ def draw_base_search(search: BaseSearch, *, ax: Any = None) -> Any:
 
 
 def _map(ax: Axes, problem: Any, xy: Any, values: Any, possible: Any, label: str) -> None:
-    """Values at places, with contours between them where places span the plane."""
+    """Draw values at places, with contours if the places span the plane."""
     draw_obstacles(ax, problem)
     ok = np.isfinite(values)
     size = float(np.ptp(xy, axis=0).max()) or 1.0

@@ -1,7 +1,7 @@
 """Style of all pictures: one colour for each role, and one function to save them.
 
-The colours are those of Okabe and Ito (2008), told apart with any kind of colour vision; they are
-helped by shape and line style, so that a print in grey can be read as well.
+The colours are those of Okabe and Ito (2008), which people with any colour vision can distinguish.
+Roles also differ in shape or line style, so that grey prints are legible.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from netsp.base import progress
 from netsp.base.errors import InputError
 
 BASE = "#000000"
-"""The anchor of the tether; drawn as a star."""
+"""Colour of the anchor of the tether, which is drawn as a star."""
 
 ROBOT, TETHER = "#e69f00", "#d55e00"
-"""Orange and vermilion."""
+"""Colours of robot and tether, orange and vermilion."""
 
 PATH, PLAN = "#0072b2", "#56b4e9"
 """Colours of paths: travelled or planned in blue, abandoned plans in sky blue and dashed."""
 
 OBSTACLE, EDGE, WRAPPED = "#c5ccd3", "#5a6672", "#e5c1d5"
-"""Greys; and what the tether winds about, in light purple."""
+"""Colours of obstacles, of their edges, and of obstacles that a path wraps."""
 
 GOAL, VISITED, LEFT_OUT, CANCELLED = "#ffffff", "#009e73", "#cc79a7", "#8a939c"
-"""A goal of a plan (its edge is the path's colour); visited (a disc), left out (a cross), cancelled
-(a plus)."""
+"""Colours of goals: planned (with an edge in the colour of the path), visited (a disc), left out (a
+cross), cancelled (a plus)."""
 
 LIMIT, EVENT, RECOVERY = "#333333", "#8a939c", "#f7f0b8"
-"""The tether's length; what happened; times of tether recovery."""
+"""Colours of the tether's limit, of events, and of times of tether recovery."""
 
 SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 """Colours of solvers side by side, in order."""
@@ -50,7 +50,7 @@ FORMATS = (".png", ".svg", ".pdf")
 
 
 def check_format(path: str | Path, *more: str) -> None:
-    """InputError unless a file name ends in a format that can be drawn.
+    """Raise InputError unless a file name ends in a format that can be drawn.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def save(figure: Any, path: str | Path, dpi: int = 150) -> None:
     Raises
     ------
     InputError
-        Another ending, a file that cannot be written.
+        The name has another ending, or the file cannot be written.
     """
     check_format(path)
     if Path(path).exists() and not Path(path).is_file():
@@ -96,7 +96,7 @@ def load_matplotlib() -> None:
 
 
 def halo() -> list[Any]:
-    """Return the effect of a white edge around letters, so that lines may pass beneath them."""
+    """Return the effect of a white edge around letters, so that they are legible over lines."""
     from matplotlib.patheffects import withStroke
 
     return [withStroke(linewidth=2.0, foreground="white")]
@@ -108,7 +108,7 @@ def svg(figure: Any, **more: Any) -> str:
     Parameters
     ----------
     more
-        Of Matplotlib's `savefig`.
+        Options of Matplotlib's `savefig`.
     """
     out = io.StringIO()
     _write(figure, out, format="svg", metadata={"Date": None}, **more)
@@ -117,8 +117,10 @@ def svg(figure: Any, **more: Any) -> str:
 
 
 def _write(figure: Any, target: Any, **more: Any) -> None:
-    """Save without Matplotlib's remarks on letters that no font has and names that leave no room:
-    the first show as boxes, the second are cut."""
+    """Save a figure without Matplotlib's warnings about missing letters and lack of room.
+
+    Missing letters show as boxes, and texts without room are cut.
+    """
     from matplotlib import rc_context
 
     # without a salt, the element ids of an SVG are random
@@ -155,8 +157,10 @@ def _ticks_formatted(figure: Any) -> Iterator[None]:
 
 
 def literal(figure: Any) -> Any:
-    """Return a Matplotlib figure whose texts are not read as mathematics, and are cut where words
-    are endless. Labels of ticks, which Matplotlib writes, stay as they are."""
+    """Make the texts of a figure plain, not mathematics, and cut very long words; return it.
+
+    Tick labels, which Matplotlib writes, do not change.
+    """
     for text in _texts(figure):
         text.set_parse_math(False)
         content = text.get_text()
@@ -180,7 +184,7 @@ def _texts(artist: Any) -> Iterator[Any]:
 
 @cache
 def _fonts_of_other_scripts() -> tuple[str, ...]:
-    """Return fonts of this machine with letters that Matplotlib's own font lacks."""
+    """Return the installed fonts with letters that Matplotlib's default font lacks."""
     from matplotlib import font_manager
 
     known_fonts = set(font_manager.get_font_names())

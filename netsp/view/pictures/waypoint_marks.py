@@ -1,4 +1,4 @@
-"""Waypoints of a mission as pictures mark them."""
+"""Marks of the waypoints of a mission in pictures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from netsp.base.arrays import Floats
 
 @dataclass(frozen=True)
 class WaypointMarks:
-    """Waypoints of a mission, and what is marked of them.
+    """Waypoints of a mission, and how they are marked.
 
     Parameters
     ----------
@@ -20,7 +20,7 @@ class WaypointMarks:
     left_out : tuple of int
         Indices of the waypoints that are not visited.
     anchor : (x, y, z) or None
-        Anchor of the tether, drawn where no tether is.
+        Anchor of the tether, which is drawn if there is no tether.
     visited : bool
         Whether the waypoints that are not left out have been visited; otherwise they are planned.
     """
@@ -32,10 +32,10 @@ class WaypointMarks:
 
     @property
     def name(self) -> str:
-        """Name in the legend of the waypoints that are not left out."""
+        """Legend of the waypoints that are not left out."""
         return "waypoint visited" if self.visited else "waypoint"
 
     @property
     def every_place(self) -> Floats:
-        """All marked places, shape (m, 3), metres."""
+        """Positions (m, 3) of all marks, metres."""
         return self.places if self.anchor is None else np.vstack([self.places, self.anchor])

@@ -1,1 +1,1 @@
-"""Results of comparisons as one page with figures and tables."""
+"""Reports: self-contained pages about tours, runs, missions and comparisons."""

@@ -1,5 +1,8 @@
-"""Briefing for the operator: every visit in numbers, the course of the tether there in words, what
-to do if it snags, and by how much the world may differ from the map."""
+"""Briefing for the operator.
+
+It has each visit in numbers, the course of the tether there in words, what to do if the tether
+snags, and by how much the world may differ from the map.
+"""
 
 from __future__ import annotations
 
@@ -36,12 +39,12 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[in
     rows : sequence of sequence of str
         Cells, as plain text.
     words : sequence of int
-        Columns of text, which are set from the left.
+        Indices of the columns of text, which are aligned to the left.
 
     Returns
     -------
     str
-        An element.
+        HTML element.
     """
     kind = [' class="words"' if k in words else "" for k in range(len(head))]
     top = "".join(f"<th{kind[k]}>{html.escape(h)}</th>" for k, h in enumerate(head))
@@ -53,17 +56,17 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[in
 
 
 def imported(site: Site) -> str:
-    """Return the table of what an import made of every feature of a map.
+    """Return the table of an import: what each feature of the map became.
 
     Parameters
     ----------
     site : Site
-        The record of a problem.
+        Record of the import.
 
     Returns
     -------
     str
-        Elements.
+        HTML elements.
     """
     head, *rows = site.table()
     import_text = f"Imported from {site.file}. What was left out is not in the plan."
@@ -80,17 +83,17 @@ def imported(site: Site) -> str:
 
 
 def checks(verdict: Verification) -> str:
-    """Return the judge's checks.
+    """Return the list of the judge's checks.
 
     Parameters
     ----------
     verdict : Verification
-        Of a solution or a mission.
+        Verdict on a solution or a mission.
 
     Returns
     -------
     str
-        An element.
+        HTML element.
     """
     rows = "".join(
         f'<tr><td class="{"ok" if c.passed else "bad"}">{"ok" if c.passed else "FAIL"}</td>'
@@ -119,21 +122,21 @@ def planned_with(solution: Solution) -> str:
 
 
 def stops(problem: Problem, solution: Solution, found: Margins | None) -> str:
-    """Return the visits in numbers.
+    """Return the table of visits in numbers.
 
     Parameters
     ----------
     problem : Problem
-        Of the solution.
+        Problem of the solution.
     solution : Solution
-        With a tour.
+        Solution with a tour.
     found : Margins, optional
-        Of the tour, if it has any.
+        Margins of the tour, if it has any.
 
     Returns
     -------
     str
-        An element.
+        HTML element.
     """
     u = problem.units
     north = "from north" if problem.origin else "from y"
@@ -190,19 +193,19 @@ def _course(problem: Problem, path: np.ndarray) -> str:
 
 
 def tethers(problem: Problem, solution: Solution) -> str:
-    """Return how the tether runs at every visit, and what to do if it snags there or on the way on.
+    """Return the course of the tether at each visit, and what to do if it snags from there on.
 
     Parameters
     ----------
     problem : Problem
-        Of the solution.
+        Problem of the solution.
     solution : Solution
-        Whose tour is not entangled.
+        Solution whose tour is not entangled.
 
     Returns
     -------
     str
-        An element.
+        HTML element.
     """
     longest = max(v.tether_length for v in solution.tour)
     paths = TautPaths(problem, 2.0 * max(problem.tether_length, longest))

@@ -1,4 +1,4 @@
-"""The map of a page: axes, scale bar, north, obstacles and goals by name, visits by number."""
+"""Map of a page: axes, scale bar, north, obstacles and goals by name, visits by number."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ BOTTOM_MARGIN = 46.0
 """Space for the numbers of the x axis, pixels."""
 
 FATE_LETTERS = 6
-"""Number of letters beside the name of a goal that was left out or cancelled, less those that fit
-into the margin."""
+"""Number of letters that the fate of a goal adds to its name, beyond those that fit in the
+margin."""
 
 MAX_CHART_NAMES = 40
 """Maximum number of goals or obstacles with names; more names would cover each other."""
@@ -110,7 +110,7 @@ class View:
 
     @classmethod
     def of(cls, problem: Problem, film: Film) -> View:
-        """Return the view of a problem, and of all that a film shows.
+        """Return the view that contains a problem and all moments of a film.
 
         Parameters
         ----------
@@ -127,7 +127,7 @@ class View:
         return cls(problem, np.vstack([m.nodes for m in film.moments]))
 
     def point(self, p: npt.ArrayLike) -> list[float]:
-        """Return a place in the picture."""
+        """Return the pixel of a place, x and y."""
         x, y = np.asarray(p, dtype=float)[:2]
         return [
             round(LEFT_MARGIN + float(x - self.low[0]) * self.scale, 2),
@@ -135,7 +135,7 @@ class View:
         ]
 
     def points(self, line: Floats) -> str:
-        """Return a line in the picture."""
+        """Return the pixels of a line, as the attribute `points` of SVG."""
         return " ".join(f"{x},{y}" for x, y in (self.point(p) for p in line))
 
 
@@ -155,22 +155,22 @@ def draw(
     problem : Problem
         What is shown.
     solution : Solution
-        Its tour.
+        Solution with the tour.
     view : View
-        Of the problem.
+        View of the problem.
     fates : dict
-        Of goals that were not visited.
+        Fates of goals that were not visited.
     maps : sequence of (float, Problem)
-        The problem as it was from some seconds on, where it changed.
+        Maps of a run that changed, each with the time, s, from which it applied.
     driven : ndarray, shape (k, 3), optional
-        Of a run, where the robot went; the tour is then drawn as what was planned.
+        Path of the robot in a run; the tour is then drawn as a plan.
     order : mapping of int to int, optional
-        Of goals, the numbers of their visits; by default as in the tour.
+        Number of the visit of each goal; by default as in the tour.
 
     Returns
     -------
     str
-        An element.
+        SVG or HTML element.
     """
     if order is None:
         order = {v.goal: n for n, v in enumerate(solution.tour, 1)}
@@ -204,12 +204,12 @@ def legend(*, run: bool = False) -> str:
     Parameters
     ----------
     run : bool
-        Of a run, whose plan is drawn besides.
+        Whether the map is of a run, which has a path and a plan.
 
     Returns
     -------
     str
-        An element.
+        SVG or HTML element.
     """
     marks = [(mark, "path" if run and text == "tour" else text) for mark, text in LEGEND]
     if run:
@@ -230,9 +230,9 @@ def round_step(span: float, parts: float) -> float:
     Parameters
     ----------
     span : float
-        Positive.
+        Positive number.
     parts : float
-        Most parts.
+        Maximum number of parts.
 
     Returns
     -------
@@ -247,7 +247,7 @@ def round_step(span: float, parts: float) -> float:
 
 
 def _frame(problem: Problem, view: View) -> list[str]:
-    """Axes with numbers, a light grid, the scale bar and north."""
+    """Return axes with numbers, a light grid, the scale bar and the north arrow."""
     units = html.escape(problem.units)
     step = round_step(float((view.high - view.low).max()), 10.0)
     left, top = view.point([view.low[0], view.high[1]])
@@ -330,7 +330,7 @@ def _obstacles(problem: Problem, view: View) -> list[str]:
 
 
 def _passing(maps: Maps, view: View) -> list[str]:
-    """Obstacles that stood there for a time only."""
+    """Return the obstacles that stood for a part of the run only."""
     out = []
     look = (
         f'fill="{style.OBSTACLE}" fill-opacity="0.6" stroke="{style.EDGE}" stroke-dasharray="5 3"'
@@ -348,7 +348,7 @@ def _passing(maps: Maps, view: View) -> list[str]:
 
 
 def _planned(path: Floats, view: View) -> list[str]:
-    """Return the path that was planned at first."""
+    """Return the planned path."""
     return [
         f'<polyline points="{view.points(path)}" fill="none" stroke="{style.PLAN}" '
         'stroke-width="1.5" stroke-dasharray="6 4"/>'
@@ -401,7 +401,7 @@ def _goals(
 
 
 def _star(x: float, y: float) -> str:
-    """Corners of a star, the mark of the base in all pictures."""
+    """Return the corners of a star, the mark of the base in all pictures."""
     angle = np.pi * (np.arange(10) / 5.0 - 0.5)
     radius = np.where(np.arange(10) % 2, 4.0, 10.0)
     corners = zip(x + radius * np.cos(angle), y + radius * np.sin(angle), strict=True)

@@ -12,7 +12,7 @@ from netsp.view.pictures import style
 from netsp.view.report.stats import Cell, Summary, gap_over_time, over_best, profile, summary
 
 MIN_AXIS_HEIGHT = 1.0
-"""Minimum height of a linear axis: one per cent, or one obstacle, is a difference worth showing."""
+"""Minimum range of a linear axis: 1 %, or one obstacle, the smallest difference worth showing."""
 
 LINES, MARKERS = ("-", "--", "-.", ":"), "os^Dv<>"
 
@@ -26,13 +26,13 @@ def _figure(columns: int = 1) -> tuple[Any, Any]:
 
 def _style(k: int) -> dict[str, Any]:
     colours = len(style.SERIES)
-    # curves that coincide are told apart by their dashes, in grey as well
+    # dashes distinguish curves that coincide, also in grey prints
     look = {"color": style.SERIES[k % colours], "linestyle": LINES[k % len(LINES)]}
     return {**look, "marker": MARKERS[k % len(MARKERS)], "ms": 4.0}
 
 
 def _legend(panel: Any) -> None:
-    """Beside the panel, where it hides no curve."""
+    """Place the legend beside the panel, where it hides no curve."""
     panel.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.02, 1.0), handlelength=3.0)
 
 
@@ -64,7 +64,7 @@ def by_goals(
                 spread = [mid - [s.low for _, s in points], [s.high for _, s in points] - mid]
                 panel.errorbar(at, mid, spread, label=name, capsize=2, lw=1.2, **_style(k))
         panel.set(title=f"tether {tether:g}", xlabel="number of goals", xticks=goals)
-        if not span:  # all beside the one number, which stands in the middle
+        if not span:  # a single number is centred
             panel.set_xlim(0.9 * goals[0], 1.1 * goals[0])
         panel.grid(alpha=0.3)
         if log:
@@ -78,19 +78,19 @@ def by_goals(
 
 
 def lengths(cells: dict[Cell, list[TrialRow]], best: dict[str, float]) -> Any:
-    """Per cent over the best known, as Fig. 5a to c."""
+    """Draw the excess over the best known length in per cent, as Fig. 5a to c."""
     return by_goals(cells, lambda r: over_best(r, best), "% over the best known", log=False)
 
 
 def times(cells: dict[Cell, list[TrialRow]]) -> Any:
-    """Seconds, roadmap and legs included, as Fig. 5d to f."""
+    """Draw the time including roadmap and legs, s, as Fig. 5d to f."""
     return by_goals(
         cells, lambda r: r["total_s"] if r.get("length") else None, "time (s)", log=True
     )
 
 
 def entanglements(cells: dict[Cell, list[TrialRow]]) -> Any | None:
-    """Obstacles entangled by baselines that are blind to the tether; None without any."""
+    """Draw the obstacles that tether-blind baselines entangle; None without such baselines."""
     blind = {c: rows for c, rows in cells.items() if any(r["status"] == "invalid" for r in rows)}
     if not blind:
         return None
@@ -133,7 +133,7 @@ def performance(by_method: dict[str, list[TrialRow]]) -> Any | None:
 
 
 def anytime(by_method: dict[str, list[TrialRow]], best: dict[str, float]) -> Any | None:
-    """Median per cent over the best known against time; None without histories."""
+    """Draw the median excess over the best known length by time; None without histories."""
     from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 
     last = max((r.get("total_s", 0.0) for rows in by_method.values() for r in rows), default=0.0)

@@ -1,5 +1,8 @@
-"""One self-contained page about a planned mission, or about a flight: pictures, the waypoints in
-their order with what the tether does there, the judge's checks, what happened on the way."""
+"""Self-contained page about a planned mission or a flight.
+
+It has pictures, the waypoints in order with the tether at each, the judge's checks, and the events
+of a flight.
+"""
 
 from __future__ import annotations
 
@@ -108,8 +111,7 @@ def _summary(mission: Mission, scene: Scene, summary: dict[str, Any]) -> str:
 
 
 def _planned(tour: PlannedTour, mission: Mission, unit: str) -> str:
-    """Return in words what is proven of a tour, among all tours or among those between the states
-    found."""
+    """Return in words what is proven about a tour, and for which scope."""
     proof = "found"
     if tour.status is Status.OPTIMAL:
         proof = f"{tour.status.verdict} among {Scope.ALL_TOURS.tours} to its waypoints"
@@ -143,7 +145,7 @@ def _planned(tour: PlannedTour, mission: Mission, unit: str) -> str:
 
 
 def _picture(scene: Scene, line: Floats, name: str, stops: WaypointMarks) -> str:
-    """Return a figure as an image made of lines; the triangles of a mesh would take megabytes."""
+    """Return a figure as an SVG image of lines; the triangles of a mesh would take megabytes."""
     out = io.BytesIO()
     style.literal(figure_of(scene, line, name, stops)).savefig(out, format="png", dpi=110)
     data = base64.b64encode(out.getvalue()).decode()
@@ -154,7 +156,7 @@ def _picture(scene: Scene, line: Floats, name: str, stops: WaypointMarks) -> str
 
 
 def _waypoints(mission: Mission, summary: dict[str, Any]) -> str:
-    """Return a row for each waypoint."""
+    """Return the table of waypoints."""
     tour = mission.tour
     flown = {int(s["waypoint"]): s for s in summary.get("stops", ())}
     words = {int(s["waypoint"]): s for s in (summary.get("words") or {}).get("stops", ())}
@@ -201,7 +203,7 @@ def _waypoints(mission: Mission, summary: dict[str, Any]) -> str:
 
 
 def _repairs(summary: dict[str, Any]) -> str:
-    """Surprises and what was done about them."""
+    """Return the table of surprises and repairs."""
     surprises, repairs = summary.get("surprises"), summary.get("repairs") or ()
     if not surprises:
         return "<p>Nothing unforeseen happened.</p>"

@@ -1,4 +1,4 @@
-"""Maps of a page that move: one slider and a play button for all of them."""
+"""Animation of the maps of a page: one slider and one play button move all of them."""
 
 from __future__ import annotations
 
@@ -93,14 +93,14 @@ def script(films: Sequence[Film], views: Sequence[View]) -> str:
     Parameters
     ----------
     films : sequence of Film
-        Of the plane.
+        Films in the plane.
     views : sequence of View
-        Of each map.
+        View of each map.
 
     Returns
     -------
     str
-        Elements.
+        HTML elements.
     """
     steps = steps_of(films, MOVING_FRAMES + 1)[1]
     shown = [

@@ -1,4 +1,4 @@
-"""A solution or the folder of a run, read with its problem, and found to belong together."""
+"""Contents of a solution file or of the folder of a run, checked to belong together."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from netsp.world.scene.scene import Scene
 
 @contextmanager
 def reading_run(source: str | Path | None) -> Iterator[None]:
-    """Raise InputError, which names the source, for errors that files of a damaged run cause."""
+    """Turn errors that damaged files of a run cause into InputError, which names the source."""
     try:
         yield
     except (KeyError, IndexError, ValueError, TypeError, OverflowError) as error:
@@ -54,17 +54,17 @@ class Opened:
     Parameters
     ----------
     problem : Problem
-        The site.
+        Problem of the solution.
     solution : Solution
-        With a tour.
+        Solution with a tour.
     rows : list of dict
-        Of a run's log; empty for a solution.
+        Rows of the log of a run; empty for a solution.
     tethers : list of dict or None
-        Of a run.
+        Tethers of a run; None for a solution.
     run : Path or None
-        Its folder.
+        Folder of a run; None for a solution.
     maps : sequence of (float, Problem)
-        The site as it was from some seconds on; the first from 0.
+        Maps of a run, each with the time, s, from which it applied; the first from 0.
     """
 
     problem: Problem
@@ -76,14 +76,14 @@ class Opened:
 
     @property
     def driven(self) -> Floats | None:
-        """(k, 3) where the robot of a run went; None of a solution."""
+        """Path (k, 3) of the robot in a run; None for a solution."""
         if not self.rows:
             return None
         return np.array([[float(r[k]) for k in "xyz"] for r in self.rows])
 
     @property
     def order(self) -> dict[int, int] | None:
-        """Numbers of the visits to the goals that a run visited; None for a solution.
+        """Number of the visit to each goal that a run visited; None for a solution.
 
         Raises
         ------
@@ -97,8 +97,13 @@ class Opened:
 
     @property
     def fates(self) -> dict[int, str]:
-        """Goals that a run did not visit, and why not in two words; InputError if its summary is
-        damaged."""
+        """Goals that a run did not visit, with the reason in two words.
+
+        Raises
+        ------
+        InputError
+            The summary of the run is damaged.
+        """
         if self.run is None:
             return {}
         file = self.run / "summary.json"
@@ -127,7 +132,7 @@ class Opened:
         summary = json_of(self.run / "summary.json")
         left = {int(x["goal"]): self._covered(int(x["goal"])) for x in summary["left_out"]}
         cancelled = [int(g) for g in summary["cancelled"]]
-        times = summary.get("cancelled_s", [math.inf] * len(cancelled))  # runs of before have none
+        times = summary.get("cancelled_s", [math.inf] * len(cancelled))  # older runs have none
         visited = {int(v["goal"]): float(v["time"]) for v in visits if int(v["goal"]) != HOME}
         return {
             VISITED: visited,
@@ -136,7 +141,7 @@ class Opened:
         }
 
     def _covered(self, goal: int) -> float:
-        """Since when an obstacle stands on a goal; inf where it was left out for another reason."""
+        """Return the time, s, from which an obstacle covers a goal; inf if none does."""
         for time, problem in self.maps:
             if goal < len(problem.goals):
                 place, min_distance = problem.goals[goal].position[:2], problem.clearance
@@ -155,7 +160,7 @@ class OpenedMission:
     Attributes
     ----------
     mission
-        Planned, or as it was flown.
+        Mission, as planned or as flown.
     run
         Folder of the flight; None if it was not flown.
     """
@@ -174,7 +179,7 @@ class OpenedMission:
         Raises
         ------
         InputError
-            A file of the flight is damaged; a mission without a tour that was not flown either.
+            A file of the flight is damaged, or the mission has no tour and was not flown.
         """
         if self.run is None:
             return film_of_mission(self.mission, self.scene, count)
@@ -193,7 +198,7 @@ def open_result(
     Raises
     ------
     InputError
-        Files that cannot be read, or do not belong together.
+        A file cannot be read, or the files do not belong together.
     """
     place = Path(source)
     if not place.is_dir():
@@ -205,12 +210,12 @@ def open_result(
 
 
 def opened(source: str | Path, problem_file: str | Path | None) -> Opened:
-    """Return a solution file, whose problem is named, or the folder of a run in the plane.
+    """Return the contents of a solution file and its problem file, or of a planar run's folder.
 
     Raises
     ------
     InputError
-        Files that cannot be read, or do not belong together.
+        A file cannot be read, or the files do not belong together.
     """
     file: str | Path = source
     run = Path(source) if Path(source).is_dir() else None
@@ -272,5 +277,5 @@ def _maps_of(file: Path) -> list[tuple[float, Problem]]:
 
 
 def json_of(file: Path) -> Any:
-    """Return the contents of a JSON file of a run; InputError if it is no JSON."""
+    """Return the contents of a JSON file of a run; raise InputError if it is not JSON."""
     return parse_json(read_text(file), str(file))

@@ -1,4 +1,4 @@
-"""One self-contained page about a comparison: figures, tables, and the rows behind each number."""
+"""Self-contained page about a comparison of solvers: figures, tables, and all rows."""
 
 from __future__ import annotations
 
@@ -42,9 +42,10 @@ CAPTIONS = {
 
 
 def write_report(results: str | Path, output: str | Path, pictures: str | None = None) -> Path:
-    """Write the page for a results file; with `pictures` (svg, png or pdf) the figures beside it.
+    """Write the page about a results file, and return its path.
 
-    Raises InputError if the results cannot be read or hold no trial.
+    With `pictures` (svg, png or pdf), also write the figures as files beside it. Raises InputError
+    if the results cannot be read or have no trial.
     """
     rows = read_rows(results)
     if not rows:
@@ -150,7 +151,7 @@ def _cells_table(by_cell: dict[Cell, list[TrialRow]], best: dict[str, float]) ->
 
 
 def _proofs_table(by_cell: dict[Cell, list[TrialRow]]) -> str:
-    """Table I: mean seconds of the trials proven, and how many of how many."""
+    """Return Table I: the mean time of proven trials, s, and their number of all trials."""
     out = []
     for method in dict.fromkeys(c.method for c in by_cell):
         rows_of_method = {
@@ -203,7 +204,7 @@ def _failures_table(rows: list[TrialRow]) -> str:
 
 
 def _rows_link(rows: list[TrialRow], best: dict[str, float]) -> str:
-    """Return a link to every row as CSV within the page."""
+    """Return a link to all rows as CSV, which the page contains."""
     out = io.StringIO()
     names = [
         "status",

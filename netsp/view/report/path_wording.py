@@ -1,4 +1,4 @@
-"""Words for the figures of paths, as the command line and the page show them."""
+"""Wording of the measures of paths, for the command line and the page."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from netsp.study.paths import PathMeasures
 from netsp.study.paths.free_route import Stretch
 
 MIN_PERCENT = 0.005
-"""Smallest difference of two lengths that is shown, in percent. Smaller ones come from drawing:
-arcs of drawn tours are circumscribed."""
+"""Smallest difference of two lengths that is shown, per cent. Smaller ones come from the polylines
+that circumscribe arcs."""
 
 
 def path_rows(m: PathMeasures) -> list[tuple[str, str]]:
-    """Return the figures of a path with their names.
+    """Return the names and values of the measures of a path.
 
     Parameters
     ----------
     m : PathMeasures
-        Figures of the path.
+        Measures of the path.
 
     Returns
     -------

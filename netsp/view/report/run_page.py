@@ -1,4 +1,4 @@
-"""The log of a run on a page: its rows, and the tether over time."""
+"""Log of a run on a page: its rows, and the tether over time."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from netsp.view.pictures import style
 
 
 def rows_of(file: Path) -> list[dict[str, str]]:
-    """Return the rows of a table of a run.
+    """Return the rows of a CSV file of a run.
 
     Parameters
     ----------
     file : Path
-        CSV.
+        CSV file.
 
     Returns
     -------
@@ -34,18 +34,18 @@ def over_time(t: Floats, length: Floats, limit: Floats, units: str) -> str:
     Parameters
     ----------
     t : ndarray, shape (n,)
-        Seconds.
+        Times, s.
     length : ndarray, shape (n,)
-        Of the tether.
+        Tether lengths.
     limit : ndarray, shape (n,)
-        That it may have.
+        Limits of the tether length.
     units : str
-        Of lengths.
+        Unit of lengths.
 
     Returns
     -------
     str
-        An element.
+        SVG element.
     """
     thin = slice(None, None, max(1, len(t) // 1200))
     top = 1.05 * float(max(length.max(), limit.max()))
@@ -85,7 +85,7 @@ def over_time(t: Floats, length: Floats, limit: Floats, units: str) -> str:
 
 
 def _ticks(top: float) -> list[float]:
-    """Round numbers from 0 to at most `top`, four to eight of them."""
+    """Return four to eight round numbers from 0 to at most `top`."""
     step = 10.0 ** np.floor(np.log10(top / 4.0))
     step *= next(k for k in (10.0, 5.0, 2.0, 1.0) if k * step <= top / 3.0)
     return [float(v) for v in step * np.arange(int(top / step) + 1)]

@@ -1,4 +1,4 @@
-"""A page of tours or runs side by side, which one slider moves."""
+"""Page of tours or runs side by side, with one slider for all."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ body { max-width: none } .beside { display: flex; flex-wrap: wrap; gap: 1em 2em 
 
 
 def save_beside(opened: Sequence[Opened], output: str | Path) -> None:
-    """Write the page.
+    """Write a page of tours or runs side by side.
 
     Parameters
     ----------
     opened : sequence of Opened
-        From left to right.
+        Tours or runs from left to right.
     output : str or Path
-        The file; replaced when it is there.
+        File to write; an existing one is replaced.
 
     Raises
     ------
     InputError
-        A file of a run is damaged; the page cannot be written.
+        A file of a run is damaged, or the page cannot be written.
     """
     films = [one.film(moving.MOVING_FRAMES) for one in opened]
     views = [chart.View.of(one.problem, film) for one, film in zip(opened, films, strict=True)]

@@ -14,11 +14,11 @@ from netsp.model.solution import Status, solution_scope
 from netsp.study.compare.rows import FAILED, TrialRow
 
 SAME_RESULT_TOLERANCE = 1e-6
-"""Tolerance of two lengths of the same tour, summed in another order, per cent."""
+"""Tolerance, per cent, for the length of one tour when it is summed in another order."""
 
 MAX_CLOSED_GAP = 1e-5
-"""Tolerance of the gap of a proven tour, as a share of the length: paths from a robot's state are
-proven to this share only."""
+"""Tolerance of the gap of a proven tour; the least accurate proofs are those of paths from a
+robot's state."""
 
 CONFIDENCE = 0.95
 """Confidence level of the intervals around medians."""
@@ -26,7 +26,7 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Cell:
-    """Place of a row in a table."""
+    """Cell of a table: method, number of goals and tether length."""
 
     method: str
     goals: int
@@ -45,7 +45,7 @@ class Summary:
 
 
 def methods(rows: Iterable[TrialRow]) -> dict[str, list[TrialRow]]:
-    """Rows by method: the solver's label, and the roadmap's where there are several."""
+    """Return rows by method: the label of the solver, and of the roadmap if there are several."""
     rows = list(rows)
     several = len({r["roadmap"]["label"] for r in rows}) > 1
     out: dict[str, list[TrialRow]] = defaultdict(list)
@@ -56,7 +56,7 @@ def methods(rows: Iterable[TrialRow]) -> dict[str, list[TrialRow]]:
 
 
 def cells(by_method: dict[str, list[TrialRow]]) -> dict[Cell, list[TrialRow]]:
-    """Rows by method, goals and tether length."""
+    """Return rows by method, number of goals and tether length."""
     out: dict[Cell, list[TrialRow]] = defaultdict(list)
     for method, rows in by_method.items():
         for row in rows:
@@ -66,7 +66,7 @@ def cells(by_method: dict[str, list[TrialRow]]) -> dict[Cell, list[TrialRow]]:
 
 
 def best_lengths(rows: Iterable[TrialRow]) -> dict[str, float]:
-    """Shortest tour known of each problem, by its sha256; tours that entangle do not count."""
+    """Return the length of the best known valid tour of each problem, by its sha256."""
     out: dict[str, float] = {}
     for row in rows:
         if row.get("length") is not None and row["status"] != "invalid":
@@ -76,7 +76,7 @@ def best_lengths(rows: Iterable[TrialRow]) -> dict[str, float]:
 
 
 def over_best(row: TrialRow, best: dict[str, float]) -> float | None:
-    """Per cent by which a row's tour is longer than the best of its problem."""
+    """Return the excess of a row's tour over the best of its problem, per cent."""
     key = row.get("problem_sha256")
     if row.get("length") is None or key not in best:
         return None
@@ -85,8 +85,11 @@ def over_best(row: TrialRow, best: dict[str, float]) -> float | None:
 
 
 def summary(values: Sequence[float]) -> Summary | None:
-    """Median with its distribution-free interval: between the order statistics that hold it with
-    `CONFIDENCE` by the binomial distribution; with few trials that is from least to greatest."""
+    """Return the median with a distribution-free confidence interval (`CONFIDENCE`).
+
+    Its ends are order statistics by the binomial distribution; with few trials, they are the
+    minimum and the maximum.
+    """
     if not values:
         return None
     x = np.sort(np.asarray(values, dtype=float))
@@ -99,38 +102,32 @@ def summary(values: Sequence[float]) -> Summary | None:
 
 
 def failures(rows: Iterable[TrialRow]) -> list[TrialRow]:
-    """Rows that came to nothing."""
+    """Return the rows without a result."""
     return [r for r in rows if r["status"] in FAILED or r["status"] == "no_solution_found"]
 
 
 def is_proven(row: TrialRow) -> bool:
-    """Say whether a row's tour is the shortest of the tours that its bound holds for: of all, of
-    its roadmap, or of its rule for classes.
+    """Return whether a row's tour is proven to be the shortest of the scope of its bound.
 
     Parameters
     ----------
     row : dict
-        A trial's.
-
-    Returns
-    -------
-    bool
-        False where the bound is open.
+        Row of a trial.
     """
     try:
         status = Status(row["status"])
-    except ValueError:  # of a failed trial
+    except ValueError:  # the trial failed
         return False
     return status.is_optimal and (row.get("gap") or 0.0) <= MAX_CLOSED_GAP
 
 
 def bound_of(row: TrialRow) -> LowerBound | None:
-    """Return the lower bound of a row, with the tours that it holds for.
+    """Return the lower bound of a row with its scope, or None.
 
     Parameters
     ----------
     row : dict
-        A trial's; one of an older version does not say which tours, but its roadmap does.
+        Row of a trial. Rows of older versions have no scope; it follows from their roadmap.
 
     Returns
     -------
@@ -148,9 +145,12 @@ def bound_of(row: TrialRow) -> LowerBound | None:
 
 
 def profile(by_method: dict[str, list[TrialRow]]) -> dict[str, Floats]:
-    """Return, for each method, the sorted ratios of its time to proof to the fastest method's
-    (Dolan & Moré 2002), over the problems that any method proved. Unproven problems are inf;
-    methods without any proof are left out."""
+    """Return the performance profile of each method (Dolan & Moré 2002).
+
+    It consists of the sorted ratios of its time to proof to that of the fastest method, over the
+    problems that any method proved; inf if the method did not prove the problem. Methods without a
+    proof are left out.
+    """
     times: dict[str, dict[tuple[str, int], float]] = {}
     for method, rows in by_method.items():
         proven = {(r["problem_sha256"], r["seed"]): r["total_s"] for r in rows if is_proven(r)}
@@ -165,8 +165,10 @@ def profile(by_method: dict[str, list[TrialRow]]) -> dict[str, Floats]:
 
 
 def gap_over_time(rows: Iterable[TrialRow], best: dict[str, float], times: Floats) -> Floats | None:
-    """Median per cent over the best known at given times, of anytime solvers; inf before the first
-    tour. None if no row has a history."""
+    """Return the median excess over the best known length at given times, per cent.
+
+    It is inf before the first tour. Return None if no row has a history.
+    """
     curves = []
     for row in rows:
         history = row.get("history") or []

@@ -1,6 +1,8 @@
-"""One self-contained page about a solution or a run, to print and take along: a map with a slider
-that moves the robot and its taut tether, the goals in their order, how the tether runs, margins,
-the checks, measures of entanglement, a run's log."""
+"""Self-contained page about a solution or a run, which can be printed.
+
+It has a map with a slider that moves the robot and its taut tether, the goals in order, the course
+of the tether, margins, the judge's checks, measures of entanglement, and the log of a run.
+"""
 
 from __future__ import annotations
 
@@ -88,7 +90,7 @@ def page(what: Opened) -> str:
 
 
 def _proof(solution: Solution) -> str:
-    """Return words for what is proven of a tour, with the status first if that is no proof."""
+    """Return in words what is proven about a tour, after the status unless that says it."""
     status = solution.status
     return solution.proof if status.is_optimal else f"{status.value}, {solution.proof}"
 
@@ -115,7 +117,7 @@ def _summary(problem: Problem, solution: Solution, what: Opened) -> str:
 
 
 def lengths_of(rows: Sequence[dict[str, str]]) -> tuple[Floats, Floats, Floats, Bools]:
-    """Return time, tether, limit, and whether the tether is being shortened, by rows of a log."""
+    """Return time (s), tether length, limit, and whether the tether is being shortened, by row."""
     t, tether, limit = (np.array([float(r[k]) for r in rows]) for k in ("time", "tether", "limit"))
     return t, tether, limit, np.array([r.get("shortening") == "True" for r in rows], dtype=bool)
 
@@ -127,8 +129,7 @@ def _reached(
     fates: dict[int, str],
     rows_of_log: Sequence[dict[str, str]],
 ) -> str:
-    """Return a table of the visits that were made, in their order, and of the goals that were not
-    reached."""
+    """Return a table of the visits in order, and of the goals that were not visited."""
     times, _, limits, _ = lengths_of(rows_of_log)
     u, planned = problem.units, {v.goal: v for v in solution.tour}
     head = [
