@@ -81,7 +81,7 @@ class SearchingRun(SolverRun):
         core = least_tethers(
             graph.costs_to_base, graph.cluster, policy.proof_search.first_tour_vertices
         )
-        search = Search(self._among(core), self.rng, clock=self.clock)
+        search = Search(self.instance_among(core), self.rng, clock=self.clock)
         search.settle()
         self.offer_incumbent_from(search)
         self.report("begun", vertices=len(graph))
@@ -101,12 +101,12 @@ class SearchingRun(SolverRun):
         for _ in range(policy.max_searches):
             before = self.length
             core = np.union1d(core, np.array(self.tour or (0,), dtype=np.int64))
-            self._search(self._among(core), clock)
+            self._search(self.instance_among(core), clock)
             self.report("begun", vertices=len(graph))
             vain = 0 if self.length < before else vain + 1
             if clock.is_up or self.tour is None or vain == policy.max_vain_searches:
                 break
-            core = self._near_incumbent()
+            core = self.classes_near_incumbent()
         return core
 
     def on_cover_bound(self, bound: float, cells: int, classes: Ints) -> tuple[int, ...] | None:
@@ -130,7 +130,7 @@ class SearchingRun(SolverRun):
         if len(classes):
             core = np.union1d(classes, np.array(self.tour or (0,), dtype=np.int64))
             share = self.gtsp_policy.proof_search.search_time_share
-            self._search(self._among(core), self.clock.part(share))
+            self._search(self.instance_among(core), self.clock.part(share))
         self.report("covers", vertices=cells)
         return self.tour
 
@@ -145,8 +145,8 @@ class SearchingRun(SolverRun):
         graph = self.graph
         core = least_tethers(graph.costs_to_base, graph.cluster, self.searched_classes_per_goal)
         if self.tour is not None:
-            core = np.union1d(core, self._near_incumbent())
-        instance = self._among(core)
+            core = np.union1d(core, self.classes_near_incumbent())
+        instance = self.instance_among(core)
         tours = [] if self.tour is None else [self.tour]
         for _ in range(count):
             if clock.is_up:
@@ -161,7 +161,8 @@ class SearchingRun(SolverRun):
                 tours.append(tour)
         return tours
 
-    def _near_incumbent(self) -> Ints:
+    def classes_near_incumbent(self) -> Ints:
+        """Return the vertices near the incumbent or the base that a search sees."""
         graph, tour = self.graph, self.tour or (0,)
         return classes_near_tour(
             graph.costs_to_base,
@@ -172,7 +173,8 @@ class SearchingRun(SolverRun):
             self.gtsp_policy.neighbourhood,
         )
 
-    def _among(self, vertices: Ints) -> Instance:
+    def instance_among(self, vertices: Ints) -> Instance:
+        """Return the instance of some vertices that a search sees."""
         return Instance.among(self.graph, vertices, self.gtsp_policy.local_search)
 
     @contextmanager

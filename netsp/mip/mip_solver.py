@@ -107,11 +107,13 @@ class MipRun(SearchingRun):
         matrices would wait for the garbage collector.
     cuts
         Cuts that the root had in the end.
+    goal_bound
+        Bound over goals or covers, which the proof adopts; None if there is none.
     """
 
     root: Root | None = None
     cuts: Sequence[Cut] = ()
-    _goal_bound: GoalBound | None = None
+    goal_bound: GoalBound | None = None
     _costs: CostMatrix | None = None
     _merged: Ints = np.zeros(0, dtype=np.int64)
 
@@ -152,7 +154,7 @@ class MipRun(SearchingRun):
                         if core is not None or (self.graph.roadmapped and has_many):
                             self.bound_by_goals(backend)
                             if self._root_is_hopeless:
-                                search_and_merge(self, self._solve_merged, policy.merging)
+                                search_and_merge(self, self.solve_merged_tours, policy.merging)
                         if core is not None and not self.is_done:
                             # only now, because covers may take longer than the core's share
                             core.start_time_share()
@@ -160,7 +162,7 @@ class MipRun(SearchingRun):
                             core.known_length = min(core.known_length, self.length)
                             core.prove(backend, walks=walks)
                     warm = core.program() if core is not None else None
-                if not (self.is_done and self._uses_sparse_costs):
+                if not (self.is_done and self.uses_sparse_costs):
                     self.prove(backend, walks=walks, warm=warm)
         if self.root is not None:
             self.cuts, self.root = self.root.lp.cuts, None
@@ -174,7 +176,7 @@ class MipRun(SearchingRun):
         warm
             Program of a proof over a core of the classes, which has searched already.
         """
-        costs, self._costs = self._costs or self._initial_costs(), None
+        costs = self.starting_costs()
         if warm is None:
             self.search(costs)
             self.report("heuristic", vertices=len(costs))
@@ -183,14 +185,19 @@ class MipRun(SearchingRun):
         if not (self.is_done or self.is_infeasible):
             self.cut(costs, backend, warm)
 
+    def starting_costs(self) -> CostMatrix:
+        """Return the costs that a proof starts from, those that a bound has measured if it has."""
+        costs, self._costs = self._costs or self._initial_costs(), None
+        return costs
+
     def _initial_costs(self) -> CostMatrix:
         """Return the costs of all legs or, if costs are sparse, of the legs that a cover leaves."""
-        graph, bound, policy = self.graph, self._goal_bound, self.mip_policy
-        if not self._uses_sparse_costs or bound is None or self.tour is None:
+        graph, bound, policy = self.graph, self.goal_bound, self.mip_policy
+        if not self.uses_sparse_costs or bound is None or self.tour is None:
             return CostMatrix(graph, policy=self.gtsp_policy.costs)
         if bound.cells is None:
             # half of the time was too little for a cover, so a search makes more of the rest
-            search_and_merge(self, self._solve_merged, policy.merging)
+            search_and_merge(self, self.solve_merged_tours, policy.merging)
             self.check()
             return CostMatrix(graph, policy=self.gtsp_policy.costs)
         odd = odd_letters(graph.signatures)
@@ -207,18 +214,18 @@ class MipRun(SearchingRun):
             return run.solve(backend, None), run.cuts
 
         try:
-            self._goal_bound = bound_over_goals(
+            self.goal_bound = bound_over_goals(
                 graph,
                 prove,
                 self._goal_limits(),
                 self.tour if self._uses_covers else None,
-                self._cover_costs(),
+                self.cover_costs(),
                 self.on_cover_bound,
                 policy,
             )
         finally:
             self.raise_bound(graph.bound_in_any_class)
-        self.raise_bound(self._goal_bound.bound)
+        self.raise_bound(self.goal_bound.bound)
         self.report("goals", vertices=len(self.graph))
 
     def _goal_limits(self) -> Limits:
@@ -226,7 +233,7 @@ class MipRun(SearchingRun):
         policy, uses_covers = self.mip_policy, self._uses_covers
         share = self._cover_time_share if uses_covers else policy.time.goal_share
         seconds = share * self.clock.left
-        if self._uses_sparse_costs:
+        if self.uses_sparse_costs:
             seconds = max(seconds, min(policy.time.min_sparse_s, 0.5 * self.clock.left))
         clock = Clock(seconds, within=self.clock) if self.clock.limit else self.clock
         # the program over all classes says nothing of classes that were left out
@@ -234,7 +241,7 @@ class MipRun(SearchingRun):
         programs = policy.goals.max_programs_before_proof if proof_follows else None
         return Limits(clock, iterations=programs, rng=self.rng)
 
-    def _cover_costs(self) -> CoverCosts:
+    def cover_costs(self) -> CoverCosts:
         """Return the costs of legs for covers, which the proof over all classes uses again."""
         graph = self.graph
 
@@ -245,7 +252,7 @@ class MipRun(SearchingRun):
         def keep(sparse: SparseCosts) -> None:
             self._costs = CostMatrix(graph, sparse, policy=self.gtsp_policy.costs)
 
-        if self._uses_sparse_costs:
+        if self.uses_sparse_costs:
             return CoverCosts(on_sparse=keep)
         is_known = self._uses_covers and graph.complete and self._measures_all_legs
         return CoverCosts(matrix=matrix if is_known else None)
@@ -261,10 +268,10 @@ class MipRun(SearchingRun):
         """True if covers come first, which pays only with many goals and classes."""
         has_many = self.graph.goal_count >= self.mip_policy.many_goals
         has_many_classes = len(self.graph) > self.mip_policy.covers.min_classes
-        return (has_many_classes and has_many) or self._uses_sparse_costs
+        return (has_many_classes and has_many) or self.uses_sparse_costs
 
     @property
-    def _uses_sparse_costs(self) -> bool:
+    def uses_sparse_costs(self) -> bool:
         """True if there are too many classes for a matrix of all legs."""
         graph = self.graph
         # with many goals, all that covers prove is to hold for classes left out, too
@@ -278,7 +285,7 @@ class MipRun(SearchingRun):
         policy, classes = self.mip_policy.time, len(self.graph)
         if self.graph.goal_count > self.mip_policy.large_goal_count:
             return policy.cover_share  # covers close the gap there
-        if self._uses_sparse_costs and self.graph.goal_count <= policy.max_sparse_goals:
+        if self.uses_sparse_costs and self.graph.goal_count <= policy.max_sparse_goals:
             least = policy.min_sparse_share
             share = policy.cover_share * (classes / policy.sparse_classes) ** 3
         else:
@@ -320,7 +327,7 @@ class MipRun(SearchingRun):
             # a core is proven over lengths; over estimates its cuts would prove less
             costs.measure(np.searchsorted(costs.vertices, warm.measured))
         self.root = root = Root(
-            self, costs, _load(BACKENDS[backend]), self.round_point, warm, self._goal_bound, policy
+            self, costs, _load(BACKENDS[backend]), self.round_point, warm, self.goal_bound, policy
         )
         yield from root.steps()
         if not self.is_done and root.point is not None:
@@ -383,9 +390,10 @@ class MipRun(SearchingRun):
         if not np.isin(classes, self._merged).all():
             self._merged = classes
             share = self.gtsp_policy.proof_search.search_time_share
-            merge(self, tours, self._solve_merged, self.clock.part(share))
+            merge(self, tours, self.solve_merged_tours, self.clock.part(share))
 
-    def _solve_merged(self, graph: TravelGraph, limits: Limits) -> Result:
+    def solve_merged_tours(self, graph: TravelGraph, limits: Limits) -> Result:
+        """Solve a graph of the classes of some tours by the run's policy, as `solve_merged`."""
         return solve_merged(graph, limits, self.mip_policy)
 
     def round_point(self, root: Root, point: Point) -> None:

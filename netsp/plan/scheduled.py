@@ -178,13 +178,13 @@ class Portfolio:
         while True:
             before = run.length
             core = np.union1d(core, np.array(run.tour or (0,), dtype=np.int64))
-            yield from run.search_steps(run._among(core), run.clock)
+            yield from run.search_steps(run.instance_among(core), run.clock)
             run.report("begun", vertices=len(graph))
             yield
             if run.tour is None:
                 return
             vain = 0 if run.length < before else vain + 1
-            core = run._near_incumbent() if len(graph) > len(core) else core
+            core = run.classes_near_incumbent() if len(graph) > len(core) else core
             if vain == policy.max_vain_searches:
                 vain = 0
                 yield from self._merge()
@@ -197,7 +197,9 @@ class Portfolio:
             tours += run.search_afresh(1, run.clock)
             yield
         if run.iteration_limit == math.inf and run.graph.goal_count >= merging.min_goals:
-            merge(run, list(dict.fromkeys(tours)), run._solve_merged, Clock.from_limit(run.clock))
+            merge(
+                run, list(dict.fromkeys(tours)), run.solve_merged_tours, Clock.from_limit(run.clock)
+            )
             yield
 
     def _goals(self) -> Steps[None]:
@@ -224,7 +226,7 @@ class Portfolio:
 
         anyway = replace(policy, covers=replace(policy.covers, min_classes=0))
         limits = Limits(run.clock, rng=run.rng)
-        costs = run._cover_costs() if run._uses_sparse_costs else CoverCosts()
+        costs = run.cover_costs() if run.uses_sparse_costs else CoverCosts()
         found = yield from goal_bound_steps(
             self.graph, prove_nothing, limits, run.tour, costs, run.on_cover_bound, anyway
         )
@@ -246,7 +248,7 @@ class Portfolio:
     def _core(self) -> Steps[None]:
         """Prove over a core of the classes; its bound holds with twice the tether of the others."""
         run, graph = self.run, self.graph
-        near = run._near_incumbent() if run.tour is not None else None
+        near = run.classes_near_incumbent() if run.tour is not None else None
         core = least_tethers(graph.costs_to_base, graph.cluster, run.core_classes_per_goal)
         core = core if near is None else np.union1d(core, near)
         core = np.union1d(core, np.array(run.tour or (0,), dtype=np.int64))
@@ -270,10 +272,8 @@ class Portfolio:
         """Prove by cutting planes, then by branch and cut, over what walks and covers have left."""
         run = self.run
         warm: WarmStart | None = self.core.program() if self.core is not None else None
-        run._goal_bound = self.goal_bound
-        costs, self.costs = self.costs, None
-        if costs is None:
-            costs = run._costs or CostMatrix(self.graph, policy=self.policy.gtsp.costs)
+        run.goal_bound = self.goal_bound
+        costs, self.costs = self.costs or run.starting_costs(), None
         yield
         if costs.rows is None:
             yield from run.search_steps(run.instance(costs, np.zeros(0, dtype=np.int64)), run.clock)

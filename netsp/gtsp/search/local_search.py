@@ -145,7 +145,18 @@ class Search:
     def chunks(
         self, rounds: float, clock: Clock, progress: Callable[[], float] | None = None
     ) -> Iterator[int]:
-        """Do what `run` does, and yield the number of rounds after every chunk."""
+        """Do what `run` does, chunk by chunk.
+
+        Parameters
+        ----------
+        rounds, clock, progress
+            As in `run`.
+
+        Yields
+        ------
+        int
+            Number of rounds of the chunk.
+        """
         policy = self.instance.policy
         n = len(self.order)
         self._link()
