@@ -36,7 +36,7 @@ def bearing(problem: Problem, direction: npt.ArrayLike) -> float:
     Parameters
     ----------
     problem : Problem
-        Its origin says where north is.
+        Problem whose origin states where north is.
     direction : array_like
         (x, y, …).
 
@@ -116,11 +116,11 @@ class Passage:
     Parameters
     ----------
     obstacle : int
-        Index, from 0.
+        Index of the obstacle, from 0.
     side : str
-        On which side.
+        Side of the obstacle on which the tether passes.
     rests : bool
-        Whether it lies against it.
+        Whether the tether touches the obstacle.
     """
 
     obstacle: int
@@ -135,11 +135,11 @@ def passages(problem: Problem, tether: Floats, word: Word) -> list[Passage]:
     Parameters
     ----------
     problem : Problem
-        Of the tether.
+        Problem of the tether.
     tether : ndarray, shape (n, 3)
-        The taut tether.
+        Polyline of the taut tether.
     word : Word
-        Of the tether.
+        Word of the tether.
 
     Returns
     -------
@@ -199,7 +199,7 @@ def _size(obstacle: Circle | Polygon, clearance: float) -> float:
 
 
 def listed(problem: Problem, run: list[Passage]) -> str:
-    """Passages as a phrase."""
+    """Return passages as a phrase."""
     if not run:
         return "straight from the base"
     return ", ".join(
@@ -214,13 +214,13 @@ def back_from(problem: Problem, runs: list[list[Passage]], names: list[str], k: 
     Parameters
     ----------
     problem : Problem
-        Of the tour.
+        Problem of the tour.
     runs : list of list of Passage
-        The passages at every visit.
+        Passages at each visit.
     names : list of str
-        Of the goals visited.
+        Names of the goals visited.
     k : int
-        Visit, from 0.
+        Index of the visit, from 0.
 
     Returns
     -------

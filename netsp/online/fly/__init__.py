@@ -1,1 +1,1 @@
-"""Tours carried out by a real vehicle, over MAVLink."""
+"""Flights: tours carried out by a real vehicle over MAVLink."""

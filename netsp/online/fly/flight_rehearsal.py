@@ -1,4 +1,4 @@
-"""Rehearsal: a made-up tour is carried out before the flight, with all that may happen on the way.
+"""Rehearsal: an example tour with all kinds of events is carried out before a flight.
 
 On a machine that never flew, everything that a flight needs is compiled at its first use, a minute
 or
@@ -52,7 +52,7 @@ def rehearse() -> None:
     Raises
     ------
     KeyboardInterrupt
-        Ctrl-C was pressed, which planning and flying would take as the wish to stop early.
+        Ctrl-C was pressed; planning and flying would treat it as a request to end early.
     """
     if not compiles():
         return

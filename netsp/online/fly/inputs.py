@@ -1,4 +1,4 @@
-"""Events that come in while a tour is flown: one JSON object a line, as in a surprise file."""
+"""Events that arrive during a flight: one JSON object on each line, as in a surprise file."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def read_events(
     on_error: Callable[[str], None],
     policy: FlightPolicy = FlightPolicy(),
 ) -> Callable[[], list[Event]]:
-    """Read events from a stream in a thread of its own.
+    """Read events from a stream in a separate thread.
 
     A stream with a file descriptor is read past Python's buffers: a thread that waits for a
     line
@@ -90,7 +90,7 @@ def _lines(stream: TextIO | BinaryIO, policy: FlightPolicy) -> Iterator[str | by
 
 
 def parse_event(line: str) -> Event:
-    """Return the event in a line of JSON; raise InputError if it is none."""
+    """Return the event in a line of JSON; raise InputError if the line is no event."""
     data = parse_json_object(line, "event")
     try:
         return Event.model_validate({"time": 0.0, **data})

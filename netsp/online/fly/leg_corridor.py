@@ -1,4 +1,4 @@
-"""Corridor of a leg: places where a vehicle may be on its path to a vertex.
+"""Corridor of a leg: the places that a vehicle may pass on its path to a vertex.
 
 A vehicle that gets a new target under way does not turn at once. It comes to rest beyond the bend
 and flies straight to the target from there. It is off the leg by its stopping distance at first,

@@ -103,7 +103,7 @@ class _Checks:
             )
 
     def require_place(self, start: Floats, max_distance: float) -> None:
-        """Wait for position and arming, and refuse a vehicle that is lost, away or disarmed."""
+        """Wait for position and arming; refuse a vehicle without position, far away or disarmed."""
 
         def is_known() -> bool:
             # a heartbeat tells whether the vehicle is armed, but not before its clock is known; the

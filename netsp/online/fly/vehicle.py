@@ -1,10 +1,11 @@
-"""Vehicle at the other end of a link, as `execute` drives it: position targets, vertex by vertex.
+"""Vehicle over a link, which `execute` drives by position targets, vertex by vertex.
 
 ArduSub in GUIDED holds a position target for good, while one with a velocity times out; so only
 positions are sent. Datagrams get lost, but the vehicle plans anew for a target that is sent again,
 and falls behind in depth: a target is sent again only if the vehicle echoes another one, or echoes
-none and does not move towards it. ArduSub does not go above home and has taken an altitude of 0 for
-"keep the present one" (`netsp.exchange.missions.mission_files`): targets are at least 0.1 m deep.
+none and does not move towards it. ArduSub does not go above home, and interprets an altitude of 0
+as "keep the current one" (`netsp.exchange.missions.mission_files`): targets are at least 0.1 m
+deep.
 """
 
 from __future__ import annotations

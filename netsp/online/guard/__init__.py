@@ -1,1 +1,1 @@
-"""Beside the vehicle: what its tether does, while somebody else is driving it."""
+"""Guard of a tether: follows the tether of a vehicle that somebody else drives."""

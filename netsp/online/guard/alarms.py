@@ -1,4 +1,4 @@
-"""Alarms: levels, reasons, and hysteresis, so that none flickers."""
+"""Alarms: levels, reasons, and hysteresis against flickering."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class _AlarmState:
     last: float = 0.0
 
     def level(self, now: float, reason: Alarm | None, policy: AlarmPolicy) -> Level | None:
-        """Note the present reason, and return the highest level that has lasted long enough."""
+        """Record the current reason, and return the highest level that has lasted long enough."""
         delays = {
             Level.NOTICE: policy.notice_delay_s,
             Level.CAUTION: policy.caution_delay_s,

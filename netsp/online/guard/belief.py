@@ -1,4 +1,4 @@
-"""Belief about the tether's class, when the position is known only roughly.
+"""Belief about the class of the tether if the position is known roughly only.
 
 The estimate is off by a drift that changes slowly and is normal with a standard deviation. The
 drift is put on a grid of offsets: a hypothesis is an offset and the word of the tether if the robot
@@ -88,7 +88,7 @@ class Belief:
         self._stays = stays
 
     def begin(self, words: dict[Word, float]) -> None:
-        """Begin anew with classes of the tether to the estimate.
+        """Restart with given classes of the tether to the estimate.
 
         Parameters
         ----------
@@ -103,7 +103,7 @@ class Belief:
     def with_drift(self, drift: float, place: Floats) -> Belief:
         """Return a belief in the same classes for another drift of the position.
 
-        What was known of the offset is lost.
+        It starts with no knowledge of the offset.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class Belief:
         return other
 
     def drop(self, words: set[Word]) -> None:
-        """Drop some classes, not all, for another reason than where the robot is."""
+        """Drop some classes, not all, for a reason other than the position of the robot."""
         self._likely = {w: p for w, p in self._likely.items() if w not in words}
         self._trim()
 

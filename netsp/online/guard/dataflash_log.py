@@ -1,4 +1,4 @@
-"""Logs that ArduPilot's vehicles write themselves (.bin)."""
+"""Reader of the onboard logs of ArduPilot vehicles (.bin)."""
 
 from __future__ import annotations
 
@@ -239,7 +239,7 @@ def _pos_unused(m: Any, frame: Frame) -> str:
 
 
 def _help(messages: Sequence[Any], counts: Counter[str], frame: Frame) -> str:
-    """Return what to do about a log without positions."""
+    """Return advice for a log without positions."""
     pos = [m for m in messages if m.get_type() == "POS"]
     fixed = sum(not (float(m.Lat) == 0.0 and float(m.Lng) == 0.0) for m in pos)
     if fixed and not frame.is_global:

@@ -1,7 +1,7 @@
 """Error of a position that no fixes correct.
 
-A filter without fixes integrates the errors of its accelerometers and of its model of the vehicle,
-so that its error grows with the square of the time. ArduSub 4.7 with the GPS switched off was off
+A filter without fixes integrates the errors of its accelerometers and of its vehicle model, so its
+error grows with the square of the time. ArduSub 4.7 with the GPS switched off was off
 by 0.25 m after 3 s, 0.54 m after 5 s, 0.99 m after 7.1 s and 3.6 m after 13 s: half of 0.04 m/s² by
 the time squared.
 """

@@ -105,7 +105,7 @@ def nearest_to_corners(
 ) -> None:
     """Measure the sites nearest to a cell's corners at the outermost points of each block.
 
-    So every block has a site to hand on. `corners` is (nx + 1, ny + 1, nz + 1).
+    So every block has a site to pass on to its neighbours. `corners` is (nx + 1, ny + 1, nz + 1).
     """
     origin, size, _ = place
     for b in range(len(blocks)):
@@ -148,8 +148,8 @@ def sweep_blocks(
     changed : ndarray of int, shape (n,)
         Last turn, counted from 1, in which anything changed in each block.
     last_checked : ndarray of int, shape (n, 6)
-        Last turn in which each block looked at its neighbour in each direction. A block is skipped
-        where nothing has changed since.
+        Last turn in which each block was compared with its neighbour in each direction. A block is
+        skipped if nothing has changed since.
     """
     origin, size, begin = place
     di = 1 if turn % 2 == 0 else -1
@@ -458,7 +458,7 @@ def _between(corners: Singles, bi: int, bj: int, bk: int, i: int, j: int, k: int
 def minimum_in_blocks(
     corners: Singles, values: Singles, table: Table, points: Ints, reach: int
 ) -> Singles:
-    """Return the least value (m,) at grid points up to `reach` voxels around m points (m, 3)."""
+    """Return the minimum (m,) at grid points within `reach` voxels of m points (m, 3)."""
     nx, ny, nz = table.shape
     out = np.empty(len(points), dtype=np.float32)
     for c in range(len(points)):
@@ -481,7 +481,7 @@ def minimum_in_blocks(
 
 @kernel
 def understate(values: Singles, side: float, corners_only: float) -> None:
-    """Subtract, far from surfaces, what interpolation between the corners of cells may add.
+    """Subtract the largest error of interpolation between the corners of cells, far from surfaces.
 
     A distance d to a point curves by 1 / d in two directions, and linear interpolation between
     values `side` apart exceeds it by up to side² / (4 d). Otherwise a ray that advances by the
@@ -497,7 +497,7 @@ def understate(values: Singles, side: float, corners_only: float) -> None:
 
 @kernel
 def along_x(sites: Floats) -> tuple[Floats, Floats]:
-    """Return the least and greatest x (m,) of each site."""
+    """Return the minimum and maximum x (m,) of each site."""
     low, high = np.empty(len(sites)), np.empty(len(sites))
     for s in range(len(sites)):
         low[s], high[s] = extent(sites, s, 0)

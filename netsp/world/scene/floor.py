@@ -75,8 +75,8 @@ def load_floor(
     origin : (x, y)
         Point that becomes (0, 0), in units of the map.
     depths : bool, optional
-        Whether values count downwards, where the grid's vertical system does not say so. None:
-        decided by the name of the band or column, else upwards.
+        Whether values count downwards, if the grid's vertical system does not state it. None
+        decides by the name of the band or column; unknown names count upwards.
 
     Returns
     -------
@@ -90,7 +90,8 @@ def load_floor(
     Raises
     ------
     InputError
-        Not readable, no values, in degrees, too many cells, or rasterio is not installed.
+        The file cannot be read, has no values, is in degrees or has too many cells, or rasterio is
+        not installed.
     """
     floor = read_floor(path, scale=scale, origin=origin, depths=depths)
     return floor.vertices, floor.faces, floor.notes
@@ -189,11 +190,11 @@ def _closed_mesh(
 
 @dataclass(frozen=True)
 class _Grid:
-    """Middles x (n,) and y (m,) of the cells, in units of the map, and finite values z (m, n).
+    """Grid of heights: centres x (n,) and y (m,) of the cells, in units of the map, and z (m, n).
 
-    The next fields are the metres per unit of the map and of the heights (None: as the map's),
-    whether heights count downwards by their system, whether they are called depths, notes, and the
-    number of cells without a value.
+    `metres` and `height_metres` are metres per unit of map and heights (None: those of the map).
+    `counts_down` is the direction by the vertical system, `called_depth` the one by name. `gaps`
+    counts cells without a value.
     """
 
     x: Floats

@@ -1,5 +1,4 @@
-"""Distance grids, as `netsp.world.scene.voxels` builds and `netsp.world.scene.packing` packs
-them."""
+"""Distance grids, which `netsp.world.scene.voxels` builds and `netsp.world.scene.packing` packs."""
 
 from __future__ import annotations
 
@@ -23,8 +22,8 @@ class VoxelGrid:
     Attributes
     ----------
     values
-        Distances, metres, negative inside: of the (nx, ny, nz) points of the grid, then of the (8,
-        8, 8) points of each block, in one row.
+        Distances, metres, negative inside, in one row: those of the (nx, ny, nz) points of the
+        grid, then those of the (8, 8, 8) points of each block.
     counts
         Counts (nx, ny, nz) of the points.
     origin

@@ -1,7 +1,6 @@
-"""Points at which a distance grid is built: all points of a box, or all only near surfaces.
+"""Lattices: the points of a distance grid, which are dense in a box or only near surfaces.
 
-Both kinds of lattice number their points in one row, so `netsp.world.scene.voxels` treats them
-alike.
+Both kinds number their points in one row, so `netsp.world.scene.voxels` treats them alike.
 """
 
 from __future__ import annotations
@@ -48,8 +47,8 @@ class Dense:
     def closest(
         self, sites: Floats, on_progress: OnStage = None, *, with_owners: bool = True
     ) -> tuple[Singles, Owners]:
-        """Return the distance of each point to the nearest site, and if wanted the index of that
-        site."""
+        """Return the distance from each point to the nearest site, and optionally the site's
+        index."""
         distances, owner = _closest(sites, self.origin, self.size, self.counts, on_progress)
         return distances.ravel(), owner.ravel()
 
@@ -75,12 +74,12 @@ class Dense:
         return np.asarray(~border[parts]).ravel()
 
     def positions(self, chosen: Bools) -> tuple[Floats, Ints]:
-        """Return the positions (m, 3) and indices of chosen points, each place once."""
+        """Return the distinct positions (m, 3) of chosen points, and their indices."""
         at = np.argwhere(chosen.reshape(self.counts))
         return self.origin + self.size * at, np.flatnonzero(chosen)
 
     def minimum_nearby(self, values: Singles, points: Floats, reach: int) -> Singles:
-        """Return the least value (m,) up to `reach` voxels around each of m places (m, 3)."""
+        """Return the minimum (m,) of the values within `reach` voxels of each place (m, 3)."""
         from scipy.ndimage import minimum_filter
 
         cell = np.rint((points - self.origin) / self.size).astype(int)
@@ -137,8 +136,7 @@ class Sparse:
     def closest(
         self, sites: Floats, on_progress: OnStage = None, *, with_owners: bool = True
     ) -> tuple[Singles, Owners]:
-        """Return distances and sites as `Dense` does, slab by slab, to need little memory in
-        between."""
+        """Return distances and sites as `Dense` does, slab by slab to save memory."""
         total = self.first + len(self.blocks) * SIDE**3
         distances = np.empty(total, dtype=np.float32)
         owner = np.empty(total if with_owners else 0, dtype=np.int32)
@@ -240,7 +238,7 @@ class Sparse:
         return places, np.flatnonzero(fine) + self.first
 
     def minimum_nearby(self, values: Singles, points: Floats, reach: int) -> Singles:
-        """Return least values as `Dense` does."""
+        """Return minima as `Dense` does."""
         cell = np.rint((points - self.origin) / self.size).astype(np.int64)
         corners, fine = self._parts(values)
         return np.asarray(compiled.minimum_in_blocks(corners, fine, self.table, cell, reach))
@@ -264,7 +262,7 @@ def sparse_near(
     triangles: Floats | None,
     region: Floats | None,
 ) -> Sparse:
-    """Return the lattice with blocks wherever a surface is near.
+    """Return the lattice that has blocks near surfaces.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ from netsp.world.scene.packing import CELLS, COUNT, NEAR, ROW, ROWS, VOXELS, can
 from netsp.world.scene.solids import BOX, CAPSULE, CYLINDER, POST, PRISM, TORUS
 
 Vectors = tuple[Floats, Floats, Floats]
-"""Coordinates of points, one array an axis."""
+"""Coordinates of points, one array for each axis."""
 
 Samples = tuple[Floats, Floats, Floats, Floats]
 """Distances and the coordinates of their gradients."""
@@ -71,8 +71,8 @@ def samples(data: Floats, offset: float, points: Floats) -> Floats:
 
 
 def lowest_along(data: Floats, offset: float, a: Floats, b: Floats, tolerance: float) -> Floats:
-    """Return the least distance along each of n segments as `sampling.lowest_along` does, without
-    voxels."""
+    """Return the minimum distance along each of n segments, as `sampling.lowest_along` does,
+    without voxels."""
     begins = [np.ascontiguousarray(a[:, axis]) for axis in range(3)]
     sides = [b[:, axis] - a[:, axis] for axis in range(3)]
     lengths = np.sqrt(sides[0] * sides[0] + sides[1] * sides[1] + sides[2] * sides[2])

@@ -1,7 +1,7 @@
-"""Distance and gradient at points: the query that tethers, planners and pictures share. Compiled.
+"""Distance and gradient at points, for tethers, planners and pictures. Compiled.
 
 Distances are exact for solids (`netsp.world.scene.solids`) and trilinear for voxels. `Field` is a
-plain tuple of arrays, so that every kernel takes it whole.
+plain tuple of arrays, because kernels accept those.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def sample(field: Field, x: float, y: float, z: float) -> tuple[float, float, fl
 
 @kernel
 def distance(field: Field, x: float, y: float, z: float) -> float:
-    """Return the distance alone."""
+    """Return the distance at a point, metres, without its gradient."""
     data = field.data
     d, _ = _nearest(data, x, y, z)
     if data[VOXELS] > 0.0:
@@ -104,7 +104,7 @@ def _nearest(data: Floats, x: float, y: float, z: float) -> tuple[float, int]:
     for item in range(begin, end):
         at = int(data[item]) if looked_up else ROWS + ROW * item
         kind = int(data[at])
-        # written out here, because a function of its own would not be compiled into the loop
+        # inlined by hand, because the compiler would not inline a function
         if kind == CAPSULE:
             e = capsule_gap(data, at + 1, x, y, z)
         elif kind == CYLINDER:
@@ -243,11 +243,11 @@ def _sample_many_in_numpy(field: Field, points: Floats) -> Floats:
 def lowest_along(
     field: Field, ax: float, ay: float, az: float, bx: float, by: float, bz: float, tolerance: float
 ) -> tuple[float, float]:
-    """Return the least distance along a segment and its place as a fraction, to within `tolerance`.
+    """Return the minimum distance along a segment, to within `tolerance`, and its place, 0 to 1.
 
-    The method is sphere tracing: within a distance d of a point no distance is below 0, so the next
-    sample may be d + tolerance further, and nothing in between is deeper than -tolerance. Samples
-    are dense only near solids.
+    The method is sphere tracing: if the distance at a point is d, no point within d is inside a
+    solid, so the next sample is d + tolerance farther, and nothing in between is deeper than
+    -tolerance. Samples are dense only near solids.
     """
     length = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2)
     if length == 0.0:
@@ -264,7 +264,7 @@ def lowest_along(
 
 
 def lowest_along_each(field: Field, a: Floats, b: Floats, tolerance: float) -> Floats:
-    """Return the least distance along each of n segments, for kernels that run interpreted.
+    """Return the minimum distance along each of n segments, for kernels that run interpreted.
 
     The distances are those of `lowest_along` to the last bit.
 

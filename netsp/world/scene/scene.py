@@ -1,5 +1,4 @@
-"""Scene: what stands in the water. Solids, a mesh, a cloud of points, or the obstacles of a
-problem.
+"""Scene: the bodies in the water, as solids, a mesh, a cloud of points, or obstacles of a problem.
 
 Scene files are validated like problems; `netsp schema scene` prints their JSON Schema.
 """
@@ -44,7 +43,7 @@ _KINDS = ("sphere", "capsule", "cylinder", "box", "torus", "post", "prism", "hal
 
 
 class Solid(Model):
-    """One solid: exactly one shape, and a name."""
+    """Solid of a scene: exactly one shape, and a name."""
 
     name: Annotated[Name | None, Field(description="shown in pictures, reports and `inspect`")] = (
         None
@@ -75,7 +74,7 @@ class Solid(Model):
 
 
 class Source(Model):
-    """Mesh or cloud in a file beside the scene's."""
+    """Mesh or cloud in a file that a scene file names."""
 
     file: Annotated[
         str,
@@ -107,7 +106,7 @@ class Source(Model):
 
 
 class Floor(Model):
-    """Sea floor from a bathymetry grid in a file beside the scene's."""
+    """Sea floor from a bathymetry grid in a file that a scene file names."""
 
     file: Annotated[
         str,
@@ -194,7 +193,7 @@ class Scene(FileModel):
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a scene file; file names in it become relative to the working directory.
+        """Return the scene in a file; file names in it become relative to the working directory.
 
         Raises
         ------
@@ -230,7 +229,7 @@ class Scene(FileModel):
         return (*self.solids, *more)
 
     def thickness(self) -> list[tuple[str, float]]:
-        """Return the name and least thickness of each solid, metres; infinite for a half space.
+        """Return the name and minimum thickness of each solid, metres; infinite for a half space.
 
         Raises
         ------
@@ -254,8 +253,7 @@ class Scene(FileModel):
         voxel : float, optional
             Edge of a voxel, metres; by default that of the scene's files.
         memory_limit : float
-            Maximum memory, GiB. The message about a grid that needs more names a voxel size that
-            does not.
+            Maximum memory, GiB. If a grid needs more, the error suggests a voxel size.
         on_progress : callable, optional
             Called with (stage, fraction done) of long builds.
         policy : ScenePolicy, optional
@@ -264,7 +262,7 @@ class Scene(FileModel):
         Raises
         ------
         InputError
-            Nothing in the scene, unreadable files, or a grid that is too large.
+            The scene is empty, a file cannot be read, or the grid is too large.
         """
         solids = self.all_solids()
         if not solids and self.mesh is None and self.cloud is None and self.floor is None:
@@ -330,7 +328,7 @@ class Scene(FileModel):
         Raises
         ------
         InputError
-            Unreadable files, or a grid that is too large.
+            A file cannot be read, or the grid is too large.
         """
         if self.mesh is None and self.cloud is None and self.floor is None:
             return None
@@ -378,8 +376,7 @@ class Scene(FileModel):
     def _files(
         self, policy: FloorPolicy | None = None
     ) -> tuple[dict[str, tuple[Floats, npt.NDArray[np.int64]]], Floats | None, list[str]]:
-        """Read mesh, floor and cloud; return triangles by name, points, and notes of what was left
-        out."""
+        """Read mesh, floor and cloud; return triangles by name, points, and notes on omissions."""
         parts: dict[str, tuple[Floats, npt.NDArray[np.int64]]] = {}
         points: Floats | None = None
         notes: list[str] = []

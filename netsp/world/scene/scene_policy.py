@@ -1,4 +1,4 @@
-"""Numbers of scenes: how grids are built, fields are sampled, and seams between solids filled."""
+"""Policies of scenes: building of grids, sampling of fields, and filling of seams."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class GridPolicy:
     Attributes
     ----------
     default_voxels
-        Number of voxels along the longest side where no size is given.
+        Default number of voxels along the longest side.
     max_dense_points
         Maximum number of points of a grid that holds all points; larger grids hold only those near
         surfaces.
@@ -31,8 +31,8 @@ class GridPolicy:
     block_reach
         Distance of a corner from a surface, in sides of a cell, up to which the cell is a block.
     inside_block_reach
-        The same inside a closed mesh. It is more than half a cell's diagonal, sqrt(3) / 2, so no
-        surface passes through a cell whose corners are all deeper.
+        Same distance inside a closed mesh. It must exceed half the diagonal of a cell, sqrt(3) / 2,
+        so that no surface passes through a cell whose corners are all deeper.
     halo_cells
         Number of cells on either side of a slab that take part in its distances. With fewer, blocks
         at the rim of a slab miss their nearest surface.
@@ -40,7 +40,7 @@ class GridPolicy:
         Number of blocks for which all workers together compute distances at a time. With more, a
         build needs more memory.
     max_workers
-        Maximum number of threads. The memory for slabs is meant for one site, not for one core.
+        Maximum number of threads, which share the memory for slabs.
     bytes_per_voxel
         Memory for each point of a dense grid while it is built.
     bytes_per_cell
@@ -118,8 +118,8 @@ class SeamPolicy:
     max_gap
         Maximum distance between two faces that count as touching, metres.
     max_overlap
-        Maximum depth of one solid in the other for which a seam is filled, metres. Beyond it, what
-        they share is deep enough without.
+        Maximum depth of one solid in the other for which a seam is filled, metres. A deeper overlap
+        leaves no slit.
     max_angle
         Maximum angle between two faces that count as parallel, radians.
     max_depth

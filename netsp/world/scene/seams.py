@@ -1,8 +1,8 @@
 """Boxes that fill the seams where solids touch.
 
-The distance field of a scene is the least of its solids' distances, which is exact outside of them.
-Inside, a point on a face that two solids share has depth 0, although there is no water for metres
-around. A tether, whose edges may dip into a surface by an eighth of delta, would pass along such a
+The distance field of a scene is the minimum of the distances to its solids, which is exact outside.
+Inside, a point on a face that two solids share has depth 0, although there is no water nearby. The
+edges of a tether may cut into a surface by an eighth of delta, so a tether would pass along such a
 face as through a slit. So every flat seam is filled with boxes that lie within the two solids.
 Distances outside change by at most the gap that counts as touching.
 """

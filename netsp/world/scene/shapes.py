@@ -34,7 +34,7 @@ class Sphere(Model):
         return 2.0 * self.radius
 
     def box(self) -> Floats:
-        """Return the least and greatest coordinates (2, 3), metres; 0 along axes without end."""
+        """Return the bounding box (2, 3), metres; 0 along axes without end."""
         return _around([self.center], self.radius)
 
 
@@ -54,7 +54,7 @@ class Capsule(Model):
         return 2.0 * self.radius
 
     def box(self) -> Floats:
-        """Return the least and greatest coordinates (2, 3), metres; 0 along axes without end."""
+        """Return the bounding box (2, 3), metres; 0 along axes without end."""
         return _around([self.a, self.b], self.radius)
 
 
@@ -86,7 +86,7 @@ class Cylinder(Model):
         return min(2.0 * self.radius, self.length)
 
     def box(self) -> Floats:
-        """Return the least and greatest coordinates (2, 3), metres; 0 along axes without end."""
+        """Return the bounding box (2, 3), metres; 0 along axes without end."""
         axis = (np.array(self.b) - np.array(self.a)) / self.length
         reach = self.radius * np.sqrt(np.maximum(0.0, 1.0 - axis**2))
         ends = np.array([self.a, self.b])
@@ -120,7 +120,7 @@ class Box(Model):
         return min(self.size)
 
     def box(self) -> Floats:
-        """Return the least and greatest coordinates (2, 3), metres; 0 along axes without end."""
+        """Return the bounding box (2, 3), metres; 0 along axes without end."""
         reach = 0.5 * np.abs(self.axes()).T @ np.array(self.size)
         return np.array([np.array(self.center) - reach, np.array(self.center) + reach])
 
@@ -197,7 +197,7 @@ class Torus(Model):
         return self.center + self.major_radius * (np.cos(t) * start + np.sin(t) * across)
 
     def box(self) -> Floats:
-        """Return the least and greatest coordinates (2, 3), metres; 0 along axes without end."""
+        """Return the bounding box (2, 3), metres; 0 along axes without end."""
         return _around(self.centreline(), self.minor_radius + 0.002 * self.major_radius)
 
 
@@ -216,7 +216,7 @@ class Post(Model):
         return 2.0 * self.radius
 
     def box(self) -> Floats:
-        """Return the least and greatest coordinates (2, 3), metres; 0 along axes without end."""
+        """Return the bounding box (2, 3), metres; 0 along axes without end."""
         return _around([(*self.center, 0.0)], self.radius) * [1.0, 1.0, 0.0]
 
 
@@ -245,14 +245,14 @@ class Prism(Model):
         return polygon_thickness(self.polygon) + 2.0 * self.grow
 
     def box(self) -> Floats:
-        """Return the least and greatest coordinates (2, 3), metres; 0 along axes without end."""
+        """Return the bounding box (2, 3), metres; 0 along axes without end."""
         xy = np.array(self.polygon)
         flat = np.column_stack([xy, np.zeros(len(xy))])
         return _around(flat, self.grow) * [1.0, 1.0, 0.0]
 
 
 class HalfSpace(Model):
-    """Everything behind a plane: a sea floor, a wall."""
+    """Half space behind a plane: a sea floor or a wall."""
 
     point: Annotated[Point3, Field(description="(x, y, z) on its face, m")]
     normal: Annotated[Point3, Field(description="direction (x, y, z) out of the solid")] = (

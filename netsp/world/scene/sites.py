@@ -1,4 +1,4 @@
-"""Sites, to which grid points measure their distance: triangles, or points with a radius. Compiled.
+"""Sites, whose distances a grid stores: triangles, or points with a radius. Compiled.
 
 A site is a row of numbers. The row of a point holds its position (3) and a radius, which is
 subtracted from the distance. The row of a triangle holds a corner (3), 0, the edges b and c from
@@ -49,7 +49,7 @@ def site_distance(sites: Floats, s: int, x: float, y: float, z: float) -> float:
     """Return the distance of a place to a site.
 
     The closest point of a triangle is the foot of the perpendicular if it lies inside, else it is
-    on an edge that the foot is beyond. The row is not taken out of the array, because counting the
+    on an edge beyond which the foot lies. The row is not bound to a name, because counting the
     reference would take longer than the distance.
     """
     x, y, z = x - sites[s, 0], y - sites[s, 1], z - sites[s, 2]
@@ -83,7 +83,7 @@ def _squared(px: float, py: float, pz: float, ex: float, ey: float, ez: float) -
 
 @kernel
 def extent(sites: Floats, s: int, axis: int) -> tuple[float, float]:
-    """Return the least and greatest coordinate of a site along an axis, without its radius."""
+    """Return the minimum and maximum coordinate of a site along an axis, without its radius."""
     a = sites[s, axis]
     if sites.shape[1] == POINT:
         return a, a

@@ -43,7 +43,7 @@ def solid_distance(
 
 @kernel
 def capsule_gap(data: Floats, r: int, x: float, y: float, z: float) -> float:
-    """Return the distance of `capsule` alone."""
+    """Return the distance of `capsule` without its gradient."""
     px, py, pz = _three(data, r)
     qx, qy, qz = _three(data, r + 3)
     ax, ay, az = qx - px, qy - py, qz - pz
@@ -58,7 +58,7 @@ def capsule_gap(data: Floats, r: int, x: float, y: float, z: float) -> float:
 
 @kernel
 def cylinder_gap(data: Floats, r: int, x: float, y: float, z: float) -> float:
-    """Return the distance of `_cylinder` alone."""
+    """Return the distance of `_cylinder` without its gradient."""
     px, py, pz = _three(data, r)
     ux, uy, uz = _three(data, r + 3)
     vx, vy, vz = x - px, y - py, z - pz
@@ -73,7 +73,7 @@ def cylinder_gap(data: Floats, r: int, x: float, y: float, z: float) -> float:
 
 @kernel
 def box_gap(data: Floats, r: int, x: float, y: float, z: float) -> float:
-    """Return the distance of `_box` alone."""
+    """Return the distance of `_box` without its gradient."""
     px, py, pz = _three(data, r)
     vx, vy, vz = x - px, y - py, z - pz
     best, squares = -math.inf, 0.0
@@ -94,7 +94,7 @@ def _three(data: Floats, at: int) -> tuple[float, float, float]:
 
 @kernel
 def _round(vx: float, vy: float, vz: float, radius: float) -> tuple[float, float, float, float]:
-    """Return distance and gradient for the vector v from the closest point of the core."""
+    """Return distance and gradient for the vector v from the closest point of an axis or arc."""
     length = math.sqrt(vx * vx + vy * vy + vz * vz)
     if length == 0.0:
         return -radius, 1.0, 0.0, 0.0

@@ -1,10 +1,10 @@
 """Grids of signed distances from meshes and clouds of points, true to a fraction of a voxel.
 
 Distances: every grid point near a surface measures its nearest triangle or point. Sweeps in the
-eight diagonal directions hand the site on to neighbours, which measure their own distance to it (a
-closest point transform). Signs: whatever a closed mesh winds around is solid, so overlapping parts
-are united. An open mesh or a cloud has no inside of its own, so water floods the grid from its
-border, and what it does not reach is solid.
+eight diagonal directions pass the site on to neighbours, which measure their own distance to it (a
+closest point transform). Signs: points around which a closed mesh winds are solid, so overlapping
+parts are united. An open mesh or a cloud has no inside, so water floods the grid from its border,
+and points that it does not reach are solid.
 """
 
 from __future__ import annotations

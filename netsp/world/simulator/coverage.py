@@ -1,8 +1,8 @@
 """Coverage: the patches of a structure's surface that a camera has seen.
 
 As Amer et al. 2025 (section VI-A) count it, a patch is seen if its centre is within the camera's
-range, its surface faces the camera and it lies within the field of view. They do not check whether
-something stands in between; here both are counted, with and without.
+range, its surface faces the camera and it lies within the field of view. They ignore occlusion;
+here both are counted, with and without occlusion.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from netsp.world.simulator.environment_policy import CoveragePolicy
 
 @dataclass(frozen=True, eq=False)
 class Patches(ComparesArrays):
-    """Surface in pieces.
+    """Patches of a surface.
 
     Attributes
     ----------
@@ -37,8 +37,8 @@ class Patches(ComparesArrays):
     areas
         (n,).
     sides
-        (m, 2) patches that are the two sides of one piece of a sheet, which is seen when either is;
-        the second has no area of its own.
+        Pairs (m, 2) of patches that are the two sides of a sheet. The sheet is seen if either side
+        is; the area of the second side is 0.
     """
 
     centres: Floats
@@ -55,13 +55,14 @@ def surface_patches(
     inspect: tuple[str, ...] | None = None,
     policy: CoveragePolicy = CoveragePolicy(),
 ) -> Patches:
-    """Return the surface of a scene in triangles with sides of at most `size`, without what lies
-    inside another solid.
+    """Return the surface of a scene as triangles with sides of at most `size`, metres.
+
+    Parts inside another solid are left out.
 
     Parameters
     ----------
     places : ndarray, shape (k, 3)
-        Positions that unbounded surfaces are cut to, metres.
+        Positions around which unbounded surfaces are cut off, metres.
     inspect : tuple of str, optional
         Names of the solids to be seen; by default all but half spaces and the sea floor.
 
@@ -108,7 +109,7 @@ def surface_patches(
 def _surfaces(
     scene: Scene, field: DistanceField, places: Floats, inspect: tuple[str, ...] | None
 ) -> list[tuple[Floats, Ints, DistanceField]]:
-    """Return vertices, faces and own field of each surface to be seen, but for that of a cloud."""
+    """Return vertices, faces and distance field of each surface to be seen, except of a cloud."""
     low, high = extent(scene, places)
     solids = scene.all_solids()
     named = {s.name for s in solids}
@@ -126,8 +127,10 @@ def _surfaces(
 
 
 def cloud_sides(field: DistanceField, points: Floats) -> tuple[Floats, Floats]:
-    """Return points (n, 3) of a cloud moved to the surface, and to its other side: the points of a
-    sheet lie in its middle."""
+    """Return points (n, 3) of a cloud moved to the surface, and to its other side.
+
+    The points of a sheet lie in its middle.
+    """
     normals = field.gradient(points)
     out = []
     for sign in (1.0, -1.0):
@@ -195,12 +198,12 @@ class CameraView(NamedTuple):
 
 
 class Coverage:
-    """Coverage so far.
+    """Coverage of a structure so far.
 
     Attributes
     ----------
     seen, seen_through
-        (n,) whether each patch was seen, with and without regard to what stands in between.
+        Masks (n,) of the patches seen, with and without occlusion.
     share, share_through
         Shares of the area; the second is the paper's.
     """
@@ -214,8 +217,10 @@ class Coverage:
         self._latest: tuple[Floats, Floats] | None = None
 
     def look(self, eye: Floats, yaw: float) -> None:
-        """Mark what the camera sees from a place (3,) looking in a horizontal direction (rad),
-        tilted towards the nearest patch as far as it can."""
+        """Mark the patches that the camera sees from a place (3,) at a yaw, rad.
+
+        The camera tilts towards the nearest patch as far as it can.
+        """
         near = self._nearest(eye)
         max_tilt = math.radians(self.camera.tilt)
         pitch = min(max(math.atan2(near[2], math.hypot(near[0], near[1])), -max_tilt), max_tilt)
@@ -237,8 +242,8 @@ class Coverage:
             self.share_through = float(self._shares @ self.seen_through)
 
     def heading(self, eye: Floats, before: float) -> float:
-        """Return the horizontal direction (rad) of the nearest patch; `before` if that is straight
-        above or below."""
+        """Return the horizontal direction of the nearest patch, rad; `before` if the patch is
+        straight above or below."""
         near = self._nearest(eye)
         if math.hypot(near[0], near[1]) < 0.2 * float(np.linalg.norm(near)):
             return before
@@ -279,8 +284,7 @@ def _nearest_in_numpy(centres: Floats, eye: Floats) -> int:
 def mark_visible(
     field: Field, surface: PatchArrays, seen: Bools, seen_through: Bools, view: CameraView
 ) -> tuple[float, float]:
-    """Mark the patches in view; return the shares that were new, with and without regard to what
-    stands in between."""
+    """Mark the patches in view; return the new shares, with and without occlusion."""
     centres, normals, shares = surface.centres, surface.normals, surface.shares
     eye, yaw, pitch, half = view.eye, view.yaw, view.pitch, view.half
     reach, off = view.reach, view.off

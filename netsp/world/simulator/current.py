@@ -10,8 +10,7 @@ from netsp.world.simulator.environment_policy import GustPolicy
 
 
 class Water:
-    """Velocity of the water over time; gusts are an Ornstein-Uhlenbeck process that a seed
-    determines.
+    """Velocity of the water over time; gusts are an Ornstein-Uhlenbeck process with a seed.
 
     Parameters
     ----------
