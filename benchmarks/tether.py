@@ -25,7 +25,8 @@ from netsp.plan.random_worlds import random_world
 from netsp.roadmap.paths import TautPaths
 from netsp.world import GeodesicTether, ReactTether, Scene
 from netsp.world.scene.field import DistanceField
-from netsp.world.scene.voxels import grid_of_cloud_file
+from netsp.world.scene.readers import Placement, read_cloud_file
+from netsp.world.scene.voxels import grid_of_cloud
 from netsp.world.tether import TetherModel
 
 SCENES = ROOT / "scenes"
@@ -323,9 +324,11 @@ def main() -> None:
         head("voxel", "grid", "build s", "notes", name="tether-cloud")
         for voxel in (0.1, 0.05):
             begin = time.perf_counter()
-            grid = grid_of_cloud_file(args.cloud, scale=args.scale, voxel=voxel)
+            cloud = read_cloud_file(args.cloud, Placement(args.scale))
+            points, notes = cloud.points, cloud.notes
+            grid = grid_of_cloud(points, voxel=voxel, source=args.cloud)
             row(voxel, "x".join(map(str, grid.counts)), f"{time.perf_counter() - begin:.2f}",
-                "; ".join(grid.notes))  # fmt: skip
+                "; ".join((*notes, *grid.notes)))  # fmt: skip
         print()
         if args.tour:
             tour(DistanceField.build([], [], [], [], grid, 0.0), args.tour, args.scale)

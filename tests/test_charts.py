@@ -178,12 +178,12 @@ def test_a_sea_floor_lies_within_the_depths_of_its_areas(seed):
 @pytest.mark.parametrize("name", ["floor.asc", "floor.tif"])
 def test_a_written_sea_floor_is_read_by_scenes(name, tmp_path):
     pytest.importorskip("rasterio")
-    from netsp.world.scene.floor import floor_mesh
+    from netsp.world.scene.floor import load_floor
 
     area = DepthArea(shapely.box(-4, -2, 4, 6), 3.0, 9.0)
     points = np.array([(-4, -2, 4.0), (4, -2, 8.0), (4, 6, 8.0), (-4, 6, 4.0)])
     sea_floor([area], points, [], (-4.0, -2.0, 4.0, 6.0), 1.0).save(tmp_path / name)
-    vertices, _ = floor_mesh(tmp_path / name)
+    vertices, *_ = load_floor(tmp_path / name)
     top = vertices[: len(vertices) // 2]
     assert top[:, 2] == pytest.approx(-(6.0 + 0.5 * top[:, 0]), abs=1e-3)
     with pytest.raises(InputError, match=r"ends in .asc, .tif, .tiff"):

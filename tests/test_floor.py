@@ -8,9 +8,9 @@ import pytest
 from netsp import InputError
 from netsp.command.main import main
 from netsp.world import GeodesicTether, Scene
-from netsp.world.scene.floor import floor_mesh
-from netsp.world.scene.readers import read_cloud
-from netsp.world.scene.voxels import grid_of_mesh_file
+from netsp.world.scene.floor import load_floor
+from netsp.world.scene.readers import read_cloud_file, read_mesh_file
+from netsp.world.scene.voxels import grid_of_triangles
 
 rasterio = pytest.importorskip("rasterio", reason="rasterio (extra geo) is not installed")
 
@@ -56,17 +56,17 @@ def test_the_floor_is_where_the_grid_says(write, tmp_path):
 def test_rows_from_north_to_south_and_the_origin_are_heeded(tmp_path):
     z = np.array([[-1.0, -1.0, -1.0], [-5.0, -5.0, -5.0], [-9.0, -9.0, -9.0]])
     file = write_asc(tmp_path / "z.asc", z, cell=2.0, corner=(500_000.0, 6_200_000.0))
-    vertices, _ = floor_mesh(file, origin=(500_000.0, 6_200_000.0))
+    vertices, *_ = load_floor(file, origin=(500_000.0, 6_200_000.0))
     top = vertices[: z.size]
     assert top[top[:, 1] == 5.0][:, 2] == pytest.approx(-1.0)  # the first row is the northernmost
     assert top[top[:, 1] == 1.0][:, 2] == pytest.approx(-9.0)
-    deep, _ = floor_mesh(file, origin=(500_000.0, 6_200_000.0), depths=True)
+    deep, *_ = load_floor(file, origin=(500_000.0, 6_200_000.0), depths=True)
     assert deep[: z.size, 2] == pytest.approx(-top[:, 2])
 
 
 def test_the_mesh_of_a_floor_is_closed_and_points_outwards(tmp_path):
     trimesh = pytest.importorskip("trimesh")
-    vertices, faces = floor_mesh(write_asc(tmp_path / "z.asc", hill()))
+    vertices, faces, _ = load_floor(write_asc(tmp_path / "z.asc", hill()))
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
@@ -76,7 +76,7 @@ def test_the_mesh_of_a_floor_is_closed_and_points_outwards(tmp_path):
 def test_cells_without_a_value_take_the_nearest(tmp_path):
     z = hill()
     z[3:6, 4:9] = -9999
-    vertices, _ = floor_mesh(write_asc(tmp_path / "z.asc", z))
+    vertices, *_ = load_floor(write_asc(tmp_path / "z.asc", z))
     assert vertices[: z.size, 2].min() > -8.01
     assert vertices[: z.size, 2].max() < -4.9
 
@@ -138,7 +138,7 @@ def test_a_scene_that_is_nothing_but_a_floor_is_drawn(tmp_path):
 def test_bad_grids_are_told_in_one_line(make, message, tmp_path):
     make(tmp_path)
     with pytest.raises(InputError, match=message) as told:
-        floor_mesh(tmp_path / "z")
+        load_floor(tmp_path / "z")
     assert "\n" not in str(told.value)
 
 
@@ -151,7 +151,7 @@ def test_clouds_are_read_from_las(kind, tmp_path):
     data = laspy.LasData(header)
     data.x, data.y, data.z = points.T
     data.write(str(tmp_path / f"cloud.{kind}"))
-    assert read_cloud(tmp_path / f"cloud.{kind}") == pytest.approx(points, abs=1e-3)
+    assert read_cloud_file(tmp_path / f"cloud.{kind}").points == pytest.approx(points, abs=1e-3)
 
 
 def test_meshes_are_read_from_glb(tmp_path):
@@ -163,7 +163,8 @@ def test_meshes_are_read_from_glb(tmp_path):
         transform=trimesh.transformations.translation_matrix((4, 0, 0)),
     )
     parts.export(tmp_path / "parts.glb")
-    grid = grid_of_mesh_file(tmp_path / "parts.glb", voxel=0.1)
+    parts = read_mesh_file(tmp_path / "parts.glb")
+    grid = grid_of_triangles(parts.vertices, parts.faces, voxel=0.1)
     field = Scene(mesh={"file": str(tmp_path / "parts.glb"), "voxel": 0.1}).field()
     assert grid.size == 0.1
     at = np.array([(0, 0, 2), (4, 0, 1.5), (4, 0, 0), (0, 0, 0)], dtype=float)

@@ -17,7 +17,7 @@ from netsp.exchange.maps.import_policy import DEFAULT_READ
 from netsp.exchange.maps.path_file import read_paths
 from netsp.exchange.maps.projection import Projection
 from netsp.model.problem import Problem
-from netsp.world.scene.readers import Placement, load_cloud, load_mesh
+from netsp.world.scene.readers import Placement, read_cloud_file, read_mesh_file
 
 PILE = np.array([(4.0, -1.0, -10.0), (6.0, 1.0, 0.0), (5.0, 0.5, -3.25), (5.5, -0.25, -7.0)])
 """Points of a pile that fit no other order or sign of their coordinates."""
@@ -25,7 +25,8 @@ PILE = np.array([(4.0, -1.0, -10.0), (6.0, 1.0, 0.0), (5.0, 0.5, -3.25), (5.5, -
 
 def pile(file, text, encoding="utf-8"):
     file.write_bytes(text.encode(encoding))
-    return load_cloud(file)
+    cloud = read_cloud_file(file)
+    return cloud.points, cloud.notes
 
 
 def rows(separator, columns, decimal="."):
@@ -65,12 +66,13 @@ def test_a_cloud_of_binary_records_keeps_its_fields_apart(tmp_path):
     )
     records = [struct.pack("<Iddd", 255, *p) for p in (*PILE, (np.nan,) * 3)]
     (tmp_path / "c.pcd").write_bytes(head.encode() + b"".join(records))
-    points, notes = load_cloud(tmp_path / "c.pcd")
+    cloud = read_cloud_file(tmp_path / "c.pcd")
+    points, notes = cloud.points, cloud.notes
     assert points.tolist() == PILE.tolist()
     assert notes == ("1 point without coordinates left out",)
     (tmp_path / "c.pcd").write_bytes(head.encode() + b"".join(records)[:-1])
     with pytest.raises(InputError, match="cut short"):
-        load_cloud(tmp_path / "c.pcd")
+        read_cloud_file(tmp_path / "c.pcd")
 
 
 @pytest.mark.parametrize(
@@ -127,7 +129,8 @@ def las(file, points, crs=None, **fields):
 
 def test_las_noise_and_withheld_points_are_no_surface(tmp_path):
     file = las(tmp_path / "c.las", PILE, classification=[2, 18, 7, 2], withheld=[0, 0, 0, 1])
-    points, notes = load_cloud(file)
+    cloud = read_cloud_file(file)
+    points, notes = cloud.points, cloud.notes
     assert points == pytest.approx(PILE[:1], abs=1e-3)
     assert len(notes) == 3
 
@@ -138,16 +141,17 @@ def test_las_noise_and_withheld_points_are_no_surface(tmp_path):
      ("EPSG:2263+5703", (0.3048006, 0.3048006, 1))],
 )  # fmt: skip
 def test_las_is_in_metres_with_z_upwards(tmp_path, crs, factor):
-    points, notes = load_cloud(las(tmp_path / "c.las", PILE, crs))
+    cloud = read_cloud_file(las(tmp_path / "c.las", PILE, crs))
+    points, notes = cloud.points, cloud.notes
     assert points == pytest.approx(PILE * np.array(factor), abs=1e-3)
     assert bool(notes) == (factor != (1, 1, 1))
 
 
 def test_las_in_degrees_is_refused(tmp_path):
     with pytest.raises(InputError, match="in degrees"):
-        load_cloud(las(tmp_path / "c.las", PILE, "EPSG:4326"))
+        read_cloud_file(las(tmp_path / "c.las", PILE, "EPSG:4326"))
     with pytest.raises(InputError, match="scale: the file states its unit"):
-        load_cloud(las(tmp_path / "d.las", PILE, "EPSG:2263"), Placement(scale=0.3048))
+        read_cloud_file(las(tmp_path / "d.las", PILE, "EPSG:2263"), Placement(scale=0.3048))
 
 
 def box_mesh(tmp_path, name, low, high):
@@ -158,7 +162,8 @@ def box_mesh(tmp_path, name, low, high):
 
 
 def box_of(file, placement=None):
-    vertices, _, notes = load_mesh(file, placement)
+    mesh = read_mesh_file(file, placement)
+    vertices, notes = mesh.vertices, mesh.notes
     return np.round([vertices.min(0), vertices.max(0)], 6).tolist(), notes
 
 
@@ -455,7 +460,8 @@ def test_every_point_of_a_cloud_is_used_or_counted_in_a_note(tmp_path, kind):
         head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 60\nHEIGHT 1\nDATA ascii\n"
         body = "\n".join(" ".join(map(str, p)) for p in points)
         file.write_text(head + body, encoding="utf-8")
-    used, notes = load_cloud(file)
+    cloud = read_cloud_file(file)
+    used, notes = cloud.points, cloud.notes
     left_out = sum(int(note.split()[0]) for note in notes if note.endswith("left out"))
     assert left_out > 0
     assert len(used) + left_out == 60

@@ -11,13 +11,9 @@ from netsp import InputError, Problem
 from netsp.command.main import main
 from netsp.world import DistanceField, Scene
 from netsp.world.scene.packing import CELLS
+from netsp.world.scene.readers import read_cloud_file, read_mesh_file
 from netsp.world.scene.surfaces import surface_of
-from netsp.world.scene.voxels import (
-    grid_of_cloud,
-    grid_of_cloud_file,
-    grid_of_mesh_file,
-    grid_of_triangles,
-)
+from netsp.world.scene.voxels import grid_of_cloud, grid_of_triangles
 
 trimesh = pytest.importorskip("trimesh")
 
@@ -229,7 +225,7 @@ def test_clouds_and_meshes_are_read_from_files(tmp_path):
     np.savetxt(tmp_path / "cloud.csv", ball.vertices, delimiter=",", header="x,y,z", comments="")
     expected = grid_of_cloud(ball.vertices, voxel=0.1).values
     for name in ("cloud.npz", "cloud.csv"):
-        found = grid_of_cloud_file(tmp_path / name, voxel=0.1).values
+        found = grid_of_cloud(read_cloud_file(tmp_path / name).points, voxel=0.1).values
         assert np.allclose(found, expected, atol=1e-4)
     scene = {"schema_version": 1, "mesh": {"file": "ball.stl", "scale": 2.0, "voxel": 0.1}}
     (tmp_path / "scene.json").write_text(json.dumps(scene))
@@ -259,7 +255,7 @@ def test_a_grid_that_is_too_large_is_refused_with_one_that_is_not():
     with pytest.raises(InputError, match=r"got none"):
         grid_of_triangles(np.zeros((0, 3)), np.zeros((0, 3), dtype=int))
     with pytest.raises(InputError, match="no such file"):
-        grid_of_mesh_file("missing.stl")
+        read_mesh_file("missing.stl")
 
 
 @pytest.mark.parametrize(

@@ -157,7 +157,7 @@ def formats() -> tuple[str, bool]:
 
 def spellings() -> tuple[str, bool]:
     """One cloud in every order of columns, with each separator, decimal sign and encoding."""
-    from netsp.world.scene.readers import read_cloud
+    from netsp.world.scene.readers import read_cloud_file
 
     points = np.random.default_rng(60).uniform(-9.0, 9.0, (40, 3)).round(3) - (0.0, 0.0, 10.0)
     columns = {
@@ -177,7 +177,7 @@ def spellings() -> tuple[str, bool]:
                 for encoding in ("utf-8", "utf-8-sig", "utf-16"):
                     file.write_bytes("\r\n".join(lines).encode(encoding))
                     tried += 1
-                    wrong += not np.allclose(read_cloud(file), points, atol=1e-5)
+                    wrong += not np.allclose(read_cloud_file(file).points, points, atol=1e-5)
     return f"{wrong} of {tried} wrong", wrong == 0
 
 

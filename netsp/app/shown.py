@@ -88,12 +88,10 @@ def read_shown(
 
 
 def _of_plan(problem: Problem, solution: Solution) -> Shown:
-    return Shown(
-        json.loads(problem.to_json()), _answer(problem, solution), scene_of(problem), solution
-    )
+    return Shown(json.loads(problem.to_json()), _answer(solution), scene_of(problem), solution)
 
 
-def _answer(problem: Problem, solution: Solution) -> dict[str, Any]:
+def _answer(solution: Solution) -> dict[str, Any]:
     return {
         "version": 0,
         "stage": "done",

@@ -103,7 +103,7 @@ def exact_length(
         if backward >= 0:
             del chain[backward]
             continue
-        entered = _entered(a, b, chain, legs, disks, slack)
+        entered = _entered(a, chain, legs, disks, slack)
         if entered is None:
             arcs = sum(c.radius * t for c, t in zip(chain, turns, strict=True))
             return length + arcs, sum(turns)
@@ -130,12 +130,7 @@ def _tangent(
 
 
 def _entered(
-    a: Floats,
-    b: Floats,
-    chain: list[Contact],
-    legs: list[tuple[float, float]],
-    disks: Floats,
-    slack: float,
+    a: Floats, chain: list[Contact], legs: list[tuple[float, float]], disks: Floats, slack: float
 ) -> tuple[int, Contact] | None:
     """Return where in the chain to insert the disk that a tangent enters deepest, and its
     contact."""

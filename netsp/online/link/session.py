@@ -66,7 +66,6 @@ class Session:
         self._fault: str | None = None
         self._places: deque[tuple[float, Point3]] = deque(maxlen=2000)
         self._texts: deque[str] = deque(maxlen=200)
-        self._acks: dict[int, int] = {}
         self._parameters: dict[str, float] = {}
         self._station: tuple[int, float] | None = None
         self._echoes = TargetEcho(frame)
@@ -169,11 +168,6 @@ class Session:
             self._texts.clear()
         return found
 
-    def pop_ack(self, command: int) -> int | None:
-        """Return the result of a command, once; None while there is none."""
-        with self._lock:
-            return self._acks.pop(command, None)
-
     def sleep(self, seconds: float) -> None:
         """Wait for some seconds of the vehicle."""
         time.sleep(seconds / self.pace)
@@ -183,8 +177,6 @@ class Session:
         if self.system is None:
             return False
         values = [*map(float, params), *[0.0] * (7 - len(params))]
-        with self._lock:
-            self._acks.pop(number, None)
         message = dialect().MAVLink_command_long_message(self.system, 1, number, 0, *values)
         return self.link.send(message)
 
@@ -301,8 +293,6 @@ class Session:
             self._heartbeat_at = self._seconds()
         elif kind == "STATUSTEXT":
             self._texts.append(str(message.text))
-        elif kind == "COMMAND_ACK":
-            self._acks[int(message.command)] = int(message.result)
         elif kind == "PARAM_VALUE":
             self._parameters[str(message.param_id)] = float(message.param_value)
         if time is not None and (self._ticked is None or self._ticked[0] != time):

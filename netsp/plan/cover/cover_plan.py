@@ -198,7 +198,7 @@ def cover(
             )
         report(f"choosing among {len(found)} viewpoints")
         choice = choose(found.sees, patches.areas, share, clock, policy)
-        return _build_cover(mission, scene, patches, found, choice, reach, share)
+        return _build_cover(mission, patches, found, choice, reach, share)
 
 
 def _check(
@@ -298,7 +298,6 @@ class _Reach:
 
 def _build_cover(
     mission: Mission,
-    scene: Scene,
     patches: Patches,
     found: Viewpoints,
     choice: Choice,

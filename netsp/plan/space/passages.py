@@ -210,7 +210,7 @@ def _gaps_between(
     side = int(np.clip((policy.max_points / len(cells)) ** (1.0 / 3.0), 2, policy.finest))
     ends, places, room = _find_links(grid, cells, nearest, side)
     ends, places, room = _unconnected_links(free, ends, places, room, policy, clock)
-    return _group_links(grid, ends, places, room, policy)
+    return _group_links(grid, ends, places, room)
 
 
 def _is_open(grid: GapGrid, gap: Gap, policy: GapPolicy) -> bool:
@@ -321,9 +321,7 @@ def _unconnected_links(
     return ends[keep], places[keep], room[keep]
 
 
-def _group_links(
-    grid: GapGrid, ends: Ints, places: Floats, room: Floats, policy: GapPolicy
-) -> list[Gap]:
+def _group_links(grid: GapGrid, ends: Ints, places: Floats, room: Floats) -> list[Gap]:
     """Return one gap for each group of links near one another, at the place with the most room."""
     from scipy.ndimage import label
 

@@ -66,12 +66,6 @@ class CarriedTether:
             node = self._parent[node]
         return out[::-1]
 
-    @property
-    def is_contractible(self) -> bool:
-        """True if the reduced sequence of crossed edges is empty, so the path contracts to a
-        point."""
-        return self._node[-1] == 0
-
     def length(self, k: int) -> float:
         """Return the length of the taut tether at a point.
 

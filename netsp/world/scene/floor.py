@@ -40,18 +40,6 @@ step."""
 _ESRI_WORDS = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter")
 
 
-def floor_mesh(
-    path: str | Path,
-    *,
-    scale: float = 1.0,
-    origin: tuple[float, float] = (0.0, 0.0),
-    depths: bool | None = None,
-) -> tuple[Floats, npt.NDArray[np.int64]]:
-    """Return the closed mesh of `load_floor` without its notes."""
-    vertices, faces, _ = load_floor(path, scale=scale, origin=origin, depths=depths)
-    return vertices, faces
-
-
 def load_floor(
     path: str | Path,
     *,

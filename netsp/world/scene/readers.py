@@ -153,18 +153,7 @@ class Placement:
         return np.asarray(out)
 
 
-def read_mesh(path: str | Path) -> tuple[Floats, npt.NDArray[np.int64]]:
-    """Return vertices (n, 3), metres, z upwards, and faces (m, 3) of a mesh file.
-
-    InputError if there are none, or coordinates are not finite.
-    """
-    vertices, faces, _ = load_mesh(path)
-    return vertices, faces
-
-
-def load_mesh(
-    path: str | Path, placement: Placement | None = None
-) -> tuple[Floats, npt.NDArray[np.int64], tuple[str, ...]]:
+def read_mesh_file(path: str | Path, placement: Placement | None = None) -> MeshReading:
     """Read a mesh file into a scene.
 
     Parameters
@@ -174,27 +163,11 @@ def load_mesh(
     placement : Placement, optional
         Place of the mesh in the scene.
 
-    Returns
-    -------
-    vertices : ndarray, shape (n, 3)
-        Vertices, metres, z upwards.
-    faces : ndarray, shape (m, 3)
-        Indices of the corners.
-    notes : tuple of str
-        Parts that were turned, converted or left out, one line each.
-
     Raises
     ------
     InputError
         Not readable, no triangles, or coordinates that are not finite.
     """
-    mesh = read_mesh_file(path, placement)
-    return mesh.vertices, mesh.faces, mesh.notes
-
-
-def read_mesh_file(path: str | Path, placement: Placement | None = None) -> MeshReading:
-    """Read a mesh file as `load_mesh` does, with the numbers of its parts that are used and left
-    out."""
     _exists(path)
     kind = Path(path).suffix.lower()
     try:
@@ -329,14 +302,7 @@ def _collada_axes(path: str | Path) -> tuple[Up, float]:
     return names[axis[1]] if axis else "y", metres  # COLLADA 1.4: Y_UP without an element
 
 
-def read_cloud(path: str | Path) -> Floats:
-    """Return the points (n, 3) of a cloud file, metres, z upwards; InputError if there are none."""
-    return load_cloud(path)[0]
-
-
-def load_cloud(
-    path: str | Path, placement: Placement | None = None
-) -> tuple[Floats, tuple[str, ...]]:
+def read_cloud_file(path: str | Path, placement: Placement | None = None) -> CloudReading:
     """Read a cloud file into a scene.
 
     Parameters
@@ -346,24 +312,11 @@ def load_cloud(
     placement : Placement, optional
         Place of the cloud in the scene.
 
-    Returns
-    -------
-    points : ndarray, shape (n, 3)
-        Points, metres, z upwards.
-    notes : tuple of str
-        Points and columns that were left out or converted, one line each.
-
     Raises
     ------
     InputError
         Not readable, no points, in degrees, or ambiguous columns.
     """
-    cloud = read_cloud_file(path, placement)
-    return cloud.points, cloud.notes
-
-
-def read_cloud_file(path: str | Path, placement: Placement | None = None) -> CloudReading:
-    """Read a cloud file as `load_cloud` does, with the numbers of its points used and left out."""
     _exists(path)
     kind = Path(path).suffix.lower()
     try:

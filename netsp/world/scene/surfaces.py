@@ -188,9 +188,9 @@ def extent(scene: Scene, *points: Floats) -> tuple[Floats, Floats]:
 
 def drawn_points(scene: Scene, policy: SurfacePolicy | None = None) -> Floats:
     """Return evenly chosen points of the scene's cloud, few enough to draw."""
-    from netsp.world.scene.readers import load_cloud
+    from netsp.world.scene.readers import read_cloud_file
 
     assert scene.cloud is not None
     max_points = (policy or SurfacePolicy()).max_cloud_points
-    points = load_cloud(scene.cloud.file, scene.cloud.placement)[0]
+    points = read_cloud_file(scene.cloud.file, scene.cloud.placement).points
     return np.asarray(points[:: -(-len(points) // max_points)])

@@ -10,8 +10,7 @@ and points that it does not reach are solid.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -21,41 +20,8 @@ from netsp.base.bounded_work import end_if_abandoned
 from netsp.base.errors import InputError
 from netsp.world.scene.grid import SIDE, VoxelGrid
 from netsp.world.scene.lattice import Dense, Lattice, OnStage, report_stage, sparse_near
-from netsp.world.scene.readers import Placement, load_cloud, load_mesh
 from netsp.world.scene.scene_policy import GridPolicy
 from netsp.world.scene.sites import point_sites, triangle_sites
-
-
-def grid_of_mesh_file(
-    path: str | Path,
-    *,
-    scale: float = 1.0,
-    voxel: float | None = None,
-    memory_limit: float = 4.0,
-    on_progress: OnStage = None,
-    policy: GridPolicy | None = None,
-) -> VoxelGrid:
-    """Return the distance grid of a mesh file in any format that trimesh reads (STL, OBJ, PLY, GLB,
-    …).
-
-    Raises
-    ------
-    InputError
-        Not readable, no triangles, coordinates that are not finite, a grid too large for
-        `memory_limit` (GiB), or trimesh is not installed.
-    """
-    vertices, faces, notes = load_mesh(path, Placement(scale))
-    end_if_abandoned()
-    grid = grid_of_triangles(
-        vertices,
-        faces,
-        voxel=voxel,
-        memory_limit=memory_limit,
-        on_progress=on_progress,
-        source=str(path),
-        policy=policy,
-    )
-    return replace(grid, notes=(*notes, *grid.notes))
 
 
 def grid_of_meshes(
@@ -172,32 +138,6 @@ class _Triangles:
         if not (values < 0.0).any():
             raise InputError(f"{source}: no solid at voxels of {size:.3g}; expected smaller voxels")
         return values, notes
-
-
-def grid_of_cloud_file(
-    path: str | Path,
-    *,
-    scale: float = 1.0,
-    voxel: float | None = None,
-    memory_limit: float = 4.0,
-    on_progress: OnStage = None,
-    policy: GridPolicy | None = None,
-) -> VoxelGrid:
-    """Return the distance grid of a cloud file in any format of
-    `netsp.world.scene.readers.load_cloud`.
-
-    InputError as for `grid_of_mesh_file`.
-    """
-    points, notes = load_cloud(path, Placement(scale))
-    grid = grid_of_cloud(
-        points,
-        voxel=voxel,
-        memory_limit=memory_limit,
-        on_progress=on_progress,
-        source=str(path),
-        policy=policy,
-    )
-    return replace(grid, notes=(*notes, *grid.notes))
 
 
 def grid_of_cloud(
