@@ -24,6 +24,7 @@ from netsp.base.arrays import Floats
 from netsp.hsignature import Word
 from netsp.world.scene.field import DistanceField
 from netsp.world.tether import GeodesicTether, Tether
+from netsp.world.world_policy import WorldPolicy
 
 
 class Letters(Protocol):
@@ -65,6 +66,10 @@ class World(Protocol):
     model: GeodesicTether
     sides: tuple[str, ...]
     """Sides of obstacles, as operators may name them."""
+
+    @property
+    def policy(self) -> WorldPolicy:
+        """Limits of searches."""
 
     @property
     def start(self) -> Floats:

@@ -27,7 +27,7 @@ from netsp.online.fly.stopped import RefusedError
 from netsp.online.guard.state_file import GuardState
 from netsp.plan.tour_plan import HOME, legs_of
 from netsp.roadmap.paths import TautPaths, UnknownPathError
-from netsp.roadmap.plane_world import free_position
+from netsp.roadmap.plane_world import PlaneWorld, free_position
 from netsp.roadmap.roadmap_policy import RoadmapPolicy
 
 BeginsAt = Callable[[Floats], ResumePoint]
@@ -157,10 +157,8 @@ def from_guard(
     InputError
         The file is not valid, of another site, or without a certain class.
     """
-    from netsp.online.guard.plane import PlaneSite
-
     known = GuardState.load(file)
-    known.words(PlaneSite(problem))
+    known.words(PlaneWorld(problem))
     likeliest, *others = known.classes
     odds = min((math.exp(c.cost - likeliest.cost) for c in others), default=math.inf)
     if odds < policy.min_class_odds:

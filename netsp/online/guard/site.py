@@ -32,13 +32,16 @@ class Loop(ComparesArrays):
 class Site(World, Protocol):
     """World where a tether is watched: what a guard asks of it besides."""
 
-    policy: SitePolicy
     lookahead_model: GeodesicTether
     """Model that is coarse enough for looks ahead."""
     centres: Floats
     """Centres of obstacles that robots circle, in the plan, shape (n, 2), m."""
     steps_per_update: int
     """Maximum number of steps of looks ahead in one update."""
+
+    @property
+    def policy(self) -> SitePolicy:
+        """Resolutions and limits."""
 
     def loops_in(self, nodes: Floats) -> list[Loop]:
         """Return the loops of a taut tether, the last to be closed first."""

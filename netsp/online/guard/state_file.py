@@ -18,9 +18,9 @@ from netsp.base.files import FileModel, write_text
 from netsp.base.validated import Model
 from netsp.hsignature import Word
 from netsp.online.guard.guard_policy import GuardPolicy
-from netsp.online.guard.site import Site
 from netsp.online.guard.tether_guard import Guard
 from netsp.world.tether import Tether
+from netsp.world.world_protocol import World
 
 MAX_LETTERS = 10_000
 """Format limit on the letters of a word in a state file. A damaged file may hold a longer word,
@@ -61,7 +61,7 @@ class GuardState(FileModel):
     ]
 
     def words(
-        self, site: Site, max_age_s: float = GuardPolicy.max_state_age_s
+        self, site: World, max_age_s: float = GuardPolicy.max_state_age_s
     ) -> dict[Word, float]:
         """Return the classes and their costs.
 
@@ -87,7 +87,7 @@ class GuardState(FileModel):
             raise InputError("--state: saved: lies in the future; is the clock right?")
         return {c.word: c.cost for c in self.classes}
 
-    def tethers(self, site: Site) -> dict[Word, Tether]:
+    def tethers(self, site: World) -> dict[Word, Tether]:
         """Return the taut tether of each class, as far as it was saved.
 
         Raises
