@@ -41,31 +41,15 @@ class DoesNotFitError(InputError):
 def icra2017(
     draw: random.Random, count: int, side: float, radii: tuple[float, float]
 ) -> list[Obstacle]:
-    """Disjoint circles anywhere, radii uniform between two limits.
+    """Draw disjoint circles anywhere, radii uniform between two limits.
 
     Source: McCammon & Hollinger 2017, section V-A; the paper gives no radii.
-
-    Parameters
-    ----------
-    draw : random.Random
-        Of all that is random.
-    count : int
-        Number of obstacles.
-    side : float
-        Side of the square.
-    radii : tuple of float
-        Least and greatest radius.
-
-    Returns
-    -------
-    list of Obstacle
-        The obstacles.
     """
 
     def candidates() -> Iterator[tuple[float, float, float]]:
         while True:
             x, y = draw.random() * side, draw.random() * side
-            yield x, y, radii[0] + draw.random() * (radii[1] - radii[0])
+            yield x, y, _radius(draw, radii)
 
     return _circles(candidates(), count, side)
 
@@ -73,24 +57,7 @@ def icra2017(
 def clustered(
     draw: random.Random, count: int, side: float, radii: tuple[float, float]
 ) -> list[Obstacle]:
-    """Circles around three to five centres, dense within and open water between.
-
-    Parameters
-    ----------
-    draw : random.Random
-        Of all that is random.
-    count : int
-        Number of obstacles.
-    side : float
-        Side of the square.
-    radii : tuple of float
-        Least and greatest radius.
-
-    Returns
-    -------
-    list of Obstacle
-        The obstacles.
-    """
+    """Draw circles around three to five centres, dense within and open water between."""
     centers = [
         (side * (0.15 + 0.7 * draw.random()), side * (0.15 + 0.7 * draw.random()))
         for _ in range(3 + int(3 * draw.random()))
@@ -102,7 +69,7 @@ def clustered(
             x, y = centers[int(len(centers) * draw.random())]
             # three uniform draws: a bell without a logarithm, so the same on every machine
             dx, dy = (spread * (sum(draw.random() for _ in range(3)) / 3.0 - 0.5) for _ in "xy")
-            r = radii[0] + draw.random() * (radii[1] - radii[0])
+            r = _radius(draw, radii)
             if 0.0 <= x + dx <= side and 0.0 <= y + dy <= side:
                 yield x + dx, y + dy, r
 
@@ -112,27 +79,11 @@ def clustered(
 def array(
     draw: random.Random, count: int, side: float, radii: tuple[float, float]
 ) -> list[Obstacle]:
-    """Circles of one radius in staggered rows, each a little off its place.
+    """Draw circles of one radius in staggered rows, each a little off its place.
 
     So are wave-energy converters laid out (Beels et al. 2010, the layouts of the 2016 paper).
-
-    Parameters
-    ----------
-    draw : random.Random
-        Of all that is random.
-    count : int
-        Number of obstacles.
-    side : float
-        Side of the square.
-    radii : tuple of float
-        Least and greatest radius.
-
-    Returns
-    -------
-    list of Obstacle
-        The obstacles.
     """
-    radius = radii[0] + draw.random() * (radii[1] - radii[0])
+    radius = _radius(draw, radii)
     rows = max(1, math.isqrt(count))
     columns = -(-count // rows)
     pitch, row_pitch = side / (columns + 0.5), side / rows
@@ -155,24 +106,7 @@ def array(
 def harbour(
     draw: random.Random, count: int, side: float, radii: tuple[float, float]
 ) -> list[Obstacle]:
-    """Polygons: piers from the southern edge, and barges at any angle in the basin.
-
-    Parameters
-    ----------
-    draw : random.Random
-        Of all that is random.
-    count : int
-        Number of obstacles.
-    side : float
-        Side of the square.
-    radii : tuple of float
-        Least and greatest half-width of a barge.
-
-    Returns
-    -------
-    list of Obstacle
-        The obstacles.
-    """
+    """Draw polygons: piers from the southern edge, and barges at any angle in the basin."""
     piers = min(max(1, count // 4), 6)
     out: list[Obstacle] = []
     for k in range(min(piers, count)):
@@ -185,7 +119,7 @@ def harbour(
         if len(out) >= count:
             return out
         place = (draw.random() * side, draw.random() * side)
-        half = radii[0] + draw.random() * (radii[1] - radii[0])
+        half = _radius(draw, radii)
         long = half * (1.0 + 2.0 * draw.random())
         # a rotation by rational numbers: no sine that could differ between machines
         t = 2.0 * draw.random() - 1.0
@@ -197,6 +131,10 @@ def harbour(
     raise DoesNotFitError(f"obstacles: {count} polygons do not fit into a square of side {side:g}")
 
 
+def _radius(draw: random.Random, radii: tuple[float, float]) -> float:
+    return radii[0] + draw.random() * (radii[1] - radii[0])
+
+
 FAMILIES: dict[str, Draw] = {
     "icra2017": icra2017,
     "rss2016": icra2017,
@@ -204,8 +142,12 @@ FAMILIES: dict[str, Draw] = {
     "array": array,
     "harbour": harbour,
 }
-"""Name → how the obstacles are drawn. `rss2016` draws 5 to 10 obstacles and goals if it is not told
-how many (McCammon & Hollinger 2016, section IV-A)."""
+"""Functions that draw obstacles, by name.
+
+They take a generator of random numbers, the number of obstacles, the side of the square, and the
+minimum and maximum radius (of a barge: half its width). `rss2016` draws 5 to 10 obstacles and goals
+if it is not told how many (McCammon & Hollinger 2016, section IV-A).
+"""
 
 
 def random_world(
