@@ -145,10 +145,19 @@ class Scheduler:
 
     Examples
     --------
-    A task that searches and one that proves, over a run:
-
-    >>> tasks = [Task("search", search, Estimate(0.1, 0)), Task("proof", prove, Estimate(5.0, 1e8))]
-    >>> run_to_end(Scheduler(run, tasks, lambda: run.length - run.bound).steps())  # doctest: +SKIP
+    >>> from netsp import TravelGraph
+    >>> from netsp.gtsp.resumable import run_to_end
+    >>> gap = 10.0
+    >>> def halve():
+    ...     global gap
+    ...     while gap > 1.0:
+    ...         gap /= 2.0
+    ...         yield
+    >>> run = SolverRun(TravelGraph.from_costs([[0, 1], [1, 0]], [0, 1]))
+    >>> tasks = [Task("halve", halve, Estimate(1.0, 0.0))]
+    >>> run_to_end(Scheduler(run, tasks, lambda: gap).steps())
+    >>> gap
+    0.625
     """
 
     def __init__(
