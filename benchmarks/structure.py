@@ -62,6 +62,14 @@ IDIOMS = re.compile(
 )
 """Quoted names, and idioms in which a word of `UNSAID` has another sense."""
 
+PHRASES = re.compile(
+    r"\b(anew|sought|in vain|once more|at hand|all the same|as ever|for ever|half-made)\b"
+    r"|\b(told|tells?)( \w+){0,3} apart\b|\bBesides,|\bbesides[.,;]|\bso (many|few) at most\b"
+    r"|\b(Of|One of) (it|them|these)\.|\b[Hh]ow many, about\b|^(Which|When|Where|Who|How)\.$",
+    re.M,
+)
+"""Phrases that no native speaker would write, and fragments instead of descriptions."""
+
 Place = tuple[str, int, str]
 """File, line and text."""
 
@@ -285,19 +293,36 @@ def said(text: str) -> list[str]:
     return [t for t, pattern in UNSAID.items() if re.search(rf"\b({pattern})\b", plain, re.I)]
 
 
-def _unsaid(tree: Tree) -> list[Place]:
-    found = []
+def _prose(tree: Tree) -> Iterator[tuple[Path, int, str]]:
+    """Yield docstrings without the names of parameters and examples, and comments."""
     for file, node, text in _documented(tree):
         prose = re.sub(r"^\s*\w+(, \w+)*( : .*)?$|^\s*>>>.*$", "", text, flags=re.M)
-        found += [tree.place(file, node, f"{t}: {text.splitlines()[0]}") for t in said(prose)]
+        yield file, getattr(node, "lineno", 1), prose
     for file, text in tree.texts.items():
         for token in tokenize.generate_tokens(io.StringIO(text).readline):
             if token.type == tokenize.COMMENT:
-                name = str(file.relative_to(tree.root.parent))
-                found += [
-                    (name, token.start[0], f"{t}: {token.string}") for t in said(token.string)
-                ]
-    return found
+                yield file, token.start[0], token.string
+
+
+def _unsaid(tree: Tree) -> list[Place]:
+    return [
+        (str(file.relative_to(tree.root.parent)), line, f"{term}: {text.strip().splitlines()[0]}")
+        for file, line, text in _prose(tree)
+        for term in said(text)
+    ]
+
+
+def phrases(text: str) -> list[str]:
+    """Return the `PHRASES` that a text uses."""
+    return [m[0] for line in text.splitlines() for m in PHRASES.finditer(line.strip())]
+
+
+def _phrases(tree: Tree) -> list[Place]:
+    return [
+        (str(file.relative_to(tree.root.parent)), line, phrase)
+        for file, line, text in _prose(tree)
+        for phrase in phrases(text)
+    ]
 
 
 def _skips(tree: Tree) -> list[Place]:
@@ -324,6 +349,7 @@ ROWS: dict[str, tuple[str, Callable[[Tree], list[Place]]]] = {
     "identifiers": ("names that the language rules forbid, once a file", _identifiers),
     "pronouns": ("docstrings with a pronoun for a number", _pronouns),
     "unsaid": ("terms that the glossary says not to use", _unsaid),
+    "phrases": ("phrases that no native speaker would write", _phrases),
     "skips": ("`# fmt: skip`", _skips),
 }
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.structure import ROWS, UNSAID, Tree, said
+from benchmarks.structure import ROWS, UNSAID, Tree, phrases, said
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -17,14 +17,15 @@ FIRST_COMMIT = "01e50a9b"
 CEILINGS = {
     "basenames": 0,
     "rooms": 16,
-    "constants": 98,
+    "constants": 83,
     "ambiguous": 0,
-    "long": 172,
-    "parameters": 70,
+    "long": 153,
+    "parameters": 67,
     "openings": 0,
     "unsaid": 0,
-    "identifiers": 122,
-    "pronouns": 24,
+    "phrases": 0,
+    "identifiers": 120,
+    "pronouns": 21,
     "skips": 29,
 }
 """Places that may break each rule, as counted by `python benchmarks/structure.py`. A change may
@@ -94,9 +95,9 @@ PAGES = [page for page in sorted((ROOT / "docs").glob("*.md")) if page.name != "
 
 
 @pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda page: page.stem)
-def test_pages_keep_to_the_terms_of_the_glossary(page):
+def test_pages_keep_to_the_terms_of_the_glossary_and_to_plain_phrases(page):
     text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
-    assert [(t, p) for p in text.split("\n\n") for t in said(p)] == []
+    assert [(t, p) for p in text.split("\n\n") for t in [*said(p), *phrases(p)]] == []
 
 
 def subjects():

@@ -255,7 +255,7 @@ class Clock:
     def with_min_cpu(self, cpu_s: float) -> Iterator[None]:
         """Abandon no work of a block before it has had some CPU time, however short the limit is.
 
-        Compiling does not count. Ctrl-C abandons work all the same.
+        Compiling does not count. Ctrl-C abandons work anyway.
 
         Parameters
         ----------

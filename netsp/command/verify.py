@@ -27,7 +27,7 @@ def run(args: argparse.Namespace) -> int:
     if args.measures and args.solution is not None and is_scene(args.problem):
         return _path_in_scene(args)
     if args.solution is None:
-        read_text(args.problem)  # a file that is not there is told as ever
+        read_text(args.problem)  # a missing file is reported as usual
         raise InputError(f"SOLUTION: {args.problem} is no mission; expected a solution beside it")
     if args.measures:
         from netsp.model.problem import Problem

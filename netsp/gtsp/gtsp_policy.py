@@ -31,7 +31,7 @@ class CostPolicy:
     s_per_single_leg, s_per_copied_leg
         Estimated CPU time of a leg, s: measured by itself, and copied from a matrix.
     tried_legs
-        Legs that are measured at a time while the nearest vertex is sought in order of bounds.
+        Number of legs measured at a time in a search, in the order of bounds, for the nearest vertex.
     bytes_per_leg
         Memory of a proof for each entry of a matrix in double precision, bytes: the cost, what is
         known of the leg, and temporaries.
@@ -44,7 +44,7 @@ class CostPolicy:
     task_rows
         Rows of sparse costs that a thread processes at a time.
     min_packed_share
-        Share of the room of sparse costs in use at which they are packed anew: packing copies all
+        Share of the room of sparse costs in use at which they are packed again: packing copies all
         costs, room that is not in use wastes memory.
     """
 
@@ -169,7 +169,7 @@ class ProofSearchPolicy:
     Attributes
     ----------
     first_tour_vertices
-        Vertices of each cluster among which the first tour is sought.
+        Vertices of each cluster among which the first tour is searched for.
     max_whole_search
         Number of vertices, all measured, up to which a search sees all of them.
     max_searches

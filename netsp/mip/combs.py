@@ -7,7 +7,7 @@ in H and partly not,
 
 (Chvátal 1973, Grötschel & Padberg 1979; over clusters: Fischetti, Salazar & Toth 1997). A set that
 the point enters and leaves once behaves like one cluster. So disjoint such sets are shrunk, and
-teeth are sought between two of them as those of 2-matching inequalities between two clusters
+teeth are searched for between two of them as those of 2-matching inequalities between two clusters
 (Padberg & Rinaldi 1990). Several limits on the size of shrunk sets are tried.
 """
 

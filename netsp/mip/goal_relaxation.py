@@ -42,7 +42,7 @@ Prove = Callable[[TravelGraph, Limits], tuple[Result, Sequence[Cut]]]
 
 @dataclass(frozen=True)
 class CoverCosts:
-    """Costs of legs between classes for covers, and who hears of them.
+    """Costs of legs between classes for covers, and the callback that gets them.
 
     Without either callback, covers have the lengths of shortest paths, and their bound also holds
     for classes that a roadmap has left out.

@@ -26,7 +26,8 @@ class CutPolicy:
         The flow between two clusters counts as fractional if it lies between a level and one less
         that level. Each level gives other handles.
     shrunk_sizes
-        Maximum numbers of clusters in a set that is shrunk before combs are sought; all are tried.
+        Maximum numbers of clusters in a set that is shrunk before combs are searched for; all are
+        tried.
     max_combs
         Maximum number of combs per point.
     min_tooth_flow
@@ -151,7 +152,7 @@ class SchedulePolicy:
         While the LP's optimum is above the bound by more than this share of the gap, the root
         prices and adds no cuts. It holds in large LPs only (`LpPolicy.many_vertices`).
     settled_share
-        Share of the gap below which cuts are sought again after that.
+        Share of the gap below which cuts are searched for again after that.
     """
 
     min_interval: int = 2
@@ -428,7 +429,7 @@ class MipPolicy:
     handover
         Sizes of the rest of a proof at which cuts take over from walks.
     search_gap_ratio
-        Share of the last gap at which the classes that the LP visits are searched once more.
+        Share of the last gap at which the classes that the LP visits are searched again.
     max_branching_legs
         Number of legs left above which neither branching nor an integer program would end.
     max_searches

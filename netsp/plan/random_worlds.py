@@ -261,7 +261,7 @@ def reachable_world(seed: int, **recipe: object) -> tuple[Problem, int]:
     world : Problem
         The world.
     drawn : int
-        How many were drawn in vain before it.
+        Number of unreachable worlds drawn before it.
 
     Raises
     ------

@@ -440,7 +440,7 @@ def run_explore(
     ----------
     target
         A point, and for each tangent a lower bound on the length from its end to that point. Only
-        paths to the point are sought.
+        paths to the point are searched for.
     max_lengths
         (points,) length of the longest path to each point that counts.
     max_hits

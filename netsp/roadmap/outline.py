@@ -235,7 +235,7 @@ def _visible_arcs(disks: Floats, blockers: Blockers, bounds: Floats, stop: Ints)
     part, part_box, skip = blockers.part, blockers.part_box, blockers.tree.skip
     tree_box, tree_first, tree_stop = blockers.tree.box, blockers.tree.first, blockers.tree.stop
     arcs = np.empty((16, 6))  # the sixth column is 1 for a whole circle
-    zero = int(np.int64(0))  # no literal: numba would compile every callee for it once more
+    zero = int(np.int64(0))  # no literal: numba would compile every callee for it again
     count = zero
     cuts = np.empty(64)
     inside = np.empty(64)

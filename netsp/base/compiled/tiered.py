@@ -152,7 +152,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
             return
         details = {"dispatcher": self, "args": types, "return_type": None}
         with event.trigger_event("numba:compile", data=details):
-            # popped first, so that an interrupt leaves no half-made library behind
+            # popped first, so that an interrupt leaves no incomplete library behind
             linked = self.overloads.pop(types)
             self.add_overload(linked.library.wrapped(linked))
         self._cache.save_overload(types, self.overloads[types])

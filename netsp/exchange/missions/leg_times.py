@@ -349,7 +349,7 @@ def target_times(
     notice_s : float
         Time from being within reach until the vehicle has the next target, s.
     repeat_s : float
-        Time after which a target is sent again and the vehicle plans anew, s.
+        Time after which a target is sent again and the vehicle plans again, s.
     """
     motion = motion or VehicleMotion()
     vehicle = _Follower(places[0], speed, motion)

@@ -9,7 +9,7 @@ its last. The tour's length is the sum of ``grown``. Between p and its successor
     min over i, j, l of ahead[p, i] + c_ij + c_jl + behind[q, l]
     less min over i, l of ahead[p, i] + c_il + behind[q, l],
 
-where the vertex of every other cluster is chosen anew.
+where the vertex of every other cluster is chosen again.
 
 Both tables are known up to a constant for each cluster. So a change is written only as far as it
 changes which vertices are best, which is seldom more than a few clusters, however long the tour.

@@ -408,7 +408,7 @@ class RepairPlanner(PredictivePlanner):
     @property
     def flown(self) -> Mission:
         """See `Planner`: the mission without a tour that its waypoints do not lie on, as when
-        waypoints were left out before the tour was planned anew."""
+        waypoints were left out before the tour was planned again."""
         m = self.mission if self.mission.waypoints else self._as_given
         assert m is not None
         if m.tour is not None and m.tour.mismatch(m.begin, m.start, m.places, m.reach):

@@ -18,7 +18,7 @@ LOCAL = "local"
 """Response of a repair: the order is kept, with other paths or classes."""
 
 REPLANNED = "replan"
-"""Response of a repair: the rest of the tour is planned anew."""
+"""Response of a repair: the rest of the tour is planned again."""
 
 HOMEWARD = "home"
 """Response of a repair in the plane: no goal can be reached, so the robot goes home."""

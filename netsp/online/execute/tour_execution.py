@@ -401,7 +401,7 @@ class _Run:
         return reserved_limit(self.problem, goals, self.reserve)
 
     def _replan_within_limit(self, why: str, left: list[int], event: str) -> None:
-        """Plan anew, after going back along the tether if too much of it is out.
+        """Plan again, after going back along the tether if too much of it is out.
 
         The tether gets shorter nowhere faster than along itself. While the limit is kept, only one
         that was lowered below what is out and the reserve is a reason to go back: towards goals

@@ -46,7 +46,7 @@ class FlightPolicy:
         Largest reported speed that counts when the target changes, m/s; higher ones are capped.
     resend_s
         Time after which a target is sent again if the vehicle echoes another one, or neither echoes
-        any nor moves towards it, s. A target that is sent again is planned for anew: the vehicle
+        any nor moves towards it, s. A target that is sent again is planned for again: the vehicle
         falls behind in depth.
     max_resends
         Maximum number of times a target is resent to a vehicle that echoes another one.

@@ -1,7 +1,7 @@
 """Vehicle over a link, which `execute` drives by position targets, vertex by vertex.
 
 ArduSub in GUIDED holds a position target for good, while one with a velocity times out; so only
-positions are sent. Datagrams get lost, but the vehicle plans anew for a target that is sent again,
+positions are sent. Datagrams get lost, but the vehicle plans again for a target that is sent again,
 and falls behind in depth: a target is sent again only if the vehicle echoes another one, or echoes
 none and does not move towards it. ArduSub does not go above home, and interprets an altitude of 0
 as "keep the current one" (`netsp.exchange.missions.mission_files`): targets are at least 0.1 m

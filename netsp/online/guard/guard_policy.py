@@ -92,7 +92,7 @@ class VelocityPolicy:
     max_mismatch
         Share of the distance by which the summed velocities may miss it.
     max_pause_s
-        Longest time without a velocity, s; after a longer one the test begins anew.
+        Longest time without a velocity, s; after a longer one the test begins again.
     max_speed_factor
         Largest believable speed as a multiple of the full speed, beyond four deviations of `noise`.
     noise
@@ -446,7 +446,7 @@ class RatePolicy:
         Time between two requests while the rate is too low, s.
     max_gap_s
         Longest time between two messages within one count, s; after a longer one, the vehicle may
-        have restarted, so counting and requesting begin anew.
+        have restarted, so counting and requesting begin again.
     """
 
     position_hz: float = 10.0

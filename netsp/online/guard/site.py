@@ -30,7 +30,7 @@ class Loop(ComparesArrays):
 
 
 class Site(World, Protocol):
-    """World where a tether is watched: what a guard asks of it besides."""
+    """World of a guarded tether: what a guard needs beyond other users."""
 
     lookahead_model: GeodesicTether
     """Model that is coarse enough for looks ahead."""

@@ -360,7 +360,7 @@ class Guard:
     def _begin_after_dropout(
         self, before: Floats, after: Floats, lost_s: float, reach: float
     ) -> None:
-        """Begin the belief anew with the classes of all paths that the robot may have taken."""
+        """Begin the belief again with the classes of all paths that the robot may have taken."""
         words = {h.word: -float(np.log(h.likely)) for h in self.belief.classes()}
         max_travel = self.options.speed * lost_s
         self.belief.begin(classes_after_dropout(self.site, words, before, after, max_travel, reach))

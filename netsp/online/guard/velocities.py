@@ -43,7 +43,7 @@ class VelocityCheck:
         self._past: deque[tuple[float, Floats, Floats]] = deque()
 
     def reset(self) -> None:
-        """Forget the past, and believe no velocity until it proves itself anew."""
+        """Forget the past, and believe no velocity until it proves itself again."""
         self._past.clear()
         self.is_believed = False
 

@@ -27,7 +27,7 @@ class CoverPolicy:
     views_per_hidden_patch
         Number of other places that are tried for a patch that is not seen yet.
     patches_per_round
-        Number of patches not seen yet for which places are sought together.
+        Number of patches not seen yet for which places are searched for together.
     min_standoff_ratio
         Smallest distance from the surface at such a place, as a multiple of the stand-off.
     max_matrix_entries

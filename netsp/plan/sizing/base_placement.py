@@ -74,9 +74,9 @@ class Candidate:
     lower_bound : float
         Lower bound on tours from here; inf if there is none.
     length : float or None
-        Length of the best tour found from here; None if none was sought.
+        Length of the best tour found from here; None if none was searched for.
     status : Status or None
-        What is proven of that tour; `infeasible` if there is none; None if none was sought.
+        What is proven of that tour; `infeasible` if there is none; None if none was searched for.
     why : str
         Reason why there is no tour from here.
     """
@@ -417,7 +417,7 @@ def shortest_paths(problem: Problem, places: Floats) -> tuple[Floats, Floats]:
     Raises
     ------
     InputError
-        Places so far apart that obstacles between them are too small to be told apart.
+        Places so far apart that obstacles between them are too small to be distinguished.
     """
     goals = problem.points[1:]
     if not len(places):

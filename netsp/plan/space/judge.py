@@ -71,7 +71,7 @@ def verify_mission(
 
     Checks that the tour leads from the start through the first waypoints and home, clear of solids;
     that the tether's word at every visit is the stated one and empty at the end; that the tether,
-    driven along it once more, keeps to its limit, has the stated lengths and is free at home; and
+    driven along it again, keeps to its limit, has the stated lengths and is free at home; and
     that length, bounds, gaps and status are consistent.
 
     Parameters

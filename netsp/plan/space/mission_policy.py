@@ -358,13 +358,13 @@ class StageTimePolicy:
     Attributes
     ----------
     first_states_share
-        Share for the first states, and once more for states where the robot has more room.
+        Share for the first states, and again for states where the robot has more room.
     path_search_share
         Share for the search for paths between waypoints in all classes.
     tether_path_share
         Share for paths along two tethers, after the search for paths has used its share.
     tree_share
-        Share for driving the tether along trees of legs, and once more for the legs between the
+        Share for driving the tether along trees of legs, and again for the legs between the
         states found there.
     home_path_share
         Share for the paths from the start to new states.
@@ -424,7 +424,7 @@ class DetourPolicy:
     max_orders
         Maximum number of orders that are driven.
     order_share
-        Share of the remaining time for the order without a tether, and once more for the lines of
+        Share of the remaining time for the order without a tether, and again for the lines of
         sight between places far apart.
     position_error
         Error of the robot's position at the bends of a path, metres. A tether must come to hang

@@ -3,7 +3,7 @@ elsewhere.
 
 A robot that passes half a metre farther out may leave its tether on the other side of a bar with a
 free end. Pulled taut, such a leg is the straight one again, so no search for taut paths finds it,
-and no word tells the two apart.
+and no word distinguishes the two.
 
 An order is driven leg by leg along taut paths and detours. After each leg, the tethers of the
 shortest paths that hang differently are kept (beam search). The first orders are that of the best

@@ -630,7 +630,7 @@ class _StateSearch:
     def shorter(self, best: DrivenTour | None, is_proven: bool) -> DrivenTour | None:
         """Return a shorter tour with detours, if there is one.
 
-        If words tell all states apart, detours lead to the tethers that straight legs lead to.
+        If words distinguish all states, detours lead to the tethers that straight legs lead to.
         """
         if is_proven and not self.states.has_free_ends:
             return None

@@ -79,7 +79,7 @@ def bound_by_upright_solids(
 def upright_obstacles(context: PlanningContext, dip: float) -> list[Circle | Polygon]:
     """Return obstacles of the plane that lie within a scene's upright solids.
 
-    A solid must stand through all heights in which tethers lie or words tell classes apart. If all
+    A solid must stand through all heights in which tethers lie or words distinguish classes. If all
     solids are upright, these are the heights of the scene's bounds. If not, a tether may be led out
     of the bounds over another solid, and these are all heights in its reach, too.
 

@@ -17,7 +17,7 @@ code { font-size: 12px; word-break: break-all } .note { color: #566573 }
 
 
 def document(title: str, style: str, body: str) -> str:
-    """Return an HTML document with a title, rules that its style sheet has besides, and a body."""
+    """Return an HTML document with a title, additional rules of its style sheet, and a body."""
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'

@@ -284,7 +284,7 @@ class DistanceField:
         return self.arrays.data[begin : begin + 6].reshape(2, 3).copy()
 
     def _points(self, points: npt.ArrayLike) -> Floats:
-        p = np.asarray(points, dtype=float, order="C")  # each memory order compiles a kernel anew
+        p = np.asarray(points, dtype=float, order="C")  # each memory order compiles a kernel again
         if p.shape[-1:] != (3,):
             raise InputError(f"points: expected shape (..., 3), got {p.shape}")
         if not np.isfinite(p).all():

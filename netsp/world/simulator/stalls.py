@@ -34,7 +34,7 @@ class Stalls:
 
     def check(self, world: Simulation, planner: Planner, command: Command) -> bool:
         """Return whether the rest of the path has not become shorter for the policy's `stall_s`; a
-        stall is recorded. A path that has been planned anew starts the time again."""
+        stall is recorded. A path that has been planned again starts the time again."""
         position = world.vehicle.position
         left = polylines.length(np.vstack([position, command.path]))
         # home may move away as fast as the robot follows

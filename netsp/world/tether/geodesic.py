@@ -288,7 +288,7 @@ class GeodesicTether:
         return self._state(strand, count, residual), payouts, turnings
 
     def refine(self, tether: Tether) -> Tether:
-        """Return the tether after pulling until nothing moves, with every contact sampled anew.
+        """Return the tether after pulling until nothing moves, with every contact sampled again.
 
         It serves after a change of the scene, too. Pulling ends after 5000 rounds at the latest;
         then `Tether.residual` is above the precision.

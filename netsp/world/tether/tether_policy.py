@@ -65,7 +65,7 @@ class TetherPolicy:
         Maximum number of rounds that are added for a strand that has come off something.
     patience_rounds
         Rounds without a shorter length after which pulling ends, besides one for each
-        `rounds_per_patience` rounds that were allowed. Over rims, nodes may come and go for ever.
+        `rounds_per_patience` rounds that were allowed. Over rims, nodes may come and go forever.
     rounds_per_patience
         Rounds that were allowed for each additional round of patience.
     standing_factor
