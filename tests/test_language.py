@@ -17,14 +17,14 @@ FIRST_COMMIT = "01e50a9b"
 CEILINGS = {
     "basenames": 0,
     "rooms": 16,
-    "constants": 83,
+    "constants": 85,
     "ambiguous": 0,
-    "long": 153,
-    "parameters": 67,
+    "long": 160,
+    "parameters": 69,
     "openings": 0,
     "unsaid": 0,
     "phrases": 0,
-    "identifiers": 120,
+    "identifiers": 122,
     "pronouns": 21,
     "skips": 29,
 }

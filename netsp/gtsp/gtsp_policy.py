@@ -31,7 +31,7 @@ class CostPolicy:
     s_per_single_leg, s_per_copied_leg
         Estimated CPU time of a leg, s: measured by itself, and copied from a matrix.
     tried_legs
-        Number of legs measured at a time in a search, in the order of bounds, for the nearest vertex.
+        Number of legs measured at a time in a search, by bounds, for the nearest vertex.
     bytes_per_leg
         Memory of a proof for each entry of a matrix in double precision, bytes: the cost, what is
         known of the leg, and temporaries.
