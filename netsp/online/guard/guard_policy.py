@@ -1,4 +1,4 @@
-"""Policies of a guard: how it tracks, what it believes, how far it looks ahead, when it warns."""
+"""Policies of a guard: tracking, belief, lookahead, and alarms."""
 
 from __future__ import annotations
 
@@ -194,15 +194,15 @@ class BeliefPolicy:
 
 @dataclass(frozen=True)
 class LookaheadPolicy:
-    """Policy of the look at where the present motion leads. All numbers are positive.
+    """Policy of the lookahead: where the current motion leads. All numbers are positive.
 
     Attributes
     ----------
     horizon_s, turn_horizon_s
-        Time that is looked ahead on a straight and on a turning course, s: a bit longer than the
-        earliest warnings of `AlarmPolicy`.
+        Horizons for a straight and for a turning course, s: slightly longer than the earliest
+        warnings of `AlarmPolicy`.
     step_s
-        Time between two places on the course, about, s.
+        Approximate time between two places on the course, s.
     max_step_angle
         Largest turn between two places on the course, rad.
     surface_distance
@@ -211,14 +211,15 @@ class LookaheadPolicy:
     min_turn_rate
         Smallest rate at which a course counts as turning, rad/s; slower turns are noise.
     min_orbit_ratio
-        A robot that circles an obstacle turns at the rate of the circle through it, times this
-        ratio or more, and at most the inverse. Its position tells the circle better than its rate.
+        Smallest ratio of the turn rate to that of the circle through the robot around an obstacle,
+        at which the robot counts as circling it; the inverse is the largest ratio. The position
+        determines the circle more precisely than the rate.
     min_orbit_tangency
         Share of the speed that must be at right angles to the direction of the obstacle.
     max_orbit_radius
         Largest radius of a circle about an obstacle, m.
     min_interval_s
-        Shortest time between the beginnings of two looks, s.
+        Shortest time between the beginnings of two lookaheads, s.
     """
 
     horizon_s: float = 36.0
@@ -243,13 +244,13 @@ class CoursePolicy:
     Attributes
     ----------
     delay_per_noise
-        Share by which a loop seems to close later for each metre of noise, 1/m: a course with noise
-        goes round in a wider circle. Not negative.
+        Share by which a loop seems to close later for each metre of noise, 1/m, because a noisy
+        course looks like a wider circle. Not negative.
     min_share
         Smallest share of the classes in which a loop must close for a warning, 0 to 1.
     min_likeliest_share
         Smallest share of the likeliest class for a warning, 0 to 1, unless a loop closes in nearly
-        all classes: where it is unknown how the tether runs, so is what closes a loop.
+        all classes: if the course of the tether is uncertain, so are loops.
     """
 
     delay_per_noise: float
@@ -379,7 +380,7 @@ class SitePolicy(WorldPolicy):
 
 @dataclass(frozen=True)
 class PacePolicy:
-    """Policy of what a live guard does how often. All numbers are positive.
+    """Policy of the intervals of a live guard. All numbers are positive.
 
     Attributes
     ----------
@@ -393,7 +394,7 @@ class PacePolicy:
     heartbeat_s
         Time between two heartbeats to a vehicle that waits to be spoken to, s.
     publish_s
-        Time between two times that figures are sent to the link, s.
+        Time between two publications of figures on the link, s.
     """
 
     update_s: float = 0.095
@@ -474,7 +475,7 @@ class RecordingPolicy:
         Share of rows with an earlier time than the previous row from which on a table is sorted, 0
         to 1. A clock that is set goes back only once.
     min_back_count
-        Least number of such rows for a table to be sorted, 1 or more.
+        Minimum number of such rows for a table to be sorted, 1 or more.
     max_height
         Largest height above the water in a column of depths, m, 0 or more. If a value is higher,
         the reader checks whether the column holds heights instead.
@@ -525,7 +526,7 @@ class GuardPolicy:
     Attributes
     ----------
     noise_left
-        Share of an estimate's noise that is left when it is smoothed, about.
+        Approximate share of the noise of an estimate that remains after smoothing.
     max_tethers
         Maximum number of classes whose tether is kept taut; the likeliest ones are. The time of an
         update grows with it.
@@ -539,13 +540,13 @@ class GuardPolicy:
     belief
         Policy of the belief about the tether's class.
     lookahead
-        Policy of the look at where the present motion leads.
+        Policy of the lookahead.
     alarms
         Policy that decides when the operator is warned.
     site
         Policy of the geometry of the site.
     pace
-        Policy of what a live guard does how often.
+        Policy of the intervals of a live guard.
     rates
         Policy of the message rates that a guard needs.
     link

@@ -1,7 +1,7 @@
-"""Rehearsal: a made-up vehicle is watched before the real one.
+"""Rehearsal: a guard watches an example vehicle before the real one.
 
-On a machine that never watched, everything that a guard needs is compiled at its first use, some of
-it only when the tether touches something. Fixes, and alarms, would wait meanwhile.
+On a new machine, kernels of a guard are compiled at their first use, some of them only when the
+tether touches something. Without the rehearsal, fixes and alarms would wait meanwhile.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Guard of a real vehicle: messages in, reports out, ten times a second, until it is stopped."""
+"""Guard of a real vehicle: it reads messages and reports ten times a second until it is stopped."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def watch(
     corrections : Queue of (side, obstacle), optional
         Corrections of the class by the operator.
     on_note : callable, optional
-        Called with a line of text now and then.
+        Called with each note, one line.
     should_stop : callable, optional
         Polled; True ends the watch.
     ask_rates : bool
@@ -192,7 +192,7 @@ class _Watch:
         self.on_report(report)
 
     def _report_silence(self, now: float) -> None:
-        """Report that nothing comes, at times."""
+        """Report at intervals that no messages arrive."""
         silent_s = now - self._heard_at
         is_due = min(silent_s, now - self._reported_at) >= self.pace.silence_s
         if is_due and self.listener.time is not None:

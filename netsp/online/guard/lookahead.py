@@ -1,9 +1,8 @@
-"""Look at where the present motion leads: to a tether that is too short, or to a loop.
+"""Lookahead: whether the current motion leads to a lack of tether, or to a loop.
 
 The robot is assumed to go straight on, in a circle at its present turn rate, or around an obstacle
 that it circles, and to slide along obstacles in its way. The tether model follows it (0.1 ms a
-step), so that contacts are lost on the way. Stretches of open water where nothing can happen are
-skipped.
+step), so contacts may come off. Steps in open water, where nothing can happen, are skipped.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ class LookaheadResult:
     loop_s
         Time until a loop closes, s; None within the horizon.
     loop
-        That loop.
+        Loop that closes.
     short_s
         Time until the tether is too short, s; None within the horizon.
     is_turning
@@ -45,16 +44,16 @@ class LookaheadResult:
 
 
 class Lookahead:
-    """Look at where the present motion leads, done in steps over several updates.
+    """Lookahead along the current motion, in steps over several updates.
 
-    All steps at once would take longer than the time between two estimates.
+    All steps together would take longer than the time between two estimates.
 
     Parameters
     ----------
     site : Site
         The site.
     tether : Tether
-        Present tether.
+        Current tether.
     motion : Motion
         Motion of the robot.
     min_speed : float
@@ -84,7 +83,7 @@ class Lookahead:
         self._courses = [_Course(tether, velocity, turn, policy) for velocity, turn in courses]
 
     def advance(self, max_steps: int) -> int:
-        """Look some steps farther, and return how many are left over; more than 0 at the end."""
+        """Simulate up to `max_steps` steps, and return how many were not needed."""
         for course in self._courses:
             while max_steps > 0 and not course.is_done:
                 course.step(self.site)
@@ -98,7 +97,7 @@ class Lookahead:
 
     @property
     def result(self) -> LookaheadResult:
-        """Return what the courses lead to first, as far as they are followed."""
+        """Return the first event on the courses, as far as they have been followed."""
         loops = [
             (c.loop_s, k)
             for k, c in enumerate(self._courses)

@@ -1,4 +1,4 @@
-"""Guard at its pace: fixes as they come, reports ten times a second."""
+"""Stream of fixes that updates a guard at its own interval, ten times a second."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Stream:
     Parameters
     ----------
     guard : Guard
-        Guard; its policy says how often it is updated, and which clocks were set.
+        Guard, whose policy has the interval of updates and the rules for clocks that were set.
     on_note : callable, optional
         Called with a line of text when the vehicle's clock goes back.
     """

@@ -1,4 +1,4 @@
-"""Fixes: what a vehicle reports of itself."""
+"""Fixes: reports of a vehicle about its position and state."""
 
 from __future__ import annotations
 
@@ -44,6 +44,6 @@ class Fix:
     aiding_fault: str | None = None
 
     def completed_by(self, earlier: Fix) -> Fix:
-        """Return this fix with what only an earlier one reports."""
+        """Return this fix; quantities that it lacks come from an earlier one."""
         missing = (f.name for f in fields(Fix) if getattr(self, f.name) is None)
         return replace(self, **{name: getattr(earlier, name) for name in missing})

@@ -1,4 +1,4 @@
-"""Taut tethers of the classes that are believed, from update to update."""
+"""Taut tethers of the believed classes, from update to update."""
 
 from __future__ import annotations
 

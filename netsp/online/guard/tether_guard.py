@@ -55,16 +55,16 @@ class GuardOptions:
 
 
 class Guard:
-    """Guard of a tether: keeps its class, its taut line, and what the present motion leads to.
+    """Guard of a tether: it follows its class and taut line, and looks ahead along the motion.
 
     Parameters
     ----------
     problem : Problem, Mission or Site
-        Site: the base, the tether's length and the obstacles count.
+        Site, with base, tether length and obstacles.
     options : GuardOptions, optional
         Knowledge of the vehicle.
     policy : GuardPolicy
-        Thresholds and limits. A `Site` brings its own `SitePolicy`.
+        Thresholds and limits. A `Site` has its own `SitePolicy`.
 
     Raises
     ------
@@ -118,7 +118,7 @@ class Guard:
         self.report: Report | None = None
 
     def _reset_lookahead(self) -> None:
-        """Forget what is ahead."""
+        """Drop the lookahead and its result."""
         self._looks: list[tuple[float, Lookahead]] = []
         self._ahead, self._ahead_share = LookaheadResult(), 1.0
 
@@ -129,7 +129,7 @@ class Guard:
         age_s: float,
         tethers: dict[Word, Tether] | None = None,
     ) -> None:
-        """Begin with the classes of an earlier run.
+        """Restore the classes of an earlier run.
 
         Parameters
         ----------
@@ -295,7 +295,7 @@ class Guard:
         return not far <= 2.0 * self.site.tether_length + 4.0 * self.drift
 
     def advance_to(self, now: float) -> Report:
-        """Advance the guard's time while nothing comes, and return the report of the guard."""
+        """Advance the time of the guard without a fix, and return the report of the guard."""
         return self.update(Fix(max(now, self._now)))
 
     def restart_vehicle(self, fix: Fix) -> Report:
@@ -374,7 +374,7 @@ class Guard:
             self.belief.drop({s.believed for s in strands} - {s.believed for s in short})
 
     def _make_report(self, fix: Fix) -> Report:
-        """Update what is ahead and the alarms, and return the report."""
+        """Update lookahead and alarms, and return the report."""
         is_vouched_for = self._is_vouched_for is not False
         claims = self._motion is not None and is_vouched_for and not self._is_silent
         motion = self._motion

@@ -1,1 +1,1 @@
-"""Link to a vehicle: MAVLink over UDP (extra `mavlink`)."""
+"""Link to a vehicle: MAVLink over UDP (needs the extra `mavlink`)."""

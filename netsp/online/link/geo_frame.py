@@ -1,4 +1,4 @@
-"""Frames of vehicles and sites.
+"""Conversion between the frames of vehicles and sites.
 
 A vehicle reports its place in metres north, east and down of where its estimate began, or in
 degrees.

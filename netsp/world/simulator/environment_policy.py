@@ -33,8 +33,8 @@ class RangingPolicy:
     Attributes
     ----------
     ray_count
-        Number of rays of one look. The fan of rays is turned from look to look, so that later rays
-        find what stood between earlier ones.
+        Number of rays of one look. Each look turns the fan of rays, so that later rays find solids
+        between earlier ones.
     """
 
     ray_count: int = 240
@@ -45,12 +45,12 @@ class RangingPolicy:
 
 @dataclass(frozen=True)
 class CoveragePolicy:
-    """Policy of the patches that coverage is counted in. All numbers are positive.
+    """Policy of the patches by which coverage is counted. All numbers are positive.
 
     Attributes
     ----------
     max_patches
-        Number of large triangles above which a surface is refused as too fine.
+        Maximum number of large triangles of a surface; a finer surface is refused.
     """
 
     max_patches: int = 200_000

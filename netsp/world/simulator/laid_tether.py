@@ -1,4 +1,4 @@
-"""The tether when a mission begins: laid out at the start, or as it is by now."""
+"""Tether at the beginning of a mission: at the start, or as its state has it."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.tether import Tether
 
 STATE_TETHER_DEPTH = 0.25
-"""Tolerance of a state's tether: how deep it may lie in a solid, as a share of delta. Edges of a
-taut tether dip into surfaces by an eighth (docs/tether.md), and a file rounds them."""
+"""Tolerance for the depth of a state's tether in a solid, as a share of delta. Edges of a taut
+tether cut into surfaces by an eighth (docs/tether.md), and files round them."""
 
 
 def first_tether(mission: Mission, field: DistanceField, model: Tethers, grid: Grid) -> Tether:
-    """Return the tether with the robot at the start: straight, or along the shortest path from the
-    anchor to a start that it does not see.
+    """Return the tether with the robot at the start.
+
+    It is straight, or, without a line of sight, along the shortest path from the anchor.
 
     Raises
     ------
     InputError
-        Anchor or start inside a solid, or in different parts of the water.
+        Anchor or start lie inside a solid, or in different parts of the water.
     """
     anchor = field.free_point(mission.anchor, "anchor")
     start = field.free_point(mission.start, "start")
@@ -43,14 +44,15 @@ def first_tether(mission: Mission, field: DistanceField, model: Tethers, grid: G
 
 
 def present_tether(mission: Mission, field: DistanceField, model: Tethers, grid: Grid) -> Tether:
-    """Return the tether when the mission begins: `first_tether`, or that of its state, pulled taut
-    as if the robot had travelled along the line of the state.
+    """Return the tether at the beginning of a mission: `first_tether`, or that of its state.
+
+    The latter is pulled taut as if the robot had travelled along the line of the state.
 
     Raises
     ------
     InputError
-        See `first_tether`; also a state inside a solid, or whose tether passes through one or is
-        longer than the limit.
+        `first_tether` raises it, the state lies inside a solid, or its tether passes through one or
+        is over the limit.
     """
     if mission.state is None:
         return first_tether(mission, field, model, grid)

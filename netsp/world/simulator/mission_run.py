@@ -1,4 +1,4 @@
-"""Simulates a mission: planner, vehicle and tether, step by step, with a log."""
+"""Simulation of a mission: planner, vehicle and tether, step by step, with a log."""
 
 from __future__ import annotations
 
@@ -42,13 +42,12 @@ from netsp.world.vehicle.kinematic import wrapped_angle
 def mission_grid(
     mission: Mission, scene: Scene, field: DistanceField, policy: PathPolicy = PathPolicy()
 ) -> Grid:
-    """Return the grid on which paths are searched: the scene's bounds, or all of the scene with a
-    margin.
+    """Return the grid of path search: over the bounds of the scene, or all of it with a margin.
 
     Raises
     ------
     InputError
-        A grid that takes too much memory, or cells larger than the site.
+        The grid would take too much memory, or its cells are larger than the site.
     """
     low, high, cell = mission_grid_box(mission, scene, policy)
     return Grid(field, low, high, cell, mission.clearance, policy)
@@ -57,12 +56,12 @@ def mission_grid(
 def mission_grid_box(
     mission: Mission, scene: Scene, policy: PathPolicy = PathPolicy()
 ) -> tuple[Floats, Floats, float]:
-    """Return low and high corner (3,) of the box of that grid, and its cell size, metres.
+    """Return the corners (3,) and the cell size of `mission_grid`, metres.
 
     Raises
     ------
     InputError
-        Cells larger than the site.
+        The cells are larger than the site.
     """
     cell = mission.cell or policy.cell
     if scene.bounds is not None:
@@ -111,7 +110,7 @@ def simulate(
     options : PlannerOptions, optional
         Options of path search.
     scene, field : Scene, DistanceField, optional
-        The scene and its field, if they are loaded.
+        Scene of the mission and its field; loaded if None.
     snap : bool
         Whether waypoints inside solids are moved out.
     surprises : SceneSurprises, optional
@@ -119,16 +118,16 @@ def simulate(
     seed : int
         Seed of the gusts and of the sensors' noise.
     on_step : callable, optional
-        Called with every row and the planner. A KeyboardInterrupt in it ends the run, which is
-        returned as far as it came.
+        Called with each row and the planner. If it raises KeyboardInterrupt, the run ends and is
+        returned.
     policy : SimulationPolicy
         Steps and thresholds of the simulation.
 
     Raises
     ------
     InputError
-        Before the first step: unknown names, waypoints inside solids, anchor and start in different
-        parts of the water, or a tether that is shorter than the path between them.
+        Before the first step: a name is unknown, a waypoint lies inside a solid, anchor and start
+        are in different parts of the water, or the tether is shorter than the path between them.
     """
     check_names(planner, vehicle, tether)
     check_size(mission, policy)
@@ -177,7 +176,7 @@ def simulate(
 def _coverage(
     mission: Mission, scene: Scene, field: DistanceField, policy: SimulationPolicy
 ) -> Coverage | None:
-    """Return the coverage before the mission; None without a camera."""
+    """Return the coverage at the beginning; None without a camera."""
     if mission.camera is None:
         return None
     size, places = mission.camera.patch, mission.every_place
@@ -192,7 +191,7 @@ class _MissionRun:
     Attributes
     ----------
     world, planner, surroundings
-        Robot, planner, and changes of the scene if there may be any.
+        Simulated robot, planner, and changes of the scene, None if there can be none.
     on_step
         See `simulate`.
     """
@@ -271,9 +270,9 @@ def stay(
     waypoint: MissionWaypoint,
     on_step: Callable[[LogRow, Planner], None] | None = None,
 ) -> None:
-    """Turn to a waypoint's heading, for at most `max_turn_s`, then stay as long as it asks.
+    """Turn to the heading of a waypoint, for at most `max_turn_s`, and stay for its dwell.
 
-    The planner is already on its way to the next waypoint.
+    The planner has already advanced to the next waypoint.
     """
     heading = None if waypoint.heading is None else math.radians(waypoint.heading)
     if heading is None and waypoint.dwell == 0.0:

@@ -1,4 +1,4 @@
-"""Range sensor: where rays in a cone first meet a solid."""
+"""Simulated range sensor: rays in a cone that end at the first solid."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ RAY_TOLERANCE = 1e-3
 
 
 def ray_fan(field_of_view: float, ahead: Floats, turn: float, ray_count: int) -> Floats:
-    """Return unit vectors (n, 3) that share a cone evenly: a Fibonacci spiral on the cap of a
-    sphere.
+    """Return unit vectors (n, 3) spread evenly in a cone: a Fibonacci spiral on a spherical cap.
 
     Parameters
     ----------
@@ -44,7 +43,7 @@ def ray_fan(field_of_view: float, ahead: Floats, turn: float, ray_count: int) ->
 
 
 class Ranging:
-    """Simulated range sensor, whose noise a seed determines."""
+    """Simulated range sensor; the seed determines its noise."""
 
     def __init__(
         self, sensor: RangeSensor, seed: int, policy: RangingPolicy = RangingPolicy()
@@ -62,9 +61,9 @@ class Ranging:
         rays : ndarray, shape (n, 3)
             Unit vectors.
         ranges : ndarray, shape (n,)
-            Measured distance to what each ray meets first, metres; inf beyond the range.
-        off : ndarray, shape (n,)
-            Errors of these, metres.
+            Measured distance to the first solid on each ray, metres; inf beyond the range.
+        errors : ndarray, shape (n,)
+            Errors of these distances, metres.
         """
         turn = self._rng.uniform(0.0, 2.0 * math.pi)
         rays = ray_fan(self.sensor.field_of_view, ahead, turn, self.policy.ray_count)
@@ -75,8 +74,10 @@ class Ranging:
 
 @kernel
 def cast_rays(field: Field, place: Floats, rays: Floats, max_range: float) -> Floats:
-    """Return (n,) the distance at which each ray (n, 3) meets a solid; inf beyond `most` (sphere
-    tracing)."""
+    """Return the distance (n,) at which each ray (n, 3) meets a solid; inf beyond `max_range`.
+
+    The method is sphere tracing.
+    """
     out = np.full(len(rays), math.inf)
     for n in range(len(rays)):
         s = 0.0

@@ -1,4 +1,4 @@
-"""Measured position of the robot: late, with noise, filtered."""
+"""Measured position of the robot: with delay and noise, and filtered."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from netsp.world.simulator.simulation_policy import SimulationPolicy
 
 
 class Positions:
-    """Positions measured one step after another and filtered; never inside a solid.
+    """Positions measured step by step and filtered; never inside a solid.
 
-    An alpha-beta filter (Bar-Shalom, Li & Kirubarajan, "Estimation with Applications to Tracking
-    and Navigation", 2001, section 6.5), with the gain of the velocity that is critically damped.
-    The estimated velocity makes up for the age of the positions.
+    The filter is an alpha-beta filter (Bar-Shalom, Li & Kirubarajan, "Estimation with Applications
+    to Tracking and Navigation", 2001, section 6.5), critically damped. The estimated velocity
+    compensates the delay of the positions.
 
     Parameters
     ----------
     place : ndarray, shape (3,)
-        First position, which is known, metres.
+        First position, which is known exactly, metres.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class Positions:
 
     @property
     def exact(self) -> bool:
-        """True if positions are known exactly and at once."""
+        """True if positions have no noise and no delay."""
         return self.sensor.noise == 0.0 and self._late == 0
 
     def __call__(self, place: Floats) -> Floats:

@@ -33,7 +33,7 @@ class Simulation:
     mission : Mission
         The mission.
     scene : DistanceField
-        The scene as it is.
+        True scene.
     vehicle : Vehicle
         The robot.
     tethers : GeodesicTether
@@ -43,11 +43,11 @@ class Simulation:
     water : callable
         Velocity of the water (3,), m/s, at a time in seconds.
     coverage : Coverage, optional
-        What the camera has seen.
+        Coverage by the camera so far; None without a camera.
     model : TetherModel, optional
-        Another model, in which the planner believes.
+        Tether model of the planner, if it is another one.
     believed : Tether, optional
-        The tether of that model.
+        Tether by the model of the planner.
     positions : Positions, optional
         Sensor of the robot's position.
     estimated_position : ndarray, shape (3,), optional
@@ -55,13 +55,13 @@ class Simulation:
     track : Track, optional
         Track of the anchor.
     now : float
-        Seconds since the start.
+        Time since the start, s.
     contacts : int
         Number of contacts of the robot with solids.
     shortening : bool
-        Whether the limit was lowered below the tether, which is being shortened.
+        Whether the tether is being shortened, because the limit was lowered below it.
     kept_tethers : list of (int, Tether)
-        Rows of the log with their tethers, at intervals, if the scene changes; else empty.
+        Indices of rows of the log and the tethers there, at intervals, if the scene changes.
     log : list of LogRow
         One row per step.
     policy : SimulationPolicy
@@ -99,7 +99,7 @@ class Simulation:
         return math.atan2(y, x) if math.hypot(x, y) > self.policy.min_course_speed else yaw
 
     def _pull(self) -> dict[str, Floats]:
-        """Return the tether's force on a vehicle, if the mission asks for it."""
+        """Return the force of the tether on the vehicle, if the mission considers it."""
         physics = self.mission.tether
         if not physics.pulls_vehicle:
             return {}
@@ -113,7 +113,7 @@ class Simulation:
         return self.mission.tether.load(self.water(self.now))
 
     def log_state(self, planner: Planner, command: Command) -> LogRow:
-        """Log the present state, with the planner's waypoint and the mode of its command."""
+        """Log the current state with the planner's waypoint and the mode of its command."""
         x, y, z = (float(v) for v in self.vehicle.position)
         seen = self.coverage
         if (
@@ -149,7 +149,7 @@ class Simulation:
     def step(
         self, path: Floats, fresh: bool, is_homeward: bool = False, heading: float | None = None
     ) -> tuple[int, bool]:
-        """Take one step along a path; a vehicle that runs into a solid is stopped where it was.
+        """Take one step along a path; a vehicle that meets a solid stops where it was before.
 
         Parameters
         ----------
@@ -157,10 +157,10 @@ class Simulation:
             Points to pass, metres.
         fresh : bool
             Whether the path does not continue the one before.
-        homeward : bool
+        is_homeward : bool
             Whether the inspection is over, so that the camera no longer determines the heading.
         heading : float, optional
-            Heading to turn to, rad, whatever the camera asks for.
+            Heading to turn to, rad; None for the heading of the camera or the course.
 
         Returns
         -------
@@ -198,8 +198,10 @@ class Simulation:
         return passed, moved
 
     def _believed_after(self, point: Floats, anchor: Floats | None) -> Tether:
-        """Return the tether of the planner's model after a step; only the geodesic one has moving
-        anchors."""
+        """Return the tether of the planner's model after a step.
+
+        Only the geodesic model has moving anchors.
+        """
         assert self.model is not None
         assert self.believed is not None
         if isinstance(self.model, GeodesicTether):
@@ -210,5 +212,5 @@ class Simulation:
 
     @property
     def robot(self) -> Floats:
-        """Position (3,) at which the planner believes the robot."""
+        """Position (3,) of the robot as the planner knows it, metres."""
         return self.vehicle.position if self.estimated_position is None else self.estimated_position

@@ -10,20 +10,20 @@ from netsp.world.simulator.environment_policy import CoveragePolicy, GustPolicy,
 
 @dataclass(frozen=True)
 class MissionLimits:
-    """Limits of a mission, beyond which a number is a mistake of units. All are positive.
+    """Limits of a mission; a number beyond is likely a mistake of units. All are positive.
 
     Attributes
     ----------
     max_distance_ratio
-        Distance of a waypoint from the anchor, in tether lengths.
+        Maximum distance of a waypoint from the anchor, in tether lengths.
     max_steps
-        Number of steps of a run.
+        Maximum number of steps of a run.
     max_tether_nodes
-        Number of nodes of a tether, its length over `delta`.
+        Maximum number of nodes of a tether, its length over `delta`.
     max_water_speed
-        Speed of the water, m/s. No sea is as fast.
+        Maximum speed of the water, m/s; no sea is as fast.
     max_drag_ratio
-        Drag on the whole tether over its tension.
+        Maximum ratio of the drag on the whole tether to its tension.
     """
 
     max_distance_ratio: float = 1000.0
@@ -43,7 +43,7 @@ class MappingPolicy:
     Attributes
     ----------
     look_steps
-        Steps between two looks of the sensor.
+        Number of steps between two looks of the sensor.
     min_hits
         Number of rays that must hit a solid before it is put on the map.
     removal_depth
@@ -56,9 +56,9 @@ class MappingPolicy:
         Distance to the last point but one, as a share of the spacing, below which the robot has
         gone back and the last point is dropped.
     recall_steps
-        Steps between two remembered shapes of the tether.
+        Number of steps between two remembered shapes of the tether.
     max_recalled
-        Maximum number of these; of more, every other one is forgotten.
+        Maximum number of remembered shapes; beyond it, every other one is dropped.
     payout_tolerance
         Difference between measured payout and that of a remembered shape up to which the shape
         explains the payout, metres.
@@ -87,21 +87,21 @@ class SimulationPolicy:
     step_s
         Time between two decisions of the planner, s.
     tether_steps
-        Steps between two tethers kept for pictures, where the scene changes.
+        Number of steps between two tethers kept for pictures, if the scene changes.
     camera_steps
-        Steps between two pictures of the camera.
+        Number of steps between two pictures of the camera.
     min_course_speed
         Speed through the water below which a vehicle keeps its heading, m/s.
     heading_tolerance_deg
-        Error of the heading up to which a vehicle has turned to a waypoint's, degrees.
+        Largest error of the heading at which a turn to a waypoint's heading is complete, degrees.
     max_waypoint_s
         Time at one waypoint after which it is left out, s.
     stall_s, stall_progress
-        Time in which a robot must come nearer along its path, s, and by how much, metres; otherwise
-        it has stalled, as in a strong current.
+        Time, s, in which the rest of the path must get shorter, and by how much, metres. Otherwise
+        the robot has stalled, for example in a strong current.
     position_gain
         Share of the error of a measured position by which the estimate is corrected, at most 1. A
-        smaller gain averages more noise out, and follows a turn later.
+        smaller gain removes more noise, and follows a turn later.
     gusts, ranging, coverage
         Policies of the environment.
     mapping

@@ -1,4 +1,4 @@
-"""Detection of a robot that makes no progress, as in a strong current."""
+"""Detection of stalls: a robot that makes no progress, for example in a strong current."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from netsp.world.simulator.simulation import Simulation
 
 @dataclass
 class Stalls:
-    """Stalls of a robot, which makes no progress along its path.
+    """Stalls of a robot: times in which it made no progress along its path.
 
     Parameters
     ----------
     found : list of dict
         Time (s), waypoint and place of each stall.
     reason : str
-        Reason of the last one, in a line.
+        Reason of the last stall, in one line.
     """
 
     found: list[dict[str, Any]] = field(default_factory=list)
@@ -33,8 +33,11 @@ class Stalls:
     _since: float = 0.0
 
     def check(self, world: Simulation, planner: Planner, command: Command) -> bool:
-        """Return whether the rest of the path has not become shorter for the policy's `stall_s`; a
-        stall is recorded. A path that has been planned again starts the time again."""
+        """Return whether the robot has stalled, and record the stall.
+
+        It has if the rest of the path has not become shorter for `stall_s`. A new path restarts the
+        time.
+        """
         position = world.vehicle.position
         left = polylines.length(np.vstack([position, command.path]))
         # home may move away as fast as the robot follows

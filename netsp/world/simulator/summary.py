@@ -1,4 +1,4 @@
-"""Numbers of a mission run."""
+"""Summary of a mission run in numbers."""
 
 from __future__ import annotations
 
@@ -20,23 +20,22 @@ from netsp.world.simulator.simulation import Simulation
 def summarise(
     mission: Mission, planner: Planner, world: Simulation, wall: float, interrupted: bool
 ) -> dict[str, Any]:
-    """Return the numbers of a run, as the papers give them.
+    """Return the numbers of a run that the papers report.
 
-    `exceedance_s` is the time in which more tether must be out than there is: the taut length with
-    slack and sag (`longest_payout`). After the limit itself was lowered below that, the time until
-    it fits is `shortening_s`. `waited_s` is the time in which the robot waited for a moving anchor.
-    `stops` has each waypoint visited, with the sum of turning angles and the factor e^(mu theta) by
-    which friction multiplies the tension. `contacts` counts contacts of the robot with solids.
-    `recovery_s` is the time to come back to the anchor afterwards, by retracing the tether, or the
-    whole path (the paper does not say which). Both, `path` and coverage are those of the
-    inspection; `home` describes the path back to the start that follows it: whether it was
-    `reached` with the tether free, how much longer the tether is there than when the mission began
-    (`left`, m), and how long it took.
+    `exceedance_s` is the time in which the payout, at most `longest_payout`, is over the limit. If
+    the limit was lowered below the payout, the time until it fits is `shortening_s` instead.
+    `waited_s` is the time in which the robot waited for a moving anchor. `stops` has each waypoint
+    visited, with the sum of turning angles and the factor e^(mu theta) by which friction multiplies
+    the tension. `contacts` counts contacts of the robot with solids. `recovery_s` is the time to
+    come back to the anchor afterwards, by retracing the tether, or the whole path (the paper does
+    not say which). Both, `path` and coverage are those of the inspection; `home` describes the path
+    back to the start that follows it: whether it was `reached` with the tether free, how much
+    longer the tether is there than when the mission began (`left`, m), and how long it took.
 
     Parameters
     ----------
     planner, world : Planner, Simulation
-        Their states at the end.
+        States at the end.
     wall : float
         Wall-clock time of the run, s.
     """
@@ -131,7 +130,7 @@ def _stops(mission: Mission, planner: Planner, log: list[LogRow]) -> list[dict[s
 
 
 def _friction(mission: Mission, turnings: Floats, step_s: float) -> dict[str, float] | None:
-    """Return the greatest turning and tension ratio, and the time over the limit; None without
+    """Return the largest turning and tension ratio, and the time over the limit, s; None without
     friction."""
     physics = mission.tether
     if physics.friction == 0.0:

@@ -1,4 +1,4 @@
-"""Surprise file of a mission: what changes in a scene while a robot is under way."""
+"""Surprise file of a mission: events that happen while the robot is under way."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ class SolidMove(Model):
 
 
 class SceneEvent(TimedEvent):
-    """Event at a time after the start; one of the other fields says what happens.
+    """Event at a time after the start; exactly one of the other fields is set.
 
-    What happens at 0 s was so from the beginning. Waypoints are numbered as in the mission file;
-    added ones come after all others.
+    Events at 0 s describe how the scene has been from the beginning. Waypoints are numbered as in
+    the mission file; added ones come after all others.
     """
 
     appear: Annotated[Solid | None, Field(description="a solid that is there from now on")] = None
@@ -71,18 +71,18 @@ class SceneSurprises(FileModel):
     events: Annotated[tuple[SceneEvent, ...], Field(description="in any order")]
 
     def by_time(self) -> list[SceneEvent]:
-        """Return the events by time; those of one time as in the file."""
+        """Return the events in order of time, and of the file if times are equal."""
         return sorted(self.events, key=lambda e: e.time)
 
     def check(self, scene: Scene, source: str = "", waypoints: int | None = None) -> None:
         """Raise InputError for events that a scene or a mission cannot have.
 
-        These name a solid or waypoint that is not there when the event comes, or give a name twice.
+        They name a solid or waypoint that does not exist at their time, or use a name twice.
 
         Parameters
         ----------
         source : str
-            Name of these surprises in messages; nothing if it is empty.
+            Name of the file in messages; empty for none.
         waypoints : int, optional
             Number of waypoints in the mission.
         """
@@ -105,15 +105,15 @@ class SceneSurprises(FileModel):
     def check_places(
         self, mission: Mission, scene: Scene, field: DistanceField, source: str = ""
     ) -> None:
-        """Raise InputError for waypoints that a mission file could not have either, and for pushes
-        of more than twice the tether.
+        """Raise InputError for waypoints that no mission can have, and for pushes beyond twice the
+        tether length.
 
         Parameters
         ----------
         scene : Scene
-            The map; what has appeared by then does not count.
+            Map at the beginning; solids that appear later are ignored.
         source : str
-            Name of these surprises in messages; nothing if it is empty.
+            Name of the file in messages; empty for none.
         """
         for k, event in enumerate(self.events):
             where = f"{source}: events[{k}]" if source else f"events[{k}]"
@@ -139,7 +139,7 @@ def solids_after(solids: tuple[Solid, ...], event: SceneEvent) -> tuple[Solid, .
     Raises
     ------
     InputError
-        The event names a solid that is not there, or one appears by a name that is taken.
+        The event names a solid that does not exist, or adds one whose name is taken.
     """
     if not event.changes_scene:
         return solids

@@ -1,8 +1,8 @@
-"""Solids that are there, and the planner's map of them, which may be wrong and is corrected.
+"""True solids, and the planner's map of them, which is corrected by the range sensor.
 
-The map begins as the scene's file. A solid that is not on it is put there once rays of the range
-sensor have met it, where the mean of their measurements says; a solid that rays pass through is
-removed. Without a range sensor, the planner learns every change at once.
+The map begins as the scene file. A solid that is missing is added once rays of the sensor have met
+it, at the mean of their measurements. A solid that rays pass through is removed. Without a range
+sensor, the planner learns of each change at once.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ class Sighting:
     Parameters
     ----------
     solid : Solid
-        The solid as it is.
+        True solid.
     count : int
-        Number of rays that have met it.
-    off : ndarray, shape (3,)
-        Sum of their errors, metres.
+        Number of rays that have met the solid.
+    error_sum : ndarray, shape (3,)
+        Sum of the errors of these rays, metres.
     mapped : Solid or None
-        The solid as it is on the map.
+        Solid on the map; None if it is not there.
     placed_by : int
-        Number of rays whose mean is its place on the map.
+        Number of rays whose mean is the place of the solid on the map.
     """
 
     solid: Solid
@@ -56,7 +56,7 @@ class Sighting:
     placed_by: int = 0
 
     def update_map_place(self, min_hits: int) -> bool:
-        """Put the solid on the map where the rays say; return whether that is a new place."""
+        """Put the solid at the mean of its measurements; return whether the map changed."""
         if self.count < max(min_hits, 4 * self.placed_by):
             return False
         x, y, z = (self.error_sum / self.count).tolist()
@@ -65,16 +65,16 @@ class Sighting:
 
 
 class Surroundings:
-    """Scene as it is, and as it is known.
+    """True scene, and the planner's map of it.
 
     Parameters
     ----------
     scene : Scene
-        The map at the beginning.
+        Map at the beginning.
     voxels : VoxelGrid or None
         Voxels of the scene.
     places : ndarray, shape (k, 3)
-        The tether when the mission begins, metres.
+        Nodes of the tether at the beginning, metres.
     seed : int
         Seed of the sensor's noise.
     """
@@ -105,7 +105,7 @@ class Surroundings:
         self._steps = 0
 
     def update(self, world: Simulation, planner: Planner) -> None:
-        """Let events happen that are due, look, and update the planner's map."""
+        """Apply due events, look with the sensor, and update the planner's map."""
         position = world.vehicle.position
         self._extend_trail(position)
         before = self.mapped
@@ -130,7 +130,7 @@ class Surroundings:
             planner.on_excess_payout(max(0.0, excess), self.trail)
 
     def _extend_trail(self, position: Floats) -> None:
-        """Lengthen the trail, or shorten it where the robot goes back along it."""
+        """Extend the trail of the robot, or shorten it if the robot goes back along it."""
         spacing = self.policy.trail_spacing
         min_distance = self.policy.retrace_share * spacing
         while len(self.trail) > 2 and np.linalg.norm(position - self.trail[-2]) < min_distance:
@@ -139,7 +139,7 @@ class Surroundings:
             self.trail = np.vstack([self.trail, position])
 
     def _apply_due_events(self, world: Simulation, planner: Planner) -> bool:
-        """Let events happen that are due; return whether the scene has changed.
+        """Apply due events, and return whether the scene has changed.
 
         A solid waits while it would stand on the tether, at home or in the anchor's way, or nearer
         to the robot than its clearance and the distance of one second.
@@ -167,8 +167,10 @@ class Surroundings:
         return True
 
     def _apply_event(self, event: SceneEvent, world: Simulation, planner: Planner) -> None:
-        """Let an event happen that does not change the scene: other waypoints, another limit, or a
-        push, as far as there is water and the tether reaches."""
+        """Apply an event that does not change the scene: waypoints, the limit, or a push.
+
+        A push ends at the first solid, and at the end of the tether.
+        """
         if event.add_waypoint is not None:
             planner.add_waypoint(event.add_waypoint)
         elif event.cancel_waypoint is not None:
@@ -236,7 +238,7 @@ class Surroundings:
     def _add_met_solids(
         self, world: Simulation, rays: Floats, ranges: Floats, errors: Floats
     ) -> bool:
-        """Put solids on the map that rays have met; return whether there were any."""
+        """Add the solids that rays have met to the map, and return whether there were any."""
         met = np.isfinite(ranges)
         points = world.vehicle.position + rays[met] * (ranges - errors)[met, None]
         solid_of_ray = world.scene.nearest(points)
@@ -269,7 +271,7 @@ class Surroundings:
     def _remove_passed_solids(
         self, known: DistanceField, position: Floats, rays: Floats, ranges: Floats
     ) -> bool:
-        """Remove solids from the map that rays pass through; return whether there were any."""
+        """Remove the solids that rays pass through from the map; return whether there were any."""
         assert self.ranging is not None
         sensor = self.ranging.sensor
         expected = cast_rays(known.arrays, position, rays, sensor.range)
@@ -287,7 +289,7 @@ class Surroundings:
         return bool(removed)
 
     def _changed_box(self, before: tuple[Solid, ...]) -> Floats:
-        """Return the box (2, 3) of all differences between the map and the one before."""
+        """Return the box (2, 3) of all differences between the previous map and the current one."""
         boxes: list[list[list[float]]] = []
         everywhere = [[-UNBOUNDED_EXTENT] * 3, [UNBOUNDED_EXTENT] * 3]
         for solids, others in ((before, self.mapped), (self.mapped, before)):
@@ -305,19 +307,18 @@ class Surroundings:
         planner.update_map(known, world.model, box, world.vehicle.position, world.believed)
 
     def _recover_tether(self, world: Simulation, model: GeodesicTether) -> Tether:
-        """Return the tether in another map, on that side of every new solid which explains the
-        payout.
+        """Return the tether in another map, on the sides of new solids that explain the payout.
 
-        What was there from the beginning lies on the side that the trail says. What has appeared
-        since lies on the side of the tether at that time, which is unknown. So the tethers at
-        earlier moments are each taken on along the trail since; the one whose payout is nearest to
-        the measured one is believed, and the earliest of several.
+        The trail decides the sides of solids that have been there from the beginning. For a solid
+        that appeared later, the tether at that unknown time decides. So each remembered tether is
+        continued along the later trail; the one whose payout is nearest to the measured one is
+        taken, the earliest if there are several.
         """
         measured = payout(world.tether, world.load)
         best, min_difference, tolerance = None, np.inf, self.policy.payout_tolerance
         for n, (nodes, count) in enumerate([(self.trail[:1], 1), *self.moments]):
             if count > len(self.trail):
-                continue  # the robot has gone back past it
+                continue  # the robot has gone back past this point
             line = np.vstack([nodes, self.trail[count:], world.vehicle.position])
             line[1:-1] = pushed_out(model.field, line[1:-1], 1e-3)
             line = np.vstack([self._anchor_path_back(world, n), line])
@@ -341,12 +342,12 @@ class Surroundings:
 
     @property
     def scene_now(self) -> Scene:
-        """Scene with the solids that are there now."""
+        """Scene with the current solids."""
         return self.scene.model_copy(update={"solids": self.solids, "problem": None})
 
     def summary_fields(self) -> dict[str, int]:
-        """Return the number of events that happened, of events that never had room, and of solids
-        that the sensor put on the map."""
+        """Return the numbers of events, of events that never had room, and of solids that the
+        sensor added to the map."""
         return {
             "happened": len(self.happened),
             "held_back": len(self.due),

@@ -43,7 +43,7 @@ class TetherModel(Protocol):
         """
 
     def drive(self, tether: Tether, path: npt.ArrayLike) -> tuple[Tether, Floats]:
-        """Return the tether after the robot has passed some points, and its lengths on the way.
+        """Return the tether after the robot has passed points, and its length at each.
 
         Parameters
         ----------

@@ -3,9 +3,9 @@
 The tether passes through nothing thicker than 1.8 delta, and its length is that of the curve, not
 of its chords; `netsp.world.tether.pull` and docs/tether.md explain why. Where the shortest curve of
 a class is unique, as among vertical prisms, it depends only on the robot's position and the class,
-so driving back undoes driving. Elsewhere a class may have several locally shortest curves, such as
-a tether that could slip off the end of a pipe. Then the tether keeps to the one that it was driven
-to for as long as that one exists.
+so driving back undoes driving. Elsewhere a class may have several locally shortest curves, for
+example if the tether could slip off the end of a pipe. Then the tether stays on the curve to which
+it was driven for as long as that curve exists.
 """
 
 from __future__ import annotations
@@ -113,8 +113,8 @@ class GeodesicTether:
         Raises
         ------
         InputError
-            Anchor or robot inside a solid or not finite, or no line of sight; then `lay` a tether
-            along a path.
+            A position is inside a solid or not finite, or there is no line of sight; use `lay` to
+            lay the tether along a path.
         """
         a, r = self.field.free_point(anchor, "anchor"), self.field.free_point(robot, "robot")
         if not self.field.line_of_sight(a, r, depth=0.125 * self.delta):
@@ -135,7 +135,7 @@ class GeodesicTether:
         Raises
         ------
         InputError
-            A point or a piece inside a solid, or not finite; fewer than two points.
+            A point or segment is inside a solid or not finite, or there are fewer than two points.
         """
         points = _points(path)
         if len(points) < 2:
@@ -189,10 +189,9 @@ class GeodesicTether:
     def update(
         self, tether: Tether, robot: npt.ArrayLike, anchor: npt.ArrayLike | None = None
     ) -> Tether:
-        """Return the tether after the robot, and on a ship the anchor, has moved in a straight
-        line.
+        """Return the tether after the robot, or also the anchor, has moved in a straight line.
 
-        Long motions are allowed; they are followed in steps as short as the scene needs.
+        Long motions are divided into steps as short as the scene needs.
 
         Parameters
         ----------
@@ -206,7 +205,7 @@ class GeodesicTether:
         Raises
         ------
         InputError
-            Robot or anchor not finite, or deeper than delta / 4 inside a solid.
+            A position is not finite, or deeper than delta / 4 inside a solid.
         """
         strand, length, residual = tether.strand, tether.length, tether.residual
         ends = [(True, robot)] if anchor is None else [(False, anchor), (True, robot)]
@@ -238,7 +237,7 @@ class GeodesicTether:
         floor : float
             Length from which on lengths are corrected for the corners of voxels that edges cut,
             metres. The correction is at most about a hundredth. The last length is always
-            corrected. For callers who ask whether the tether stays below a limit.
+            corrected. Callers that compare lengths with a limit pass a value below it.
 
         Returns
         -------
@@ -290,8 +289,8 @@ class GeodesicTether:
     def refine(self, tether: Tether) -> Tether:
         """Return the tether after pulling until nothing moves, with every contact sampled again.
 
-        It serves after a change of the scene, too. Pulling ends after 5000 rounds at the latest;
-        then `Tether.residual` is above the precision.
+        It also serves after a change of the scene. Pulling ends after 5000 rounds; then
+        `Tether.residual` is above the precision.
 
         Parameters
         ----------
@@ -319,7 +318,8 @@ def _show(point: Floats) -> str:
 
 
 def _points(path: npt.ArrayLike) -> Floats:
-    """Return a path as an array (k, 3); InputError if it has another shape or is not finite."""
+    """Return a path as an array (k, 3); raise InputError if its shape is wrong or it is not
+    finite."""
     try:
         points = np.ascontiguousarray(path, dtype=float)
     except (TypeError, ValueError):

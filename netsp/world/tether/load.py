@@ -8,8 +8,8 @@ ds``, gives ``tan a = w s / T`` from the middle on: a catenary. Its length is ``
 2)`` with ``q = w c / T``, that is c (1 + q^2 / 24) while q is small.
 
 Friction. Around contacts the tension grows by e^(mu theta), theta the sum of turning angles (Euler,
-Eytelwein: the capstan). The tension is least at the anchor, where it is held, so sag calculated
-with it is never too small.
+Eytelwein: the capstan). The tension is smallest at the anchor, so sag that is computed with the
+tension there is never too small.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Load(NamedTuple):
     Attributes
     ----------
     slack
-        Additional tether as a share of its length.
+        Slack, as a share of the taut length.
     drag
         Drag of a metre of tether in a flow of 1 m/s across it, N s^2 / m^3.
     x, y, z
@@ -62,7 +62,7 @@ class Load(NamedTuple):
 
 @kernel
 def span_length(c: float, dx: float, dy: float, dz: float, load: Load) -> float:
-    """Return the length of a span of chord c along (dx, dy, dz)."""
+    """Return the length of a span with the chord c, metres, along (dx, dy, dz)."""
     if c <= 0.0 or load.drag == 0.0:
         return c
     along = (load.x * dx + load.y * dy + load.z * dz) / c
@@ -89,7 +89,7 @@ def strand_payout(strand: Floats, count: int, load: Load) -> float:
             strand[i, Z] - strand[first, Z],
             load,
         )
-        total += max(sagging, chord + over)  # a piece that is bent over a surface does not sag, too
+        total += max(sagging, chord + over)  # a piece that bends over a surface does not sag
         first, chord, over = i, 0.0, 0.0
     return (1.0 + load.slack) * total
 

@@ -13,8 +13,7 @@ from netsp.world.tether.tether_policy import SLIP, PullSettings
 def mend(
     field: Field, strand: Floats, count: int, settings: PullSettings, room: int, deep: float
 ) -> tuple[Floats, int]:
-    """Probe every edge that may be too deep, and put a node on the surface at the deepest point of
-    each.
+    """Probe each edge that may be too deep, and put a node on the surface at its deepest point.
 
     Parameters
     ----------
@@ -22,7 +21,7 @@ def mend(
         Maximum number of nodes of the strand. One for every two slips is more than any surface
         needs; a strand that begins inside a solid could otherwise grow in every round.
     deep : float
-        Depth from which on an edge is too deep, metres. Below a slip, all edges are probed.
+        Depth at which an edge is too deep, metres. If it is below a slip, all edges are probed.
     """
     slip = SLIP * settings.delta
     i, budget = 0, min(64 + 2 * count, room - count)
@@ -47,8 +46,9 @@ def has_node_near(
 ) -> bool:
     """Return whether a node near edge i is closer to a point than `reach`.
 
-    More than the ends of the edge are compared: in the crease between two solids, out of the one is
-    into the other, and nodes would be put at the same two places without end.
+    The comparison includes nodes beyond the ends of the edge: in the crease between two solids, a
+    node that leaves one solid enters the other, and nodes would be added at the same two places
+    without end.
     """
     for j in range(max(0, i - 2), min(count, i + 4)):
         if (strand[j, X] - x) ** 2 + (strand[j, Y] - y) ** 2 + (

@@ -1,6 +1,6 @@
 """`react`: Algorithm 1 of Amer et al. 2025, for comparison with the paper.
 
-Where the paper leaves room:
+The paper leaves these choices:
 
 - Listing and text differ. The listing stops at the first node that is out of sight (``break``); the
   text lets j go on to the preceding node "until a collision-free line of sight is found". Both are
@@ -85,7 +85,7 @@ class ReactTether:
         Raises
         ------
         InputError
-            As `GeodesicTether.start` raises it.
+            `GeodesicTether.start` would raise it.
         """
         a, r = self.field.free_point(anchor, "anchor"), self.field.free_point(robot, "robot")
         if not self.field.line_of_sight(a, r, depth=0.01 * self.delta):

@@ -1,4 +1,4 @@
-"""Tethers as rows of numbers, and what all models share: frames, probes of edges, lengths.
+"""Strands: tethers as rows of numbers, with frames, probes of edges and lengths for all models.
 
 Row i of a strand describes node i and the edge from it to node i + 1. The first node is the anchor,
 the last one the robot; the others rest on something. Positions are in metres.
@@ -148,7 +148,7 @@ def strand_length(strand: Floats, count: int) -> float:
 
 @kernel
 def note_motion(strand: Floats, count: int, i: int, by: float) -> None:
-    """Book a motion of node i against its two edges."""
+    """Add a motion of node i to the budgets of its two edges."""
     strand[i, STALE] += by
     if i > 0:
         strand[i - 1, USED] += by / strand[i - 1, REACH1]
@@ -158,16 +158,14 @@ def note_motion(strand: Floats, count: int, i: int, by: float) -> None:
 
 @kernel
 def probe_edge(field: Field, strand: Floats, i: int, tolerance: float) -> tuple[float, float]:
-    """Probe edge i for its deepest point, and note how far its ends may move before it must be
-    probed again.
+    """Probe edge i for its deepest point; return its distance and its place, as a fraction.
 
-    The arc over the edge is noted, too. Returns the least distance, and where it is, as a fraction
-    of the edge.
+    Record how far the ends may move before the edge must be probed again, and the arc over it.
 
     Parameters
     ----------
     tolerance : float
-        Depth that is allowed, and least distance between two samples, metres.
+        Allowed depth, and minimum distance between two samples, metres.
     """
     ax, ay, az = strand[i, X], strand[i, Y], strand[i, Z]
     bx, by, bz = strand[i + 1, X], strand[i + 1, Y], strand[i + 1, Z]
@@ -289,8 +287,8 @@ def to_surface(
 ) -> tuple[float, float, float]:
     """Return the point of the surface near a point that is not deep.
 
-    Out of one solid may be into another: in the crease between two solids, the point goes back and
-    forth in ever smaller steps.
+    Leaving one solid may mean entering another: in the crease between two solids, the point moves
+    back and forth in ever smaller steps.
     """
     for turn in range(12):
         d, nx, ny, nz, _ = sample(field, x, y, z)

@@ -1,4 +1,4 @@
-"""Tethers as their users see them: immutable states with nodes, length and contacts."""
+"""Public tethers: immutable states with nodes, length and contacts."""
 
 from __future__ import annotations
 
@@ -53,8 +53,10 @@ class Tether(ComparesArrays):
 
     @property
     def nodes(self) -> Floats:
-        """Nodes (n, 3) from the anchor to the robot. In the geodesic model, all between rest on
-        something."""
+        """Nodes (n, 3) from the anchor to the robot, metres.
+
+        In the geodesic model, all nodes between them rest on surfaces.
+        """
         return self.strand[:, :3]
 
     @property

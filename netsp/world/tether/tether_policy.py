@@ -1,4 +1,4 @@
-"""Numbers of the tether models: when contacts hold, how far nodes move, and when pulling ends."""
+"""Policy of the tether models: when contacts hold, how far nodes move, and when pulling ends."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class TetherPolicy:
         Maximum share of a contact's stiffness that the curvature of the surface takes away. On a
         sphere all of it is gone where the strand reaches half way round.
     max_halvings
-        Maximum number of times that a step that went too far is halved.
+        Maximum number of times that a step is halved if it went too far.
     min_fall
         Reduction of the length in one round that shows that the strand has come off something,
         strides. Such a strand gets up to `max_extra_rounds` more rounds, unless delta is finer than
@@ -64,15 +64,15 @@ class TetherPolicy:
     max_extra_rounds
         Maximum number of rounds that are added for a strand that has come off something.
     patience_rounds
-        Rounds without a shorter length after which pulling ends, besides one for each
-        `rounds_per_patience` rounds that were allowed. Over rims, nodes may come and go forever.
+        Number of rounds without a shorter length after which pulling ends, in addition to one for
+        each `rounds_per_patience` rounds allowed. Over rims, nodes may come and go forever.
     rounds_per_patience
-        Rounds that were allowed for each additional round of patience.
+        Number of allowed rounds that add one round of patience.
     standing_factor
         Factor on the number of rounds for a strand whose ends do not move, so that slow slipping
         ends.
     passing_rounds
-        Rounds after each step of an end that moves on at once.
+        Number of rounds after each step of an end that does not stop there.
     max_tip_cosine
         Cosine of the angle between the directions before and after some contacts, below which the
         strand turns sharply there.

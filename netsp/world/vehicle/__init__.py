@@ -1,4 +1,4 @@
-"""Vehicles by name: what carries out a planner's path in a simulation."""
+"""Simulated vehicles by name; a vehicle follows the path of a planner."""
 
 from __future__ import annotations
 

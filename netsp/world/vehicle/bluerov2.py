@@ -20,7 +20,7 @@ TOP_SPEED = 1.5
 class BlueRov2:
     """BlueROV2, its controller, and its estimate of the current.
 
-    The controller does not know the water's motion: it infers it from its drift.
+    The controller does not know the velocity of the water; it infers it from the drift.
     """
 
     def __init__(

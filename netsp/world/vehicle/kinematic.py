@@ -1,4 +1,4 @@
-"""Protocol of vehicles in the simulation, and the kinematic one, which follows paths exactly."""
+"""Protocol of simulated vehicles, and the kinematic vehicle, which follows paths exactly."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Vehicle(Protocol):
     Attributes
     ----------
     position : ndarray, shape (3,)
-        Metres.
+        Position, metres.
     yaw : float
         Heading, rad.
     control_s : list of float
@@ -63,15 +63,15 @@ class Vehicle(Protocol):
         points : list of ndarray
             Points passed on straight lines, the last one the new position.
         count : int
-            Number of points of the path that are behind the vehicle.
+            Number of points of the path that the vehicle has passed.
         """
 
     def stop_at(self, place: Floats) -> None:
-        """Be at rest at a place (3,), metres."""
+        """Set the vehicle to rest at a place (3,), metres."""
 
 
 class KinematicVehicle:
-    """Vehicle that follows a path at its speed (m/s), whatever the water does."""
+    """Vehicle that follows a path at a constant speed (m/s) and ignores the water."""
 
     def __init__(
         self, place: Floats, speed: float, policy: VehiclePolicy = VehiclePolicy()
