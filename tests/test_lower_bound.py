@@ -16,8 +16,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from netsp import Problem, Solution, TravelGraph, solve, solve_graph, travel_graph, verify
-from netsp.app import solving
 from netsp.app.app_policy import AppPolicy
+from netsp.app.facts import bound_message
+from netsp.app.version_solver import VersionSolver
 from netsp.base.errors import InputError
 from netsp.command import gtsp as gtsp_command
 from netsp.command import json_output
@@ -164,10 +165,10 @@ PLACES = {
     "title of a picture": lambda p, s, b: _title(p, s),
     "report of a tour": lambda p, s, b: _summary(p, s, NOT_FLOWN),
     "progress": lambda p, s, b: table_row(b),
-    "page of the app": lambda p, s, b: solving.bound_message(s.status, s.length, s.bound)["proof"],
-    "page of the app, for programs": lambda p, s, b: solving.bound_message(
-        s.status, s.length, s.bound
-    )["lower_bound_of"],
+    "page of the app": lambda p, s, b: bound_message(s.status, s.length, s.bound)["proof"],
+    "page of the app, for programs": lambda p, s, b: bound_message(s.status, s.length, s.bound)[
+        "lower_bound_of"
+    ],
     "cells of a comparison": lambda p, s, b: _cells_table(
         cells({"mip": [study_row(b.scope)]}), {"x": 10.0}
     ),
@@ -424,7 +425,8 @@ def told_to_the_page(problem, time_limit, monkeypatch):
         by_name, "travel_graph", lambda p, *name, **o: whole(p, *name, **{"max_classes": 4, **o})
     )
     ours, theirs = Pipe()
-    solving._solve(theirs, 1, problem.to_json(), time_limit, None, AppPolicy(tour_interval_s=0.0))
+    policy = AppPolicy(tour_interval_s=0.0)
+    VersionSolver(theirs, 1, problem.to_json(), policy).solve(time_limit, None)
     said = []
     while ours.poll():
         said.append(ours.recv())

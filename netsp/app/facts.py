@@ -13,8 +13,9 @@ from netsp.app.app_policy import AppPolicy
 from netsp.app.dragged_tethers import Cursor
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
+from netsp.model.bound_scope import LowerBound
 from netsp.model.problem import Problem
-from netsp.model.solution import Solution
+from netsp.model.solution import Solution, Status, proof
 from netsp.plan.sizing.base_placement import shortest_paths
 from netsp.plan.sizing.tether_margins import margins
 
@@ -66,6 +67,15 @@ def facts(
         "margins": found,
         "profile": rows,
         "visits": visited,
+    }
+
+
+def bound_message(status: Status, length: float | None, bound: LowerBound | None) -> dict[str, Any]:
+    """Return the fields of a tour's bound for the page: length, scope and the words shown."""
+    return {
+        "lower_bound": None if bound is None else bound.length,
+        "lower_bound_of": None if bound is None else bound.scope.value,
+        "proof": proof(status, length, bound),
     }
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from netsp.app.app_policy import AppPolicy
-from netsp.app.solving import bound_message
+from netsp.app.facts import bound_message
 from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
 from netsp.model.problem import Problem
