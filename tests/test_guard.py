@@ -45,8 +45,7 @@ from netsp.online.guard.tether_belief import Strands
 from netsp.online.guard.tether_guard import Guard, GuardOptions
 from netsp.online.link.geo_frame import Frame
 from netsp.online.link.modes import Mode
-from netsp.roadmap.plane_world import RayLetters, paths_between
-from netsp.world.side_names import passes_on_side
+from netsp.roadmap.plane_world import PlaneWorld, RayLetters
 from tests.autopilot import Autopilot
 
 RECORDED = Path(__file__).parent / "data" / "ardusub"
@@ -334,10 +333,10 @@ def test_a_tether_that_begins_or_ends_on_a_ray_does_not_cross_it(side):
     over = np.array([(0, 0), (-0.5, 5), (0, 5.5), (1, 8)], dtype=float)
     away = np.array([(0, 0), (3, -2)], dtype=float)
     back = np.array([(0, 0), (0, 3), (0.5, 5), (0, 7)], dtype=float)
-    assert passes_on_side(site, east, side, "A") == (side == "east")
-    assert passes_on_side(site, over, side, "A") == (side in ("north", "west"))
-    assert not passes_on_side(site, away, side, "A")
-    assert passes_on_side(site, back, side, "A") == (side == "east")
+    assert PlaneWorld(site).passes_on_side(east, side, "A") == (side == "east")
+    assert PlaneWorld(site).passes_on_side(over, side, "A") == (side in ("north", "west"))
+    assert not PlaneWorld(site).passes_on_side(away, side, "A")
+    assert PlaneWorld(site).passes_on_side(back, side, "A") == (side == "east")
 
 
 def test_a_gap_leaves_every_class_that_the_robot_can_have_reached():
@@ -353,10 +352,10 @@ def test_a_gap_leaves_every_class_that_the_robot_can_have_reached():
 
 def test_ways_are_those_no_longer_than_the_robot_can_have_gone():
     a, b = np.array([3.0, 0.0, 0.0]), np.array([7.0, 0.0, 0.0])
-    assert {word for word, _ in paths_between(SITE, a, b, 4.6)} == {(), (1,)}
-    lengths = [length for _, length in paths_between(SITE, a, b, 12.0)]
+    assert {word for word, _ in PlaneWorld(SITE).paths_between(a, b, 4.6)} == {(), (1,)}
+    lengths = [length for _, length in PlaneWorld(SITE).paths_between(a, b, 12.0)]
     assert lengths == sorted(lengths)
-    assert len(paths_between(SITE, a, b, 12.0)) > 2
+    assert len(PlaneWorld(SITE).paths_between(a, b, 12.0)) > 2
 
 
 def test_long_gaps_and_places_beyond_any_tether_take_no_time_to_think_about():

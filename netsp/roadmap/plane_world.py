@@ -18,7 +18,7 @@ from netsp.hsignature.words import invert, least_changed
 from netsp.model.problem import Circle, Problem
 from netsp.roadmap.tether_classes import Tethers
 from netsp.world.scene.scene import scene_of
-from netsp.world.side_names import SIDES, listed, passages, passes_on_side, side
+from netsp.world.side_names import SIDES, crosses_ray, listed, passages, side, side_direction
 from netsp.world.tether import GeodesicTether, Tether
 from netsp.world.tether.resolution import suggested_delta
 from netsp.world.world_policy import WorldPolicy
@@ -166,8 +166,31 @@ class PlaneWorld:
     def paths_between(
         self, before: Floats, after: Floats, max_length: float
     ) -> list[tuple[Word, float]]:
-        """Return the words and lengths of paths from one place to another, shortest first."""
-        return paths_between(self.problem, before, after, max_length, self.policy)
+        """Return the words and lengths of paths from one place to another, shortest first.
+
+        Obstacles count without the clearance.
+        """
+        problem, policy = self.problem, self.policy
+        bare = problem.model_copy(update={"clearance": 0.0, "bounds": None})
+        begin, end = free_position(bare, before), free_position(bare, after)
+        straight = math.dist(begin, end)
+        if straight <= 1e-6 * problem.scale:
+            end = begin
+        # up to ever larger lengths, until there are enough: all paths at once may be too many
+        longest, found = max(1.05 * straight, 1e-6 * problem.scale), []
+        for _ in range(policy.max_searches):
+            free = bare.model_copy(update={"base": begin, "goals": (), "tether_length": longest})
+            found = Tethers(free).classes(*end)
+            if len(found) >= policy.max_paths or (found and longest >= max_length):
+                break
+            longer = policy.length_growth * longest + 0.5
+            longest = min(longer, max(max_length, longest + 0.5)) if found else longer
+        kept = [(t.word, t.length) for t in found if t.length <= max(max_length, found[0].length)]
+        if kept:
+            return kept[: policy.max_paths]
+        # between obstacles that overlap there may be none: then the robot moved straight
+        line = np.array([before, after])
+        return [(crossings(line, problem.representative_points), math.dist(before, after))]
 
     def classes_on_side(
         self, believed: Iterable[Word], robot: Floats, side: str, obstacle: int | str
@@ -194,7 +217,9 @@ class PlaneWorld:
 
     def passes_on_side(self, nodes: Floats, side: str, obstacle: int | str) -> bool:
         """Return whether a tether passes an obstacle on one side, and not on the opposite one."""
-        return passes_on_side(self.problem, nodes, side, obstacle)
+        index = index_of(obstacle, list(self.problem.obstacles), "obstacle")
+        ray, middle, path = side_direction(self.problem, side), self.rays[index], nodes[:, :2]
+        return crosses_ray(path, middle, ray) and not crosses_ray(path, middle, -ray)
 
     def describe_path(self, nodes: Floats, word: Word) -> str:
         """Describe a tether by the obstacles that it rests on, and those whose letters it has."""
@@ -246,45 +271,3 @@ def free_position(problem: Problem, robot: Floats) -> tuple[float, float, float]
         place[:2] = nearest + (direction / size if size else 0.0) * 1e-7 * problem.scale
     x, y, z = place.tolist()
     return (x, y, z)
-
-
-def paths_between(
-    problem: Problem,
-    before: Floats,
-    after: Floats,
-    max_length: float,
-    policy: WorldPolicy = WorldPolicy(),
-) -> list[tuple[Word, float]]:
-    """Return the words and lengths of paths from one place to another, shortest first.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem; obstacles count without the clearance.
-    before, after : ndarray, shape (3,)
-        Places, m.
-    max_length : float
-        Largest length, m; the shortest path counts at any length.
-    policy : WorldPolicy
-        Limits of the search.
-    """
-    bare = problem.model_copy(update={"clearance": 0.0, "bounds": None})
-    begin, end = free_position(bare, before), free_position(bare, after)
-    straight = math.dist(begin, end)
-    if straight <= 1e-6 * problem.scale:
-        end = begin
-    # up to ever larger lengths, until there are enough: all paths at once may be too many
-    longest, found = max(1.05 * straight, 1e-6 * problem.scale), []
-    for _ in range(policy.max_searches):
-        free = bare.model_copy(update={"base": begin, "goals": (), "tether_length": longest})
-        found = Tethers(free).classes(*end)
-        if len(found) >= policy.max_paths or (found and longest >= max_length):
-            break
-        longer = policy.length_growth * longest + 0.5
-        longest = min(longer, max(max_length, longest + 0.5)) if found else longer
-    kept = [(t.word, t.length) for t in found if t.length <= max(max_length, found[0].length)]
-    if kept:
-        return kept[: policy.max_paths]
-    # between obstacles that overlap there may be none: then the robot moved straight
-    line = np.array([before, after])
-    return [(crossings(line, problem.representative_points), math.dist(before, after))]

@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
-from netsp.base.field_types import index_of
 from netsp.hsignature import Word
 from netsp.hsignature.rays import crossings
 from netsp.model.problem import Circle, Polygon, Problem
@@ -89,19 +88,6 @@ def crosses_ray(path: Floats, begin: Floats, direction: Floats) -> bool:
             if along[k] + share * (along[j] - along[k]) > 0.0:
                 return True
     return False
-
-
-def passes_on_side(problem: Problem, path: Floats, side: str, obstacle: int | str) -> bool:
-    """Return whether a tether passes an obstacle on one side, and not on the opposite one.
-
-    Raises
-    ------
-    InputError
-        There is no such obstacle or side.
-    """
-    index = index_of(obstacle, list(problem.obstacles), "obstacle")
-    ray, middle = side_direction(problem, side), problem.representative_points[index]
-    return crosses_ray(path[:, :2], middle, ray) and not crosses_ray(path[:, :2], middle, -ray)
 
 
 def beside(side: str, name: str) -> str:
