@@ -200,14 +200,7 @@ def random_world(
     _check(family, goals, obstacles, tether_length, side, radii)
     # text is hashed by Python into a seed of its own, the same in every version
     draw = random.Random(seed if attempt == 0 else f"{seed}/{attempt}")
-    if family == "rss2016":
-        obstacles = (5, 10) if obstacles is None else obstacles
-    if isinstance(obstacles, tuple):
-        least, most = obstacles
-        obstacles = least + int((most - least + 1) * draw.random())
-    if family == "rss2016":
-        goals = 5 + int(6 * draw.random()) if goals is None else goals
-    goals, obstacles = 20 if goals is None else goals, 20 if obstacles is None else obstacles
+    obstacles, goals = _counts(draw, family, obstacles, goals)
 
     def place() -> Place:
         x = draw.random() * side
@@ -244,6 +237,20 @@ def random_world(
     raise DoesNotFitError(
         f"goals: only {len(found)} of {goals} places within reach of the tether found"
     )
+
+
+def _counts(
+    draw: random.Random, family: str, obstacles: int | tuple[int, int] | None, goals: int | None
+) -> tuple[int, int]:
+    """Return the numbers of obstacles and of goals, drawn where they are not given."""
+    if obstacles is None:
+        obstacles = (5, 10) if family == "rss2016" else 20
+    if isinstance(obstacles, tuple):
+        low, high = obstacles
+        obstacles = low + int((high - low + 1) * draw.random())
+    if goals is None:
+        goals = 5 + int(6 * draw.random()) if family == "rss2016" else 20
+    return obstacles, goals
 
 
 def reachable_world(seed: int, **recipe: object) -> tuple[Problem, int]:

@@ -144,16 +144,18 @@ def cover(
         standoff = 0.5 * camera.range if standoff is None else standoff
         farthest = camera.range if farthest is None else min(farthest, camera.range)
         _check(standoff, farthest, clearance, share, incidence, tether_length)
-        check_bounds(
-            Mission(
-                scene="-",
-                anchor=anchor,
-                start=start or anchor,
-                tether_length=UNKNOWN_TETHER_LENGTH,
-                waypoints=(MissionWaypoint(position=anchor),),
-            ),
-            scene,
+        mission = Mission(
+            scene="-",
+            name=scene.name,
+            anchor=anchor,
+            start=start or anchor,
+            waypoints=(MissionWaypoint(position=anchor),),
+            clearance=clearance,
+            camera=camera,
+            inspect=inspect,
+            tether_length=tether_length or UNKNOWN_TETHER_LENGTH,
         )
+        check_bounds(mission, scene)
         field = clock.bounded("measuring distances in the scene", scene.field)
         base = field.free_point(anchor, "anchor")
         first = base if start is None else field.free_point(start, "start")
@@ -163,17 +165,7 @@ def cover(
             lambda: surface_patches(scene, field, camera.patch, np.array([anchor]), inspect),
         )
         patches = coarsen(fine, camera.patch)
-        mission = Mission(
-            scene="-",
-            name=scene.name,
-            anchor=anchor,
-            start=tuple(first.tolist()),
-            waypoints=(MissionWaypoint(position=anchor),),
-            clearance=clearance,
-            camera=camera,
-            inspect=inspect,
-            tether_length=tether_length or UNKNOWN_TETHER_LENGTH,
-        )
+        mission = mission.model_copy(update={"start": tuple(first.tolist())})
         reach = clock.bounded(
             "finding where the robot gets to",
             lambda: _Reach.build(mission, scene, field, patches, standoff, policy),

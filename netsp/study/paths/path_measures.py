@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -321,11 +322,7 @@ def measure_path(
     end_gap = float(np.linalg.norm(given[-1] - base[:size]))
     led = _Led(problem, given, found, laid)
     seen = [p for p in found if led.sees(p, goals[p.goal])]
-    heights = given[:, 2] if size == 3 else None
-    if heights is None:
-        known = [(p.place, float(goals[p.goal, 2])) for p in seen]
-        end = [(len(given) - 1.0, float(base[2]))] if end_gap <= radius else []
-        heights = _rising(given, [(0.0, float(base[2])), *known, *end])
+    heights = given[:, 2] if size == 3 else _heights(problem, given, seen, end_gap <= radius)
     points = np.column_stack([given[:, :2], heights])
     travelled = polylines.along(points)
     length = float(travelled[-1])
@@ -336,22 +333,7 @@ def measure_path(
 
     loop = led.lifted(heights)
     carried = CarriedTether(led.puller, loop[: led.last + 1])
-    place = np.arange(len(given))
-    cluster, before, visits = problem.clusters, set[int](), []
-    for p in seen:
-        k, goal = led.index(p.place), goals[p.goal]
-        visits.append(
-            GoalVisit(
-                goal=p.goal,
-                is_first=int(cluster[p.goal]) not in before,
-                along=float(np.interp(p.place, place, travelled)),
-                time_s=float(np.interp(p.place, place, seconds)),
-                miss=p.miss,
-                tether=carried.length_to(k, goal) if led.is_reached(k) else None,
-                word=led.word(k, goal),
-            )
-        )
-        before.add(int(cluster[p.goal]))
+    visits = _visits(problem, led, carried, seen, travelled, seconds)
     is_reached = led.is_reached(led.last)
     error = policy.tether_error * problem.tether_length
     at, longest = carried.longest(error, led.first) if is_reached else (led.first, 0.0)
@@ -364,7 +346,7 @@ def measure_path(
         speed=speed,
         has_heights=size == 3,
         radius=radius,
-        visits=tuple(visits),
+        visits=visits,
         start_gap=start_gap,
         end_gap=end_gap,
         is_closed=max(start_gap, end_gap) <= radius,
@@ -382,6 +364,42 @@ def measure_path(
         points=points,
         carried=carried,
     )
+
+
+def _heights(problem: Problem, path: Floats, seen: Sequence[Passing], ends_at_base: bool) -> Floats:
+    """Return heights that change evenly between the base and the visited goals."""
+    base = float(problem.base[2])
+    known = [(p.place, float(problem.points[1:][p.goal, 2])) for p in seen]
+    end = [(len(path) - 1.0, base)] if ends_at_base else []
+    return _rising(path, [(0.0, base), *known, *end])
+
+
+def _visits(
+    problem: Problem,
+    led: _Led,
+    carried: CarriedTether,
+    seen: Sequence[Passing],
+    travelled: Floats,
+    seconds: Floats,
+) -> tuple[GoalVisit, ...]:
+    """Return the visits of goals, with length and time on the way to each."""
+    place = np.arange(len(travelled))
+    goals, clusters, before, visits = problem.points[1:], problem.clusters, set[int](), []
+    for p in seen:
+        k, goal = led.index(p.place), goals[p.goal]
+        visits.append(
+            GoalVisit(
+                goal=p.goal,
+                is_first=int(clusters[p.goal]) not in before,
+                along=float(np.interp(p.place, place, travelled)),
+                time_s=float(np.interp(p.place, place, seconds)),
+                miss=p.miss,
+                tether=carried.length_to(k, goal) if led.is_reached(k) else None,
+                word=led.word(k, goal),
+            )
+        )
+        before.add(int(clusters[p.goal]))
+    return tuple(visits)
 
 
 class _Led:
