@@ -1,5 +1,6 @@
 """Comparisons survive kills, crashes and torn lines, and nothing is run twice or lost."""
 
+import functools
 import json
 import os
 import signal
@@ -17,11 +18,11 @@ from hypothesis import strategies as st
 from netsp import InputError, solve
 from netsp.command.main import main
 from netsp.plan.solver_table import SOLVERS, Solver
-from netsp.study.compare import pool
 from netsp.study.compare.rows import RowsFile, combine, read_rows
 from netsp.study.compare.study import Study, shard
 from netsp.study.compare.study_run import compare
-from netsp.study.compare.trial import MAX_PROGRESS_ROWS, run, thinned, world_of
+from netsp.study.compare.trial import run, thinned, world_of
+from netsp.study.compare.trial_policy import TrialPolicy
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -200,7 +201,6 @@ def test_solvers_that_crash_hang_or_eat_cost_one_row_each(tmp_path, monkeypatch)
     (tmp_path / "sitecustomize.py").write_text(textwrap.dedent(patch))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(pool, "HUNG_GRACE_S", 10.0)
     for name in names:
         monkeypatch.setitem(SOLVERS, name, Solver(name, f"badsolvers:{name}"))
     study = Study.checked(
@@ -212,7 +212,7 @@ def test_solvers_that_crash_hang_or_eat_cost_one_row_each(tmp_path, monkeypatch)
         "test",
     )  # fmt: skip
     out = tmp_path / "r.jsonl"
-    tally = compare(study, out, jobs=2)
+    tally = compare(study, out, jobs=2, policy=TrialPolicy(hung_grace_s=10.0))
     status = {r["solver"]["name"]: r["status"] for r in read_rows(out)}
     assert status == {**names, "greedy": "feasible"}
     assert (tally.done, tally.failed) == (6, 5)
@@ -309,7 +309,7 @@ def test_flags_make_the_same_study_as_a_file(tmp_path, capsys):
 @given(st.integers(1, 2000))
 def test_a_thinned_history_keeps_its_ends(n):
     out = thinned(list(range(n)))
-    assert len(out) == min(n, MAX_PROGRESS_ROWS)
+    assert len(out) == min(n, TrialPolicy.max_progress_rows)
     assert (out[0], out[-1]) == (0, n - 1)
     assert out == sorted(set(out))
 
@@ -366,7 +366,8 @@ def test_a_dask_cluster_gives_the_same_rows_though_a_worker_is_killed(dask_clust
 def test_a_scheduler_that_is_not_there_is_told_in_one_line(tmp_path, capsys, monkeypatch):
     from netsp.study.compare import cluster
 
-    monkeypatch.setattr(cluster, "CONNECT_S", 1.0)
+    impatient = functools.partial(cluster.dask_executor, policy=TrialPolicy(connect_s=1.0))
+    monkeypatch.setattr(cluster, "dask_executor", impatient)
     (tmp_path / "s.toml").write_text(TOML)
     command = ["compare", str(tmp_path / "s.toml"), "-o", str(tmp_path / "r.jsonl")]
     assert main([*command, "--scheduler", "tcp://127.0.0.1:9"]) == 2

@@ -274,14 +274,15 @@ def test_a_function_that_fails_costs_its_rows_only(small, tour, tmp_path, capsys
     assert "are not run again" in capsys.readouterr().err
 
 
-def test_what_answers_late_does_not_count(small, tour, monkeypatch):
+def test_what_answers_late_does_not_count(small, tour):
     with_records(small, tour)
-    monkeypatch.setattr(rank, "MAX_OVERTIME_S", 0.0)
 
     def slow(problem, path, limit, should_stop):
         time.sleep(0.3)
         return tour
 
-    (row,) = rank.run(Library(small), [SMALL], "slow", slow, 0.1)
+    (row,) = rank.run(
+        Library(small), [SMALL], "slow", slow, 0.1, rank.RankPolicy(max_overtime_s=0.0)
+    )
     assert not row.verified
     assert row.message.startswith("late: answered after")

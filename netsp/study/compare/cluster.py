@@ -11,22 +11,17 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from netsp.base.errors import InputError
-from netsp.study.compare.pool import HUNG_GRACE_S, crashed
+from netsp.study.compare.pool import crashed
 from netsp.study.compare.rows import TrialRow
 from netsp.study.compare.study import Trial
 from netsp.study.compare.study_run import Executor
+from netsp.study.compare.trial_policy import TrialPolicy
 
 if TYPE_CHECKING:
     from distributed import Client
 
-CONNECT_S = 10.0
-"""Time limit for the scheduler's first answer, s."""
 
-QUEUED_PER_WORKER = 4
-"""Number of trials queued for each thread of the cluster, so that no thread waits."""
-
-
-def dask_executor(address: str) -> Executor:
+def dask_executor(address: str, policy: TrialPolicy = TrialPolicy()) -> Executor:
     """Return an executor on the scheduler at ``tcp://host:port``.
 
     Raises InputError if Dask is not installed or no scheduler answers.
@@ -38,7 +33,7 @@ def dask_executor(address: str) -> Executor:
             'a scheduler needs Dask; install it with: pip install "netsp[cluster]"'
         ) from None
     try:
-        client = Client(address, timeout=CONNECT_S)
+        client = Client(address, timeout=policy.connect_s)
     except (OSError, ValueError, TypeError) as error:
         raise InputError(
             f"scheduler: no Dask scheduler at {address!r} ({type(error).__name__}); expected "
@@ -47,14 +42,16 @@ def dask_executor(address: str) -> Executor:
 
     def execute(trials: list[Trial]) -> Iterator[tuple[Trial, TrialRow]]:
         try:
-            yield from _execute(client, trials)
+            yield from _execute(client, trials, policy)
         finally:
             client.close()
 
     return execute
 
 
-def _execute(client: Client, trials: list[Trial]) -> Iterator[tuple[Trial, TrialRow]]:
+def _execute(
+    client: Client, trials: list[Trial], policy: TrialPolicy
+) -> Iterator[tuple[Trial, TrialRow]]:
     from distributed import as_completed
 
     queue = iter(trials)
@@ -66,10 +63,12 @@ def _execute(client: Client, trials: list[Trial]) -> Iterator[tuple[Trial, Trial
             return None
         running[trial.id] = trial
         # pure=False: Dask does not reuse the result of an equal trial of an earlier run
-        return client.submit(guarded, trial, key=f"netsp-{trial.id}", pure=False, retries=0)
+        return client.submit(guarded, trial, policy, key=f"netsp-{trial.id}", pure=False, retries=0)
 
     threads = max(sum(client.nthreads().values()), 1)
-    first = [f for f in (submit() for _ in range(QUEUED_PER_WORKER * threads)) if f is not None]
+    first = [
+        f for f in (submit() for _ in range(policy.queued_per_worker * threads)) if f is not None
+    ]
     pending = as_completed(first)
     for future in pending:
         trial = running.pop(future.key.removeprefix("netsp-"))
@@ -88,7 +87,7 @@ def _execute(client: Client, trials: list[Trial]) -> Iterator[tuple[Trial, Trial
         yield trial, outcome
 
 
-def guarded(trial: Trial) -> TrialRow:
+def guarded(trial: Trial, policy: TrialPolicy = TrialPolicy()) -> TrialRow:
     """Run a trial on a worker; return a row even if it raises an error or does not answer."""
     import threading
 
@@ -107,7 +106,7 @@ def guarded(trial: Trial) -> TrialRow:
     thread = threading.Thread(target=body, daemon=True)
     thread.start()
     limit = trial.solver["time_limit"]
-    thread.join(None if limit is None else 2.0 * limit + HUNG_GRACE_S)
+    thread.join(None if limit is None else 2.0 * limit + policy.hung_grace_s)
     if not outcome:
         return {"status": "timeout", "message": "the solver did not come back"}
     return outcome[0]

@@ -23,10 +23,6 @@ from netsp.model.solution import Solution, Status
 from netsp.plan.solve_problem import solve
 from netsp.roadmap.tether_classes import Tethers
 from netsp.study.paths import PathMeasures, PathPolicy, measure_path
-from netsp.study.paths.path_measures import DEFAULT_SPEED
-
-ORDER_TIME_SHARE = 0.2
-"""Minimum share of the time limit for each path's order, even if the tour used it all."""
 
 COLUMNS = (
     "path",
@@ -280,7 +276,7 @@ def compare_paths(
     paths: Sequence[FoundPath],
     solution: Solution | None = None,
     *,
-    speed: float = DEFAULT_SPEED,
+    speed: float = PathPolicy.speed,
     policy: PathPolicy | None = None,
     time_limit: float | None = None,
     seed: int = 0,
@@ -332,6 +328,7 @@ def compare_paths(
         raise InputError("--solution: is the solution of another problem (sha256 differs)")
     if solution is not None and solution.length is None:
         raise InputError(f"--solution: has no tour (status {solution.status.value})")
+    policy = policy or PathPolicy()
     on_stage("measuring paths")
     laid = _laid_tether(problem)
     measured = []
@@ -356,8 +353,8 @@ def compare_paths(
             note, is_infeasible = str(error), isinstance(error, InfeasibleError)
 
     def left() -> float | None:
-        """Return the remaining time, s, but at least the share `ORDER_TIME_SHARE` of the limit."""
-        return None if time_limit is None else max(clock.left, ORDER_TIME_SHARE * time_limit)
+        """Return the remaining time, s, but at least `order_time_share` of the limit."""
+        return None if time_limit is None else max(clock.left, policy.order_time_share * time_limit)
 
     known: dict[tuple[int, ...], tuple[float | None, str]] = {}
     out = []

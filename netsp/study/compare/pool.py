@@ -21,10 +21,7 @@ from netsp.base.errors import PluginError
 from netsp.base.interrupt_signals import INTERRUPTS
 from netsp.study.compare.rows import LOST, TrialRow
 from netsp.study.compare.study import Trial
-
-HUNG_GRACE_S = 60.0
-"""Time limit of a trial beyond twice its own limit, s; then it counts as hung. The time includes
-building the roadmap and compiling kernels."""
+from netsp.study.compare.trial_policy import TrialPolicy
 
 
 @dataclass
@@ -35,7 +32,9 @@ class _Worker:
     deadline: float = float("inf")
 
 
-def run_all(trials: list[Trial], jobs: int) -> Iterator[tuple[Trial, TrialRow]]:
+def run_all(
+    trials: list[Trial], jobs: int, policy: TrialPolicy = TrialPolicy()
+) -> Iterator[tuple[Trial, TrialRow]]:
     """Run trials in `jobs` processes, and yield each trial with its row as it finishes.
 
     Closing the iterator kills the workers.
@@ -45,7 +44,7 @@ def run_all(trials: list[Trial], jobs: int) -> Iterator[tuple[Trial, TrialRow]]:
     workers = [_start(context) for _ in range(min(jobs, len(trials)))]
     try:
         for worker in workers:
-            _feed(worker, queue)
+            _feed(worker, queue, policy.hung_grace_s)
         while any(w.trial is not None for w in workers):
             soonest = min(w.deadline for w in workers)
             ready = wait(
@@ -70,7 +69,7 @@ def run_all(trials: list[Trial], jobs: int) -> Iterator[tuple[Trial, TrialRow]]:
                 if outcome["status"] in LOST:
                     _stop(worker)
                     workers[k] = worker = _start(context)
-                _feed(worker, queue)
+                _feed(worker, queue, policy.hung_grace_s)
                 yield trial, outcome
     finally:
         for worker in workers:
@@ -85,13 +84,13 @@ def _start(context: Any) -> _Worker:
     return _Worker(process, ours)
 
 
-def _feed(worker: _Worker, queue: list[Trial]) -> None:
+def _feed(worker: _Worker, queue: list[Trial], grace_s: float) -> None:
     worker.trial, worker.deadline = None, float("inf")
     if queue:
         worker.trial = queue.pop()
         limit = worker.trial.solver["time_limit"]
         if limit is not None:
-            worker.deadline = time.monotonic() + 2.0 * limit + HUNG_GRACE_S
+            worker.deadline = time.monotonic() + 2.0 * limit + grace_s
         with contextlib.suppress(OSError):  # the closed pipe will show that the worker is dead
             worker.pipe.send(worker.trial)
 

@@ -20,13 +20,10 @@ from netsp.base.validated import Model, explain
 from netsp.plan.random_worlds import FAMILIES
 from netsp.plan.solve_problem import check_solver
 from netsp.plan.solver_table import ROADMAPS, SOLVERS
+from netsp.study.compare.trial_policy import TrialPolicy
 
 Whole = Annotated[Integer, Field(ge=1, le=100_000)]
 Natural = Annotated[Integer, Field(ge=0, le=2**62)]
-
-
-MAX_TRIALS = 500_000
-"""Maximum number of trials of a study."""
 
 
 class Worlds(Model):
@@ -164,8 +161,8 @@ class Study(Model):
                 raise ValueError(f"{what}: {again[0]:g} appears twice; expected each once")
         count = self.worlds.count * len(self.goals) * len(self.tether_lengths)
         count *= len(self.roadmaps) * len(self.solvers) * len(self.seeds)
-        if count > MAX_TRIALS:
-            raise ValueError(f"{count} trials; expected at most {MAX_TRIALS}")
+        if count > (limit := TrialPolicy.max_trials):
+            raise ValueError(f"{count} trials; expected at most {limit}")
         return self
 
     @classmethod

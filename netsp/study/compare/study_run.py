@@ -12,6 +12,7 @@ from netsp.study.compare.pool import run_all
 from netsp.study.compare.rows import FAILED, RowsFile, TrialRow
 from netsp.study.compare.study import Study, Trial, shard
 from netsp.study.compare.trial import check, full_row
+from netsp.study.compare.trial_policy import TrialPolicy
 
 
 class Executor(Protocol):
@@ -39,6 +40,7 @@ def compare(
     part: tuple[int, int] = (1, 1),
     executor: Executor | None = None,
     on_row: Callable[[TrialRow, Tally], None] | None = None,
+    policy: TrialPolicy = TrialPolicy(),
 ) -> Tally:
     """Run the trials of a study that the results file does not hold yet, and append their rows.
 
@@ -50,6 +52,8 @@ def compare(
         Shard to run, as (i, n): the i-th of n.
     on_row
         Called with each new row.
+    policy
+        Time after which a trial counts as hung, unless an executor is given.
 
     Raises InputError if the file holds anything but rows of this study, or options of a roadmap do
     not exist. A trial that fails has a row and is not run again.
@@ -61,7 +65,7 @@ def compare(
         left = [t for t in trials if t.id not in rows.done]
         begun = done = len(trials) - len(left)
         failed = 0
-        outcomes = run_all(left, jobs) if executor is None else executor(left)
+        outcomes = run_all(left, jobs, policy) if executor is None else executor(left)
         with closing(outcomes):  # type: ignore[type-var]
             for trial, outcome in outcomes:
                 row = full_row(trial, outcome, study.sha256, study.name)

@@ -22,9 +22,7 @@ from netsp.model.problem import Goal, Problem
 from netsp.model.solution import Status
 from netsp.study.compare.rows import SCHEMA, TrialRow
 from netsp.study.compare.study import Trial
-
-MAX_PROGRESS_ROWS = 200
-"""Maximum number of incumbents in the row of a trial."""
+from netsp.study.compare.trial_policy import TrialPolicy
 
 
 @functools.lru_cache(maxsize=4)
@@ -106,12 +104,10 @@ def _cpu_s() -> float:
     return t.user + t.system + t.children_user + t.children_system
 
 
-def thinned(history: list[Any]) -> list[Any]:
-    """Return at most `MAX_PROGRESS_ROWS` entries, evenly spaced, with the first and the last."""
-    n = len(history)
-    if n <= MAX_PROGRESS_ROWS:
-        return history
-    return [history[k * (n - 1) // (MAX_PROGRESS_ROWS - 1)] for k in range(MAX_PROGRESS_ROWS)]
+def thinned(history: list[Any], policy: TrialPolicy = TrialPolicy()) -> list[Any]:
+    """Return at most `max_progress_rows` entries, evenly spaced, with the first and the last."""
+    n, limit = len(history), policy.max_progress_rows
+    return history if n <= limit else [history[k * (n - 1) // (limit - 1)] for k in range(limit)]
 
 
 def full_row(trial: Trial, outcome: TrialRow, study: str, study_name: str) -> TrialRow:

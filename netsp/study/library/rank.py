@@ -14,6 +14,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -24,6 +25,7 @@ from netsp.base.errors import InputError, NetspError
 from netsp.base.field_types import Name, NonNegative, Total
 from netsp.base.files import read_text
 from netsp.base.interrupt_signals import until_interrupt
+from netsp.base.number_ranges import check_not_negative
 from netsp.base.registry import foreign
 from netsp.base.validated import Model, read_model
 from netsp.judge import verify
@@ -31,15 +33,26 @@ from netsp.model.problem import Problem
 from netsp.model.solution import Solution
 from netsp.study.library.records import SAME_LENGTH_TOLERANCE, Library
 
-MAX_OVERTIME_RATIO = 1.1
-"""Ratio of time to time limit above which a late result does not count, if it is also later than
-`MAX_OVERTIME_S`."""
 
-MAX_OVERTIME_S = 5.0
-"""Overtime above which a late result does not count, s; it allows for loading libraries."""
+@dataclass(frozen=True)
+class RankPolicy:
+    """Policy of a ranking: when a result is late. All numbers are 0 or more.
 
-RANK_GRACE_S = 10.0
-"""Time limit of a command beyond twice its own limit, s; then it is killed."""
+    Attributes
+    ----------
+    max_overtime_ratio, max_overtime_s
+        A result does not count if its time exceeds the limit by both this ratio and this many
+        seconds, which allow for loading libraries.
+    grace_s
+        Time limit of a command beyond twice its own limit, s; then it is killed.
+    """
+
+    max_overtime_ratio: float = 1.1
+    max_overtime_s: float = 5.0
+    grace_s: float = 10.0
+
+    def __post_init__(self) -> None:
+        check_not_negative(self)
 
 
 class Row(Model):
@@ -103,7 +116,7 @@ def _guarded(function: Callable[..., Any], name: str) -> Callable[..., Any]:
     return call
 
 
-def by_command(command: str) -> Solve:
+def by_command(command: str, policy: RankPolicy = RankPolicy()) -> Solve:
     """Return a solver that runs a command with ``{problem}``, ``{solution}`` and ``{seconds}``
     filled in.
 
@@ -131,7 +144,7 @@ def by_command(command: str) -> Solve:
             try:
                 done = subprocess.run(
                     filled,
-                    timeout=2.0 * limit + RANK_GRACE_S,
+                    timeout=2.0 * limit + policy.grace_s,
                     stdout=subprocess.DEVNULL,
                     stderr=subprocess.PIPE,
                     text=True,
@@ -140,7 +153,7 @@ def by_command(command: str) -> Solve:
             except OSError as error:
                 raise InputError(f"--command: {words[0]}: {error.strerror or error}") from None
             except subprocess.TimeoutExpired:
-                raise NetspError(f"did not end within {2.0 * limit + RANK_GRACE_S:g} s") from None
+                raise NetspError(f"did not end within {2.0 * limit + policy.grace_s:g} s") from None
             if not out.exists():
                 last = (done.stderr.strip().splitlines() or ["nothing said"])[-1]
                 raise NetspError(f"wrote no solution; exit code {done.returncode}: {last[:120]}")
@@ -150,7 +163,12 @@ def by_command(command: str) -> Solve:
 
 
 def run(
-    library: Library, names: Sequence[str], label: str, solve: Solve, limit: float
+    library: Library,
+    names: Sequence[str],
+    label: str,
+    solve: Solve,
+    limit: float,
+    policy: RankPolicy = RankPolicy(),
 ) -> Iterator[Row]:
     """Run a solver over problems, one after the other.
 
@@ -168,6 +186,8 @@ def run(
         The solver.
     limit : float
         Time limit for each problem, s.
+    policy : RankPolicy
+        When a result is late.
 
     Yields
     ------
@@ -181,13 +201,21 @@ def run(
     """
     with until_interrupt(None) as clock:
         for name in names:
-            row = _run(library, name, label, solve, limit, clock)
+            row = _run(library, name, label, solve, limit, clock, policy)
             if clock.is_stopped:
                 return
             yield row
 
 
-def _run(library: Library, name: str, label: str, solve: Solve, limit: float, clock: Clock) -> Row:
+def _run(
+    library: Library,
+    name: str,
+    label: str,
+    solve: Solve,
+    limit: float,
+    clock: Clock,
+    policy: RankPolicy,
+) -> Row:
     """Solve one problem, and return its row."""
     problem = library.problem(name)
     begin = time.perf_counter()
@@ -200,7 +228,7 @@ def _run(library: Library, name: str, label: str, solve: Solve, limit: float, cl
     try:
         solution = solve(problem, library.paths[name], limit, lambda: clock.is_stopped)
         row["seconds"] = round(time.perf_counter() - begin, 3)
-        if row["seconds"] > MAX_OVERTIME_RATIO * limit + MAX_OVERTIME_S:
+        if row["seconds"] > policy.max_overtime_ratio * limit + policy.max_overtime_s:
             row["message"] = f"late: answered after {row['seconds']:.1f} s of {limit:g}"
         elif solution.length is None:
             row["message"] = solution.status.value

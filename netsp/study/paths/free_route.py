@@ -18,7 +18,9 @@ import numpy as np
 import shapely
 
 from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
+from netsp.base.number_ranges import check_positive, check_shares
 from netsp.hsignature.signature_measures import winding_numbers
 from netsp.judge.passage import passes
 from netsp.judge.solid_distances import bridges
@@ -26,20 +28,36 @@ from netsp.judge.stringpull import StringPuller
 from netsp.judge.tour_checks import CONTACT_REACH
 from netsp.model.problem import Circle, Polygon
 
-INSET_SHARE = 0.25
-"""Distance of the outline from the judge's insets, as a share of the distance of the true outline.
-With a share between 0 and 1, a path along the outline clears the insets, and a path along the true
-outline does not change."""
-
 SAME_PLACE_TOLERANCE = 1e-9
 """Tolerance for two places on a path that count as one, in segments."""
 
-DEPTH_SAMPLES = 64
-"""Number of places, in addition to corners, at which the depth of a part is measured."""
 
-BOX_SHARE = 1.5
-"""Margin of the box around all points and obstacles if there are no bounds, as a multiple of the
-reach of the path; at most 2, because the judge triangulates that far."""
+@dataclass(frozen=True)
+class FreeRoutePolicy:
+    """Policy of detours around the obstacles that a path enters.
+
+    Attributes
+    ----------
+    inset_share
+        Distance of the outline from the judge's insets, as a share of the distance of the true
+        outline. With a share between 0 and 1, a path along the outline clears the insets, and a
+        path along the true outline does not change.
+    depth_samples
+        Number of places, in addition to corners, at which the depth of a part is measured.
+    box_ratio
+        Margin of the box around all points and obstacles if there are no bounds, as a multiple of
+        the reach of the path; at most 2, because the judge triangulates that far.
+    """
+
+    inset_share: float = 0.25
+    depth_samples: int = 64
+    box_ratio: float = 1.5
+
+    def __post_init__(self) -> None:
+        check_positive(self)
+        check_shares(self, "inset_share")
+        if self.box_ratio > 2.0:
+            raise InputError(f"box_ratio: expected at most 2, got {self.box_ratio:g}")
 
 
 @dataclass(frozen=True)
@@ -97,18 +115,22 @@ class FreeSpace:
         String puller of the judge.
     reach : float
         Largest distance of the path from the base, in the problem's units.
+    policy : FreeRoutePolicy
+        Distances from obstacles, and accuracy of depths.
     """
 
-    def __init__(self, puller: StringPuller, reach: float) -> None:
-        problem = puller.problem
+    def __init__(
+        self, puller: StringPuller, reach: float, policy: FreeRoutePolicy = FreeRoutePolicy()
+    ) -> None:
+        problem, self._policy = puller.problem, policy
         self.problem, self.origin, self.place = problem, puller.origin, puller.place
         shapes = [
-            s.shape.buffer(INSET_SHARE * s.depth, join_style="mitre") if s.depth else s.shape
+            s.shape.buffer(policy.inset_share * s.depth, join_style="mitre") if s.depth else s.shape
             for s in puller.solids
         ]
         self._bridges = bridges(problem, puller.solids, self.origin, self.place)
         shapes += [
-            shapely.LineString(bridge.line).buffer(INSET_SHARE * self.place)
+            shapely.LineString(bridge.line).buffer(policy.inset_share * self.place)
             for bridge in self._bridges
         ]
         if problem.bounds is not None:
@@ -116,7 +138,7 @@ class FreeSpace:
         else:
             every = [shapely.MultiPoint(problem.points[:, :2] - self.origin), *shapes]
             box = shapely.union_all(every).envelope
-            box = box.buffer(BOX_SHARE * max(reach, problem.scale), join_style="mitre")
+            box = box.buffer(policy.box_ratio * max(reach, problem.scale), join_style="mitre")
         self.shape = box.difference(shapely.union_all(shapes)) if shapes else box
         shapely.prepare(self.shape)
         parts = shapely.get_parts(self.shape)
@@ -251,7 +273,7 @@ class FreeSpace:
             inside = _merged(
                 [part for k in hits.tolist() for part in _shares(xy, k, segments[k] & shape)]
             )
-            depths = [_depth(_part(xy, *part), o) for part in inside]
+            depths = [_depth(_part(xy, *part), o, self._policy.depth_samples) for part in inside]
             deep = [
                 (part, depth)
                 for part, depth in zip(inside, depths, strict=True)
@@ -362,9 +384,9 @@ def _along_ring(ring: shapely.LinearRing, a: float, b: float) -> Floats:
     return np.vstack([ends[0], inner, ends[1]])
 
 
-def _depth(part: Floats, obstacle: Circle | Polygon) -> float:
+def _depth(part: Floats, obstacle: Circle | Polygon, samples: int) -> float:
     """Return the largest depth of a part of a path in an obstacle."""
-    every = polylines.points_along(part, max(polylines.length(part) / DEPTH_SAMPLES, 1e-300))
+    every = polylines.points_along(part, max(polylines.length(part) / samples, 1e-300))
     return float(-np.min(obstacle.signed_distance(np.vstack([part, every]))))
 
 

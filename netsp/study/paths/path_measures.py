@@ -17,17 +17,14 @@ from netsp.base.deprecated import deprecated_method
 from netsp.base.errors import InputError
 from netsp.base.field_types import checked_argument
 from netsp.base.geometry import polylines
+from netsp.base.number_ranges import check_shares
 from netsp.base.validated import shown
 from netsp.hsignature import Word, concatenate, crossings, entangled, reduce
 from netsp.judge.stringpull import StringPuller
 from netsp.model.problem import Problem
 from netsp.study.paths.carried_tether import CarriedTether
-from netsp.study.paths.free_route import FreeLoop, FreeSpace, Stretch
+from netsp.study.paths.free_route import FreeLoop, FreeRoutePolicy, FreeSpace, Stretch
 from netsp.study.paths.goal_visits import Passing, passings
-
-DEFAULT_SPEED = 0.5
-"""Default speed of paths without time stamps, and of `netsp execute`, in the problem's units per
-second."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +43,22 @@ class PathPolicy:
         of the radius; above 1, so that noisy positions do not count as new visits.
     tether_error : float
         Largest error of the longest tether along the path, as a share of the problem's tether.
+    speed : float
+        Default speed of tours and of paths without time stamps, in the problem's units per second.
+    order_time_share : float
+        Share of the time limit that each search for the best tour in the order of a path has at
+        least.
+    route : FreeRoutePolicy
+        Detours around the obstacles that a path enters.
     """
 
     radius: float | None = None
     radius_share: float = 0.02
     leave_ratio: float = 2.0
     tether_error: float = 1e-6
+    speed: float = 0.5
+    order_time_share: float = 0.2
+    route: FreeRoutePolicy = FreeRoutePolicy()
 
     def __post_init__(self) -> None:
         if self.radius is not None:
@@ -59,6 +66,8 @@ class PathPolicy:
         checked_argument("radius_share", self.radius_share, 0.0, 1.0)
         checked_argument("leave_ratio", self.leave_ratio, 1.0, 1e6)
         checked_argument("tether_error", self.tether_error, 0.0, 1.0)
+        checked_argument("speed", self.speed, 0.0)
+        check_shares(self, "order_time_share")
 
     def radius_in(self, problem: Problem) -> float:
         """Return the radius for a problem.
@@ -261,7 +270,7 @@ def measure_path(
     path: npt.ArrayLike,
     *,
     times: npt.ArrayLike | None = None,
-    speed: float = DEFAULT_SPEED,
+    speed: float = PathPolicy.speed,
     policy: PathPolicy | None = None,
     tether: npt.ArrayLike | None = None,
 ) -> PathMeasures:
@@ -320,7 +329,7 @@ def measure_path(
     start = base if laid is None else np.append(laid[-1], base[len(laid[-1]) :])
     start_gap = float(np.linalg.norm(given[0] - start[:size]))
     end_gap = float(np.linalg.norm(given[-1] - base[:size]))
-    led = _Led(problem, given, found, laid)
+    led = _Led(problem, given, found, laid, policy.route)
     seen = [p for p in found if led.sees(p, goals[p.goal])]
     heights = given[:, 2] if size == 3 else _heights(problem, given, seen, end_gap <= radius)
     points = np.column_stack([given[:, :2], heights])
@@ -410,7 +419,12 @@ class _Led:
     """
 
     def __init__(
-        self, problem: Problem, given: Floats, found: list[Passing], tether: Floats | None
+        self,
+        problem: Problem,
+        given: Floats,
+        found: list[Passing],
+        tether: Floats | None,
+        route: FreeRoutePolicy,
     ) -> None:
         xy, base = given[:, :2], np.array(problem.base[:2], dtype=float)
         self.flat = polylines.along(xy)
@@ -427,7 +441,7 @@ class _Led:
         moves = np.concatenate([[True], np.any(np.diff(line, axis=0) != 0.0, axis=1)])
         reach = float(np.abs(line - base).max())
         self.puller = StringPuller(problem, max(reach, problem.scale))
-        self.space = FreeSpace(self.puller, reach)
+        self.space = FreeSpace(self.puller, reach, route)
         self.loop: FreeLoop = self.space.free_loop(line[moves], along[moves])
         s = self.loop.along
         self.first = min(int(np.searchsorted(s, 0.0)), len(s) - 1)
