@@ -8,7 +8,7 @@ import pytest
 
 from netsp import Circle, Problem
 from netsp.base import progress
-from netsp.command import patience
+from netsp.command.command_policy import CommandPolicy
 from netsp.command.main import main
 from netsp.command.patience import Patience, span
 from netsp.command.stages import Stages
@@ -18,11 +18,7 @@ from netsp.roadmap.roadmap_policy import ReachPolicy, RoadmapPolicy
 
 ROOT = Path(__file__).parent.parent
 
-
-@pytest.fixture
-def at_once(monkeypatch):
-    monkeypatch.setattr(patience, "FIRST_LINE_S", 0.001)
-    monkeypatch.setattr(patience, "LINE_INTERVAL_S", 0.02)
+AT_ONCE = CommandPolicy(silence_s=0.001, line_interval_s=0.02)
 
 
 def test_what_is_quickly_done_says_nothing():
@@ -32,9 +28,9 @@ def test_what_is_quickly_done_says_nothing():
     assert out.getvalue() == ""
 
 
-def test_the_time_left_is_that_of_the_steps_left(at_once):
+def test_the_time_left_is_that_of_the_steps_left():
     out = io.StringIO()
-    with Patience(out, "counting") as told:
+    with Patience(out, "counting", AT_ONCE) as told:
         for k in progress.track(range(4)):
             if k == 3:
                 time.sleep(0.1)
@@ -46,9 +42,9 @@ def test_the_time_left_is_that_of_the_steps_left(at_once):
     assert "3 of 4" in out.getvalue()
 
 
-def test_work_without_steps_says_how_long_it_has_taken(at_once):
+def test_work_without_steps_says_how_long_it_has_taken():
     out = io.StringIO()
-    with Patience(out, "waiting"):
+    with Patience(out, "waiting", AT_ONCE):
         time.sleep(0.1)
     assert "waiting: 0:00 so far" in out.getvalue()
 
@@ -60,8 +56,8 @@ def test_work_without_steps_says_how_long_it_has_taken(at_once):
         (["import", "{root}/examples/site.geojson", "-o", "{tmp}/p.json"], "reading "),
     ],
 )
-def test_commands_say_what_takes_so_long(at_once, tmp_path, capsys, words, said):
-    assert main([w.format(root=ROOT, tmp=tmp_path) for w in words]) == 0
+def test_commands_say_what_takes_so_long(tmp_path, capsys, words, said):
+    assert main([w.format(root=ROOT, tmp=tmp_path) for w in words], AT_ONCE) == 0
     assert said in capsys.readouterr().err
 
 

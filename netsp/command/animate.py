@@ -8,17 +8,8 @@ from pathlib import Path
 
 from netsp.base.errors import InputError
 
-MAX_SIDE_BY_SIDE = 3
-"""Maximum number of runs in one film."""
-
 PAGE = ".html"
 """Ending of films that are pages."""
-
-MAX_SECONDS = 600
-"""Maximum duration of a film, s."""
-
-MAX_FPS = 60
-"""Maximum number of frames per second."""
 
 
 def run(args: argparse.Namespace) -> int:
@@ -30,14 +21,14 @@ def run(args: argparse.Namespace) -> int:
     if Path(args.output).suffix.lower() not in kinds:
         raise InputError(f"{args.output}: expected a name ending in {', '.join(kinds)}")
     for name, value, maximum in (
-        ("--seconds", args.seconds, MAX_SECONDS),
-        ("--fps", args.fps, MAX_FPS),
+        ("--seconds", args.seconds, args.policy.max_film_s),
+        ("--fps", args.fps, args.policy.max_fps),
     ):
         if value > maximum:
             raise InputError(f"{name}: expected at most {maximum}, got {value}")
-    if len(args.source) > MAX_SIDE_BY_SIDE:
+    if len(args.source) > args.policy.max_films:
         raise InputError(
-            f"SOURCE: {len(args.source)} of them; expected {MAX_SIDE_BY_SIDE} or fewer"
+            f"SOURCE: {len(args.source)} of them; expected {args.policy.max_films} or fewer"
         )
     if Path(args.output).suffix.lower() == PAGE:
         return _page(args)

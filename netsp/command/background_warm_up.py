@@ -12,7 +12,7 @@ SWITCH_VARIABLE = "NETSP_BACKGROUND"
 """Environment variable whose value 0 turns the background process off."""
 
 LOWEST_PRIORITY = 19
-"""Niceness of the process, the highest of Linux: other processes get the processor first."""
+"""Code of Linux for the lowest priority: other processes get the processor first."""
 
 
 def begin(command: str) -> None:

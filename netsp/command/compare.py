@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from netsp.base.errors import EXIT_INTERRUPTED, InputError
 from netsp.command import json_output, messages
+from netsp.command.command_policy import CommandPolicy
 from netsp.command.patience import span
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def run(args: argparse.Namespace) -> int:
         from netsp.study.compare.cluster import dask_executor
 
         executor = dask_executor(args.scheduler)
-    bar = Bar(sys.stderr, args.quiet)
+    bar = Bar(sys.stderr, args.quiet, args.policy)
     try:
         tally = compare(
             study, args.output, jobs=args.jobs, part=args.shard, executor=executor, on_row=bar.show
@@ -90,10 +91,13 @@ def study_of(args: argparse.Namespace) -> Study:
 class Bar:
     """One line that is drawn over, on a terminal; a line now and then elsewhere."""
 
-    def __init__(self, stream: TextIO, quiet: bool) -> None:
+    def __init__(
+        self, stream: TextIO, quiet: bool, policy: CommandPolicy = CommandPolicy()
+    ) -> None:
         self.stream, self.quiet = stream, quiet
         self.begin = self.shown = time.monotonic()
         self.live = stream.isatty()
+        self._interval_s = policy.redraw_interval_s if self.live else policy.trial_interval_s
 
     def show(self, row: TrialRow, tally: Tally) -> None:
         """After a trial."""
@@ -105,7 +109,7 @@ class Bar:
             self._clear()
             print(f"{describe_row(row)}: {row['status']}: {row['message']}", file=self.stream)
         now = time.monotonic()
-        if now - self.shown < (0.1 if self.live else 10.0) and tally.done < tally.total:
+        if now - self.shown < self._interval_s and tally.done < tally.total:
             return
         self.shown = now
         fresh = tally.done - tally.begun

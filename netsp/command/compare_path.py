@@ -26,7 +26,6 @@ def run(args: argparse.Namespace) -> int:
     from netsp.model.solution import Solution
     from netsp.study.compare.path_comparison import compare_paths
     from netsp.study.paths import PathPolicy
-    from netsp.study.paths.path_measures import DEFAULT_SPEED
 
     if args.json and args.output == STANDARD:
         raise InputError("--json: standard output is taken by the table; expected -o FILE")
@@ -41,12 +40,12 @@ def run(args: argparse.Namespace) -> int:
     with contextlib.ExitStack() as stack:
         stage = None
         if not args.quiet:
-            stage = stack.enter_context(Stages(sys.stderr, args.time_limit))
+            stage = stack.enter_context(Stages(sys.stderr, args.time_limit, args.policy))
         found = compare_paths(
             problem,
             paths,
             solution,
-            speed=args.speed or DEFAULT_SPEED,
+            speed=args.speed or PathPolicy.speed,
             policy=PathPolicy(radius=args.radius),
             time_limit=args.time_limit,
             seed=args.seed,

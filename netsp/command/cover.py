@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     scene = clock.bounded("reading the scene", lambda: Scene.load(args.scene))
     if not args.quiet:
         note_scene(scene.name, scene.reading_notes())
-    stages = None if args.quiet else Stages(sys.stderr, clock.left)
+    stages = None if args.quiet else Stages(sys.stderr, clock.left, args.policy)
     with stages or contextlib.nullcontext():
         found = cover(
             scene,

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from netsp.online.execute.events import Surprises
     from netsp.online.execute.execution_log import ExecutionRow
 
-SPEED = 0.5
-"""Default speed of a robot in the plane; missions have a speed of their own."""
-
 
 def run(args: argparse.Namespace) -> int:
     """Carry the tour out, write what happened, and return the exit code."""
@@ -80,7 +77,7 @@ def _problem(args: argparse.Namespace) -> int:
     problem, solution = load_pair(args.problem, args.solution)
     surprises = checked_surprises(args, problem)
     options = ExecutionOptions(
-        speed=args.speed or SPEED,
+        speed=args.speed or ExecutionOptions.speed,
         vehicle=args.vehicle,
         delta=args.delta,
         repair=args.planner == "repair",

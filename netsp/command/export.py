@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     from netsp.exchange.missions.mission_files import ExportSettings
     from netsp.exchange.missions.waypoints import Waypoint
 
-SPEED = 0.5
-"""Metres per second, where none is given."""
-
 
 def run(args: argparse.Namespace) -> int:
     """Write the file, warn of what is tight, and return the exit code."""
@@ -53,7 +50,7 @@ def _problem(args: argparse.Namespace) -> int:
         projection = Projection.parse(args.origin, problem.base[:2], "--origin")
     settings = mission_files.ExportSettings(
         goal_hold_s=args.hold,
-        speed=args.speed or SPEED,
+        speed=args.speed or mission_files.ExportSettings.speed,
         max_waypoints=args.max_waypoints,
         fence=FencePolicy(max_bytes=args.fence_bytes),
     )

@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
         )
     graph = instance.to_travel_graph()
     begin = time.monotonic()
-    table = None if args.quiet else ProgressTable(sys.stderr)
+    table = None if args.quiet else ProgressTable(sys.stderr, args.policy)
     with table or contextlib.nullcontext():
         if table:
             table.begin(instance, "looking for a first tour …")

@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     viewpoints: frozenset[str] = frozenset()
     floor: SeaFloor | None = None
     found: ImportedSite | None = None
-    with Patience(sys.stderr, f"reading {args.site}"):
+    with Patience(sys.stderr, f"reading {args.site}", args.policy):
         if _is_image(args):
             problem = _of_image(args)
         else:
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         from netsp.roadmap.reachable_goals import UNREACHED, keep_reachable_goals, unreached_note
 
         try:
-            with Patience(sys.stderr, "looking for the goals in reach"):
+            with Patience(sys.stderr, "looking for the goals in reach", args.policy):
                 before = problem.goals
                 problem, why = keep_reachable_goals(
                     problem, None if args.skip_unreachable else viewpoints

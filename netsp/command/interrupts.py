@@ -18,14 +18,11 @@ from netsp.base.errors import is_interrupt
 
 T = TypeVar("T")
 
-SIGNAL_INTERVAL_S = 0.05
-"""Time after which an interrupt that got lost is sent again, s."""
-
 
 @contextmanager
-def resending_lost_interrupts() -> Iterator[None]:
-    """Make SIGTERM raise KeyboardInterrupt, as Ctrl-C does, and repeat an interrupt a moment later
-    if it was raised where nobody can catch it."""
+def resending_lost_interrupts(delay_s: float = 0.05) -> Iterator[None]:
+    """Make SIGTERM raise KeyboardInterrupt, as Ctrl-C does, and repeat an interrupt `delay_s`
+    seconds later if it was raised where nobody can catch it."""
     before = sys.unraisablehook
     hears_sigterm = (
         threading.current_thread() is threading.main_thread()
@@ -38,7 +35,7 @@ def resending_lost_interrupts() -> Iterator[None]:
         if unraisable.exc_value is None or not is_interrupt(unraisable.exc_value):
             before(unraisable)
             return
-        again = threading.Timer(SIGNAL_INTERVAL_S, _interrupt)
+        again = threading.Timer(delay_s, _interrupt)
         again.daemon = True
         again.start()
 

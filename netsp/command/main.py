@@ -30,35 +30,29 @@ from netsp.base.errors import (
 from netsp.command import background_warm_up, messages
 from netsp.command.command_clock import begin_command
 from netsp.command.command_options import add_options, check_files
+from netsp.command.command_policy import CommandPolicy
 from netsp.command.command_table import COMMANDS
 from netsp.command.interrupts import resending_lost_interrupts
 from netsp.command.status_line import status_line
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None, policy: CommandPolicy = CommandPolicy()) -> int:
     """Run the command line; returns the exit code."""
     if argv is None:
         # modules and pictures consist of objects that stay: collecting garbage at each 700 new
         # objects, as by default, takes a tenth of the time of a short command
-        gc.set_threshold(GARBAGE_THRESHOLD)
-    code = _main(argv)
+        gc.set_threshold(policy.garbage_threshold)
+    code = _main(argv, policy)
     if argv is None:
-        _end_abandoned_work(code)
+        _end_abandoned_work(code, policy.abandoned_grace_s)
     return code
 
 
-GARBAGE_THRESHOLD = 100_000
-"""New objects between two garbage collections; the garbage among them takes about 20 MB at most."""
-
-ABANDONED_GRACE_S = 0.5
-"""Seconds for abandoned work to end by itself, and to end the processes that it started."""
-
-
-def _end_abandoned_work(code: int) -> None:
+def _end_abandoned_work(code: int, grace_s: float) -> None:
     """End the process at once if work that was abandoned still runs in another language: Python
     would end its thread in the middle of it, which aborts the process."""
     bounded_work = sys.modules.get("netsp.base.bounded_work")
-    if bounded_work is None or not bounded_work.is_abandoned_work_running(ABANDONED_GRACE_S):
+    if bounded_work is None or not bounded_work.is_abandoned_work_running(grace_s):
         return
     with contextlib.suppress(OSError, ValueError):
         sys.stdout.flush()
@@ -67,7 +61,7 @@ def _end_abandoned_work(code: int) -> None:
     os._exit(code)
 
 
-def _main(argv: Sequence[str] | None) -> int:
+def _main(argv: Sequence[str] | None, policy: CommandPolicy) -> int:
     """Run the command line; return the exit code, whatever work goes on."""
     begin_command()
     wanted: str | None = None
@@ -78,6 +72,7 @@ def _main(argv: Sequence[str] | None) -> int:
         wanted = next((w for w in words if not w.startswith("-")), None)
         try:
             args = _parsed(words, wanted)
+            args.policy = policy
         except SystemExit:  # after --help or --version
             sys.stdout.flush()
             raise
@@ -90,9 +85,9 @@ def _main(argv: Sequence[str] | None) -> int:
             background_warm_up.begin(wanted)
         return code
     except SeveralErrors as error:
-        for complaint in error.complaints[:MAX_COMPLAINTS]:
+        for complaint in error.complaints[: policy.max_complaints]:
             messages.error(complaint)
-        if (more := len(error.complaints) - MAX_COMPLAINTS) > 0:
+        if (more := len(error.complaints) - policy.max_complaints) > 0:
             messages.error(f"and {more} more")
         return error.exit_code
     except NetspError as error:
@@ -158,9 +153,6 @@ class _Parser(argparse.ArgumentParser):
     def _print_message(self, message: str, file: Any = None) -> None:
         (file or sys.stderr).write(message)  # argparse swallows the errors of a full disk
 
-
-MAX_COMPLAINTS = 20
-"""Maximum number of lines about one input; further complaints are counted."""
 
 VECTORS = ("--origin", "--base", "--current")
 """Flags whose values may begin with a minus and are no numbers to argparse."""

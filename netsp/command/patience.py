@@ -8,12 +8,7 @@ from contextlib import ExitStack
 from typing import TextIO
 
 from netsp.base.progress import reported_to
-
-FIRST_LINE_S = 3.0
-"""Time of silence before the first line, s."""
-
-LINE_INTERVAL_S = 5.0
-"""Time between two lines, s."""
+from netsp.command.command_policy import CommandPolicy
 
 
 class Patience:
@@ -26,10 +21,12 @@ class Patience:
         Where to.
     doing : str
         What is being done.
+    policy : CommandPolicy
+        Times of the first line and of those after it.
     """
 
-    def __init__(self, stream: TextIO, doing: str) -> None:
-        self._stream, self._doing = stream, doing
+    def __init__(self, stream: TextIO, doing: str, policy: CommandPolicy = CommandPolicy()) -> None:
+        self._stream, self._doing, self._policy = stream, doing, policy
         self._done, self._total = 0, 0
         self._begin = self._since = time.monotonic()
         self._over = threading.Event()
@@ -52,9 +49,9 @@ class Patience:
         self._done, self._total = done, total
 
     def _watch(self) -> None:
-        wait = FIRST_LINE_S
+        wait = self._policy.silence_s
         while not self._over.wait(wait):
-            wait = LINE_INTERVAL_S
+            wait = self._policy.line_interval_s
             print(self.line, file=self._stream, flush=True)
 
     @property

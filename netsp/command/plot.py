@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def run(args: argparse.Namespace) -> int:
     """Draw, and return the exit code."""
-    with Patience(sys.stderr, f"drawing {args.output}"):
+    with Patience(sys.stderr, f"drawing {args.output}", args.policy):
         return _drawn(args)
 
 

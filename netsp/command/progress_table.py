@@ -7,6 +7,7 @@ import time
 from typing import Protocol, TextIO
 
 from netsp.base.errors import counted
+from netsp.command.command_policy import CommandPolicy
 from netsp.gtsp.travel.result import Progress
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution, Status
@@ -15,12 +16,6 @@ _HEADER = (
     f"{'time':>7}  {'stage':<10} {'tour':>12} {'bound':>12} {'gap':>9} {'of':>11} {'cuts':>6} "
     f"{'vertices':>8} {'legs':>9} {'iteration':>11}"
 )
-
-TABLE_DELAY_S = 3.0
-"""Time of silence after which the table names the step at work, s."""
-
-ROW_INTERVAL_S = 0.2
-"""Minimum time between two rows that show only a better bound, s."""
 
 
 class Named(Protocol):
@@ -38,15 +33,15 @@ class Named(Protocol):
 class ProgressTable:
     """Prints a row for every better tour and every new stage, and now and then for the bound."""
 
-    def __init__(self, stream: TextIO) -> None:
-        self.stream = stream
+    def __init__(self, stream: TextIO, policy: CommandPolicy = CommandPolicy()) -> None:
+        self.stream, self._policy = stream, policy
         self._header = False
         self._last: Progress | None = None
         self._shown = 0.0
         self._held: tuple[float, Progress] | None = None
         self._begin = time.monotonic()
         self._slow = ""
-        self._patience = threading.Timer(TABLE_DELAY_S, self._explain)
+        self._patience = threading.Timer(policy.silence_s, self._explain)
         self._patience.daemon = True
 
     def begin(self, problem: Named, slow: str = "building the roadmap …") -> None:
@@ -55,7 +50,7 @@ class ProgressTable:
         Parameters
         ----------
         slow
-            What is said if nothing else is for `TABLE_DELAY_S` seconds.
+            What is said if nothing else is for `silence_s` seconds.
         """
         self._slow = slow
         self._begin = time.monotonic()
@@ -74,7 +69,7 @@ class ProgressTable:
         )
         # the solver's own time does not count the roadmap, which the summary does
         now = time.monotonic()
-        if news or now - self._shown >= ROW_INTERVAL_S:
+        if news or now - self._shown >= self._policy.row_interval_s:
             self._show(now - self._begin, row)
         else:
             self._held = now - self._begin, row
@@ -118,6 +113,7 @@ def summary(
     output: str | None = None,
     picture: str | None = None,
     trace: str | None = None,
+    policy: CommandPolicy = CommandPolicy(),
 ) -> str:
     """Return the result in a few lines."""
     t = solution.timings
@@ -155,7 +151,7 @@ def summary(
     if solution.entangled:
         lines.insert(1, f"wraps    {len(solution.entangled)} obstacles: {wrapped}")
     if solution.legs_left_out:
-        lines.insert(1, _left_out(problem, solution))
+        lines.insert(1, _left_out(problem, solution, policy.max_named_legs))
     if output:
         lines.append(f"solution {output}")
     if picture:
@@ -165,15 +161,11 @@ def summary(
     return "\n".join(lines)
 
 
-MAX_NAMED_LEGS = 3
-"""Legs left out that the summary names; of more it says how many."""
-
-
-def _left_out(problem: Problem, solution: Solution) -> str:
+def _left_out(problem: Problem, solution: Solution, limit: int) -> str:
     """Return the line that says which legs were left out."""
     legs = [f"{problem.goal_name(a)} to {problem.goal_name(b)}" for a, b in solution.legs_left_out]
-    more = f" and {len(legs) - MAX_NAMED_LEGS} more" if len(legs) > MAX_NAMED_LEGS else ""
-    named = ", ".join(legs[:MAX_NAMED_LEGS]) + more
+    more = f" and {len(legs) - limit} more" if len(legs) > limit else ""
+    named = ", ".join(legs[:limit]) + more
     return (
         f"left out {counted(len(legs), 'leg')} whose taut path was not found ({named}); the bound "
         "holds for tours along them, too"

@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
         if text := warm_starts.told(problem, warm):
             messages.note(text)
     rows: list[Progress] = []
-    table = None if args.quiet else ProgressTable(sys.stderr)
+    table = None if args.quiet else ProgressTable(sys.stderr, args.policy)
 
     def listen(row: Progress) -> None:
         if table:
@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
             problem_picture.save_trace(rows, title, problem.units, args.plot_trace)
     if table:
         table.end()
-        text = summary(problem, solution, args.output, args.plot, args.plot_trace)
+        text = summary(problem, solution, args.output, args.plot, args.plot_trace, args.policy)
         print(text, file=sys.stderr)
         if solution.tour:
             warn_of_problem(args, problem, args.margin)

@@ -20,14 +20,12 @@ from netsp.command import json_output
 from netsp.command.clearance_warning import warn_of_clearance
 from netsp.command.command_clock import command_clock
 from netsp.command.command_options import given_params
+from netsp.command.command_policy import CommandPolicy
 
 if TYPE_CHECKING:
     from netsp.plan.space.mission_solver import SolvedMission
     from netsp.world.mission.mission import Mission
     from netsp.world.scene.scene import Scene
-
-MISSION_TIME_LIMIT_S = 60.0
-"""Default time limit for missions, s."""
 
 
 def run(args: argparse.Namespace) -> int:
@@ -40,10 +38,10 @@ def run(args: argparse.Namespace) -> int:
     from netsp.world.mission.mission import Mission
 
     params = given_params(args)
-    clock = command_clock(args.time_limit or MISSION_TIME_LIMIT_S)
+    clock = command_clock(args.time_limit or args.policy.mission_time_limit_s)
     begin = time.monotonic()
     mission = clock.bounded("reading the mission", lambda: Mission.load(args.problem))
-    stages = None if args.quiet else Stages(sys.stderr, clock.left)
+    stages = None if args.quiet else Stages(sys.stderr, clock.left, args.policy)
     with stages or contextlib.nullcontext():
         with clock.with_min_cpu(MissionPolicy().first_tour_s):
             scene = clock.bounded("reading the scene", mission.load_scene)
@@ -72,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
         draw(found, scene, args.plot)
     if not args.quiet:
         spent = time.monotonic() - begin
-        text = summary(mission, found, spent, args.output, args.plot, scene.units)
+        text = summary(mission, found, spent, args.output, args.plot, scene.units, args.policy)
         print(text, file=sys.stderr)
         warn_of_clearance(args.position_error, args.current, mission.clearance, scene.units)
     if args.json:
@@ -105,10 +103,6 @@ def draw(found: SolvedMission, scene: Scene, file: str) -> None:
         save_mission(found.mission, scene, file)
 
 
-MAX_NAMED_WAYPOINTS = 16
-"""Maximum number of waypoints of an order that is printed in full."""
-
-
 def summary(
     mission: Mission,
     found: SolvedMission,
@@ -116,6 +110,7 @@ def summary(
     output: str | None,
     plot: str | None,
     units: str,
+    policy: CommandPolicy = CommandPolicy(),
 ) -> str:
     """Return the result in a few lines."""
     from netsp.model.bound_scope import LowerBound, Scope
@@ -155,8 +150,9 @@ def summary(
             f"{of_all.percent(tour.length, 1)}"
         )
     names = [f"#{n}" for n in found.order[: len(tour.stops)]]
-    if len(names) > MAX_NAMED_WAYPOINTS:
-        names = [*names[: MAX_NAMED_WAYPOINTS // 2], "…", *names[-MAX_NAMED_WAYPOINTS // 2 :]]
+    limit = policy.max_named_waypoints
+    if len(names) > limit:
+        names = [*names[: limit // 2], "…", *names[-limit // 2 :]]
     lines.append(f"order    start → {' → '.join(names)} → start")
     lines.append(f"tether   longest {tour.longest_tether:.4g} of {mission.tether_length:g} {units}")
     if found.run is not None:
@@ -175,8 +171,8 @@ def summary(
             "class, too; an empty one still is that of a free tether"
         )
     if found.left_out:
-        named = ", ".join(f"#{n}" for n in found.left_out[:MAX_NAMED_WAYPOINTS])
-        more = len(found.left_out) - MAX_NAMED_WAYPOINTS
+        named = ", ".join(f"#{n}" for n in found.left_out[:limit])
+        more = len(found.left_out) - limit
         lines.append(
             f"left out {named}{f' and {more} more' if more > 0 else ''}: not reached by any tether "
             f"within the limit that was found{_perhaps(found)}"

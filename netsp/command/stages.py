@@ -5,28 +5,27 @@ from __future__ import annotations
 import time
 from typing import TextIO
 
+from netsp.command.command_policy import CommandPolicy
 from netsp.command.patience import span
-
-STAGE_INTERVAL_S = 5.0
-"""Time between two lines of one stage if the output is not a terminal, s."""
 
 
 class Stages:
     """Shows what is being done: in one line that is written again where somebody watches, else in a
     line for each stage, and for a long one now and then. With a limit, the seconds left of it."""
 
-    def __init__(self, stream: TextIO, limit: float | None = None) -> None:
+    def __init__(
+        self, stream: TextIO, limit: float | None = None, policy: CommandPolicy = CommandPolicy()
+    ) -> None:
         self._stream, self._begin, self._limit = stream, time.monotonic(), limit
         self._watched = stream.isatty()
-        self._stage, self._shown = "", -STAGE_INTERVAL_S
+        self._interval_s = policy.redraw_interval_s if self._watched else policy.line_interval_s
+        self._stage, self._shown = "", -self._interval_s
 
     def __call__(self, text: str) -> None:
         """Show it, if it is a new stage or some time has passed."""
         now = time.monotonic()
         stage = text.split(",")[0].split(" from ")[0]
-        if stage == self._stage and now - self._shown < (
-            0.1 if self._watched else STAGE_INTERVAL_S
-        ):
+        if stage == self._stage and now - self._shown < self._interval_s:
             return
         if stage != self._stage and not self._watched:
             text = stage  # how far it is will be told of those that take long

@@ -9,9 +9,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
 
-DEFAULT_COLUMNS = 80
-"""Width of a terminal that does not report it, characters."""
-
 
 class StatusLine:
     """Line that is redrawn while work goes on, and removed before other output is written.
@@ -22,10 +19,12 @@ class StatusLine:
     ----------
     stream : file
         Stream of a terminal.
+    default_columns : int
+        Width of a terminal that does not report it, characters.
     """
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
+    def __init__(self, stream: TextIO, default_columns: int = 80) -> None:
+        self._stream, self._default_columns = stream, default_columns
         self._lock = threading.RLock()
         self._is_shown = False
         self._unfinished = ""
@@ -62,7 +61,7 @@ class StatusLine:
             columns = os.get_terminal_size(self._stream.fileno()).columns
         except (OSError, ValueError):
             columns = 0
-        return columns or DEFAULT_COLUMNS
+        return columns or self._default_columns
 
 
 class _StreamAboveLine:
