@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from netsp import Problem
-from netsp.view.pictures.label_placement import HEIGHT_PER_LINE, WIDTH_PER_LETTER, place_labels
+from netsp.view.pictures.label_placement import place_labels
+from netsp.view.pictures.picture_layout import LabelLayout
 from netsp.view.pictures.problem_picture import draw_map
 
 
@@ -17,13 +18,13 @@ def test_no_label_covers_a_marker_or_another_label(seed, n, span):
     places = rng.uniform(0.0, span, (n, 2))
     texts = ["x" * int(k) for k in rng.integers(0, 9, n)]
     taken = rng.uniform(0.0, span, (1, 2))
-    found = place_labels(places, texts, font_size=6.0, marker_radius=5.0, taken=taken)
+    found = place_labels(places, texts, marker_radius=5.0, taken=taken)
     assert all(label is None for label, text in zip(found, texts, strict=True) if not text)
     boxes = [(place, np.array([5.0, 5.0])) for place in (*places, *taken)]
     labels = []
     for place, text, label in zip(places, texts, found, strict=True):
         if label is not None:
-            half = 3.0 * np.array([WIDTH_PER_LETTER * len(text), HEIGHT_PER_LINE])
+            half = 3.0 * np.array([LabelLayout.letter_width * len(text), LabelLayout.line_height])
             shift = {"left": half[0], "center": 0.0, "right": -half[0]}[label.align]
             labels.append((place + label.offset + (shift, 0.0), half))
     pairs = [*itertools.product(labels, boxes), *itertools.combinations(labels, 2)]

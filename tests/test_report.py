@@ -56,7 +56,7 @@ def test_the_interval_of_a_median_is_between_order_statistics_that_hold_it(value
     # the chance that the true median is below the value of this rank, or above its mirror image
     rank = x.index(s.low)
     if rank > 0:
-        assert 2 * binom.cdf(rank - 1, n, 0.5) <= 1 - stats.CONFIDENCE
+        assert 2 * binom.cdf(rank - 1, n, 0.5) <= 1 - stats.ReportPolicy.confidence
     assert s.low in x
     assert s.high in x
     assert (s.mean, s.count) == (pytest.approx(np.mean(values)), n)
@@ -68,7 +68,7 @@ def test_intervals_cover_the_median_as_often_as_they_say():
     for _ in range(2000):
         s = stats.summary(rng.exponential(1.0, 25).tolist())
         held += s.low <= np.log(2.0) <= s.high
-    assert held / 2000 >= stats.CONFIDENCE - 0.01
+    assert held / 2000 >= stats.ReportPolicy.confidence - 0.01
 
 
 def test_a_profile_counts_what_is_proven_within_a_multiple_of_the_fastest():

@@ -13,9 +13,10 @@ from netsp import Problem
 from netsp.view.pictures import style
 from netsp.view.pictures.execution import draw_map
 from netsp.view.pictures.film import film_of_flight
-from netsp.view.pictures.film_page import PAGE_FRAMES, save_page
+from netsp.view.pictures.film_page import save_page
 from netsp.view.pictures.interactive import seen
 from netsp.view.pictures.mission_picture import save_runs
+from netsp.view.pictures.picture_layout import PageLayout
 from netsp.world.mission.mission import Mission
 from netsp.world.simulator.mission_run import simulate
 from tests import drawn_samples
@@ -166,7 +167,7 @@ def test_a_page_of_a_hundred_waypoints_is_small_and_plays(tmp_path):
     assert len(mission.waypoints) >= 97
     scene = mission.load_scene()
     run = simulate(mission, scene=scene)
-    films = [film_of_flight(run, scene, PAGE_FRAMES)]
+    films = [film_of_flight(run, scene, PageLayout.frames)]
     save_page(films, "helix", tmp_path / "run.html")
     text = (tmp_path / "run.html").read_text()
     assert len(text) < 3_000_000

@@ -43,13 +43,14 @@ def small() -> tuple[str, bool]:
     from sites import shipped
 
     from netsp.view.pictures.film import film_of_flight
-    from netsp.view.pictures.film_page import PAGE_FRAMES, save_page
+    from netsp.view.pictures.film_page import save_page
+    from netsp.view.pictures.picture_layout import PageLayout
     from netsp.world.simulator.mission_run import simulate
 
     mission, scene = shipped("basin")
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "run.html"
-        film = film_of_flight(simulate(mission, scene=scene), scene, PAGE_FRAMES)
+        film = film_of_flight(simulate(mission, scene=scene), scene, PageLayout.frames)
         save_page([film], mission.name, file)
         size = file.stat().st_size / 1e6
     return f"{size:.2f} MB for {len(mission.waypoints)} waypoints", size <= 3.0

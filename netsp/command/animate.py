@@ -63,9 +63,10 @@ def _page(args: argparse.Namespace) -> int:
             "a page of one kind"
         )
     if missions:
-        from netsp.view.pictures.film_page import PAGE_FRAMES, save_page
+        from netsp.view.pictures.film_page import save_page
+        from netsp.view.pictures.picture_layout import PageLayout
 
-        films = [what.film(PAGE_FRAMES) for what in missions]
+        films = [what.film(PageLayout.frames) for what in missions]
         names = dict.fromkeys(film.title.split("\n")[0] for film in films)
         save_page(films, " and ".join(names), args.output)
     elif len(tours) > 1:

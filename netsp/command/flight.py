@@ -154,9 +154,10 @@ def draw_runs(runs: list[Run], scene: Scene, folder: Path) -> None:
     except ImportError:
         return
     from netsp.view.pictures.film import film_of_flight
-    from netsp.view.pictures.film_page import PAGE_FRAMES, save_page
+    from netsp.view.pictures.film_page import save_page
+    from netsp.view.pictures.picture_layout import PageLayout
 
-    films = [film_of_flight(run, scene, PAGE_FRAMES) for run in runs]
+    films = [film_of_flight(run, scene, PageLayout.frames) for run in runs]
     save_page(films, runs[0].mission.name, folder / "run.html")
 
 

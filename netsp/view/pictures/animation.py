@@ -17,29 +17,12 @@ from netsp.model.problem import Problem
 from netsp.view.pictures import style
 from netsp.view.pictures.film import Film, steps_of
 from netsp.view.pictures.moments import CANCELLED, LEFT_OUT, VISITED
+from netsp.view.pictures.picture_layout import FilmLayout
 from netsp.view.pictures.problem_picture import draw_map, view
 from netsp.view.pictures.scene_picture import draw_space
 from netsp.view.pictures.waypoint_marks import WaypointMarks
 
 FORMATS = (".gif", ".mp4")
-
-GIF_COLOURS = 64
-"""Number of colours of a GIF: the few colours of pictures, and shades for the edges of lines."""
-
-FILM_WIDTH = 6.4
-"""Width of a panel, inches."""
-
-FILM_DPI = 100
-"""Resolution of a film, pixels per inch."""
-
-MAX_FILM_HEIGHT = 5.6
-"""Maximum height of a panel in space, inches."""
-
-LEGEND_HEIGHT = 0.25
-"""Height of one line of the legend below the panels, inches."""
-
-LEGEND_COLUMNS = 5
-"""Number of marks in one line of the legend, for each panel."""
 
 ROBOT = {"marker": "o", "ms": 9, "color": style.ROBOT, "mec": style.BASE, "mew": 0.8}
 
@@ -50,12 +33,6 @@ MARKS: tuple[tuple[str, dict[str, Any]], ...] = (
 )
 """Marks of the fates of goals and waypoints."""
 
-CAPTION_LETTERS = 62
-"""Maximum number of letters in a line of a panel's title."""
-
-HOLD_S = 1.5
-"""Time for which the last picture is shown, s."""
-
 
 def save_animation(
     films: Sequence[Film],
@@ -63,6 +40,7 @@ def save_animation(
     seconds: float = 12.0,
     fps: int = 15,
     on_progress: Callable[[int, int], None] | None = None,
+    layout: FilmLayout = FilmLayout(),
 ) -> None:
     """Write a GIF or MP4 of one film, or of several side by side.
 
@@ -78,6 +56,8 @@ def save_animation(
         Pictures per second.
     on_progress : callable, optional
         Called with the number of pictures drawn and the number of all pictures.
+    layout : FilmLayout
+        Sizes, and the time for which the last picture is shown.
 
     Raises
     ------
@@ -97,7 +77,12 @@ def save_animation(
         # renamed into place when complete, so that Ctrl-C keeps an older file
         with tempfile.TemporaryDirectory(dir=target.parent, prefix=".netsp-") as folder:
             part = Path(folder) / f"film{suffix}"
-            write(part, _report_frames(_pictures(films, count), count, on_progress), fps)
+            write(
+                part,
+                _report_frames(_pictures(films, count, layout), count, on_progress),
+                fps,
+                layout,
+            )
             part.replace(target)
     except OSError as error:
         raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None
@@ -112,14 +97,16 @@ def _report_frames(
         yield picture
 
 
-def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
+def _pictures(films: Sequence[Film], count: int, layout: FilmLayout) -> Iterator[Any]:
     """Yield the pixels (h, w, 3) of each picture; fixed parts are drawn once for each map."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    handles, columns = _legend(films), LEGEND_COLUMNS * len(films)
-    height = max(map(_height, films)) + LEGEND_HEIGHT * -(-len(handles) // columns)
-    figure = Figure(figsize=(FILM_WIDTH * len(films), height), dpi=FILM_DPI, layout="constrained")
+    handles, columns = _legend(films), layout.legend_columns * len(films)
+    legend_lines = -(-len(handles) // columns)
+    height = max(_height(film, layout) for film in films) + layout.legend_height * legend_lines
+    size = layout.panel_width * len(films), height
+    figure = Figure(figsize=size, dpi=layout.dpi, layout="constrained")
     canvas = FigureCanvasAgg(figure)
     panels: list[Any] = [
         figure.add_subplot(1, len(films), k, projection="3d" if film.scene else None)
@@ -136,7 +123,7 @@ def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
         now = [film.moments[n] for film, n in zip(films, step.moments, strict=True)]
         if [moment.problem for moment in now] != shown:
             shown = [moment.problem for moment in now]
-            _draw_maps(panels, films, shown)
+            _draw_maps(panels, films, shown, layout)
             style.literal(figure)
             canvas.draw()
             still = canvas.copy_from_bbox(figure.bbox)
@@ -195,7 +182,7 @@ def _legend(films: Sequence[Film]) -> list[Any]:
     ]
 
 
-def _draw_space(ax: Any, film: Film) -> None:
+def _draw_space(ax: Any, film: Film, layout: FilmLayout) -> None:
     """Draw the part of a scene around the path of the robot."""
     assert film.scene is not None
     every = np.vstack([m.nodes for m in film.moments] + [film.moments[-1].path])
@@ -204,23 +191,23 @@ def _draw_space(ax: Any, film: Film) -> None:
     for line in ax.lines:
         if line.get_label() == "path" and not line.get_animated():
             line.remove()
-    ax.set_title(_title(film), fontsize=10, loc="left")
+    ax.set_title(_title(film, layout.title_letters), fontsize=10, loc="left")
 
 
-def _title(film: Film) -> str:
+def _title(film: Film, letters: int) -> str:
     """Return the title, wrapped to the panel, with space below for the caption."""
-    lines = [
-        part for line in film.title.split("\n") for part in textwrap.wrap(line, CAPTION_LETTERS)
-    ]
+    lines = [part for line in film.title.split("\n") for part in textwrap.wrap(line, letters)]
     return "\n".join([*lines, ""])
 
 
-def _draw_maps(panels: Any, films: Sequence[Film], shown: Sequence[Problem | None]) -> None:
+def _draw_maps(
+    panels: Any, films: Sequence[Film], shown: Sequence[Problem | None], layout: FilmLayout
+) -> None:
     """Replace the fixed parts of each panel if its map has changed."""
     for ax, film, problem in zip(panels, films, shown, strict=True):
         if film.scene is not None:
             if not ax.collections:
-                _draw_space(ax, film)
+                _draw_space(ax, film, layout)
             continue
         assert problem is not None
         for artist in [*ax.patches, *ax.lines, *ax.texts, *ax.collections]:
@@ -229,7 +216,7 @@ def _draw_maps(panels: Any, films: Sequence[Film], shown: Sequence[Problem | Non
         draw_map(problem, ax=ax)
         xmin, ymin, xmax, ymax = _view(film)
         ax.set(xlim=(xmin, xmax), ylim=(ymin, ymax))
-        ax.set_title(_title(film), fontsize=10, loc="left")
+        ax.set_title(_title(film, layout.title_letters), fontsize=10, loc="left")
 
 
 def _view(film: Film) -> tuple[float, float, float, float]:
@@ -240,15 +227,16 @@ def _view(film: Film) -> tuple[float, float, float, float]:
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
-def _height(film: Film) -> float:
+def _height(film: Film, layout: FilmLayout) -> float:
     """Return the height of the panel that fits the map, inches."""
     if film.scene is not None:
-        return MAX_FILM_HEIGHT
+        return layout.max_panel_height
     xmin, ymin, xmax, ymax = _view(film)
-    return float(np.clip(FILM_WIDTH * (ymax - ymin) / (xmax - xmin) + 0.8, 2.5, 2.0 * FILM_WIDTH))
+    width = layout.panel_width
+    return float(np.clip(width * (ymax - ymin) / (xmax - xmin) + 0.8, 2.5, 2.0 * width))
 
 
-def _palette(picture: Any) -> Any:
+def _palette(picture: Any, colours: int) -> Any:
     """Return the palette of a picture, which always contains the colours of the roles."""
     from PIL import Image
 
@@ -267,16 +255,16 @@ def _palette(picture: Any) -> Any:
     out.paste(picture)
     for k, colour in enumerate(roles):
         out.paste(Image.new("RGB", (picture.width, 20), colour), (0, picture.height + 20 * k))
-    return out.quantize(GIF_COLOURS)
+    return out.quantize(colours)
 
 
-def _write_gif(file: Path, pictures: Iterator[Any], fps: int) -> None:
+def _write_gif(file: Path, pictures: Iterator[Any], fps: int, layout: FilmLayout) -> None:
     from PIL import Image
 
     drawn = [Image.fromarray(picture) for picture in pictures]
-    palette = _palette(drawn[len(drawn) // 2])
+    palette = _palette(drawn[len(drawn) // 2], layout.gif_colours)
     frames = [d.quantize(palette=palette, dither=Image.Dither.NONE) for d in drawn]
-    durations = [1000 // fps] * (len(frames) - 1) + [int(1000 * HOLD_S)]
+    durations = [1000 // fps] * (len(frames) - 1) + [int(1000 * layout.hold_s)]
     frames[0].save(file, save_all=True, append_images=frames[1:], duration=durations, loop=0)
 
 
@@ -292,7 +280,7 @@ def _check_ffmpeg(imageio_ffmpeg: Any) -> None:
         raise InputError(f"films in .mp4 need an ffmpeg that runs: {why}; a .gif does not")
 
 
-def _write_mp4(file: Path, pictures: Iterator[Any], fps: int) -> None:
+def _write_mp4(file: Path, pictures: Iterator[Any], fps: int, layout: FilmLayout) -> None:
     try:
         import imageio_ffmpeg
     except ImportError:
@@ -313,7 +301,7 @@ def _write_mp4(file: Path, pictures: Iterator[Any], fps: int) -> None:
         for picture in (first, *pictures):
             last = np.ascontiguousarray(picture[:height, :width])
             writer.send(last)
-        for _ in range(int(HOLD_S * fps)):
+        for _ in range(int(layout.hold_s * fps)):
             writer.send(last)
     finally:
         writer.close()

@@ -9,16 +9,11 @@ import numpy as np
 
 from netsp.plan.cover import Cover
 from netsp.view.pictures import style
+from netsp.view.pictures.picture_layout import SpaceLayout
 from netsp.world.scene.scene import Scene
 
-ARROW_LENGTH = 0.5
-"""Length of the lines that show the heading of the camera, metres."""
 
-MAX_DRAWN_PATCHES = 6000
-"""Maximum number of patches that are drawn."""
-
-
-def save(found: Cover, scene: Scene, file: str | Path) -> None:
+def save(found: Cover, scene: Scene, file: str | Path, layout: SpaceLayout = SpaceLayout()) -> None:
     """Draw the patches by whether they are seen, left out or invisible, and the waypoints.
 
     There is a view in space, one from above and one from a side.
@@ -36,7 +31,7 @@ def save(found: Cover, scene: Scene, file: str | Path) -> None:
     unit, places = scene.units, found.viewpoints.places
     patches, sees = found.patches, found.viewpoints.sees
     seen = sees.any(axis=0)
-    step = max(1, len(patches.areas) // MAX_DRAWN_PATCHES)
+    step = max(1, len(patches.areas) // layout.max_patches)
     kinds = (
         (seen, style.OBSTACLE, "seen"),
         (~seen & found.visible_patches, style.LIMIT, "left out"),
@@ -46,7 +41,7 @@ def save(found: Cover, scene: Scene, file: str | Path) -> None:
         shown_centres = patches.centres[chosen][::step]
         if len(shown_centres):
             space.scatter(*shown_centres.T, s=1.5, color=colour, label=label, depthshade=False)
-    ahead = ARROW_LENGTH * np.column_stack(
+    ahead = layout.heading_length * np.column_stack(
         [np.cos(found.viewpoints.headings), np.sin(found.viewpoints.headings)]
     )
     space.scatter(*places.T, s=10, color=style.TETHER, label="waypoints", depthshade=False)

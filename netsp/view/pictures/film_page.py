@@ -20,20 +20,14 @@ from netsp.view.pictures.interactive import (
     write_figure,
 )
 from netsp.view.pictures.moments import LEFT_OUT, VISITED, Moment
+from netsp.view.pictures.picture_layout import PageLayout
 from netsp.view.pictures.scene_picture import parts_of
 from netsp.world.scene.surfaces import extent
 
-PAGE_FRAMES = 120
-"""Number of moments on the slider."""
 
-FILM_MS = 12_000
-"""Duration of the film when it plays, ms."""
-
-PAGE_CAPTION_LETTERS = 150
-"""Maximum number of letters in a line of the title."""
-
-
-def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
+def save_page(
+    films: Sequence[Film], title: str, file: str | Path, page: PageLayout = PageLayout()
+) -> None:
     """Write a self-contained page with one slider for all films.
 
     Parameters
@@ -44,6 +38,8 @@ def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
         Title of the page.
     file : str or Path
         File to write; an existing one is replaced.
+    page : PageLayout
+        Number of moments and their duration.
 
     Raises
     ------
@@ -59,7 +55,7 @@ def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
         "<br>".join(
             html.escape(part)
             for line in film.title.split("\n")[film.title.startswith(f"{title}\n") :]
-            for part in textwrap.wrap(line, PAGE_CAPTION_LETTERS // columns)
+            for part in textwrap.wrap(line, page.title_letters // columns)
         )
         for film in films
     ]
@@ -71,7 +67,7 @@ def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
         horizontal_spacing=0.01,
     )
     figure.update_annotations(font={"size": 13}, yanchor="bottom")
-    what, found = steps_of(films, PAGE_FRAMES)
+    what, found = steps_of(films, page.frames)
     changing: list[list[dict[str, Any]]] = [[] for _ in found]
     numbers: list[int] = []
     for k, film in enumerate(films):
@@ -115,7 +111,7 @@ def save_page(films: Sequence[Film], title: str, file: str | Path) -> None:
                 "len": 0.81,
             }
         ],
-        updatemenus=[_play()],
+        updatemenus=[_play(page)],
         **scenes,
     )
     write_figure(figure, title, file, frames)
@@ -145,10 +141,10 @@ def _marks(film: Film, name: str, which: list[int], **marker: Any) -> dict[str, 
     return marks_trace(name, (x, y, z), marker, [f"#{k}" for k in which])
 
 
-def _play() -> dict[str, Any]:
+def _play(page: PageLayout) -> dict[str, Any]:
     """Return the buttons that play and pause the film."""
     on = {
-        "frame": {"duration": FILM_MS // PAGE_FRAMES, "redraw": True},
+        "frame": {"duration": page.duration_ms // page.frames, "redraw": True},
         "fromcurrent": True,
         "transition": {"duration": 0},
     }

@@ -22,18 +22,13 @@ from netsp.base.errors import InputError
 from netsp.base.files import write_text
 from netsp.base.geometry import polylines
 from netsp.view.pictures import style
+from netsp.view.pictures.picture_layout import PageLayout
 from netsp.view.pictures.waypoint_marks import WaypointMarks
 from netsp.world.scene.scene import Scene
 from netsp.world.scene.surfaces import Triangles, drawn_points
 
-VISIBLE_SHARE = 1e-3
-"""Smallest deviation of a line that is drawn, as a share of the size of the picture."""
-
 EYE = {"x": 1.5, "y": -1.6, "z": 1.0}
 """Point of view of a scene, in units of its size: from the south-east, as in figures."""
-
-COORDINATE_DIGITS = 3
-"""Number of decimals of coordinates in pages."""
 
 PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
@@ -116,14 +111,14 @@ def _plain(value: Any) -> Any:
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, np.ndarray):
         value = (
-            np.round(value, COORDINATE_DIGITS).tolist()
+            np.round(value, PageLayout.digits).tolist()
             if value.dtype.kind == "f"
             else value.tolist()
         )
     if isinstance(value, list | tuple):
         return [_plain(v) for v in value]
     if isinstance(value, float):
-        return round(value, COORDINATE_DIGITS)
+        return round(value, PageLayout.digits)
     return value
 
 
@@ -211,7 +206,7 @@ def mesh_trace(name: str, vertices: Floats, faces: npt.NDArray[np.int64]) -> Any
 def seen(points: Floats) -> Ints:
     """Return the indices of the points of a line (k, 3) that make a visible difference."""
     size = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
-    return np.flatnonzero(polylines.essential(points, VISIBLE_SHARE * size))
+    return np.flatnonzero(polylines.essential(points, PageLayout.min_deviation * size))
 
 
 def line_trace(name: str, points: Floats, colour: str, width: float) -> dict[str, Any]:

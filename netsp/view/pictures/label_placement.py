@@ -9,24 +9,10 @@ from typing import Literal
 import numpy as np
 
 from netsp.base.arrays import Floats
+from netsp.view.pictures.picture_layout import LabelLayout
 
 Alignment = Literal["left", "center", "right"]
 """Horizontal alignment of a text."""
-
-WIDTH_PER_LETTER = 0.62
-"""Mean width of a letter as a share of the font size; slightly more than that of digits."""
-
-HEIGHT_PER_LINE = 1.25
-"""Height of a line as a share of the font size."""
-
-LABEL_GAP = 8.0
-"""Distance from the middle of a marker to the near end of a label beside it, points."""
-
-LABEL_RISE = 7.8
-"""Distance from the middle of a marker up or down to the middle of a label, points."""
-
-LABEL_SIDES = ((1, -1), (1, 0), (1, 1), (0, -1), (0, 1), (-1, -1), (-1, 0), (-1, 1))
-"""Directions from a marker to its label, the preferred first."""
 
 ALIGNMENTS: dict[int, Alignment] = {1: "left", 0: "center", -1: "right"}
 """End of the label that faces the marker, by direction."""
@@ -52,9 +38,9 @@ def place_labels(
     places: Floats,
     texts: Sequence[str],
     *,
-    font_size: float,
     marker_radius: float,
     taken: Floats | None = None,
+    layout: LabelLayout = LabelLayout(),
 ) -> list[LabelPlace | None]:
     """Return the place of each label; None if it would cover a marker or another label.
 
@@ -66,12 +52,12 @@ def place_labels(
         Middles of the markers, in points on the paper.
     texts : sequence of str
         One line for each marker; an empty one needs no place.
-    font_size : float
-        Font size, points.
     marker_radius : float
         Radius of the markers, points.
     taken : ndarray, shape (k, 2), optional
         Middles of other markers of this radius.
+    layout : LabelLayout
+        Font size, and distances from the markers.
 
     Returns
     -------
@@ -80,9 +66,9 @@ def place_labels(
 
     Examples
     --------
-    >>> place_labels(np.array([[0.0, 0.0]]), ["A"], font_size=6, marker_radius=5.0)
+    >>> place_labels(np.array([[0.0, 0.0]]), ["A"], marker_radius=5.0)
     [LabelPlace(offset=(8.0, -7.8), align='left')]
-    >>> place_labels(np.zeros((1, 2)), [""], font_size=6, marker_radius=5.0)
+    >>> place_labels(np.zeros((1, 2)), [""], marker_radius=5.0)
     [None]
     """
     others = np.empty((0, 2)) if taken is None else taken
@@ -92,11 +78,12 @@ def place_labels(
     ]
     out: list[LabelPlace | None] = []
     for place, text in zip(places, texts, strict=True):
-        half = 0.5 * font_size * np.array([WIDTH_PER_LETTER * len(text), HEIGHT_PER_LINE])
+        size = np.array([layout.letter_width * len(text), layout.line_height])
+        half = 0.5 * layout.font_size * size
         chosen = None
-        for side in LABEL_SIDES if text else ():
-            above = LABEL_RISE if side[0] else marker_radius + half[1]
-            offset = (LABEL_GAP * side[0], float(above * side[1]))
+        for side in layout.sides if text else ():
+            above = layout.rise if side[0] else marker_radius + half[1]
+            offset = (layout.gap * side[0], float(above * side[1]))
             middle = place + offset + (half[0] * side[0], 0.0)
             box = np.concatenate([middle - half, middle + half])
             filled = np.vstack(boxes)

@@ -17,13 +17,11 @@ from netsp.plan.space.space_world import SpaceWorld
 from netsp.plan.tour_plan import HOME
 from netsp.roadmap.plane_world import PlaneWorld
 from netsp.view.pictures.mission_picture import path_of, tethers_along
+from netsp.view.pictures.picture_layout import PageLayout
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import Run
 from netsp.world.scene.scene import Scene
 from netsp.world.world_protocol import World
-
-MAX_MOMENTS = 400
-"""Approximate maximum number of points that draw the path so far."""
 
 VISITED, LEFT_OUT, CANCELLED = "visited", "left out", "cancelled"
 """Fates of a goal or waypoint."""
@@ -179,7 +177,7 @@ def moments_of_run(
             f"{frame['time']:.4g} s; tether {float(row['tether']):.4g} of {float(row['limit']):g} "
             f"{problem.units}; {where}"
         )
-        gone = np.vstack([path[: k : max(1, k // MAX_MOMENTS)], nodes[-1:]])
+        gone = np.vstack([path[: k : max(1, k // PageLayout.path_points)], nodes[-1:]])
         now = frame["time"] if k < len(rows) - 1 else np.inf
         fates = {
             fate: tuple(g for g, when in begins.items() if when <= now)
@@ -212,7 +210,7 @@ def moments_of_flight(run: Run, scene: Scene, count: int) -> list[Moment]:
             f"{r.time:.4g} s; tether {r.tether:.4g} of {r.limit:g} {units}; "
             f"{len(fates[VISITED])} of {len(run.mission.waypoints)} visited"
         )
-        gone = np.vstack([path[: row : max(1, row // MAX_MOMENTS)], path[row]])
+        gone = np.vstack([path[: row : max(1, row // PageLayout.path_points)], path[row]])
         nodes = np.vstack([tether.nodes[:-1], path[row]])
         out.append(Moment(nodes, gone, text, fates=fates))
     return out

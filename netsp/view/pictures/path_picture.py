@@ -11,25 +11,19 @@ from netsp.base.geometry import polylines
 from netsp.study.compare.path_comparison import ComparedPath, PathComparison
 from netsp.study.paths import PathMeasures
 from netsp.view.pictures import style
+from netsp.view.pictures.picture_layout import MapLayout
 from netsp.view.pictures.problem_picture import draw_obstacles
 
-ROW_HEIGHT = 4.6
-"""Height of the row of one path, with a map and a curve side by side, inches."""
 
-MAX_TITLE = 150
-"""Largest number of letters of the title that fit the width of the picture."""
-
-MAX_NAMED_GOALS = 40
-"""Largest number of goals or obstacles with names in the picture; more names would overlap."""
-
-
-def draw_comparison(found: PathComparison) -> Any:
+def draw_comparison(found: PathComparison, layout: MapLayout = MapLayout()) -> Any:
     """Draw paths with the planned tour.
 
     Parameters
     ----------
     found : PathComparison
         The comparison.
+    layout : MapLayout
+        Sizes, and how many goals and obstacles have names.
 
     Returns
     -------
@@ -39,18 +33,20 @@ def draw_comparison(found: PathComparison) -> Any:
     from matplotlib.figure import Figure
 
     rows = len(found.paths)
-    figure = Figure(figsize=(13.0, ROW_HEIGHT * rows + 0.4), layout="constrained")
+    figure = Figure(figsize=(13.0, layout.row_height * rows + 0.4), layout="constrained")
     axes = figure.subplots(rows, 2, squeeze=False, width_ratios=[1.15, 1.0])
     for (left, right), path in zip(axes, found.paths, strict=True):
-        draw_path_map(found, path, ax=left)
-        draw_tether_along(path.measures, ax=right)
+        draw_path_map(found, path, ax=left, layout=layout)
+        draw_tether_along(path.measures, ax=right, layout=layout)
         left.set_title(_title(found, path), fontsize=10, loc="left")
     tour = (
         f"no tour ({found.tour_note})"
         if found.tour_length is None
         else (f"planned tour of {found.tour_length:.6g} {found.problem.units}, {found.proof}")
     )
-    figure.suptitle(f"{found.problem.name}: paths beside the {tour}"[:MAX_TITLE], fontsize=11)
+    figure.suptitle(
+        f"{found.problem.name}: paths beside the {tour}"[: layout.title_letters], fontsize=11
+    )
     return figure
 
 
@@ -69,14 +65,16 @@ def _title(found: PathComparison, path: ComparedPath) -> str:
     )
 
 
-def draw_path_map(found: PathComparison, path: ComparedPath, *, ax: Any = None) -> Any:
+def draw_path_map(
+    found: PathComparison, path: ComparedPath, *, ax: Any = None, layout: MapLayout = MapLayout()
+) -> Any:
     """Draw one path over the tour, on axes of the caller or on new ones; return the axes."""
     from matplotlib.figure import Figure
 
     problem, m = found.problem, path.measures
     if ax is None:
         ax = Figure(figsize=(7, 6), layout="constrained").subplots()
-    label = problem.obstacle_name if len(problem.obstacles) <= MAX_NAMED_GOALS else None
+    label = problem.obstacle_name if len(problem.obstacles) <= layout.max_named else None
     draw_obstacles(ax, problem, label=label, wrapped=m.entangled)
     if problem.bounds is not None:
         xmin, ymin, xmax, ymax = problem.bounds
@@ -114,7 +112,7 @@ def draw_path_map(found: PathComparison, path: ComparedPath, *, ax: Any = None) 
         place = goal.position[:2]
         if k in number:
             ax.annotate(str(number[k]), place, ha="center", va="center", fontsize=7, zorder=6)
-        if len(problem.goals) <= MAX_NAMED_GOALS and goal.name:
+        if len(problem.goals) <= layout.max_named and goal.name:
             ax.annotate(
                 goal.name,
                 place,
@@ -142,7 +140,7 @@ def draw_path_map(found: PathComparison, path: ComparedPath, *, ax: Any = None) 
     return ax
 
 
-def draw_tether_along(m: PathMeasures, *, ax: Any = None) -> Any:
+def draw_tether_along(m: PathMeasures, *, ax: Any = None, layout: MapLayout = MapLayout()) -> Any:
     """Draw the taut tether along a path, on axes of the caller or on new ones; return the axes."""
     from matplotlib.figure import Figure
 
@@ -164,7 +162,7 @@ def draw_tether_along(m: PathMeasures, *, ax: Any = None) -> Any:
             ls="none",
             label="at a goal",
         )
-    if len(problem.goals) <= MAX_NAMED_GOALS:
+    if len(problem.goals) <= layout.max_named:
         for v in m.visits:
             if v.tether is not None:
                 ax.annotate(

@@ -16,28 +16,11 @@ from netsp.model.solution import Solution, Status
 from netsp.roadmap.paths import TautPaths
 from netsp.view.pictures import style
 from netsp.view.pictures.label_placement import LabelPlace, place_labels
+from netsp.view.pictures.picture_layout import LabelLayout, MapLayout
 
 if TYPE_CHECKING:
     import shapely
     from matplotlib.axes import Axes
-
-
-MAX_LABELLED = 40
-"""Maximum number of goals with names; more names would overlap."""
-
-LABEL_SIZE = 6.0
-"""Font size of names, points."""
-
-MIN_VISIBLE_SHARE = 0.012
-"""Minimum radius of a circle whose name is written in it, as a share of the map."""
-
-
-HIDDEN_RIM = 0.002
-"""Distance from an obstacle's outline within which outlines of omitted features are not drawn, as a
-share of the width of the picture."""
-
-FULL_STRENGTH_EDGES = 1000.0
-"""Number of edges of a roadmap above which they are drawn fainter."""
 
 
 def save(problem: Problem, solution: Solution | None, path: str | Path) -> None:
@@ -69,7 +52,7 @@ def save_import(problem: Problem, left_out: Sequence[shapely.Geometry], path: st
     # edges that areas share are drawn once, because dashes over dashes look like a solid line
     edges = _edges(shapely.union_all([s for s in seen if s.length > 0.0]))
     rims = shapely.STRtree([o.shape().boundary for o in problem.obstacles])
-    width = HIDDEN_RIM * (limits[0][1] - limits[0][0])
+    width = MapLayout.hidden_rim * (limits[0][1] - limits[0][0])
     hidden = [
         set(map(tuple, rims.query(shapely.points(at), "dwithin", width).T.tolist()))
         for at in (edges[:, 0], edges.mean(axis=1), edges[:, 1])
@@ -172,7 +155,7 @@ def save_roadmap(problem: Problem, roadmap: str, options: dict[str, Any], path: 
             f"{len(t.arcs)} arcs, {len(lines) // 2} tangents, {len(built.cluster) - 1} classes"
         )
     # thousands of edges must not hide obstacles, goals and milestones
-    alpha = float(np.clip(FULL_STRENGTH_EDGES / max(len(lines), 1), 0.04, 0.35))
+    alpha = float(np.clip(MapLayout.full_strength_edges / max(len(lines), 1), 0.04, 0.35))
     ax.add_collection(
         LineCollection(list(lines), colors=style.PATH, lw=0.35, alpha=alpha, zorder=2)
     )
@@ -345,7 +328,7 @@ def draw_map(
     ax.tick_params(labelsize=8)
     _frame(ax, problem, solution)
     more = ""
-    if len(problem.goals) <= MAX_LABELLED:
+    if len(problem.goals) <= MapLayout.max_named:
         more = _label_goals(ax, problem, 6.5 if order else 4.5, is_numbered=bool(order))
     ax.set_title(_title(problem, solution) + more, fontsize=10, loc="left")
     return ax
@@ -385,7 +368,7 @@ def _label_goals(ax: Axes, problem: Problem, radius: float, *, is_numbered: bool
     more = ""
 
     def places() -> list[LabelPlace | None]:
-        return place_labels(flat, texts, font_size=LABEL_SIZE, marker_radius=radius, taken=base)
+        return place_labels(flat, texts, marker_radius=radius, taken=base)
 
     found = places()
     has_room = all(place or not text for place, text in zip(found, texts, strict=True))
@@ -401,7 +384,7 @@ def _label_goals(ax: Axes, problem: Problem, radius: float, *, is_numbered: bool
                 textcoords="offset points",
                 ha=place.align,
                 va="center",
-                fontsize=LABEL_SIZE,
+                fontsize=LabelLayout.font_size,
                 color=style.EDGE,
                 zorder=6,
                 path_effects=style.halo(),
@@ -470,7 +453,7 @@ def draw_obstacles(
     from matplotlib.patches import Polygon as Patch
 
     xmin, ymin, xmax, ymax = view(problem, None)
-    small = MIN_VISIBLE_SHARE * max(xmax - xmin, ymax - ymin)
+    small = MapLayout.min_circle * max(xmax - xmin, ymax - ymin)
     corners: list[tuple[float, float]] = []
     for i, o in enumerate(progress.track(problem.obstacles)):
         look: dict[str, Any] = {"fc": style.OBSTACLE, "ec": style.EDGE, "lw": 0.6, "zorder": 1}
@@ -573,7 +556,7 @@ def view(problem: Problem, solution: Solution | None = None) -> tuple[float, flo
     low, high = low - 0.05 * size, high + 0.05 * size
     longest = max(len(g.name or "") for g in problem.goals)
     if (
-        longest and len(problem.goals) <= MAX_LABELLED
+        longest and len(problem.goals) <= MapLayout.max_named
     ):  # their labels stand to the right of the goals
         high[0] += min(0.03 + 0.008 * longest, 0.2) * size
     for axis in range(2):

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from netsp.base.arrays import Floats
 from netsp.base.geometry import polylines
 from netsp.view.pictures import style
+from netsp.view.pictures.picture_layout import SpaceLayout
 from netsp.view.pictures.waypoint_marks import WaypointMarks
 from netsp.world.scene.scene import Scene
 from netsp.world.scene.shapes import HalfSpace
@@ -19,15 +20,6 @@ from netsp.world.scene.surfaces import Triangles, drawn_points, extent, surface_
 from netsp.world.tether import Tether
 
 INTERACTIVE = ".html"
-
-TALL_RATIO = 1.5
-"""Minimum ratio of height to width of a scene whose side views are drawn side by side."""
-
-TICK_SPACING = 0.45
-"""Minimum distance of two ticks with numbers, inches."""
-
-MAX_NUMBERED = 30
-"""Maximum number of waypoints whose numbers are drawn."""
 
 
 def save(
@@ -132,7 +124,7 @@ def _figure(
     names = ("x", "y", "z")
     views = ((0, 1, "from above"), (0, 2, "from the south"), (1, 2, "from the east"))
     size = high - low
-    if size[2] > TALL_RATIO * max(size[0], size[1]):
+    if size[2] > SpaceLayout.tall_ratio * max(size[0], size[1]):
         wide = {"width_ratios": [size[a] for a, _, _ in views]}
         panels, room = right.subplots(1, 3, **wide), (1.3, 5.5)
     else:
@@ -149,7 +141,7 @@ def _figure(
         panel.set(xlim=(low[a], high[a]), ylim=(low[b], high[b]), aspect="equal")
         scale = min(room[0] / size[a], room[1] / size[b])  # inches
         for axis, along in ((panel.xaxis, a), (panel.yaxis, b)):
-            count = int(np.clip(scale * size[along] / TICK_SPACING, 2, 5))
+            count = int(np.clip(scale * size[along] / SpaceLayout.tick_spacing, 2, 5))
             axis.set_major_locator(MaxNLocator(count))
         panel.set_title(name, fontsize=9)
         panel.set(xlabel=f"{names[a]} ({unit})", ylabel=f"{names[b]} ({unit})")
@@ -209,7 +201,7 @@ def draw_stops(ax: Any, stops: WaypointMarks, axes: tuple[int, ...]) -> None:
         chosen_places = stops.places[chosen][:, columns]
         if len(chosen_places):
             ax.plot(*chosen_places.T, ls="none", label=label, **look)
-    if len(columns) == 2 and len(stops.places) <= MAX_NUMBERED:
+    if len(columns) == 2 and len(stops.places) <= SpaceLayout.max_numbered:
         for k, (x, y) in enumerate(stops.places[:, columns]):
             ax.annotate(
                 str(k),

@@ -8,6 +8,7 @@ import numpy as np
 
 from netsp.model.solution import Status
 from netsp.view.pictures import style
+from netsp.view.pictures.picture_layout import MapLayout
 from netsp.view.pictures.problem_picture import draw_obstacles
 
 if TYPE_CHECKING:
@@ -16,11 +17,10 @@ if TYPE_CHECKING:
     from netsp.plan.sizing.base_placement import BaseSearch
     from netsp.plan.sizing.tether_sizing import TetherCurve
 
-MAX_LABELS = 12
-"""Maximum number of steps with labels."""
 
-
-def draw_tether_curve(curve: TetherCurve, *, ax: Axes | None = None) -> Any:
+def draw_tether_curve(
+    curve: TetherCurve, *, ax: Axes | None = None, layout: MapLayout = MapLayout()
+) -> Any:
     """Draw the shortest tour by tether length on given or new axes, and return the axes."""
     if ax is None:
         from matplotlib.figure import Figure
@@ -44,7 +44,7 @@ def draw_tether_curve(curve: TetherCurve, *, ax: Axes | None = None) -> Any:
             ax.fill_between(
                 [s.tether, s.until], s.lower_bound, s.length, color=style.PLAN, alpha=0.25, lw=0
             )
-        if len(curve.steps) <= MAX_LABELS:
+        if len(curve.steps) <= layout.max_steps:
             ax.annotate(
                 f"{s.tether:.4g}: {s.length:.5g}",
                 (s.tether, s.length),
@@ -70,14 +70,7 @@ def draw_tether_curve(curve: TetherCurve, *, ax: Axes | None = None) -> Any:
     return ax
 
 
-MAX_NAMES = 24
-"""Maximum number of places with names."""
-
-CONTOUR_LEVELS = 12
-"""Number of contours of a map."""
-
-
-def draw_base_search(search: BaseSearch, *, ax: Any = None) -> Any:
+def draw_base_search(search: BaseSearch, *, ax: Any = None, layout: MapLayout = MapLayout()) -> Any:
     """Draw maps of the shortest sufficient tether and the shortest tour at base candidates.
 
     Contours are drawn if the candidates spread over the plane. Returns both axes.
@@ -93,8 +86,8 @@ def draw_base_search(search: BaseSearch, *, ax: Any = None) -> Any:
     tether = np.array([c.shortest_tether for c in search.candidates])
     tour = np.array([np.nan if c.length is None else c.length for c in search.candidates])
     possible = np.array([c.possible for c in search.candidates])
-    _map(left, problem, xy, tether, possible, "shortest sufficient tether")
-    _map(right, problem, xy, tour, possible, "shortest tour")
+    _map(left, problem, xy, tether, possible, "shortest sufficient tether", layout.contours)
+    _map(right, problem, xy, tour, possible, "shortest tour", layout.contours)
     only = np.isnan(tour) & possible
     right.plot(
         *xy[only].T,
@@ -105,7 +98,7 @@ def draw_base_search(search: BaseSearch, *, ax: Any = None) -> Any:
         zorder=4,
         label="proven worse without a tour" if search.proven else "not solved",
     )
-    if len(xy) <= MAX_NAMES:
+    if len(xy) <= layout.max_places:
         for c in search.candidates:
             left.annotate(c.name, c.position[:2], (4, 4), textcoords="offset points", fontsize=7)
     best = search.best
@@ -141,7 +134,9 @@ def draw_base_search(search: BaseSearch, *, ax: Any = None) -> Any:
     return left, right
 
 
-def _map(ax: Axes, problem: Any, xy: Any, values: Any, possible: Any, label: str) -> None:
+def _map(
+    ax: Axes, problem: Any, xy: Any, values: Any, possible: Any, label: str, contours: int
+) -> None:
     """Draw values at places, with contours if the places span the plane."""
     draw_obstacles(ax, problem)
     ok = np.isfinite(values)
@@ -149,7 +144,7 @@ def _map(ax: Axes, problem: Any, xy: Any, values: Any, possible: Any, label: str
     spread = np.linalg.svd(xy[ok] - xy[ok].mean(0))[1] if ok.sum() >= 4 else np.zeros(2)
     if ok.sum() >= 4 and spread[1] > 1e-3 * size and np.ptp(values[ok]) > 0.0:
         drawn = ax.tricontour(
-            *xy[ok].T, values[ok], levels=CONTOUR_LEVELS, cmap="viridis", linewidths=1.2, zorder=1
+            *xy[ok].T, values[ok], levels=contours, cmap="viridis", linewidths=1.2, zorder=1
         )
         ax.clabel(drawn, fontsize=7, fmt="%.4g")
     if ok.any():

@@ -43,9 +43,6 @@ SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#00
 RUNS = (PATH, TETHER)
 """Colours of two runs side by side."""
 
-MAX_WORD_LETTERS = 40
-"""Maximum number of letters of one word in a picture; longer words end in an ellipsis."""
-
 FORMATS = (".png", ".svg", ".pdf")
 
 
@@ -156,8 +153,8 @@ def _ticks_formatted(figure: Any) -> Iterator[None]:
             del part.draw
 
 
-def literal(figure: Any) -> Any:
-    """Make the texts of a figure plain, not mathematics, and cut very long words; return it.
+def literal(figure: Any, max_letters: int = 40) -> Any:
+    """Make the texts of a figure plain, not mathematics, and cut words to `max_letters`; return it.
 
     Tick labels, which Matplotlib writes, do not change.
     """
@@ -166,7 +163,7 @@ def literal(figure: Any) -> Any:
         content = text.get_text()
         if not content.isascii():
             text.set_fontfamily(["DejaVu Sans", *_fonts_of_other_scripts()])
-        text.set_text(re.sub(rf"(\S{{{MAX_WORD_LETTERS}}})\S+", r"\1…", content))
+        text.set_text(re.sub(rf"(\S{{{max_letters}}})\S+", r"\1…", content))
     return figure
 
 

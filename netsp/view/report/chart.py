@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -12,30 +13,12 @@ import numpy.typing as npt
 
 from netsp.base.arrays import Floats
 from netsp.base.geometry import polylines
+from netsp.base.number_ranges import check_not_negative
 from netsp.model.problem import Circle, Problem
 from netsp.model.solution import Solution
 from netsp.online.execute.temporary_obstacles import Maps, lasting_problem, temporary_obstacles
 from netsp.view.pictures import style
 from netsp.view.pictures.film import Film
-
-CHART_WIDTH = 900.0
-"""Width of the map, pixels."""
-
-LEFT_MARGIN = 52.0
-"""Space for the numbers of the y axis, pixels."""
-
-TOP_MARGIN = 44.0
-"""Space for scale bar and north arrow, pixels."""
-
-BOTTOM_MARGIN = 46.0
-"""Space for the numbers of the x axis, pixels."""
-
-FATE_LETTERS = 6
-"""Number of letters that the fate of a goal adds to its name, beyond those that fit in the
-margin."""
-
-MAX_CHART_NAMES = 40
-"""Maximum number of goals or obstacles with names; more names would cover each other."""
 
 LEGEND = (
     (f'<path d="M8 1 10 6 15 6 11 9 13 15 8 11 3 15 5 9 1 6 6 6Z" fill="{style.BASE}"/>', "base"),
@@ -73,6 +56,35 @@ MOVES = ' class="noprint"'
 _PLANNED = f'<path d="M0 8H16" stroke="{style.PLAN}" stroke-width="2" stroke-dasharray="4 3"/>'
 
 
+@dataclass(frozen=True)
+class ChartLayout:
+    """Layout of the map in a page. All numbers are 0 or more.
+
+    Attributes
+    ----------
+    width
+        Width of the map, pixels.
+    left, top, bottom
+        Space for the numbers of the y axis, for scale bar and north arrow, and for the numbers of
+        the x axis, pixels.
+    fate_letters
+        Number of letters that the fate of a goal adds to its name, beyond those that fit in the
+        margin.
+    max_named
+        Maximum number of goals, and of obstacles, with names; more names would cover each other.
+    """
+
+    width: float = 900.0
+    left: float = 52.0
+    top: float = 44.0
+    bottom: float = 46.0
+    fate_letters: int = 6
+    max_named: int = 40
+
+    def __post_init__(self) -> None:
+        check_not_negative(self)
+
+
 class View:
     """Transformation from the plan to the picture.
 
@@ -82,9 +94,12 @@ class View:
         What is shown.
     more : ndarray, shape (n, 2) or (n, 3)
         Places that are to be seen, too.
+    layout : ChartLayout
+        Size and margins of the picture.
     """
 
-    def __init__(self, problem: Problem, more: Floats) -> None:
+    def __init__(self, problem: Problem, more: Floats, layout: ChartLayout = ChartLayout()) -> None:
+        self.layout = layout
         xy = [problem.points[:, :2], more[:, :2]]
         for o in problem.obstacles:
             c = np.array([o.center]) if isinstance(o, Circle) else np.array(o.polygon)
@@ -94,19 +109,18 @@ class View:
         low, high = every.min(axis=0), every.max(axis=0)
         room = 0.04 * float((high - low).max()) + 1e-9
         self.low, self.high = low - room, high + room
-        if len(problem.goals) <= MAX_CHART_NAMES:  # names stand to the right of goals
-            letters = (
-                max((len(goal.name or "") for goal in problem.goals), default=0) + FATE_LETTERS
-            )
+        if len(problem.goals) <= layout.max_named:  # names stand to the right of goals
+            longest = max((len(goal.name or "") for goal in problem.goals), default=0)
+            letters = longest + layout.fate_letters
             self.high[0] += min(0.007 * letters, 0.2) * float((high - low).max())
         lack = 0.25 * float((self.high - self.low).max()) - (self.high - self.low)
         self.low, self.high = (
             self.low - np.maximum(lack, 0.0) / 2,
             self.high + np.maximum(lack, 0.0) / 2,
         )
-        self.scale = (CHART_WIDTH - LEFT_MARGIN - 8.0) / float(self.high[0] - self.low[0])
-        self.bottom = TOP_MARGIN + float(self.high[1] - self.low[1]) * self.scale
-        self.height = self.bottom + BOTTOM_MARGIN
+        self.scale = (layout.width - layout.left - 8.0) / float(self.high[0] - self.low[0])
+        self.bottom = layout.top + float(self.high[1] - self.low[1]) * self.scale
+        self.height = self.bottom + layout.bottom
 
     @classmethod
     def of(cls, problem: Problem, film: Film) -> View:
@@ -130,8 +144,8 @@ class View:
         """Return the pixel of a place, x and y."""
         x, y = np.asarray(p, dtype=float)[:2]
         return [
-            round(LEFT_MARGIN + float(x - self.low[0]) * self.scale, 2),
-            round(TOP_MARGIN + float(self.high[1] - y) * self.scale, 2),
+            round(self.layout.left + float(x - self.low[0]) * self.scale, 2),
+            round(self.layout.top + float(self.high[1] - y) * self.scale, 2),
         ]
 
     def points(self, line: Floats) -> str:
@@ -193,7 +207,7 @@ def draw(
     )
     shapes.append(f'<circle class="robot" r="6" fill="{style.ROBOT}" stroke="{style.BASE}"/>')
     return (
-        f'<svg class="map" viewBox="0 0 {CHART_WIDTH:g} {view.height:.1f}" role="img" '
+        f'<svg class="map" viewBox="0 0 {view.layout.width:g} {view.height:.1f}" role="img" '
         f'aria-label="map">{"".join(shapes)}</svg>'
     )
 
@@ -321,7 +335,7 @@ def _obstacles(problem: Problem, view: View) -> list[str]:
                 out.append(f'<polygon points="{view.points(ring)}" {around}/>')
             corners = view.points(np.array(o.polygon))
             out.append(f'<polygon points="{corners}" {look}>{title}</polygon>')
-        if len(problem.obstacles) <= MAX_CHART_NAMES:
+        if len(problem.obstacles) <= view.layout.max_named:
             out.append(
                 f'<text x="{x}" y="{y + 4}" class="name" text-anchor="middle">'
                 f"{html.escape(problem.obstacle_name(i))}</text>"
@@ -378,7 +392,7 @@ def _tour(path: Floats, view: View) -> list[str]:
 def _goals(
     problem: Problem, visit: Mapping[int, int], view: View, fates: dict[int, str]
 ) -> list[str]:
-    named = len(problem.goals) <= MAX_CHART_NAMES
+    named = len(problem.goals) <= view.layout.max_named
     out = []
     for k, goal in enumerate(problem.goals):
         x, y = view.point(goal.position)

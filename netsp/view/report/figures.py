@@ -9,10 +9,15 @@ import numpy as np
 
 from netsp.study.compare.rows import TrialRow
 from netsp.view.pictures import style
-from netsp.view.report.stats import Cell, Summary, gap_over_time, over_best, profile, summary
-
-MIN_AXIS_HEIGHT = 1.0
-"""Minimum range of a linear axis: 1 %, or one obstacle, the smallest difference worth showing."""
+from netsp.view.report.stats import (
+    Cell,
+    ReportPolicy,
+    Summary,
+    gap_over_time,
+    over_best,
+    profile,
+    summary,
+)
 
 LINES, MARKERS = ("-", "--", "-.", ":"), "os^Dv<>"
 
@@ -69,8 +74,9 @@ def by_goals(
         panel.grid(alpha=0.3)
         if log:
             panel.set_yscale("log")
-        elif panel.get_ylim()[1] < MIN_AXIS_HEIGHT:
-            panel.set_ylim(-0.05 * MIN_AXIS_HEIGHT, MIN_AXIS_HEIGHT)
+        elif panel.get_ylim()[1] < ReportPolicy.min_axis_range:
+            top = ReportPolicy.min_axis_range
+            panel.set_ylim(-0.05 * top, top)
     axes[0][0].set_ylabel(label)
     if axes[0][-1].get_legend_handles_labels()[0]:
         _legend(axes[0][-1])
@@ -153,7 +159,7 @@ def anytime(by_method: dict[str, list[TrialRow]], best: dict[str, float]) -> Any
     panel.yaxis.set_major_locator(FixedLocator([0.0, *(10.0**k for k in range(-1, 7))]))
     panel.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     panel.yaxis.set_minor_locator(NullLocator())
-    panel.set_ylim(bottom=-0.02, top=max(panel.get_ylim()[1], MIN_AXIS_HEIGHT))
+    panel.set_ylim(bottom=-0.02, top=max(panel.get_ylim()[1], ReportPolicy.min_axis_range))
     panel.grid(alpha=0.3)
     if panel.get_legend_handles_labels()[0]:
         _legend(panel)

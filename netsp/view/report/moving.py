@@ -8,10 +8,8 @@ from collections.abc import Sequence
 from netsp.view.pictures import style
 from netsp.view.pictures.film import Film, steps_of
 from netsp.view.pictures.moments import VISITED, Moment
+from netsp.view.pictures.picture_layout import PageLayout
 from netsp.view.report.chart import View
-
-MOVING_FRAMES = 240
-"""Number of positions of the slider."""
 
 CONTROLS = (
     '<div class="noprint"><button id="play" type="button">▶ play</button>'
@@ -102,7 +100,7 @@ def script(films: Sequence[Film], views: Sequence[View]) -> str:
     str
         HTML elements.
     """
-    steps = steps_of(films, MOVING_FRAMES + 1)[1]
+    steps = steps_of(films, PageLayout.plane_frames + 1)[1]
     shown = [
         {
             "moments": [_frame(moment, view) for moment in film.moments],

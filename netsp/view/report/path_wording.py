@@ -9,8 +9,8 @@ from netsp.study.paths import PathMeasures
 from netsp.study.paths.free_route import Stretch
 
 MIN_PERCENT = 0.005
-"""Smallest difference of two lengths that is shown, per cent. Smaller ones come from the polylines
-that circumscribe arcs."""
+"""Tolerance of equal lengths, per cent: smaller differences come from the polylines that
+circumscribe arcs."""
 
 
 def path_rows(m: PathMeasures) -> list[tuple[str, str]]:

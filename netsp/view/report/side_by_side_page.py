@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from netsp.base.files import write_text
+from netsp.view.pictures.picture_layout import PageLayout
 from netsp.view.report import chart, moving
 from netsp.view.report.html_document import document
 from netsp.view.report.opened import Opened
@@ -32,7 +33,7 @@ def save_beside(opened: Sequence[Opened], output: str | Path) -> None:
     InputError
         A file of a run is damaged, or the page cannot be written.
     """
-    films = [one.film(moving.MOVING_FRAMES) for one in opened]
+    films = [one.film(PageLayout.plane_frames) for one in opened]
     views = [chart.View.of(one.problem, film) for one, film in zip(opened, films, strict=True)]
     names = list(dict.fromkeys(one.problem.name for one in opened))
     title = f"{' and '.join(names)}: {len(opened)} side by side"

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from netsp.base.arrays import Floats
+from netsp.base.number_ranges import check_positive, check_shares
 from netsp.model.bound_scope import LowerBound, Scope
 from netsp.model.solution import Status, solution_scope
 from netsp.study.compare.rows import FAILED, TrialRow
@@ -19,9 +20,6 @@ SAME_RESULT_TOLERANCE = 1e-6
 MAX_CLOSED_GAP = 1e-5
 """Tolerance of the gap of a proven tour; the least accurate proofs are those of paths from a
 robot's state."""
-
-CONFIDENCE = 0.95
-"""Confidence level of the intervals around medians."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +73,26 @@ def best_lengths(rows: Iterable[TrialRow]) -> dict[str, float]:
     return out
 
 
+@dataclass(frozen=True)
+class ReportPolicy:
+    """Policy of the numbers in reports about comparisons.
+
+    Attributes
+    ----------
+    confidence
+        Confidence level of the intervals around medians, 0 to 1.
+    min_axis_range
+        Minimum range of a linear axis: 1 %, or one obstacle, the smallest difference worth showing.
+    """
+
+    confidence: float = 0.95
+    min_axis_range: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_positive(self)
+        check_shares(self, "confidence")
+
+
 def over_best(row: TrialRow, best: dict[str, float]) -> float | None:
     """Return the excess of a row's tour over the best of its problem, per cent."""
     key = row.get("problem_sha256")
@@ -84,8 +102,8 @@ def over_best(row: TrialRow, best: dict[str, float]) -> float | None:
     return over if abs(over) > SAME_RESULT_TOLERANCE else 0.0
 
 
-def summary(values: Sequence[float]) -> Summary | None:
-    """Return the median with a distribution-free confidence interval (`CONFIDENCE`).
+def summary(values: Sequence[float], policy: ReportPolicy = ReportPolicy()) -> Summary | None:
+    """Return the median with a distribution-free confidence interval.
 
     Its ends are order statistics by the binomial distribution; with few trials, they are the
     minimum and the maximum.
@@ -96,7 +114,7 @@ def summary(values: Sequence[float]) -> Summary | None:
     n = len(x)
     from scipy.stats import binom
 
-    k = int(binom.ppf(0.5 * (1.0 - CONFIDENCE), n, 0.5))
+    k = int(binom.ppf(0.5 * (1.0 - policy.confidence), n, 0.5))
     k = max(0, min(k - 1, (n - 1) // 2)) if k > 0 else 0
     return Summary(float(np.median(x)), float(x[k]), float(x[n - 1 - k]), float(x.mean()), n)
 

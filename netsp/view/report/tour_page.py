@@ -20,6 +20,7 @@ from netsp.model.problem import Problem
 from netsp.model.solution import Solution, Status
 from netsp.online.execute.tether_limits import describe_limits, limit_periods, overruns
 from netsp.plan.tour_plan import HOME
+from netsp.view.pictures.picture_layout import PageLayout
 from netsp.view.report import briefing, chart, moving, run_page
 from netsp.view.report.html_document import document
 from netsp.view.report.opened import Opened, json_of
@@ -50,7 +51,7 @@ def page(what: Opened) -> str:
         A file of the run is damaged.
     """
     problem, solution, run = what.problem, what.solution, what.run
-    film, fates = what.film(moving.MOVING_FRAMES), what.fates
+    film, fates = what.film(PageLayout.plane_frames), what.fates
     view = chart.View.of(problem, film)
     title = f"{problem.name}: {'a run' if run else 'a tour'}"
     is_same_problem = problem.sha256 == solution.problem.sha256
