@@ -24,9 +24,6 @@ from netsp.mip.cover_bounds import Cells
 from netsp.mip.cover_costs import Covers
 from netsp.mip.mip_policy import CoverPolicy
 
-MAX_OBSTACLES = 60
-"""Format limit: number of obstacles whose parities fit into the bits of an integer."""
-
 SIDE_TOLERANCE = 1e-12
 """Tolerance below which the gain of changing a side counts as rounding."""
 
@@ -70,7 +67,7 @@ class CoverRefinement:
         """
         policy, known = self.policy, cells.obstacles
         left = [i for i in range(self.covers.obstacles) if i not in known]
-        if not left or len(known) >= MAX_OBSTACLES:
+        if not left or len(known) >= policy.max_obstacles:
             return []
         lengths = self.covers.costs_by_parity(cells, ends)
         least = lengths.min(axis=2, keepdims=True)
@@ -98,8 +95,12 @@ class CoverRefinement:
         out: list[int] = []
         for i in order:
             count = len(self.covers.cells((*cells.obstacles, *out, i)).cluster)
-            is_full = len(cells.obstacles) + len(out) == MAX_OBSTACLES or count > policy.max_cells
-            if is_full or (out and count > policy.max_growth * len(cells.cluster)):
+            has_all = len(cells.obstacles) + len(out) == policy.max_obstacles
+            if (
+                has_all
+                or count > policy.max_cells
+                or (out and count > policy.max_growth * len(cells.cluster))
+            ):
                 break
             out.append(i)
         return out

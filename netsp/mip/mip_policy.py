@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from netsp.base.errors import InputError
 from netsp.base.number_ranges import check_not_negative, check_positive, check_shares
 from netsp.gtsp.dp.handover import Handover
 from netsp.gtsp.gtsp_policy import GtspPolicy
@@ -267,6 +268,9 @@ class CoverPolicy:
         Covers over shortest paths before those over the classes that are left.
     max_cells
         Maximum number of cells.
+    max_obstacles
+        Maximum number of obstacles whose sides tell cells apart; their parities fit into the bits
+        of an integer up to 62.
     patience
         Pricing passes without progress after which the next cover is tried.
     promise_decay
@@ -289,6 +293,7 @@ class CoverPolicy:
     max_growth: float = 1.3
     coarse_covers: int = 3
     max_cells: int = 6000
+    max_obstacles: int = 60
     patience: int = 4
     promise_decay: float = 0.5
     size_exponent: float = 2.5
@@ -300,6 +305,8 @@ class CoverPolicy:
     def __post_init__(self) -> None:
         check_not_negative(self)
         check_shares(self, "promise_decay", "path_time_share")
+        if self.max_obstacles > 62:
+            raise InputError(f"max_obstacles: expected at most 62, got {self.max_obstacles}")
 
 
 @dataclass(frozen=True)

@@ -119,8 +119,8 @@ def max_turning(friction: float, max_tension_ratio: float | None) -> float:
 
 
 MAX_FRICTION = 10.0
-"""Format limit of all files: coefficient of friction of tether on obstacle, in practice 0.1 to
-1."""
+"""Format limit of solution files and arguments: coefficient of friction of tether on obstacle. It
+was chosen well above what occurs, 0.1 to 1, and is in the published schema."""
 
 
 def tension_ratio(friction: float, turning: float) -> float:

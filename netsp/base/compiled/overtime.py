@@ -22,10 +22,6 @@ from netsp.base.compiled.compile_policy import current_policy
 
 T = TypeVar("T")
 
-MAX_STEPS_TO_EXCEPTION = 1000
-"""Tolerance for the delay of a pending exception, loop steps; Python checks for one at each
-step."""
-
 
 class Overtime(BaseException):
     """Exception that ends a call whose budget is used up."""
@@ -105,18 +101,18 @@ class _Watch:
                 time.sleep(policy.check_interval_s)
 
 
-def _catch_pending(thread: int) -> None:
+def _catch_pending(thread: int, max_steps: int = 1000) -> None:
     """Catch `Overtime` if it is pending in this thread; do nothing if it was raised already.
 
     CPython 3.11 can cancel a pending exception, but afterwards it still checks for one: every call
     becomes slower, and hangs under a profiler. So this function sends `Overtime` again and catches
-    it.
+    it: Python raises it within a few steps of a loop, at most `max_steps`.
     """
     try:
         ctypes.pythonapi.PyThreadState_SetAsyncExc(
             ctypes.c_ulong(thread), ctypes.py_object(Overtime)
         )
-        for _ in range(MAX_STEPS_TO_EXCEPTION):
+        for _ in range(max_steps):
             pass
     except Overtime:
         return  # `suppress` is a Python function, which could be interrupted before its `try`
