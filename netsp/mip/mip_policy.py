@@ -269,8 +269,8 @@ class CoverPolicy:
     max_cells
         Maximum number of cells.
     max_obstacles
-        Maximum number of obstacles whose sides tell cells apart; their parities fit into the bits
-        of an integer up to 62.
+        Maximum number of obstacles by whose sides cells differ; the parities of 62 or fewer fit
+        into the bits of an integer.
     patience
         Pricing passes without progress after which the next cover is tried.
     promise_decay
