@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import inspect
 import io
 import re
 import tokenize
@@ -325,6 +326,47 @@ def _phrases(tree: Tree) -> list[Place]:
     ]
 
 
+SECTION = re.compile(r"^(Parameters|Attributes)\n-+\n(.*?)(?=^\w[\w ]*\n-{3,}$|\Z)", re.M | re.S)
+
+
+def _documented_names(text: str, kind: str) -> list[str]:
+    """Return the names that a section of a docstring describes."""
+    return [
+        name.strip("* ")
+        for section, lines in SECTION.findall(inspect.cleandoc(text))
+        if section == kind
+        for entry in re.findall(r"^(\S[^:\n]*)(?: : .*)?$", lines, re.M)
+        for name in entry.split(",")
+    ]
+
+
+def _undocumented(tree: Tree) -> list[Place]:
+    """Return the parameters and attributes in docstrings that the code does not have."""
+    found = []
+    for file, node in tree.functions():
+        a = node.args
+        own = {p.arg for p in (*a.posonlyargs, *a.args, *a.kwonlyargs, a.vararg, a.kwarg) if p}
+        names = _documented_names(ast.get_docstring(node, clean=False) or "", "Parameters")
+        found += [tree.place(file, node, f"{node.name}: {n}") for n in names if n not in own]
+    for file, module in tree.trees.items():
+        for node in ast.walk(module):
+            if isinstance(node, ast.ClassDef) and not _bases(node) - {"NamedTuple", "Protocol"}:
+                text = ast.get_docstring(node, clean=False) or ""
+                names = [
+                    *_documented_names(text, "Parameters"),
+                    *_documented_names(text, "Attributes"),
+                ]
+                own = {_defined(n) for n in ast.walk(node)}
+                found += [
+                    tree.place(file, node, f"{node.name}: {n}") for n in names if n not in own
+                ]
+    return found
+
+
+def _bases(node: ast.ClassDef) -> set[str]:
+    return {ast.unparse(base).split("[")[0] for base in node.bases}
+
+
 def _skips(tree: Tree) -> list[Place]:
     return [
         (str(file.relative_to(tree.root.parent)), k, line.strip())
@@ -350,6 +392,7 @@ ROWS: dict[str, tuple[str, Callable[[Tree], list[Place]]]] = {
     "pronouns": ("docstrings with a pronoun for a number", _pronouns),
     "unsaid": ("terms that the glossary says not to use", _unsaid),
     "phrases": ("phrases that no native speaker would write", _phrases),
+    "undocumented": ("documented names that the code does not have", _undocumented),
     "skips": ("`# fmt: skip`", _skips),
 }
 

@@ -24,6 +24,7 @@ CEILINGS = {
     "openings": 0,
     "unsaid": 0,
     "phrases": 0,
+    "undocumented": 0,
     "identifiers": 122,
     "pronouns": 21,
     "skips": 29,

@@ -42,7 +42,9 @@ def compare(
     on_row: Callable[[TrialRow, Tally], None] | None = None,
     policy: TrialPolicy = TrialPolicy(),
 ) -> Tally:
-    """Run the trials of a study that the results file does not hold yet, and append their rows.
+    """Run the trials of a study that the results file lacks, and append their rows.
+
+    A trial that fails has a row and is not run again.
 
     Parameters
     ----------
@@ -55,8 +57,10 @@ def compare(
     policy
         Time after which a trial counts as hung, unless an executor is given.
 
-    Raises InputError if the file holds anything but rows of this study, or options of a roadmap do
-    not exist. A trial that fails has a row and is not run again.
+    Raises
+    ------
+    InputError
+        The file has content other than rows of this study, or a roadmap has unknown options.
     """
     trials = shard(list(study.trials()), *part)
     for trial in {t.roadmap["label"]: t for t in trials}.values():
