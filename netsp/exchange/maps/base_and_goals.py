@@ -26,19 +26,17 @@ def base_of(
         )
         return None
     feature = bases[0] if bases else None
-    if not context.map.is_geographic:
-        if feature is None:
-            if not context.complaints:  # a damaged feature may be the base
-                context.complain("has no base; expected a Point of kind base")
-            return None
+    is_in_plane = not context.map.is_geographic
+    if feature is None and (is_in_plane or context.projection is None):
+        if not context.complaints:  # a damaged feature may be the base
+            hint = () if is_in_plane else (", or --base LAT,LON", "base")
+            context.complain("has no base; expected a Point of kind base", *hint)
+        return None
+    if is_in_plane:
+        assert feature is not None
         return context.place(feature.shape, feature), feature
     if context.projection is None:
-        if feature is None:
-            if not context.complaints:
-                context.complain(
-                    "has no base; expected a Point of kind base", ", or --base LAT,LON", "base"
-                )
-            return None
+        assert feature is not None
         heading = context.number(feature, "heading") or 0.0
         try:
             context.projection = Projection(
@@ -48,15 +46,16 @@ def base_of(
             context.complain(str(error))
             return None
     x, y = context.projection.base.tolist()
-    z = context.height(feature) if feature is not None else 0.0
-    if feature is not None:
-        place = context.plane(feature.shape)
-        shift = float(np.hypot(place.x - x, place.y - y))
-        if shift > context.policy.max_base_shift:
-            context.notes.append(
-                f"{feature.where}: the base is at the place that was given, {length_text(shift)} "
-                "away; only the properties of the file's base are used"
-            )
+    if feature is None:
+        return (x, y, 0.0), None
+    z = context.height(feature)
+    place = context.plane(feature.shape)
+    shift = float(np.hypot(place.x - x, place.y - y))
+    if shift > context.policy.max_base_shift:
+        context.notes.append(
+            f"{feature.where}: the base is at the place that was given, {length_text(shift)} "
+            "away; only the properties of the file's base are used"
+        )
     return (x, y, z), feature
 
 

@@ -39,19 +39,30 @@ def use_depths(
             context.ledger.use(feature, "obstacle")
         parts["obstacle"] += [*shallow, *shoals]
     if reach is not None:
-        if draught is not None:
-            _note_share(
-                context,
-                depthless_share(context.map.features, context.plane, reach),
-                "is water whose depth the chart does not give; --draught makes no obstacle of it",
-            )
-        _note_share(
-            context,
-            uncharted_share(context.map.features, context.plane, reach),
-            "is not on this chart, and free of obstacles in the problem",
-        )
+        _note_unknown_water(context, reach)
     if not context.options.floor or context.complaints:
         return None
+    return _floor(context, free)
+
+
+def _note_unknown_water(context: MapContext, reach: CropWindow) -> None:
+    """Add notes on water within the reach whose depth or obstacles the chart does not give."""
+    features = context.map.features
+    if context.options.draught is not None:
+        _note_share(
+            context,
+            depthless_share(features, context.plane, reach),
+            "is water whose depth the chart does not give; --draught makes no obstacle of it",
+        )
+    _note_share(
+        context,
+        uncharted_share(features, context.plane, reach),
+        "is not on this chart, and free of obstacles in the problem",
+    )
+
+
+def _floor(context: MapContext, free: list[Feature]) -> SeaFloor | None:
+    """Return the sea floor of a chart's features; the ledger gets their use."""
     floor, found = chart_floor(
         free, context.plane, context.window, context.options.floor_cell, context.policy
     )

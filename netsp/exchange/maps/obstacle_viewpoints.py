@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,9 @@ from pydantic import ValidationError
 from netsp.base.errors import InputError, counted
 from netsp.base.validated import explain, shown
 from netsp.exchange.maps.map_context import MapContext, area_of
+from netsp.exchange.maps.options import InspectionOptions
 from netsp.model.import_record import MAX_NAMED
+from netsp.model.shorthand import Inspection
 
 
 def viewpoints_of(
@@ -22,45 +25,47 @@ def viewpoints_of(
     clearance: float,
 ) -> list[dict[str, Any]]:
     """Return the viewpoints of the obstacles to be inspected."""
-    from netsp.model.shorthand import Inspection
-
     goals: list[dict[str, Any]] = []
     chosen = _chosen(context, obstacles)
     for k, obstacle in enumerate(obstacles):
-        feature, inspection = (
-            obstacle["feature"],
-            context.options.inspection if k in chosen else None,
-        )
-        stated = feature.get("viewpoints", "inspect")
-        if stated is None and inspection is None:
+        feature = obstacle["feature"]
+        inspection = context.options.inspection if k in chosen else None
+        if inspection is None and feature.get("viewpoints", "inspect") is None:
             continue
-        standoff = feature.get("standoff")
-        heights = feature.get("depths")
         try:
-            parsed = Inspection.model_validate(
-                {
-                    "inspect": obstacle["name"] or f"#{k}",
-                    "viewpoints": _whole(stated)
-                    if stated is not None
-                    else inspection and inspection.viewpoints,
-                    "standoff": inspection.standoff
-                    if standoff is None and inspection is not None
-                    else _real(standoff) * context.unit,
-                    "depths": [h * context.unit for h in _list(heights)]
-                    if heights is not None
-                    else (inspection.depths if inspection is not None else (0.0,)),
-                }
-            )
+            found = _inspection(context, obstacle, f"#{k}", inspection).goals(obstacle)
         except (ValidationError, ValueError, TypeError) as error:
             text = explain(error) if isinstance(error, ValidationError) else str(error)
             context.complain(f"{feature.where}: {text}")
             continue
-        goals += [
-            {**g, "where": feature.where, "layer": feature.layer} for g in parsed.goals(obstacle)
-        ]
+        goals += [{**g, "where": feature.where, "layer": feature.layer} for g in found]
     if context.options.inspection is not None:
         goals = _free_viewpoints(context, goals, obstacles, anchor, tether, clearance)
     return goals
+
+
+def _inspection(
+    context: MapContext, obstacle: dict[str, Any], name: str, default: InspectionOptions | None
+) -> Inspection:
+    """Return the inspection of an obstacle, by its own properties or else by the options."""
+    feature = obstacle["feature"]
+    stated, standoff, heights = (
+        feature.get(*names) for names in (("viewpoints", "inspect"), ("standoff",), ("depths",))
+    )
+    fields: dict[str, Any] = {"viewpoints": None, "depths": (0.0,)}
+    if default is not None:
+        fields = {
+            "viewpoints": default.viewpoints,
+            "standoff": default.standoff,
+            "depths": default.depths,
+        }
+    if stated is not None:
+        fields["viewpoints"] = _whole(stated)
+    if standoff is not None or default is None:
+        fields["standoff"] = _real(standoff) * context.unit
+    if heights is not None:
+        fields["depths"] = [h * context.unit for h in _list(heights)]
+    return Inspection.model_validate({"inspect": obstacle["name"] or name, **fields})
 
 
 def _chosen(context: MapContext, obstacles: list[dict[str, Any]]) -> set[int]:
@@ -118,7 +123,7 @@ def _free_viewpoints(
     is_in = _distance(places[:, :2], obstacles) < max(clearance, 1e-9)
     seen: set[tuple[float, ...]] = set()
     kept: list[dict[str, Any]] = []
-    groups: dict[tuple[str, str], list[str]] = {}
+    left_out: dict[tuple[str, str], list[str]] = {}
     for k, goal in enumerate(goals):
         cause = ""
         if is_in[k]:
@@ -131,16 +136,11 @@ def _free_viewpoints(
             seen.add(place)
             kept.append(goal)
             continue
-        groups.setdefault((goal["layer"], cause), []).append(str(goal["name"]))
-    for (layer, cause), names in groups.items():
-        shown_names = ", ".join(names[:MAX_NAMED]) + (", …" if len(names) > MAX_NAMED else "")
-        called = f"layer {layer!r}: " if layer else ""
-        context.notes.append(
-            f"{called}{counted(len(names), 'viewpoint')} left out: {cause} ({shown_names})"
-        )
+        left_out.setdefault((goal["layer"], cause), []).append(str(goal["name"]))
+    _note_left_out(context, left_out)
     if not kept and not _complains_of_base(context, anchor, obstacles):
         number: Counter[str] = Counter()
-        for (_, cause), names in groups.items():
+        for (_, cause), names in left_out.items():
             number[cause] += len(names)
         causes = ", ".join(f"{n} {cause}" for cause, n in number.items())
         context.complain(
@@ -148,6 +148,16 @@ def _free_viewpoints(
             "base or tether"
         )
     return kept
+
+
+def _note_left_out(context: MapContext, left_out: Mapping[tuple[str, str], list[str]]) -> None:
+    """Add a note on the viewpoints left out of each layer for each cause."""
+    for (layer, cause), names in left_out.items():
+        shown_names = ", ".join(names[:MAX_NAMED]) + (", …" if len(names) > MAX_NAMED else "")
+        called = f"layer {layer!r}: " if layer else ""
+        context.notes.append(
+            f"{called}{counted(len(names), 'viewpoint')} left out: {cause} ({shown_names})"
+        )
 
 
 def _complains_of_base(context: MapContext, anchor: Any, obstacles: list[dict[str, Any]]) -> bool:

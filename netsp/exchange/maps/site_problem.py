@@ -41,8 +41,9 @@ def site_of(context: MapContext, name: str) -> ImportedSite:
     anchor, base_feature = base
     tether = context.length(base_feature, "tether_length", context.options.tether)
     if tether is None:
+        option = ", or --tether L"
         context.complain(
-            "has no tether length; expected tether_length of the base", ", or --tether L", "tether"
+            "has no tether length; expected tether_length of the base", option, "tether"
         )
     clearance = context.length(base_feature, "clearance", context.options.clearance) or 0.0
     goals = goals_of(context, parts["goal"]) + table_goals(context)
@@ -69,27 +70,23 @@ def site_of(context: MapContext, name: str) -> ImportedSite:
         goals = goals_within_reach(context, goals, anchor, tether)
     if context.complaints:
         raise context.refused()
-    problem = _validated(
-        context,
-        {
-            "schema_version": 1,
-            "name": name,
-            "base": list(anchor),
-            "goals": [_bare(g) for g in goals],
-            "obstacles": [_bare(o) for o in obstacles],
-            "tether_length": tether,
-            "clearance": clearance,
-            **({"bounds": bounds} if bounds else {}),
-            **context.origin(),
-            "site": Site(
-                file=Path(context.file).name[: context.policy.max_file_name_length],
-                imported=context.ledger.records(),
-                cropped=outlines.cropped,
-            ),
-        },
-        goals,
-        obstacles,
-    )
+    data = {
+        "schema_version": 1,
+        "name": name,
+        "base": list(anchor),
+        "goals": [_bare(g) for g in goals],
+        "obstacles": [_bare(o) for o in obstacles],
+        "tether_length": tether,
+        "clearance": clearance,
+        **({"bounds": bounds} if bounds else {}),
+        **context.origin(),
+        "site": Site(
+            file=Path(context.file).name[: context.policy.max_file_name_length],
+            imported=context.ledger.records(),
+            cropped=outlines.cropped,
+        ),
+    }
+    problem = _validated(context, data, goals, obstacles)
     assert problem.site is not None
     return ImportedSite(
         problem,
