@@ -21,16 +21,6 @@ from netsp.study.paths import PathMeasures, measure_path
 def drawn_points(value: object, policy: AppPolicy = AppPolicy()) -> list[list[float]]:
     """Check the points of a drawn path.
 
-    Parameters
-    ----------
-    value : object
-        Value of a message.
-
-    Returns
-    -------
-    list of [x, y]
-        Points with finite coordinates.
-
     Raises
     ------
     InputError
@@ -152,13 +142,6 @@ def worth_of_order(
 
 def drawn_file(problem: Problem, points: list[list[float]]) -> str:
     """Return a drawn path as GeoJSON, as `netsp compare-path` reads it.
-
-    Parameters
-    ----------
-    problem : Problem
-        Problem on the map.
-    points : list of [x, y]
-        The path.
 
     Returns
     -------

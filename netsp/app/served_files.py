@@ -47,16 +47,6 @@ EXPORTS = {
 def bare_name(name: str, policy: AppPolicy = AppPolicy()) -> str:
     """Return the last part of a file name from any operating system.
 
-    Parameters
-    ----------
-    name : str
-        As given.
-
-    Returns
-    -------
-    str
-        Without folders.
-
     Raises
     ------
     InputError
@@ -112,11 +102,6 @@ class ImportAnswers:
         given : mapping
             Name of a field to text; other names do not count.
 
-        Returns
-        -------
-        ImportAnswers
-            The answers.
-
         Raises
         ------
         InputError
@@ -140,16 +125,6 @@ class ImportAnswers:
 
 def without_options(text: str) -> str:
     """Return a message without its clauses about options of the command line.
-
-    Parameters
-    ----------
-    text : str
-        One line.
-
-    Returns
-    -------
-    str
-        One line.
 
     Examples
     --------
@@ -354,13 +329,7 @@ def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str,
 
 
 def is_map(content: bytes) -> bool:
-    """Return whether a JSON file is a map (GeoJSON or a QGroundControl plan) instead of a problem.
-
-    Parameters
-    ----------
-    content : bytes
-        Contents of the file.
-    """
+    """Return whether JSON is a map (GeoJSON or a QGroundControl plan) instead of a problem."""
     try:
         data = json.loads(content.decode("utf-8-sig"))
     except (ValueError, RecursionError):  # `Problem.load` says what is wrong

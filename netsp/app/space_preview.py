@@ -20,11 +20,6 @@ from netsp.world.scene.surfaces import extent
 def script() -> Path:
     """Return the path of plotly's script, which its package contains.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     InputError

@@ -89,11 +89,6 @@ class Document:
     def problem(self) -> Problem:
         """Return the current version as a problem.
 
-        Returns
-        -------
-        Problem
-            Validated.
-
         Raises
         ------
         InputError
@@ -193,11 +188,6 @@ class Document:
         ----------
         file : str or Path, optional
             Its name from now on.
-
-        Returns
-        -------
-        Path
-            The file.
 
         Raises
         ------

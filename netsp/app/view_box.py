@@ -75,13 +75,7 @@ class Frame:
         )
 
     def problem(self) -> Problem:
-        """Return the problem as it was saved last (Ctrl+S on the map).
-
-        Returns
-        -------
-        Problem
-            Of the file.
-        """
+        """Return the problem as it was saved last (Ctrl+S on the map)."""
         return Problem.load(self.file)
 
     def close(self) -> None:

@@ -68,11 +68,6 @@ def figure_of(scene: Scene, path: Floats, title: str, stops: WaypointMarks) -> A
         Title of the figure.
     stops : WaypointMarks
         Waypoints.
-
-    Returns
-    -------
-    Figure
-        The figure.
     """
     low, high = extent(scene, path, stops.every_place)
     nothing = np.zeros((0, 3))

@@ -40,11 +40,6 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[in
         Cells, as plain text.
     words : sequence of int
         Indices of the columns of text, which are aligned to the left.
-
-    Returns
-    -------
-    str
-        HTML element.
     """
     kind = [' class="words"' if k in words else "" for k in range(len(head))]
     top = "".join(f"<th{kind[k]}>{html.escape(h)}</th>" for k, h in enumerate(head))
@@ -56,18 +51,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[in
 
 
 def imported(site: Site) -> str:
-    """Return the table of an import: what each feature of the map became.
-
-    Parameters
-    ----------
-    site : Site
-        Record of the import.
-
-    Returns
-    -------
-    str
-        HTML elements.
-    """
+    """Return the table of an import: what each feature of the map became."""
     head, *rows = site.table()
     import_text = f"Imported from {site.file}. What was left out is not in the plan."
     if site.edited:
@@ -89,11 +73,6 @@ def checks(verdict: Verification) -> str:
     ----------
     verdict : Verification
         Verdict on a solution or a mission.
-
-    Returns
-    -------
-    str
-        HTML element.
     """
     rows = "".join(
         f'<tr><td class="{"ok" if c.passed else "bad"}">{"ok" if c.passed else "FAIL"}</td>'
@@ -132,11 +111,6 @@ def stops(problem: Problem, solution: Solution, found: Margins | None) -> str:
         Solution with a tour.
     found : Margins, optional
         Margins of the tour, if it has any.
-
-    Returns
-    -------
-    str
-        HTML element.
     """
     u = problem.units
     north = "from north" if problem.origin else "from y"
@@ -201,11 +175,6 @@ def tethers(problem: Problem, solution: Solution) -> str:
         Problem of the solution.
     solution : Solution
         Solution whose tour is not entangled.
-
-    Returns
-    -------
-    str
-        HTML element.
     """
     longest = max(v.tether_length for v in solution.tour)
     paths = TautPaths(problem, 2.0 * max(problem.tether_length, longest))

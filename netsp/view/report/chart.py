@@ -124,20 +124,7 @@ class View:
 
     @classmethod
     def of(cls, problem: Problem, film: Film) -> View:
-        """Return the view that contains a problem and all moments of a film.
-
-        Parameters
-        ----------
-        problem : Problem
-            What is shown.
-        film : Film
-            Of the plane.
-
-        Returns
-        -------
-        View
-            Of both.
-        """
+        """Return the view that contains a problem and all moments of a film."""
         return cls(problem, np.vstack([m.nodes for m in film.moments]))
 
     def point(self, p: npt.ArrayLike) -> list[float]:
@@ -180,11 +167,6 @@ def draw(
         Path of the robot in a run; the tour is then drawn as a plan.
     order : mapping of int to int, optional
         Number of the visit of each goal; by default as in the tour.
-
-    Returns
-    -------
-    str
-        SVG or HTML element.
     """
     if order is None:
         order = {v.goal: n for n, v in enumerate(solution.tour, 1)}
@@ -219,11 +201,6 @@ def legend(*, run: bool = False) -> str:
     ----------
     run : bool
         Whether the map is of a run, which has a path and a plan.
-
-    Returns
-    -------
-    str
-        SVG or HTML element.
     """
     marks = [(mark, "path" if run and text == "tour" else text) for mark, text in LEGEND]
     if run:
@@ -247,11 +224,6 @@ def round_step(span: float, parts: float) -> float:
         Positive number.
     parts : float
         Maximum number of parts.
-
-    Returns
-    -------
-    float
-        The step.
     """
     min_step = span / parts
     power = 10.0 ** math.floor(math.log10(min_step))

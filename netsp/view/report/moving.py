@@ -86,20 +86,7 @@ button.addEventListener("click", () => {
 
 
 def script(films: Sequence[Film], views: Sequence[View]) -> str:
-    """Return the script that moves the maps of a page, in order.
-
-    Parameters
-    ----------
-    films : sequence of Film
-        Films in the plane.
-    views : sequence of View
-        View of each map.
-
-    Returns
-    -------
-    str
-        HTML elements.
-    """
+    """Return the script that moves the maps of a page, in order."""
     steps = steps_of(films, PageLayout.plane_frames + 1)[1]
     shown = [
         {

@@ -23,11 +23,6 @@ PAGE_STYLE = """
 def page(found: PathComparison) -> str:
     """Return the page as HTML.
 
-    Parameters
-    ----------
-    found : PathComparison
-        The comparison.
-
     Returns
     -------
     str

@@ -16,11 +16,6 @@ circumscribe arcs."""
 def path_rows(m: PathMeasures) -> list[tuple[str, str]]:
     """Return the names and values of the measures of a path.
 
-    Parameters
-    ----------
-    m : PathMeasures
-        Measures of the path.
-
     Returns
     -------
     list of (str, str)
@@ -146,13 +141,6 @@ def order_in_words(found: PathComparison, path: ComparedPath) -> str:
 
 def figures_of(found: PathComparison, path: ComparedPath) -> list[tuple[str, str]]:
     """Return the figures of a path and its comparison with the tour as text.
-
-    Parameters
-    ----------
-    found : PathComparison
-        The comparison.
-    path : ComparedPath
-        A path of the comparison.
 
     Returns
     -------

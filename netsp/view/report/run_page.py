@@ -15,11 +15,6 @@ from netsp.view.pictures import style
 def rows_of(file: Path) -> list[dict[str, str]]:
     """Return the rows of a CSV file of a run.
 
-    Parameters
-    ----------
-    file : Path
-        CSV file.
-
     Returns
     -------
     list of dict
@@ -41,11 +36,6 @@ def over_time(t: Floats, length: Floats, limit: Floats, units: str) -> str:
         Limits of the tether length.
     units : str
         Unit of lengths.
-
-    Returns
-    -------
-    str
-        SVG element.
     """
     thin = slice(None, None, max(1, len(t) // 1200))
     top = 1.05 * float(max(length.max(), limit.max()))

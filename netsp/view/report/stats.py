@@ -125,13 +125,7 @@ def failures(rows: Iterable[TrialRow]) -> list[TrialRow]:
 
 
 def is_proven(row: TrialRow) -> bool:
-    """Return whether a row's tour is proven to be the shortest of the scope of its bound.
-
-    Parameters
-    ----------
-    row : dict
-        Row of a trial.
-    """
+    """Return whether a row's tour is proven to be the shortest of the scope of its bound."""
     try:
         status = Status(row["status"])
     except ValueError:  # the trial failed
