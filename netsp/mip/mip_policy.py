@@ -9,6 +9,10 @@ from netsp.base.number_ranges import check_not_negative, check_positive, check_s
 from netsp.gtsp.dp.handover import Handover
 from netsp.gtsp.gtsp_policy import GtspPolicy
 
+CUT_FAMILIES = ("goals", "branches", "minimum cuts", "parity", "blossoms", "combs")
+"""Format: names of the families of cuts that a policy can leave out. Subtour cuts of components are
+never left out, because a point without them may be no tour."""
+
 
 @dataclass(frozen=True)
 class CutPolicy:
@@ -16,6 +20,8 @@ class CutPolicy:
 
     Attributes
     ----------
+    families
+        Names of the families of cuts that are separated, of `CUT_FAMILIES`.
     min_subtour_violation
         Minimum violation of a subtour cut; weaker cuts add a row and hardly move the LP.
     max_subtour_cuts
@@ -55,6 +61,7 @@ class CutPolicy:
         Idle cuts are removed only if at most this share of all cuts remains.
     """
 
+    families: tuple[str, ...] = CUT_FAMILIES
     min_subtour_violation: float = 1e-4
     max_subtour_cuts: int = 60
     min_comb_violation: float = 0.02
@@ -76,6 +83,11 @@ class CutPolicy:
         check_not_negative(self)
         check_shares(self, "incumbent_weight", "max_kept_share")
         # lists, as study files have them
+        object.__setattr__(self, "families", tuple(self.families))
+        for family in self.families:
+            if family not in CUT_FAMILIES:
+                known = ", ".join(CUT_FAMILIES)
+                raise InputError(f"families: unknown {family!r}; expected some of {known}")
         object.__setattr__(self, "fractional_levels", tuple(self.fractional_levels))
         object.__setattr__(self, "shrunk_sizes", tuple(self.shrunk_sizes))
 

@@ -443,12 +443,17 @@ class Root:
         cuts = fractional_cuts(point.x, point.legs, point.y, cluster, self.branch, near, policy)
         if cuts:
             return cuts
-        cuts = parity_cuts(point.legs, point.y, cluster, self.odd, self.run.check, policy)
+        if "parity" in policy.families:
+            cuts = parity_cuts(point.legs, point.y, cluster, self.odd, self.run.check, policy)
         if cuts:
             return cuts
         flow = cluster_flows(point.legs, point.y, cluster)
-        tight = tight_sets(self.lp.cuts, point, flow, cluster)
-        return blossom_cuts(flow, cluster, policy) + comb_cuts(flow, tight, cluster, policy)
+        if "blossoms" in policy.families:
+            cuts = blossom_cuts(flow, cluster, policy)
+        if "combs" in policy.families:
+            tight = tight_sets(self.lp.cuts, point, flow, cluster)
+            cuts = cuts + comb_cuts(flow, tight, cluster, policy)
+        return cuts
 
     def purge(self, point: Point, *, risen: bool) -> None:
         """Count a round of all cuts, and remove idle ones if the bound has risen.

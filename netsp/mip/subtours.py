@@ -141,14 +141,16 @@ def fractional_cuts(
     near
         Nearest visited vertices, for `component_cuts`.
     """
-    cuts = component_cuts(x, legs, y, cluster, near) + goal_cuts(legs, y, cluster, policy)
+    cuts = component_cuts(x, legs, y, cluster, near)
+    if "goals" in policy.families:
+        cuts += goal_cuts(legs, y, cluster, policy)
     known = {np.packbits(c.inside).tobytes() for c in cuts}
     support = np.flatnonzero(x > SUPPORT_TOLERANCE)
     on = y > SUPPORT_TOLERANCE
     sets = _SetCuts(x, legs[on], y[on], cluster, policy)
-    if branch is not None and len(branch):
+    if branch is not None and len(branch) and "branches" in policy.families:
         sets.add_branches(branch, support)
-    if len(sets.found) < policy.max_subtour_cuts // 2:
+    if "minimum cuts" in policy.families and len(sets.found) < policy.max_subtour_cuts // 2:
         sets.add_minimum_cuts(support, near)
     new = [f for key, f in sets.found.items() if key not in known]
     best = sorted(new, key=lambda f: -f[0])[: policy.max_subtour_cuts]
