@@ -112,7 +112,7 @@ class Alarms:
         """
         by_kind = {a.kind: a for a in reasons}
         raised = []
-        for kind in {*by_kind, *self._states}:
+        for kind in dict.fromkeys((*by_kind, *self._states)):
             state = self._states.setdefault(kind, _AlarmState())
             level = state.level(now, by_kind.get(kind), self.policy)
             raised += state.show(now, level, by_kind.get(kind), self.policy)
