@@ -76,11 +76,6 @@ class deprecated_method:
 def renamed_parameters(**renamed: str) -> Callable[[Function], Function]:
     """Return a decorator for a function that accepts old names of keyword parameters.
 
-    Parameters
-    ----------
-    **renamed : str
-        Old names and new names.
-
     Examples
     --------
     >>> @renamed_parameters(told="on_progress")

@@ -117,11 +117,6 @@ def _inputs(args: argparse.Namespace) -> tuple[Problem, list[FoundPath]]:
 def describe(found: PathComparison) -> str:
     """Return a comparison as text.
 
-    Parameters
-    ----------
-    found : PathComparison
-        The comparison.
-
     Returns
     -------
     str

@@ -110,13 +110,7 @@ class CompileTimes:
 
 
 def kernel_name(kernel: Any) -> str:
-    """Return module and name of a kernel.
-
-    Parameters
-    ----------
-    kernel : dispatcher
-        The kernel.
-    """
+    """Return module and name of a kernel."""
     return f"{kernel.py_func.__module__.removeprefix('netsp.')}.{kernel.py_func.__name__}"
 
 

@@ -175,15 +175,7 @@ def _of_image(args: argparse.Namespace) -> Problem:
 
 
 def show_table(site: str, found: ImportedSite) -> None:
-    """Print a table of how the features of each layer were used, and the notes of the import.
-
-    Parameters
-    ----------
-    site : str
-        Name of the map.
-    found : ImportedSite
-        Result of the import.
-    """
+    """Print a table of how the features of each layer were used, and the notes of the import."""
     from netsp.command.text_table import print_table
 
     record = found.problem.site

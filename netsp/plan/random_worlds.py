@@ -185,11 +185,6 @@ def random_world(
     attempt : int
         Another world of the same seed, for when one does not fit.
 
-    Returns
-    -------
-    Problem
-        The world.
-
     Raises
     ------
     InputError

@@ -142,13 +142,6 @@ class _Columns:
 
         After a vain search the tether is carried on from all searched classes, if they are few.
 
-        Parameters
-        ----------
-        graph
-            Travel graph.
-        searched
-            Classes that are searched first.
-
         Returns
         -------
         tuple

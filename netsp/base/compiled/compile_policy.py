@@ -110,13 +110,7 @@ def current_policy() -> CompilePolicy:
 
 @contextlib.contextmanager
 def compiled_by(policy: CompilePolicy) -> Iterator[None]:
-    """Use another policy in all threads while the body runs.
-
-    Parameters
-    ----------
-    policy : CompilePolicy
-        The policy.
-    """
+    """Use another policy in all threads while the body runs."""
     global _policy
     before, _policy = _policy, policy
     try:

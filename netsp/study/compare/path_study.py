@@ -50,16 +50,6 @@ class PathStudy(Model):
     def load(cls, path: str | Path) -> Self:
         """Read a study file.
 
-        Parameters
-        ----------
-        path : str or Path
-            TOML file.
-
-        Returns
-        -------
-        PathStudy
-            The study.
-
         Raises
         ------
         InputError

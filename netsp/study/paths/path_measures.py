@@ -297,11 +297,6 @@ def measure_path(
     tether : array_like, shape (k, 2) or (k, 3), optional
         Line of the tether at the beginning, from the base on; by default a straight line.
 
-    Returns
-    -------
-    PathMeasures
-        Figures of the path.
-
     Raises
     ------
     InputError

@@ -135,15 +135,7 @@ def drive_under(
 
 
 def payout(tether: Tether, load: Load) -> float:
-    """Return the payout of a tether: the length that must be out, metres.
-
-    Parameters
-    ----------
-    tether : Tether
-        The taut tether.
-    load : Load
-        Forces on it.
-    """
+    """Return the payout of a tether: the length that must be out, metres."""
     if load.slack == 0.0 and load.drag == 0.0:
         return tether.length
     more = tether.length - strand_length(tether.strand, len(tether.strand))
