@@ -17,7 +17,7 @@ FIRST_COMMIT = "01e50a9b"
 CEILINGS = {
     "basenames": 0,
     "rooms": 16,
-    "constants": 5,
+    "constants": 0,
     "ambiguous": 0,
     "long": 160,
     "parameters": 69,

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError, Problem, solve
+from netsp.command.command_policy import CommandPolicy
 from netsp.command.main import main
 from netsp.plan.random_worlds import FAMILIES, random_world, reachable_world
 
@@ -124,9 +125,9 @@ def test_netsp_world_writes_a_problem_that_solve_reads(tmp_path, capsys):
         (["--tether", "0.001"], "places within reach of the tether found"),
     ],
 )
-def test_bad_worlds_are_told_in_one_line(args, said, capsys, monkeypatch):
-    monkeypatch.setattr("netsp.plan.random_worlds.ATTEMPTS", 3)  # of 50, each as much in vain
-    assert main(["world", *args]) == 2
+def test_bad_worlds_are_told_in_one_line(args, said, capsys):
+    policy = CommandPolicy(max_worlds=3)  # of 50, each as much in vain
+    assert main(["world", *args], policy) == 2
     err = capsys.readouterr().err
     assert said in err
     assert err.count("\n") == 1

@@ -29,6 +29,8 @@ class CommandPolicy:
         Maximum number of legs and of waypoints that a summary names; further ones are counted.
     mission_time_limit_s
         Default time limit for missions, s.
+    max_worlds
+        Maximum number of random worlds that are drawn for one seed.
     max_films, max_film_s, max_fps
         Maximum number of runs in one film, its maximum duration, s, and frames per second.
     garbage_threshold
@@ -47,6 +49,7 @@ class CommandPolicy:
     max_named_legs: int = 3
     max_named_waypoints: int = 16
     mission_time_limit_s: float = 60.0
+    max_worlds: int = 50
     max_films: int = 3
     max_film_s: int = 600
     max_fps: int = 60

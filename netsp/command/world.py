@@ -15,6 +15,7 @@ def run(args: argparse.Namespace) -> int:
 
     problem, in_vain = reachable_world(
         args.seed,
+        max_worlds=args.policy.max_worlds,
         family=args.family,
         goals=args.goals,
         obstacles=args.obstacles,

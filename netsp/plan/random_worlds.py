@@ -21,17 +21,15 @@ from netsp.model.problem import Circle, Goal, Obstacle, Polygon, Problem
 Place = tuple[float, float]
 Draw = Callable[[random.Random, int, float, tuple[float, float]], list[Obstacle]]
 
-GIVE_UP = 20_000
-"""Draws after which a world is called too full."""
+MAX_DRAWS = 20_000
+"""Format of random worlds: draws after which a world is too full. With another number, a seed would
+give another world."""
 
-APART = 1e-3
-"""Least gap between obstacles, times the side."""
+MIN_GAP_SHARE = 1e-3
+"""Format of random worlds: minimum gap between obstacles, as a share of the side."""
 
-MOST = 10_000
-"""Most goals, and most obstacles."""
-
-ATTEMPTS = 50
-"""Worlds drawn for one seed before `reachable_world` gives up."""
+MAX_COUNT = 10_000
+"""Format limit of random worlds: goals, and obstacles."""
 
 
 class DoesNotFitError(InputError):
@@ -87,7 +85,7 @@ def array(
     rows = max(1, math.isqrt(count))
     columns = -(-count // rows)
     pitch, row_pitch = side / (columns + 0.5), side / rows
-    wander = 0.5 * min(pitch, row_pitch) - radius - APART * side
+    wander = 0.5 * min(pitch, row_pitch) - radius - MIN_GAP_SHARE * side
     if wander <= 0.0:
         raise DoesNotFitError(
             f"obstacles: {count} circles of radius {radius:.3g} do not fit into rows in a square "
@@ -115,7 +113,7 @@ def harbour(
         x = side * (k + 0.2 + 0.6 * draw.random()) / piers
         x = min(max(x, 0.5 * width), side - 0.5 * width)
         out.append(_rectangle((x, 0.5 * length), (1.0, 0.0), 0.5 * width, 0.5 * length))
-    for _ in range(GIVE_UP):
+    for _ in range(MAX_DRAWS):
         if len(out) >= count:
             return out
         place = (draw.random() * side, draw.random() * side)
@@ -126,7 +124,7 @@ def harbour(
         barge = _rectangle(
             place, ((1.0 - t * t) / (1.0 + t * t), 2.0 * t / (1.0 + t * t)), long, half
         )
-        if all(_apart(barge, other, APART * side) for other in out):
+        if all(_apart(barge, other, MIN_GAP_SHARE * side) for other in out):
             out.append(barge)
     raise DoesNotFitError(f"obstacles: {count} polygons do not fit into a square of side {side:g}")
 
@@ -206,7 +204,7 @@ def random_world(
     def free(x: float, y: float) -> bool:
         return not any(_holds(shape, x, y) for shape in shapes)
 
-    base = next((p for _ in range(GIVE_UP) if free(*(p := place()))), None)
+    base = next((p for _ in range(MAX_DRAWS) if free(*(p := place()))), None)
     if base is None:
         raise DoesNotFitError("obstacles: no room for the base")
 
@@ -220,7 +218,7 @@ def random_world(
         )
 
     found: list[Place] = []
-    for _ in range(GIVE_UP // 100):
+    for _ in range(MAX_DRAWS // 100):
         drawn = [place() for _ in range(4 * goals)]
         drawn = [p for p in drawn if free(*p) and math.dist(p, base) <= tether_length]
         for some in (drawn[: 2 * goals], drawn[2 * goals :]):
@@ -248,13 +246,15 @@ def _counts(
     return obstacles, goals
 
 
-def reachable_world(seed: int, **recipe: object) -> tuple[Problem, int]:
+def reachable_world(seed: int, *, max_worlds: int = 50, **recipe: object) -> tuple[Problem, int]:
     """Return the first world of a seed that fits.
 
     Parameters
     ----------
     seed : int
         Of all draws.
+    max_worlds : int
+        Maximum number of worlds that are drawn.
     **recipe : object
         As of `random_world`.
 
@@ -268,13 +268,13 @@ def reachable_world(seed: int, **recipe: object) -> tuple[Problem, int]:
     Raises
     ------
     InputError
-        None of `ATTEMPTS` worlds fits, or no draw can mend it.
+        None of `max_worlds` worlds fits, or no draw can mend it.
     """
-    for attempt in range(ATTEMPTS):
+    for attempt in range(max_worlds):
         try:
             return random_world(seed, attempt=attempt, **recipe), attempt  # type: ignore[arg-type]
         except DoesNotFitError:
-            if attempt == ATTEMPTS - 1:
+            if attempt == max_worlds - 1:
                 raise
     raise AssertionError("unreachable")
 
@@ -289,13 +289,12 @@ def _check(
 ) -> None:
     if family not in FAMILIES:
         raise InputError(f"family: unknown {family!r}; expected one of {', '.join(FAMILIES)}")
-    if goals is not None and not 1 <= goals <= MOST:
-        raise InputError(f"world: goals: expected 1 to {MOST}, got {goals}")
+    if goals is not None and not 1 <= goals <= MAX_COUNT:
+        raise InputError(f"world: goals: expected 1 to {MAX_COUNT}, got {goals}")
     least, most = obstacles if isinstance(obstacles, tuple) else (obstacles or 0, obstacles or 0)
-    if not (0 <= least <= MOST and 0 <= most <= MOST):
-        raise InputError(
-            f"world: obstacles: expected 0 to {MOST}, got {most if 0 <= least <= MOST else least}"
-        )
+    for count in (least, most):
+        if not 0 <= count <= MAX_COUNT:
+            raise InputError(f"world: obstacles: expected 0 to {MAX_COUNT}, got {count}")
     if least > most:
         raise InputError(f"world: obstacles: expected minimum <= maximum, got {least} and {most}")
     for name, value in (("tether_length", tether_length), ("side", side), ("radii", radii[1])):
@@ -312,11 +311,11 @@ def _circles(
 ) -> list[Obstacle]:
     """Return the first candidates that keep apart."""
     taken: list[tuple[float, float, float]] = []
-    for _ in range(GIVE_UP):
+    for _ in range(MAX_DRAWS):
         if len(taken) == count:
             return [Circle(center=(x, y), radius=r) for x, y, r in taken]
         x, y, r = next(candidates)
-        gap = r + APART * side
+        gap = r + MIN_GAP_SHARE * side
         if all(math.hypot(x - a, y - b) > q + gap for a, b, q in taken):
             taken.append((x, y, r))
     raise DoesNotFitError(f"obstacles: {count} circles do not fit into a square of side {side:g}")

@@ -25,8 +25,9 @@ AXES = ("+y", "+x +y", "+x", "+x −y", "−y", "−x −y", "−x", "−x +y")
 SIDES = {"north": 0, "east": 2, "south": 4, "west": 6}
 """Index of each side in `WINDS` and in `AXES`."""
 
-TOUCHING = 2e-3
-"""Relative to the size of an obstacle: arcs are drawn with corners that lie so far off."""
+ARC_TOLERANCE = 2e-3
+"""Tolerance of touching, as a share of the size of an obstacle: the corners of polylines that stand
+for arcs lie this far from the arc."""
 
 
 def bearing(problem: Problem, direction: npt.ArrayLike) -> float:
@@ -175,7 +176,7 @@ def _touched(problem: Problem, points: Floats) -> npt.NDArray[np.intp]:
         for o in problem.obstacles
     ])  # fmt: skip
     on = gaps.argmin(axis=0)
-    return np.where(gaps.min(axis=0) <= TOUCHING, on, -1)
+    return np.where(gaps.min(axis=0) <= ARC_TOLERANCE, on, -1)
 
 
 @lru_cache(maxsize=4096)
