@@ -131,7 +131,7 @@ def solved(graph: TravelGraph, options: dict[str, Any], limit: float, seed: int)
     seconds = time.process_time() - begin
     if found.length is None:
         return Outcome(seconds)
-    asked = graph.as_asked(found)
+    asked = graph.for_problem(found)
     return Outcome(seconds, found.length, asked.lower_bound or 0.0)
 
 

@@ -25,10 +25,10 @@ from peak import highest
 from table import head, heading, row
 
 from netsp import Status, solve_graph
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.model.problem import Problem
 from netsp.plan.random_worlds import random_world
 from netsp.roadmap.taut import TautRoadmap
+from netsp.roadmap.travel_graph import TravelGraph
 from netsp.view.pictures.style import SERIES, save
 
 GOALS = (10, 20, 40, 80, 160, 320)

@@ -33,7 +33,6 @@ from table import ROOT, head, heading, row
 from netsp import Problem, solve
 from netsp.base.clock import Clock
 from netsp.base.geometry import polylines
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.hsignature.rays import signature
 from netsp.plan.random_worlds import reachable_world
 from netsp.plan.solve_problem import solve_graph
@@ -53,6 +52,7 @@ from netsp.plan.space.space_signature import SpaceSignature
 from netsp.plan.space.upright import bound_by_upright_solids
 from netsp.plan.space.visit_order import order_by_going_on
 from netsp.roadmap.explain_unreachable import shortest_tethers
+from netsp.roadmap.travel_graph import TravelGraph
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.run_log import Run

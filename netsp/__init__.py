@@ -17,13 +17,13 @@ from netsp.base.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from netsp.base.errors import InfeasibleError, InputError, NetspError, VerificationError
-    from netsp.gtsp.travel.graph import TravelGraph
     from netsp.gtsp.travel.result import Progress, Result
     from netsp.judge import Verification, verify
     from netsp.model.problem import Circle, Goal, Polygon, Problem, State
     from netsp.model.solution import Solution, Status
     from netsp.plan.solve_problem import solve, solve_graph, travel_graph
     from netsp.roadmap.tether_classes import Tethers
+    from netsp.roadmap.travel_graph import TravelGraph
 
 __version__ = "0.1.0"
 
@@ -41,7 +41,7 @@ _PUBLIC = {
     "State": "netsp.model.problem",
     "Status": "netsp.model.solution",
     "Tethers": "netsp.roadmap.tether_classes",
-    "TravelGraph": "netsp.gtsp.travel.graph",
+    "TravelGraph": "netsp.roadmap.travel_graph",
     "Verification": "netsp.judge",
     "VerificationError": "netsp.base.errors",
     "solve": "netsp.plan.solve_problem",

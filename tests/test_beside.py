@@ -7,9 +7,9 @@ import pytest
 
 from netsp import solve, travel_graph
 from netsp.gtsp.gtsp_policy import GtspPolicy, ProofSearchPolicy
+from netsp.gtsp.instance import cheapest_per_cluster
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.neighbourhood import cheapest_insertions
-from netsp.gtsp.travel.graph import least_tethers
 from netsp.mip.mip_policy import MipPolicy
 from netsp.mip.mip_solver import MipRun
 from netsp.plan.random_worlds import random_world
@@ -47,7 +47,7 @@ def test_of_each_goal_those_are_chosen_that_lengthen_the_tour_least(seed):
 def test_a_search_of_two_classes_a_goal_finds_more_than_those_of_least_tether_hold(seed):
     problem = random_world(seed, goals=20, tether_length=350.0)
     graph = travel_graph(problem)
-    least = least_tethers(graph.costs_to_base, graph.cluster, 2)
+    least = cheapest_per_cluster(graph.costs_to_base, graph.cluster, 2)
     shortest_of_these = solve_all(graph.subgraph(least))
     found = solve(problem, solver="lns", params={"classes": 2}, iteration_limit=3000)
     assert found.length < 0.95 * shortest_of_these
@@ -67,7 +67,9 @@ def test_a_proof_begins_with_a_tour_beside_which_there_is_none_better():
     run = MipRun(graph, Limits(iterations=10_000), search_rounds=300, policy=policy)
     run.find_first_tour()
     first = solve_all(
-        graph.subgraph(least_tethers(graph.costs_to_base, graph.cluster, run.core_classes_per_goal))
+        graph.subgraph(
+            cheapest_per_cluster(graph.costs_to_base, graph.cluster, run.core_classes_per_goal)
+        )
     )
     core = run.search_near_incumbent()
     assert run.length < first - 1.0

@@ -14,7 +14,6 @@ from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.gtsp_policy import CostPolicy
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.solver_run import RunStopped
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip.branching import Tree
 from netsp.mip.combs import comb_cuts
 from netsp.mip.cuts import Cut, cut_coefficients
@@ -26,6 +25,7 @@ from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
 from netsp.mip.root import Root
 from netsp.mip.subtours import component_cuts
+from netsp.roadmap.travel_graph import TravelGraph
 from tests.brute import brute_tour
 from tests.cut_points import all_legs, some_cut, tours_as_points
 from tests.travel_graphs import random_graph

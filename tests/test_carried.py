@@ -40,8 +40,8 @@ def few(problem, most=40):
 def test_classes_that_are_put_back_have_the_tethers_of_the_whole_roadmap():
     problem = windfarm(3, 1.02, radius=15.0)
     whole, part = travel_graph(problem), few(problem, 20)
-    assert whole.complete
-    assert not part.complete
+    assert whole.is_complete
+    assert not part.is_complete
     every = [(int(whole.cluster[v]), whole.signatures[v]) for v in range(1, len(whole))]
     again = part.carrier.with_classes(every, lambda: False)
     assert len(again) == len(whole)

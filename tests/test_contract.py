@@ -402,7 +402,7 @@ def test_progress_carries_the_tour(solver):
 def test_progress_over_few_classes_first_carries_tours_of_the_whole_graph():
     problem = random_world(12, goals=26, tether=300.0)
     graph = travel_graph(problem, max_classes=130)
-    assert not graph.complete
+    assert not graph.is_complete
     rows = []
     solve_graph(graph, on_progress=rows.append, time_limit=1.5)
     told = [r for r in rows if r.tour is not None]

@@ -87,7 +87,7 @@ def test_sections_of_public_docstrings_are_true_and_complete_in_themselves(name)
 
 
 def test_there_is_a_public_interface_to_document():
-    assert {"netsp.plan.solve_problem.solve", "netsp.gtsp.travel.graph.TravelGraph.path"} <= set(
+    assert {"netsp.plan.solve_problem.solve", "netsp.roadmap.travel_graph.TravelGraph.path"} <= set(
         PUBLIC
     )
     assert len(PUBLIC) > 150

@@ -19,8 +19,7 @@ from netsp.gtsp.cost_oracle import MatrixCosts
 from netsp.gtsp.gtsp_policy import CostPolicy, GtspPolicy, ProofSearchPolicy
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.solver_run import RunStopped
-from netsp.gtsp.travel.graph import TravelGraph
-from netsp.gtsp.travel.parity_distances import WaysByParity
+from netsp.gtsp.travel.parity_distances import ParityDistances
 from netsp.mip import root
 from netsp.mip.cover_costs import ClassCovers, PathCovers
 from netsp.mip.covers import cover_steps, refine_covers
@@ -32,11 +31,12 @@ from netsp.mip.lagrangian_bound import exact_bound
 from netsp.mip.legprices import LegPrices
 from netsp.mip.mip_policy import CoverPolicy, MipPolicy, TimePolicy
 from netsp.mip.mip_solver import MipRun, Params, solve
-from netsp.mip.parity_cuts import odd_letters, parity_cuts
+from netsp.mip.parity_cuts import odd_numbers, parity_cuts
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
 from netsp.plan.random_worlds import random_world
 from netsp.plan.solve_policy import RoutePolicy, SolvePolicy
+from netsp.roadmap.travel_graph import TravelGraph
 from tests.brute import brute_tour
 from tests.cut_points import all_legs, small, tours_as_points, towers
 from tests.travel_graphs import random_graph
@@ -122,8 +122,8 @@ def test_a_ring_that_lies_on_two_sheets_by_halves_is_cut():
 @pytest.mark.parametrize("seed", range(4))
 def test_ways_are_the_shortest_legs_of_their_parity(seed):
     graph = travel_graph(small(seed, tether_length=150.0))
-    ways = graph.ways_by_parity()
-    odd, cluster = odd_letters(graph.signatures, ways.obstacles), graph.cluster
+    ways = graph.parity_oracle(lambda: False)
+    odd, cluster = odd_numbers(graph.labels, ways.obstacles), graph.cluster
     best = {}
     for u, v in itertools.combinations(range(len(graph)), 2):
         a, b = sorted((int(cluster[u]), int(cluster[v])))
@@ -203,11 +203,11 @@ def test_two_sheets_know_that_a_ring_around_an_obstacle_is_no_tour(kind):
     """The tour over shortest paths goes around once; one that is not entangled leaves out a piece
     of the ring and returns."""
     graph = travel_graph(around())
-    best, odd = solve_graph(graph, "auto"), odd_letters(graph.signatures)
+    best, odd = solve_graph(graph, "auto"), odd_numbers(graph.labels)
     assert bound_over_goals(graph, proven_goals, Limits()).bound < 0.9 * best.length
     tower = (
         ClassCovers(graph.costs, graph.cluster, odd) if kind == "classes"
-        else PathCovers(graph.ways_by_parity(), np.inf)
+        else PathCovers(graph.parity_oracle(lambda: False), np.inf)
     )  # fmt: skip
     stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour]
     found = refine_covers(tower, stops, best.length, Limits())
@@ -325,7 +325,7 @@ def test_with_too_many_classes_for_a_matrix_covers_bound_the_tour(seed, monkeypa
 
 def test_more_obstacles_than_a_word_of_the_machine_has_bits():
     rows = np.array([[1 << 63, 1], [0, 1 << 5]], dtype=np.uint64)
-    ways = WaysByParity(np.array([(0, 1), (0, 2)]), rows, np.array([1.0, 2.0]), 9.0, 70)
+    ways = ParityDistances(np.array([(0, 1), (0, 2)]), rows, np.array([1.0, 2.0]), 9.0, 70)
     assert [np.flatnonzero(o).tolist() for o in ways.odd_of(np.arange(2))] == [[63, 64], [69]]
     cells = PathCovers(ways, np.inf).cells((64, 69))
     assert list(zip(cells.cluster, cells.code, strict=True)) == [(0, 0), (1, 1), (2, 2)]

@@ -14,11 +14,11 @@ from netsp.base.clock import Clock
 from netsp.base.errors import MemoryLimitError
 from netsp.gtsp.gtsp_policy import CostPolicy, GtspPolicy
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.search import Instance, Search
+from netsp.gtsp.search import LayeredInstance, Search
 from netsp.mip.flows import Edges, min_cuts
 from netsp.mip.mip_policy import MipPolicy
 from netsp.mip.mip_solver import MipRun
-from netsp.mip.subtours import cover_branches
+from netsp.mip.subtours import label_families
 from netsp.plan.solve_policy import RoutePolicy, SolvePolicy, SubsetPolicy
 from netsp.roadmap.slits import _taut_string, build_slits, slit_lengths
 from netsp.roadmap.taut import TautRoadmap
@@ -170,7 +170,7 @@ def test_the_clusters_with_a_cut_below_enough_are_those_of_networkx(seed):
 
 def test_branches_are_the_prefixes_of_words():
     words = [(), (1,), (1, 2), (1, 2, 3), (-1,), (-1, 2)]
-    found = {tuple(np.flatnonzero(row).tolist()) for row in cover_branches(words)}
+    found = {tuple(np.flatnonzero(row).tolist()) for row in label_families(words)}
     assert found == {(1, 2, 3), (2, 3), (4, 5)}
 
 
@@ -190,7 +190,7 @@ def test_nothing_that_is_ruled_out_is_in_the_optimum(seed):
 @given(st.integers(0, 10_000), st.integers(2, 7))
 def test_the_search_keeps_its_length_and_never_beats_brute_force(seed, goals):
     graph = random_graph(seed, goals=goals)
-    search = Search(Instance.of_graph(graph), np.random.default_rng(seed))
+    search = Search(LayeredInstance.of_graph(graph), np.random.default_rng(seed))
     search.settle()
     settled = search.best_length
     search.run(50, Clock(None))
@@ -367,7 +367,7 @@ def test_no_leg_is_shorter_than_the_way_between_its_goals_in_any_class(problem, 
         graph = travel_graph(problem, roadmap, **options)
     except NetspError:  # a goal out of reach
         return
-    least = graph.between_goals()
+    least = graph.distances_between_goals()
     for a, b in itertools.combinations(range(graph.goal_count + 1), 2):
         legs = graph.costs[np.ix_(graph.members(a), graph.members(b))]
         assert least[a, b] <= legs.min() * (1 + 1e-9)
@@ -378,6 +378,9 @@ def test_no_leg_is_shorter_than_the_way_between_its_goals_in_any_class(problem, 
 def test_what_was_not_looked_at_in_time_bounds_nothing():
     graph = travel_graph(random_world(0, goals=20, tether=300.0))
     looked = iter([False, True])
-    part, whole = graph.between_goals(lambda: next(looked)), graph.between_goals()
+    part, whole = (
+        graph.distances_between_goals(lambda: next(looked)),
+        graph.distances_between_goals(),
+    )
     assert (part <= whole).all()
     assert 0 < (part == 0.0).sum() < part.size

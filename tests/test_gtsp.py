@@ -177,7 +177,7 @@ def test_geographical_distances_are_those_of_the_published_optimum(tmp_path):
         tmp_path, "NAME: ulysses16.tsp", "TYPE: TSP", "DIMENSION: 16", "EDGE_WEIGHT_TYPE: GEO",
         "DISPLAY_DATA_TYPE: COORD_DISPLAY", "NODE_COORD_SECTION", *rows, "EOF",
     )  # fmt: skip
-    found = solve_graph(load(path).to_travel_graph())
+    found = solve_graph(load(path).to_instance())
     assert (found.length, found.status) == (6859.0, Status.OPTIMAL)
 
 
@@ -260,7 +260,7 @@ def test_the_command_writes_a_tour_whose_length_adds_up(tmp_path, capsys):
 
 def test_the_picture_shows_every_vertex_and_the_tour():
     instance = load(RING)
-    found = solve_graph(instance.to_travel_graph())
+    found = solve_graph(instance.to_instance())
     ax = draw_gtsp(instance, found)
     drawn = {line.get_label(): line.get_xydata() for line in ax.lines}
     assert (drawn["vertex, with its cluster"] == instance.places).all()
@@ -326,7 +326,7 @@ def test_least_costs_between_clusters_are_those_of_their_vertices():
     clusters = np.r_[0, clusters]
     costs = rng.random((21, 21))
     graph = TravelGraph.from_costs(costs + costs.T, clusters)
-    between = graph.between_goals()
+    between = graph.distances_between_goals()
     for a, b in itertools.permutations(range(6), 2):
         assert between[a, b] == graph.costs[clusters == a][:, clusters == b].min()
     assert not between.diagonal().any()

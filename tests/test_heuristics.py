@@ -10,11 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, NetspError, Polygon, Problem, solve_graph
-from netsp.anneal import icra2017, rss2016
+from netsp.anneal import icra2017
 from netsp.base.compiled.rng import seeded, uniform
 from netsp.gtsp.gtsp_policy import CostPolicy
-from netsp.gtsp.search import Instance
+from netsp.gtsp.search import LayeredInstance
 from netsp.hsignature import concatenate, entangled, signature
+from netsp.plan import rss2016
 from netsp.plan.random_worlds import random_world as papers_world
 from netsp.plan.solve_problem import travel_graph
 from netsp.plan.solver_table import ROADMAPS
@@ -83,7 +84,7 @@ def test_reduced_mip_is_optimal_over_the_classes_of_least_tether(seed):
 @given(st.integers(0, 1000), st.integers(1, 7), st.floats(0.01, 10.0))
 def test_the_annealed_length_is_that_of_the_tour(seed, goals, theta):
     g = random_graph(seed, goals=goals)
-    instance = Instance.of_graph(g)
+    instance = LayeredInstance.of_graph(g)
     rng = np.random.default_rng(seed)
     tour = np.zeros(goals + 1, dtype=np.int64)
     for k, c in enumerate(rng.permutation(np.arange(1, goals + 1))):

@@ -101,7 +101,7 @@ def test_states_of_unknown_turning_are_left_out_and_no_bound_claims_them(fails):
         part = limit_turning(PROBLEM, graph, 100.0)
     assert len(part) == len(graph) - 1
     assert part.scope.value == "kept_classes"
-    assert part.least_left_out == graph.tethers[shortest]
+    assert part.min_tether_left_out == graph.tethers[shortest]
     fails(lambda b, word: b == 1)
     with pytest.warns(LeftOutWarning), pytest.raises(LimitReachedError, match="it is unknown how"):
         limit_turning(PROBLEM, graph, 100.0)

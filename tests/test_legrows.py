@@ -20,7 +20,7 @@ from netsp.mip.covers import refine_covers
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.mip_policy import CoverPolicy, MipPolicy
-from netsp.mip.parity_cuts import odd_letters
+from netsp.mip.parity_cuts import odd_numbers
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
 from netsp.model.problem import State
@@ -191,8 +191,8 @@ def over_ways(seed, coarse_covers=3):
     """A small world, its best tour, and what covers of ways prove with a tour 2 % longer."""
     graph = travel_graph(small(seed, tether_length=150.0))
     best = solve_graph(graph, "auto")
-    ways = graph.ways_by_parity()
-    odd = odd_letters(graph.signatures, ways.obstacles)
+    ways = graph.parity_oracle(lambda: False)
+    odd = odd_numbers(graph.labels, ways.obstacles)
     stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour]
     seen = []
 
@@ -377,9 +377,9 @@ def test_legs_in_blocks_are_those_rounded_and_ways_no_longer(kind):
             assert np.allclose(costs, expected[rows], rtol=3e-7)
         assert seen.sum() == (len(graph) if asked is None else 23)
         assert (seen[slice(None) if asked is None else asked] == 1).all()
-    ways = graph.ways_by_parity()
-    assert graph.knows_ways
-    odd = odd_letters(graph.signatures, ways.obstacles)
+    ways = graph.parity_oracle(lambda: False)
+    assert graph.parity_oracle is not None
+    odd = odd_numbers(graph.labels, ways.obstacles)
     tower = PathCovers(ways, np.inf)
     cells = tower.cells(tuple(range(ways.obstacles)))
     own = cells.cells_of(graph.cluster, odd)

@@ -9,7 +9,7 @@ from netsp.base.clock import Clock
 from netsp.base.compiled.rng import seeded
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.search.descent import descend, two_opt
-from netsp.gtsp.search.layers import Instance, best_classes
+from netsp.gtsp.search.layers import LayeredInstance, best_classes
 from netsp.gtsp.search.links import Tables, best_place, link, no_links, put, take_out, write_order
 from netsp.gtsp.search.lns_solver import Params, solve
 from netsp.gtsp.search.local_search import Search
@@ -150,7 +150,7 @@ def _begun(seed, goals, places):
 def _random_instance(rng, goals, places):
     cluster = np.concatenate([[0], np.repeat(np.arange(1, goals + 1), rng.integers(1, 5, goals))])
     where = rng.integers(0, places + 1, (len(cluster), 2)).astype(float)
-    return Instance(cluster, np.hypot(*(where[:, None] - where[None]).T))
+    return LayeredInstance(cluster, np.hypot(*(where[:, None] - where[None]).T))
 
 
 def _some_precedences(rng, order):
@@ -247,7 +247,7 @@ def _settled(rng, kind, clock=None):
     goals = int(rng.integers(3, 12))
     cluster = np.concatenate([[0], np.repeat(np.arange(1, goals + 1), rng.integers(1, 4))])
     costs = np.triu(COSTS[kind](rng, (len(cluster), len(cluster))), 1)
-    i = Instance(cluster, costs + costs.T)
+    i = LayeredInstance(cluster, costs + costs.T)
     order = np.concatenate([[0], 1 + rng.permutation(goals)])
     search = Search(i, rng, order, clock)
     search.settle()

@@ -388,7 +388,7 @@ def test_no_row_over_few_classes_claims_a_bound_on_all_tours(restricted, most, s
     rows, text = [], io.StringIO()
     params = {"policy": FEW_CLASSES} if solver == "auto" else None
     graph = travel_graph(problem, max_classes=most)
-    assert not graph.complete
+    assert not graph.is_complete
     with ProgressTable(text) as table:
         found = solve_graph(
             graph,

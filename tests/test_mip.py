@@ -23,7 +23,6 @@ from netsp.gtsp.limits import Limits
 from netsp.gtsp.params import read_params
 from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.travel.costs import rounded_down
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip import root
 from netsp.mip import solve as mip
 from netsp.mip.cbc_program import CbcRelaxation
@@ -42,6 +41,7 @@ from netsp.mip.subtours import components, fractional_cuts, goal_cuts, strongest
 from netsp.model.solution import Status
 from netsp.plan.random_worlds import random_world as far_world
 from netsp.roadmap.taut import TautRoadmap
+from netsp.roadmap.travel_graph import TravelGraph
 from tests.brute import brute_tour as brute
 from tests.travel_graphs import bound_legs_first, random_graph
 from tests.worlds import costs_of, random_world
@@ -656,7 +656,7 @@ def test_one_trees_come_near_the_tour_of_many_places():
 
 def test_between_goals_straight_lines_bound_legs_when_there_is_no_time():
     graph = travel_graph(far_world(0, goals=6, tether_length=300.0))
-    hurried, whole = graph.between_goals(lambda: True), graph.between_goals()
+    hurried, whole = graph.distances_between_goals(lambda: True), graph.distances_between_goals()
     assert (hurried[~np.eye(7, dtype=bool)] > 0.0).all()
     assert (hurried <= whole * (1 + 1e-9)).all()
     legs = np.isfinite(graph.costs)

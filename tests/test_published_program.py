@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from netsp import InputError, solve_graph
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip.cbc_program import CbcInteger
 from netsp.model.solution import Status
+from netsp.roadmap.travel_graph import TravelGraph
 from tests.brute import brute_tour
 from tests.travel_graphs import random_graph
 

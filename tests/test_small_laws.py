@@ -47,7 +47,6 @@ from netsp.exchange.missions.waypoints import (
 )
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.solver_run import SolverRun
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.kept import with_bound, with_classes_left_out
 from netsp.gtsp.travel.result import Result, proven, relative_gap
 from netsp.hsignature.words import concatenate, cyclically_reduced, entangled, invert, reduce
@@ -76,6 +75,7 @@ from netsp.online.guard.telemetry import Fix
 from netsp.online.link.vehicle_kind import VehicleKind
 from netsp.plan.cover.choose import choose_greedily, counting_bound, prune
 from netsp.plan.tour_plan import HOME, Leg
+from netsp.roadmap.travel_graph import TravelGraph
 
 # words
 

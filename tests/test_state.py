@@ -81,7 +81,7 @@ def test_from_a_state_there_is_a_bound_whatever_the_time(seed):
     found = solve_graph(graph_from_state(left), "auto", time_limit=clock)
     assert 0.2 * best < found.lower_bound <= best <= found.length
     legs = graph_from_state(left)
-    bounds, costs = legs.between_goals(), legs.costs
+    bounds, costs = legs.distances_between_goals(), legs.costs
     least = np.array([
         [costs[np.ix_(legs.members(a), legs.members(b))].min() for b in range(len(bounds))]
         for a in range(len(bounds))

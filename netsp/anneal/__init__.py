@@ -1,6 +1,8 @@
-"""Simulated annealing, as in the papers of 2017 (on the travel graph) and 2016 (on free paths)."""
+"""Simulated annealing, as in the paper of 2017."""
 
 from netsp.anneal.icra2017 import solve
-from netsp.anneal.rss2016 import solve as solve_2016
+from netsp.base.deprecated import deprecated_names
 
-__all__ = ["solve", "solve_2016"]
+__all__ = ["solve"]
+
+__getattr__ = deprecated_names(globals(), solve_2016="netsp.plan.rss2016:solve")

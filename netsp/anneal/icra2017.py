@@ -20,11 +20,11 @@ from netsp.anneal.cooling import Cooling, Schedule
 from netsp.base.arrays import Floats, Ints
 from netsp.base.compiled.kernel import kernel
 from netsp.base.compiled.rng import below, metropolis, seeded
+from netsp.gtsp.instance import Instance
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.search.layers import Instance
+from netsp.gtsp.search.layers import LayeredInstance
 from netsp.gtsp.search.lns_solver import max_classes_per_goal, search_core
 from netsp.gtsp.solver_run import SolverRun
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
 
 
@@ -58,7 +58,7 @@ class Params(Cooling):
                 raise ValueError(f"option {name!r}: expected 1 or more, got {getattr(self, name)}")
 
 
-def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
+def solve(graph: Instance, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Anneal as in the 2017 paper, from a random tour or the warm start, without a lower bound.
 
     An iteration is one proposal. Source: McCammon & Hollinger 2017, section IV-D.
@@ -78,7 +78,7 @@ def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     run.check()
     graph = run.graph
     core = search_core(run, max_classes_per_goal(graph, chosen.max_vertices))
-    instance = Instance.among(graph, core)
+    instance = LayeredInstance.among(graph, core)
     goals = graph.goal_count
     state = np.zeros(goals + 1, dtype=np.int64)
     if warm:

@@ -12,7 +12,6 @@ from netsp.app.app_policy import AppPolicy
 from netsp.app.facts import bound_message, facts, needed, plain, shortest_sufficient
 from netsp.base.clock import Clock
 from netsp.base.errors import InfeasibleError, InputError, NetspError
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Progress
 from netsp.judge import checked
 from netsp.model.problem import Problem
@@ -20,6 +19,7 @@ from netsp.model.solution import Solution, Status
 from netsp.plan.answer import to_solution
 from netsp.plan.solve_problem import DEFAULT_SOLVER, solve_over, travel_graph
 from netsp.plan.warm_start import old_tour
+from netsp.roadmap.travel_graph import TravelGraph
 
 
 class VersionSolver:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from types import ModuleType
 
 MOVED = {
+    "anneal.rss2016": "plan.rss2016",
     "app.files": "app.served_files",
     "app.frame": "app.view_box",
     "app.space": "app.space_preview",
@@ -62,6 +63,12 @@ MOVED = {
     "gtsplib": "gtsp.gtsplib",
     "gtsplib.read": "gtsp.gtsplib.gtsp_file",
     "gtsplib.tour": "gtsp.gtsplib.tour_file",
+    "greedy.blind": "plan.greedy_blind",
+    "gtsp.greedy.blind": "plan.greedy_blind",
+    "gtsp.travel.choices": "roadmap.goal_choices",
+    "gtsp.travel.graph": "roadmap.travel_graph",
+    "gtsp.travel.leg_provider": "roadmap.leg_provider",
+    "gtsp.travel.tether_blind_legs": "roadmap.tether_blind_legs",
     "guard": "online.guard",
     "guard.ahead": "online.guard.lookahead",
     "guard.fix": "online.guard.telemetry",
@@ -193,8 +200,10 @@ MOVED = {
     "space.water": "plan.space.planning_context",
     "steps": "base.progress",
     "travel": "gtsp.travel",
-    "travel.detours": "gtsp.travel.tether_blind_legs",
-    "travel.legs": "gtsp.travel.leg_provider",
+    "travel.choices": "roadmap.goal_choices",
+    "travel.detours": "roadmap.tether_blind_legs",
+    "travel.graph": "roadmap.travel_graph",
+    "travel.legs": "roadmap.leg_provider",
     "travel.ways": "gtsp.travel.parity_distances",
     "worlds": "plan.random_worlds",
 }

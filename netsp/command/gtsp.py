@@ -14,7 +14,7 @@ from netsp.command.command_clock import command_clock
 from netsp.command.command_options import given_params
 
 if TYPE_CHECKING:
-    from netsp.gtsp.gtsplib import Instance
+    from netsp.gtsp.gtsplib import GtsplibInstance
     from netsp.gtsp.travel.result import Result
 
 
@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(
             f"--plot: {args.instance} is given by its distances, so there is nothing to draw"
         )
-    graph = instance.to_travel_graph()
+    graph = instance.to_instance()
     begin = time.monotonic()
     table = None if args.quiet else ProgressTable(sys.stderr, args.policy)
     with table or contextlib.nullcontext():
@@ -85,7 +85,9 @@ def _summary(result: Result, spent: float, output: str | None, plot: str | None)
     return "\n".join(lines)
 
 
-def _summary_for_programs(instance: Instance, result: Result, spent: float) -> dict[str, object]:
+def _summary_for_programs(
+    instance: GtsplibInstance, result: Result, spent: float
+) -> dict[str, object]:
     """Return the result for programs."""
     return {
         "instance": instance.name,

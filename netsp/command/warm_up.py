@@ -129,12 +129,11 @@ def steps() -> Iterator[Step]:
     from netsp.base.errors import InputError, LimitReachedError
     from netsp.gtsp.limits import Limits
     from netsp.gtsp.sparse_costs import SparseCosts
-    from netsp.gtsp.travel.graph import TravelGraph
     from netsp.judge import verify
     from netsp.mip.cover_costs import ClassCovers, PathCovers
     from netsp.mip.covers import refine_covers
     from netsp.mip.deadlegs import DeadLegs
-    from netsp.mip.parity_cuts import odd_letters
+    from netsp.mip.parity_cuts import odd_numbers
     from netsp.mip.prices import Prices
     from netsp.mip.program import Duals
     from netsp.online.fly.flight_rehearsal import rehearse
@@ -143,6 +142,7 @@ def steps() -> Iterator[Step]:
     from netsp.plan.solve_problem import solve, solve_graph, travel_graph
     from netsp.plan.solver_table import SOLVERS
     from netsp.plan.space.mission_solver import solve_mission
+    from netsp.roadmap.travel_graph import TravelGraph
     from netsp.world import ReactTether, Scene
     from netsp.world.mission.equipment import TetherPhysics
     from netsp.world.mission.mission import Mission
@@ -178,7 +178,7 @@ def steps() -> Iterator[Step]:
         )
         rows.add_above(none, np.zeros((1, 1), dtype=bool))
         rows.nearest_legs(1)
-        odd = odd_letters(graph.signatures)
+        odd = odd_numbers(graph.labels)
         tower = ClassCovers(rows, graph.cluster, odd)
         cells = tower.cells(())
         tower.costs(cells)
@@ -198,7 +198,8 @@ def steps() -> Iterator[Step]:
         graph = travel_graph(random_world(3, goals=4, tether_length=200.0))
         best = solve_graph(graph, "mip")
         assert best.length is not None
-        odd, paths = odd_letters(graph.signatures), graph.ways_by_parity()
+        assert graph.parity_oracle is not None
+        odd, paths = odd_numbers(graph.labels), graph.parity_oracle(lambda: False)
         assert paths is not None
         stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour or ()]
         for tower in ClassCovers(graph.costs, graph.cluster, odd), PathCovers(paths, np.inf):

@@ -20,10 +20,10 @@ import numpy.typing as npt
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.ram import check_available
 from netsp.gtsp.gtsp_policy import CostPolicy
+from netsp.gtsp.instance import Instance
 from netsp.gtsp.nearest_index import NearestIndex
 from netsp.gtsp.sparse_costs import SparseCosts
 from netsp.gtsp.travel.costs import rounded_down
-from netsp.gtsp.travel.graph import TravelGraph
 
 NO_VALUES: Floats = np.zeros((0, 0), dtype=np.float32)  # type: ignore[assignment]
 """Matrix where costs are sparse."""
@@ -49,11 +49,7 @@ class CostMatrix:
     """
 
     def __init__(
-        self,
-        graph: TravelGraph,
-        rows: SparseCosts | None = None,
-        *,
-        policy: CostPolicy = CostPolicy(),
+        self, graph: Instance, rows: SparseCosts | None = None, *, policy: CostPolicy = CostPolicy()
     ) -> None:
         self.graph, self.rows, self.policy = graph, rows, policy
         self._was_sparse = rows is not None  # then legs of the incumbent may be missing

@@ -45,10 +45,10 @@ class CostOracle(ABC):
 
     @abstractmethod
     def lengths(
-        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+        self, vertices: Ints, wanted: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
         """Return symmetric costs (k, k) among vertices; inf within a cluster, and anything where
-        `asked` (k, k, symmetric) is false.
+        `wanted` (k, k, symmetric) is false.
 
         Raises LimitReachedError if the clock is up before many are measured.
         """
@@ -72,9 +72,9 @@ class CostOracle(ABC):
         """Return the costs (k,) of single legs between vertices of different clusters."""
         chosen, at = np.unique(np.concatenate([us, vs]), return_inverse=True)
         i, j = at[: len(us)], at[len(us) :]
-        asked = np.zeros((len(chosen), len(chosen)), dtype=bool)
-        asked[i, j] = asked[j, i] = True
-        return np.asarray(self.lengths(chosen, asked, clock)[i, j])
+        wanted = np.zeros((len(chosen), len(chosen)), dtype=bool)
+        wanted[i, j] = wanted[j, i] = True
+        return np.asarray(self.lengths(chosen, wanted, clock)[i, j])
 
     def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
         """Return the costs (k, k) among vertices in single precision, rounded down."""
@@ -103,7 +103,7 @@ class MatrixCosts(CostOracle):
         return Estimate(self.cost_policy.s_per_copied_leg * k * k, 8.0 * k * k)
 
     def lengths(
-        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+        self, vertices: Ints, wanted: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
         """Return the costs (k, k) among vertices."""
         return self.costs[np.ix_(vertices, vertices)]

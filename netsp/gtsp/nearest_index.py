@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from netsp.base.arrays import Bools, Ints
-from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.instance import Instance
 
 NO_VERTICES: Ints = np.zeros(0, dtype=np.int64)
 
@@ -24,7 +24,7 @@ class NearestIndex:
         Graph whose legs can be found in blocks.
     """
 
-    def __init__(self, graph: TravelGraph) -> None:
+    def __init__(self, graph: Instance) -> None:
         self._graph = graph
         self._rows, self._costs = NO_VERTICES, np.zeros((0, len(graph)), np.float32)
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from netsp.base.arrays import Floats, Ints
 from netsp.gtsp.gtsp_policy import NeighbourhoodPolicy
-from netsp.gtsp.travel.graph import least_tethers
+from netsp.gtsp.instance import cheapest_per_cluster
 
 
 def cheapest_insertions(bounds: Floats, tour: npt.ArrayLike, cluster: Ints, count: int) -> Ints:
@@ -78,6 +78,6 @@ def classes_near_tour(
     ndarray of int
         Vertices in order, the tour's among them.
     """
-    near_base = least_tethers(base_costs, cluster, max(1, count // policy.near_tour_ratio))
+    near_base = cheapest_per_cluster(base_costs, cluster, max(1, count // policy.near_tour_ratio))
     near_tour = cheapest_insertions(bounds, tour, cluster, count)
     return np.unique(np.concatenate([near_base, near_tour, np.asarray(tour, dtype=np.int64)]))

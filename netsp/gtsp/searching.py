@@ -21,13 +21,13 @@ from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
 from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.gtsp_policy import GtspPolicy
+from netsp.gtsp.instance import Instance, cheapest_per_cluster
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.neighbourhood import classes_near_tour
 from netsp.gtsp.resumable import Steps, run_to_end
-from netsp.gtsp.search.layers import Instance
+from netsp.gtsp.search.layers import LayeredInstance
 from netsp.gtsp.search.local_search import Search
 from netsp.gtsp.solver_run import BOUND_ROUNDING, RunStopped, SolverRun
-from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
 
 
@@ -54,7 +54,7 @@ class SearchingRun(SolverRun):
 
     def __init__(
         self,
-        graph: TravelGraph,
+        graph: Instance,
         limits: Limits | None = None,
         *,
         search_rounds: int = 500,
@@ -66,7 +66,7 @@ class SearchingRun(SolverRun):
         self.outer: tuple[SearchingRun, Ints] | None = None
         self.local_optima: list[tuple[int, ...]] = []
         self.bound = 0.0
-        self._whole: tuple[int, Instance] | None = None
+        self._whole: tuple[int, LayeredInstance] | None = None
 
     def find_first_tour(self) -> None:
         """Search for a tour among few vertices, before legs are bounded.
@@ -76,9 +76,9 @@ class SearchingRun(SolverRun):
         """
         graph, policy = self.graph, self.gtsp_policy
         is_small = len(graph) <= policy.costs.max_measured_vertices
-        if self.tour is not None or is_small or not graph.roadmapped:
+        if self.tour is not None or is_small or graph.has_cost_matrix:
             return
-        core = least_tethers(
+        core = cheapest_per_cluster(
             graph.costs_to_base, graph.cluster, policy.proof_search.first_tour_vertices
         )
         search = Search(self.instance_among(core), self.rng, clock=self.clock)
@@ -96,7 +96,9 @@ class SearchingRun(SolverRun):
         """
         graph, policy = self.graph, self.gtsp_policy.proof_search
         clock = self.clock.part(policy.search_time_share)
-        core = least_tethers(graph.costs_to_base, graph.cluster, self.searched_classes_per_goal)
+        core = cheapest_per_cluster(
+            graph.costs_to_base, graph.cluster, self.searched_classes_per_goal
+        )
         vain = 0
         for _ in range(policy.max_searches):
             before = self.length
@@ -143,7 +145,9 @@ class SearchingRun(SolverRun):
             The incumbent, if there is one, and the tour of each search.
         """
         graph = self.graph
-        core = least_tethers(graph.costs_to_base, graph.cluster, self.searched_classes_per_goal)
+        core = cheapest_per_cluster(
+            graph.costs_to_base, graph.cluster, self.searched_classes_per_goal
+        )
         if self.tour is not None:
             core = np.union1d(core, self.classes_near_incumbent())
         instance = self.instance_among(core)
@@ -173,9 +177,9 @@ class SearchingRun(SolverRun):
             self.gtsp_policy.neighbourhood,
         )
 
-    def instance_among(self, vertices: Ints) -> Instance:
+    def instance_among(self, vertices: Ints) -> LayeredInstance:
         """Return the instance of some vertices that a search sees."""
-        return Instance.among(self.graph, vertices, self.gtsp_policy.local_search)
+        return LayeredInstance.among(self.graph, vertices, self.gtsp_policy.local_search)
 
     @contextmanager
     def core(self) -> Iterator[Self | None]:
@@ -190,10 +194,10 @@ class SearchingRun(SolverRun):
             The run; None if a core is too large a part of all vertices to pay.
         """
         graph, policy = self.graph, self.gtsp_policy
-        core = least_tethers(graph.costs_to_base, graph.cluster, self.core_classes_per_goal)
+        core = cheapest_per_cluster(graph.costs_to_base, graph.cluster, self.core_classes_per_goal)
         ratio = policy.proof_search.core_ratio(graph.goal_count)
         few = len(graph) <= max(policy.costs.max_measured_vertices, ratio * len(core))
-        if few or not graph.roadmapped or self.outer is not None:
+        if few or graph.has_cost_matrix or self.outer is not None:
             yield None
             return
         near = self.search_near_incumbent()
@@ -212,7 +216,7 @@ class SearchingRun(SolverRun):
         finally:
             self.iterations += inner.iterations
 
-    def run_over(self, graph: TravelGraph, limits: Limits) -> Self:
+    def run_over(self, graph: Instance, limits: Limits) -> Self:
         """Return a run over another graph with the same settings."""
         return type(self)(graph, limits, search_rounds=self.search_rounds, policy=self.gtsp_policy)
 
@@ -253,10 +257,10 @@ class SearchingRun(SolverRun):
     def searches_all_vertices(self, costs: CostMatrix) -> bool:
         """Return whether a search sees all remaining vertices."""
         few = len(costs) <= self.gtsp_policy.proof_search.max_whole_search
-        few = few or not self.graph.roadmapped
+        few = few or self.graph.has_cost_matrix
         return costs.exact is None and costs.rows is None and few
 
-    def instance(self, costs: CostMatrix, more: Ints) -> Instance:
+    def instance(self, costs: CostMatrix, more: Ints) -> LayeredInstance:
         """Return the instance that is searched.
 
         It holds all remaining vertices if they are few. Otherwise it holds those near the base or
@@ -266,7 +270,7 @@ class SearchingRun(SolverRun):
         if self.searches_all_vertices(costs):
             if self._whole is None or self._whole[0] != len(costs):
                 values = np.asarray(costs.values, dtype=np.float64)
-                whole = Instance(
+                whole = LayeredInstance(
                     costs.cluster, values, costs.vertices, self.graph.before, policy.local_search
                 )
                 self._whole = len(costs), whole
@@ -275,14 +279,14 @@ class SearchingRun(SolverRun):
         own = np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
         count = self.searched_classes_per_goal
         if self.tour is None:
-            near = least_tethers(base_costs, costs.cluster, count)
+            near = cheapest_per_cluster(base_costs, costs.cluster, count)
         else:
             bounds = costs.lower_bounds_from(own)
             near = classes_near_tour(
                 base_costs, costs.cluster, bounds, own, count, policy.neighbourhood
             )
         core = np.unique(np.concatenate([near, own, more]))
-        return Instance(
+        return LayeredInstance(
             costs.cluster[core],
             costs.among(core),
             costs.vertices[core],
@@ -303,11 +307,11 @@ class SearchingRun(SolverRun):
             if self.searches_all_vertices(costs) or clock.is_up or vain == policy.max_vain_searches:
                 break
 
-    def _search(self, instance: Instance, clock: Clock, *, rounded: bool = False) -> None:
+    def _search(self, instance: LayeredInstance, clock: Clock, *, rounded: bool = False) -> None:
         run_to_end(self.search_steps(instance, clock, rounded=rounded))
 
     def search_steps(
-        self, instance: Instance, clock: Clock, *, rounded: bool = False
+        self, instance: LayeredInstance, clock: Clock, *, rounded: bool = False
     ) -> Steps[None]:
         """Search an instance from the incumbent, with a step for each temperature."""
         start = None if self.tour is None else self.graph.cluster[list(self.tour)]

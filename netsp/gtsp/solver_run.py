@@ -13,8 +13,8 @@ from netsp.base.arrays import Ints
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError, LimitReachedError, MemoryLimitError, is_interrupt
 from netsp.gtsp.gtsp_policy import CostPolicy
+from netsp.gtsp.instance import BaselessInstance, Instance, cheapest_per_cluster
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.travel.graph import BaselessGraph, TravelGraph, least_tethers
 from netsp.gtsp.travel.result import Progress, Result, proven
 from netsp.model.bound_scope import LowerBound
 from netsp.model.solution import Status
@@ -48,10 +48,10 @@ class SolverRun:
     """
 
     def __init__(
-        self, graph: TravelGraph, limits: Limits | None = None, *, policy: CostPolicy = CostPolicy()
+        self, graph: Instance, limits: Limits | None = None, *, policy: CostPolicy = CostPolicy()
     ) -> None:
         limits = limits or Limits()
-        if isinstance(graph, BaselessGraph):
+        if isinstance(graph, BaselessInstance):
             raise InputError("graph: has no base; expected solve_graph to be called with it")
         # compiled loops rely on a vertex in every cluster
         lost = np.flatnonzero(np.bincount(graph.cluster) == 0)
@@ -105,7 +105,7 @@ class SolverRun:
         a baseline that shows nothing except its own tour.
         """
         try:
-            if not blind and not self.graph.complete and self.clock.limit is not None:
+            if not blind and not self.graph.is_complete and self.clock.limit is not None:
                 # a roadmap that was cut short is too large for anything to be quick
                 self.ensure_tour()
             yield
@@ -146,9 +146,9 @@ class SolverRun:
         takes long to measure, it returns to the base after each.
         """
         graph = self.graph
-        if self.tour is not None or not graph.roadmapped:
+        if self.tour is not None or graph.has_cost_matrix:
             return
-        core = least_tethers(graph.costs_to_base, graph.cluster, 1)
+        core = cheapest_per_cluster(graph.costs_to_base, graph.cluster, 1)
         if self.cost_policy.allows_single(graph.oracle.estimate(2).seconds):
             self._build_nearest_neighbour_tour(core)
         else:

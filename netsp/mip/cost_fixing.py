@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats
+from netsp.gtsp.instance import Instance
 from netsp.gtsp.sparse_costs import SparseCosts
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip.cover_bounds import CellBound
 from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.mip_policy import PricingPolicy
@@ -38,7 +38,7 @@ def max_leg_costs(
 
 
 def surviving_legs(
-    graph: TravelGraph,
+    graph: Instance,
     bound: CellBound,
     length: float,
     tour: Sequence[int],
@@ -52,7 +52,7 @@ def surviving_legs(
     tour
         Tour of that length, whose legs are kept in any case.
     odd
-        Result of `netsp.mip.parity_cuts.odd_letters`.
+        Result of `netsp.mip.parity_cuts.odd_numbers`.
 
     Raises
     ------

@@ -36,7 +36,7 @@ class Cells:
         Parameters
         ----------
         odd
-            Result of `netsp.mip.parity_cuts.odd_letters`.
+            Result of `netsp.mip.parity_cuts.odd_numbers`.
         """
         return self._places(cluster, packed(odd, self.obstacles))
 

@@ -15,7 +15,7 @@ import numpy as np
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.compiled.kernel import kernel
 from netsp.gtsp.sparse_costs import Rows, SparseCosts
-from netsp.gtsp.travel.parity_distances import WaysByParity
+from netsp.gtsp.travel.parity_distances import ParityDistances
 from netsp.mip.cover_bounds import Cells, packed
 
 
@@ -48,7 +48,7 @@ class ClassCovers:
     cluster
         (V,) cluster of each vertex.
     odd
-        Result of `netsp.mip.parity_cuts.odd_letters`.
+        Result of `netsp.mip.parity_cuts.odd_numbers`.
     """
 
     def __init__(self, costs: Floats | SparseCosts, cluster: Ints, odd: Bools) -> None:
@@ -156,19 +156,19 @@ class PathCovers:
 
     Parameters
     ----------
-    ways
+    paths
         Shortest paths between goals, by parity.
-    tether
-        Upper bound on the tether; goals are reached by paths up to that length.
+    max_length
+        Maximum length of a path from the base; goals are reached by paths up to it.
     """
 
-    def __init__(self, ways: WaysByParity, tether: float) -> None:
-        self._paths, self.obstacles = ways, ways.obstacles
-        self._odd = ways.odd_of(np.arange(len(ways.ends)))
-        reached = (ways.ends[:, 0] == 0) & (ways.length <= tether)
-        self._goal, self._at_goal = ways.ends[reached, 1], self._odd[reached]
-        self._size = int(ways.ends.max()) + 1
-        self._pair = ways.ends[:, 0] * self._size + ways.ends[:, 1]
+    def __init__(self, paths: ParityDistances, max_length: float) -> None:
+        self._paths, self.obstacles = paths, paths.obstacles
+        self._odd = paths.odd_of(np.arange(len(paths.ends)))
+        reached = (paths.ends[:, 0] == 0) & (paths.length <= max_length)
+        self._goal, self._at_goal = paths.ends[reached, 1], self._odd[reached]
+        self._size = int(paths.ends.max()) + 1
+        self._pair = paths.ends[:, 0] * self._size + paths.ends[:, 1]
         self._order = np.argsort(self._pair, kind="stable")
         pairs = np.arange(self._size**2 + 1)
         self._row = np.searchsorted(self._pair[self._order], pairs).astype(np.int64)

@@ -28,11 +28,11 @@ from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError, is_interrupt
 from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.cost_oracle import MatrixCosts
+from netsp.gtsp.instance import Instance, Label
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.resumable import Steps, run_to_end
 from netsp.gtsp.searching import SearchingRun
 from netsp.gtsp.solver_run import RunStopped
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip.cover_bounds import CellBound, Cells
 from netsp.mip.cover_costs import Covers
 from netsp.mip.cover_refinement import CoverRefinement
@@ -177,9 +177,7 @@ class _Level:
             np.array([g for g, _ in tour]), np.array([odd for _, odd in tour])
         )
         cluster = self.cells.cluster
-        graph = TravelGraph(
-            cluster, _words(self.cells), np.zeros(len(cluster)), MatrixCosts(costs, cluster)
-        )
+        graph = Instance(cluster, MatrixCosts(costs, cluster), _labels(self.cells))
         # tours over cells are none over classes: the incumbent is one over classes
         run = self.run = SearchingRun(graph, limits, policy=policy.gtsp)
         run.tour, run.length = tuple(self.cell_tour.tolist()), length
@@ -273,8 +271,8 @@ def _spread(flags: Bools, at: Ints, size: int) -> Bools:
     return out
 
 
-def _words(cells: Cells) -> list[tuple[int, ...]]:
-    """Return a word for each cell: a letter of each obstacle with an odd number of them."""
+def _labels(cells: Cells) -> list[Label]:
+    """Return a label for each cell: the obstacles on whose odd side it is."""
     return [
         tuple(i + 1 for j, i in enumerate(cells.obstacles) if code >> j & 1)
         for code in cells.code.tolist()

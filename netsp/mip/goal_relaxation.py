@@ -19,10 +19,10 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock
+from netsp.gtsp.instance import Instance, cheapest_per_cluster
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.resumable import Steps, run_to_end
 from netsp.gtsp.sparse_costs import SparseCosts
-from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.gtsp.travel.result import Result
 from netsp.mip.cost_fixing import PATH_ROUNDING, surviving_legs
 from netsp.mip.cover_bounds import CellBound, Cells, GoalBound
@@ -30,13 +30,13 @@ from netsp.mip.cover_costs import ClassCovers, Covers, PathCovers
 from netsp.mip.covers import ParityTour, cover_steps
 from netsp.mip.cuts import Cut
 from netsp.mip.mip_policy import GoalBoundPolicy, MipPolicy
-from netsp.mip.parity_cuts import odd_letters
+from netsp.mip.parity_cuts import odd_numbers
 
 OnBound = Callable[[float, int, Ints], Sequence[int] | None]
 """Callback for each better bound, with the bound, the number of cells, and the classes of shortest
 tether in the cells that the program's point visits. Returns a better tour, or None."""
 
-Prove = Callable[[TravelGraph, Limits], tuple[Result, Sequence[Cut]]]
+Prove = Callable[[Instance, Limits], tuple[Result, Sequence[Cut]]]
 """Solver that bounds, which returns its result and the cuts that it had in the end."""
 
 
@@ -67,7 +67,7 @@ class CoverCosts:
 
 
 def bound_over_goals(
-    graph: TravelGraph,
+    graph: Instance,
     prove: Prove,
     limits: Limits,
     tour: Sequence[int] | None = None,
@@ -86,7 +86,7 @@ def bound_over_goals(
 
 
 def goal_bound_steps(
-    graph: TravelGraph,
+    graph: Instance,
     prove: Prove,
     limits: Limits,
     tour: Sequence[int] | None = None,
@@ -96,7 +96,7 @@ def goal_bound_steps(
 ) -> Steps[GoalBound]:
     """Do what `bound_over_goals` does, with a step for each LP of a cover."""
     clock = Clock.from_limit(limits.time)
-    least = graph.between_goals(lambda: clock.is_up)
+    least = graph.distances_between_goals(lambda: clock.is_up)
     bound = one_tree_bound(_finite(least), lambda: clock.is_up, policy.goals)
     cuts: tuple[Cut, ...] = ()
     cells: CellBound | None = None
@@ -105,7 +105,7 @@ def goal_bound_steps(
         run = _CoverRun(graph, tour, replace(limits, time=clock), costs, on_bound, policy)
         cells = yield from run.steps()
     if cells is None or graph.goal_count < policy.goals.max_proven_goals:
-        over = TravelGraph.from_costs(least, range(graph.goal_count + 1))
+        over = Instance.from_costs(least, range(graph.goal_count + 1))
         programs = policy.goals.max_programs
         if limits.iterations is not None:
             programs = min(limits.iterations, programs)
@@ -118,14 +118,14 @@ def goal_bound_steps(
     return GoalBound(max(bound, over_cells), cuts, cells)
 
 
-def bound_by_one_trees(graph: TravelGraph, policy: GoalBoundPolicy = GoalBoundPolicy()) -> None:
+def bound_by_one_trees(graph: Instance, policy: GoalBoundPolicy = GoalBoundPolicy()) -> None:
     """Give a graph a first bound when no time is left, without measuring legs.
 
     It is that of a few 1-trees of straight lines between goals, or of the least costs between
     clusters.
     """
     if not graph.bound_in_any_class:
-        least = graph.between_goals(lambda: True)
+        least = graph.distances_between_goals(lambda: True)
         left = iter(range(policy.untimed_legs // least.size))
         bound = one_tree_bound(_finite(least), lambda: next(left, None) is None, policy)
         _raise_bound_in_any_class(graph, bound * (1.0 - PATH_ROUNDING))
@@ -137,7 +137,7 @@ def _finite(lengths: Floats) -> Floats:
     return np.asarray(np.minimum(lengths, longest))
 
 
-def _raise_bound_in_any_class(graph: TravelGraph, bound: float) -> None:
+def _raise_bound_in_any_class(graph: Instance, bound: float) -> None:
     graph.bound_in_any_class = max(graph.bound_in_any_class, bound)
 
 
@@ -146,7 +146,7 @@ class _CoverRun:
 
     def __init__(
         self,
-        graph: TravelGraph,
+        graph: Instance,
         tour: Sequence[int],
         limits: Limits,
         costs: CoverCosts,
@@ -179,13 +179,13 @@ class _CoverRun:
     def _first_covers(self, matrix: Floats | None) -> Covers | None:
         graph = self.graph
         if matrix is not None:
-            self.odd = odd_letters(graph.signatures)
+            self.odd = odd_numbers(graph.labels)
             return ClassCovers(matrix, graph.cluster, self.odd)
         share = self.clock.part(self.policy.covers.path_time_share)
-        paths = graph.ways_by_parity(lambda: share.is_up)
+        paths = graph.parity_oracle and graph.parity_oracle(lambda: share.is_up)
         if paths is None:
             return None
-        self.odd = odd_letters(graph.signatures, paths.obstacles)
+        self.odd = odd_numbers(graph.labels, paths.obstacles)
         return PathCovers(paths, np.inf)
 
     def _parity_tour(self) -> ParityTour:
@@ -199,7 +199,7 @@ class _CoverRun:
         cell = cells.cells_of(graph.cluster, self.odd)
         above = np.flatnonzero(np.isin(cell, visited))
         count = self.policy.covers.classes_per_cell
-        least = least_tethers(graph.costs_to_base[above], cell[above], count)
+        least = cheapest_per_cluster(graph.costs_to_base[above], cell[above], count)
         if not self.costs.is_over_kept_classes:
             _raise_bound_in_any_class(graph, bound)
         better = self.on_bound(bound, len(cells.cluster), above[least])

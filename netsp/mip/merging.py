@@ -19,13 +19,13 @@ import numpy as np
 from netsp.base.arrays import Ints
 from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
+from netsp.gtsp.instance import Instance
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.searching import SearchingRun
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
 from netsp.mip.mip_policy import MergingPolicy
 
-Prove = Callable[[TravelGraph, Limits], Result]
+Prove = Callable[[Instance, Limits], Result]
 """Solver that proves."""
 
 
@@ -60,13 +60,13 @@ def visited_classes(tours: Iterable[Sequence[int]]) -> Ints:
 
 
 def merged_tour(
-    graph: TravelGraph, tours: Sequence[Sequence[int]], prove: Prove, limits: Limits
+    graph: Instance, tours: Sequence[Sequence[int]], prove: Prove, limits: Limits
 ) -> list[int] | None:
     """Return the shortest tour through the classes of some tours that the limits allow to find."""
     if not tours:
         return None
     vertices = visited_classes(tours)
-    part = TravelGraph.from_costs(graph.costs_among(vertices), graph.cluster[vertices])
+    part = Instance.from_costs(graph.costs_among(vertices), graph.cluster[vertices])
     known = [np.searchsorted(vertices, t).tolist() for t in tours]
     found = prove(part, replace(limits, warm_start=min(known, key=part.tour_length)))
     return None if found.tour is None else vertices[list(found.tour)].tolist()

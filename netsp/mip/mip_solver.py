@@ -18,13 +18,13 @@ from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock
 from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.dp.dp_solver import bound_by_walks
+from netsp.gtsp.instance import Instance
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.resumable import Steps, run_to_end
 from netsp.gtsp.search import Search
 from netsp.gtsp.searching import SearchingRun
 from netsp.gtsp.solver_run import RunStopped
 from netsp.gtsp.sparse_costs import SparseCosts
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
 from netsp.mip.branching import Tree
 from netsp.mip.cost_fixing import surviving_legs
@@ -34,7 +34,7 @@ from netsp.mip.goal_relaxation import CoverCosts, bound_over_goals
 from netsp.mip.lp_warm_start import WarmStart
 from netsp.mip.merging import merge, search_and_merge, visited_classes
 from netsp.mip.mip_policy import MipPolicy
-from netsp.mip.parity_cuts import odd_letters
+from netsp.mip.parity_cuts import odd_numbers
 from netsp.mip.program import IntegerProgram, Point
 from netsp.mip.root import Root, tour_legs
 from netsp.mip.subtours import component_cuts, cycles_of, heaviest_walk
@@ -84,7 +84,7 @@ class Params:
             )
 
 
-def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
+def solve(graph: Instance, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Solve the generalised TSP of a travel graph to proven optimality, or as far as time allows.
 
     An iteration is one linear or integer program solved. The program is that of McCammon &
@@ -119,7 +119,7 @@ class MipRun(SearchingRun):
 
     def __init__(
         self,
-        graph: TravelGraph,
+        graph: Instance,
         limits: Limits | None = None,
         *,
         search_rounds: int = 500,
@@ -128,7 +128,7 @@ class MipRun(SearchingRun):
         super().__init__(graph, limits, search_rounds=search_rounds, policy=policy.gtsp)
         self.mip_policy = policy
 
-    def run_over(self, graph: TravelGraph, limits: Limits) -> Self:
+    def run_over(self, graph: Instance, limits: Limits) -> Self:
         """Return a run over another graph with the same settings."""
         return type(self)(graph, limits, search_rounds=self.search_rounds, policy=self.mip_policy)
 
@@ -151,7 +151,7 @@ class MipRun(SearchingRun):
                 if not walks or len(self.graph) > policy.core_classes:
                     with self.core() as core:
                         has_many = self.graph.goal_count >= policy.many_goals
-                        if core is not None or (self.graph.roadmapped and has_many):
+                        if core is not None or (not self.graph.has_cost_matrix and has_many):
                             self.bound_by_goals(backend)
                             if self._root_is_hopeless:
                                 search_and_merge(self, self.solve_merged_tours, policy.merging)
@@ -200,7 +200,7 @@ class MipRun(SearchingRun):
             search_and_merge(self, self.solve_merged_tours, policy.merging)
             self.check()
             return CostMatrix(graph, policy=self.gtsp_policy.costs)
-        odd = odd_letters(graph.signatures)
+        odd = odd_numbers(graph.labels)
         with graph.on_clock(self.clock):
             sparse = surviving_legs(graph, bound.cells, self.length, self.tour, odd, policy.pricing)
             return CostMatrix(graph, sparse, policy=self.gtsp_policy.costs)
@@ -209,7 +209,7 @@ class MipRun(SearchingRun):
         """Find a first bound over goals or covers, before the proof over all classes has one."""
         graph, policy = self.graph, self.mip_policy
 
-        def prove(graph: TravelGraph, limits: Limits) -> tuple[Result, Sequence[Cut]]:
+        def prove(graph: Instance, limits: Limits) -> tuple[Result, Sequence[Cut]]:
             run = MipRun(graph, limits, policy=policy)
             return run.solve(backend, None), run.cuts
 
@@ -237,7 +237,7 @@ class MipRun(SearchingRun):
             seconds = max(seconds, min(policy.time.min_sparse_s, 0.5 * self.clock.left))
         clock = Clock(seconds, within=self.clock) if self.clock.limit else self.clock
         # the program over all classes says nothing of classes that were left out
-        proof_follows = not uses_covers and self.graph.complete
+        proof_follows = not uses_covers and self.graph.is_complete
         programs = policy.goals.max_programs_before_proof if proof_follows else None
         return Limits(clock, iterations=programs, rng=self.rng)
 
@@ -254,7 +254,7 @@ class MipRun(SearchingRun):
 
         if self.uses_sparse_costs:
             return CoverCosts(on_sparse=keep)
-        is_known = self._uses_covers and graph.complete and self._measures_all_legs
+        is_known = self._uses_covers and graph.is_complete and self._measures_all_legs
         return CoverCosts(matrix=matrix if is_known else None)
 
     @property
@@ -275,8 +275,8 @@ class MipRun(SearchingRun):
         """True if there are too many classes for a matrix of all legs."""
         graph = self.graph
         # with many goals, all that covers prove is to hold for classes left out, too
-        is_whole = graph.complete or graph.goal_count < self.mip_policy.many_goals
-        is_known = is_whole and graph.knows_ways
+        is_whole = graph.is_complete or graph.goal_count < self.mip_policy.many_goals
+        is_known = is_whole and graph.parity_oracle is not None
         return is_known and len(graph) > self.gtsp_policy.costs.max_double_vertices
 
     @property
@@ -381,7 +381,7 @@ class MipRun(SearchingRun):
         With a limit of iterations nothing is merged, because merging would take uncounted ones.
         """
         graph, policy = self.graph, self.mip_policy.merging
-        is_worth_it = graph.roadmapped and graph.goal_count >= policy.min_goals
+        is_worth_it = not graph.has_cost_matrix and graph.goal_count >= policy.min_goals
         is_over = self.is_done or self.clock.is_up or self.iteration_limit < np.inf
         if not is_worth_it or is_over or not self.local_optima or self.tour is None:
             return
@@ -392,7 +392,7 @@ class MipRun(SearchingRun):
             share = self.gtsp_policy.proof_search.search_time_share
             merge(self, tours, self.solve_merged_tours, self.clock.part(share))
 
-    def solve_merged_tours(self, graph: TravelGraph, limits: Limits) -> Result:
+    def solve_merged_tours(self, graph: Instance, limits: Limits) -> Result:
         """Solve a graph of the classes of some tours by the run's policy, as `solve_merged`."""
         return solve_merged(graph, limits, self.mip_policy)
 
@@ -471,7 +471,7 @@ class MipRun(SearchingRun):
             model.add_cuts(cuts)
 
 
-def solve_merged(graph: TravelGraph, limits: Limits, policy: MipPolicy = MipPolicy()) -> Result:
+def solve_merged(graph: Instance, limits: Limits, policy: MipPolicy = MipPolicy()) -> Result:
     """Solve a graph of few classes from a tour that is known, without a search."""
     run = MipRun(graph, limits, search_rounds=0, policy=policy)
     return run.solve(DEFAULT_BACKEND, limits.warm_start)

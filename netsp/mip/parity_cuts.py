@@ -31,7 +31,8 @@ import numpy as np
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.compiled.interpretation import interprets
 from netsp.base.compiled.kernel import kernel
-from netsp.hsignature import Word
+from netsp.base.deprecated import deprecated_names
+from netsp.gtsp.instance import Label
 from netsp.mip.cuts import Cut
 from netsp.mip.mip_policy import CutPolicy
 
@@ -39,18 +40,19 @@ FLOW_TOLERANCE = 1e-9
 """Tolerance below which a flow counts as zero, and two costs as equal."""
 
 
-def odd_letters(signatures: Sequence[Word], obstacles: int | None = None) -> Bools:
-    """Return the mask (V, n) of obstacles of which each word has an odd number of letters.
+def odd_numbers(labels: Sequence[Label], count: int | None = None) -> Bools:
+    """Return the mask (V, n) of the numbers that each label holds an odd number of times, whatever
+    their sign.
 
     Parameters
     ----------
-    obstacles
-        Number of obstacles n; by default the last one in any word.
+    count
+        Largest number n; by default that in any label.
     """
-    last = max((abs(a) for word in signatures for a in word), default=0)
-    out = np.zeros((len(signatures), last if obstacles is None else obstacles), dtype=bool)
-    for v, word in enumerate(signatures):
-        for a in word:
+    largest = max((abs(a) for label in labels for a in label), default=0)
+    out = np.zeros((len(labels), largest if count is None else count), dtype=bool)
+    for v, label in enumerate(labels):
+        for a in label:
             out[v, abs(a) - 1] ^= True
     return out
 
@@ -68,7 +70,7 @@ def parity_cuts(
     Parameters
     ----------
     odd
-        Result of `odd_letters`.
+        Result of `odd_numbers`.
     check
         Called for each set of obstacles; may raise to stop.
     """
@@ -248,3 +250,6 @@ def _costs_of(across: Floats) -> tuple[Floats, Ints]:
     at = off.argmin(axis=1)
     is_odd = np.count_nonzero(is_tooth, axis=1) % 2 == 1
     return np.where(is_odd, total, total + off[np.arange(len(at)), at]), np.where(is_odd, -1, at)
+
+
+__getattr__ = deprecated_names(globals(), odd_letters="odd_numbers")

@@ -31,9 +31,9 @@ import numpy as np
 from netsp.base.arrays import Floats, Ints
 from netsp.base.errors import InputError
 from netsp.base.ram import check_available
+from netsp.gtsp.instance import Instance
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.solver_run import RunStopped, SolverRun
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
 from netsp.mip.cbc_program import CbcInteger
 from netsp.mip.subtours import cycles_of
@@ -73,7 +73,7 @@ class Params:
             )
 
 
-def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
+def solve(graph: Instance, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Solve the published program, cut its subtours, and solve it again (`mip-2017`).
 
     A warm start is ignored, so that the baseline shows what the method does alone. An iteration is
@@ -100,7 +100,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     return run.finish("proven" if run.is_done else "open")
 
 
-def _all_legs(graph: TravelGraph, params: Params) -> tuple[Ints, Floats]:
+def _all_legs(graph: Instance, params: Params) -> tuple[Ints, Floats]:
     """Return all legs (k, 2) between vertices of different goals, and their costs."""
     sizes = np.bincount(graph.cluster).astype(float)
     count = (sizes.sum() ** 2 - (sizes**2).sum()) / 2.0

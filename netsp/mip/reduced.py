@@ -20,11 +20,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from netsp.gtsp.instance import Instance, cheapest_per_cluster
 from netsp.gtsp.limits import Limits
-from netsp.gtsp.search import Instance, best_classes
+from netsp.gtsp.search import LayeredInstance, best_classes
 from netsp.gtsp.search.lns_solver import max_classes_per_goal, search_core
 from netsp.gtsp.solver_run import SolverRun
-from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.gtsp.travel.result import Progress, Result
 from netsp.mip.mip_solver import MipRun, Params
 
@@ -58,7 +58,7 @@ class ReducedParams(Params):
 
 
 def solve(
-    graph: TravelGraph, params: ReducedParams | None = None, limits: Limits | None = None
+    graph: Instance, params: ReducedParams | None = None, limits: Limits | None = None
 ) -> Result:
     """Solve the TSP over the classes of shortest tether.
 
@@ -66,7 +66,7 @@ def solve(
     are all that there are. An iteration is one of `netsp.mip.mip_solver`.
     """
     chosen, limits = params or ReducedParams(), limits or Limits()
-    kept = least_tethers(graph.costs_to_base, graph.cluster, chosen.classes)
+    kept = cheapest_per_cluster(graph.costs_to_base, graph.cluster, chosen.classes)
     whole = len(kept) == len(graph)
     inner = replace(limits, warm_start=None, on_progress=None)
     part = MipRun(
@@ -96,7 +96,7 @@ def solve(
             if chosen.polish and not whole:
                 outer.check()
                 count = max_classes_per_goal(graph, chosen.max_polished)
-                instance = Instance.among(graph, search_core(outer, count))
+                instance = LayeredInstance.among(graph, search_core(outer, count))
                 order = graph.cluster[kept[np.array(result.tour[1:])]]
                 _, tour = best_classes(order, instance.start, instance.costs)
                 outer.update_incumbent(instance.original(tour))

@@ -25,11 +25,11 @@ from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.lp_warm_start import WarmStart
 from netsp.mip.mip_policy import MipPolicy
-from netsp.mip.parity_cuts import odd_letters, parity_cuts
+from netsp.mip.parity_cuts import odd_numbers, parity_cuts
 from netsp.mip.prices import Prices
 from netsp.mip.pricing_schedule import PricingSchedule
 from netsp.mip.program import Duals, Point, Relaxation
-from netsp.mip.subtours import cover_branches, fractional_cuts
+from netsp.mip.subtours import fractional_cuts, label_families
 
 ROUNDING_TOLERANCE = 1e-9
 """Tolerance, relative, below which reduced costs and visits count as zero."""
@@ -74,8 +74,8 @@ class Root:
     ) -> None:
         self.run, self.costs, self.round_point, self.policy = run, costs, round_point, policy
         graph = costs.graph
-        words = [graph.signatures[v] for v in costs.vertices]
-        self.branch, self.odd = cover_branches(words), odd_letters(words)
+        labels = [graph.labels[v] for v in costs.vertices]
+        self.branch, self.odd = label_families(labels), odd_numbers(labels)
         self.dead = self._dead_legs()
         self.cover_patience: int | None = None
         self.best: BoundProof | None = None

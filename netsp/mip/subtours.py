@@ -13,7 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
-from netsp.hsignature import Word
+from netsp.base.deprecated import deprecated_names
+from netsp.gtsp.instance import Label
 from netsp.mip.blossoms import cluster_flows
 from netsp.mip.cuts import Cut
 from netsp.mip.flows import Edges, min_cuts
@@ -107,14 +108,14 @@ def goal_cuts(legs: Ints, y: Floats, cluster: Ints, policy: CutPolicy = CutPolic
     return [Cut(s[cluster], c) for s, c in distinct.values()]
 
 
-def cover_branches(signatures: Sequence[Word]) -> Bools:
-    """Return masks (k, V) of the branches of the cover with more than one vertex."""
-    rows: dict[Word, list[int]] = {}
-    for v, word in enumerate(signatures):
-        for k in range(1, len(word) + 1):
-            rows.setdefault(word[:k], []).append(v)
+def label_families(labels: Sequence[Label]) -> Bools:
+    """Return masks (k, V) of the sets of several vertices whose labels begin alike."""
+    rows: dict[Label, list[int]] = {}
+    for v, label in enumerate(labels):
+        for k in range(1, len(label) + 1):
+            rows.setdefault(label[:k], []).append(v)
     distinct = {tuple(r) for r in rows.values() if len(r) > 1}
-    out = np.zeros((len(distinct), len(signatures)), dtype=bool)
+    out = np.zeros((len(distinct), len(labels)), dtype=bool)
     for k, row in enumerate(sorted(distinct)):
         out[k, list(row)] = True
     return out
@@ -137,7 +138,7 @@ def fractional_cuts(
     Parameters
     ----------
     branch
-        Result of `cover_branches`.
+        Result of `label_families`.
     near
         Nearest visited vertices, for `component_cuts`.
     """
@@ -248,3 +249,6 @@ def heaviest_walk(legs: Ints, y: Floats, cluster: Ints) -> list[int]:
         left[current] = False
         order.append(current)
     return order
+
+
+__getattr__ = deprecated_names(globals(), cover_branches="label_families")

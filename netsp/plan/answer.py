@@ -11,11 +11,11 @@ from itertools import pairwise
 import numpy as np
 
 from netsp.base.errors import warn_left_out
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result, Trajectory
 from netsp.hsignature import Word, entangled
 from netsp.model.problem import Problem
 from netsp.model.solution import ProblemReference, Solution, Timings, Visit
+from netsp.roadmap.travel_graph import TravelGraph
 
 
 def to_solution(

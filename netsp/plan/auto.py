@@ -23,11 +23,11 @@ from netsp.base.errors import MemoryLimitError
 from netsp.gtsp.dp.dp_solver import Params as WalkParams
 from netsp.gtsp.dp.dp_solver import fits as walks_fit
 from netsp.gtsp.dp.dp_solver import solve as walk
+from netsp.gtsp.instance import Instance, cheapest_per_cluster
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.search.lns_solver import Params as SearchParams
 from netsp.gtsp.search.lns_solver import solve as search
 from netsp.gtsp.solver_run import SolverRun
-from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.gtsp.travel.kept import with_bound, with_classes_left_out
 from netsp.gtsp.travel.result import Result, of_part
 from netsp.mip.goal_relaxation import OnBound, bound_by_one_trees, bound_over_goals
@@ -63,7 +63,7 @@ class Params:
         MipParams(backend=self.backend)
 
 
-def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
+def solve(graph: Instance, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Solve by size; iterations are those of the solver chosen."""
     chosen = params or Params()
     if chosen.scheduler:
@@ -75,7 +75,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     return found
 
 
-def _solve_by_size(graph: TravelGraph, chosen: Params, limits: Limits) -> Result:
+def _solve_by_size(graph: Instance, chosen: Params, limits: Limits) -> Result:
     routes = chosen.policy.routes
     if exact.fits(graph, chosen.policy.subsets):
         return _over_subsets(graph, limits)
@@ -83,7 +83,7 @@ def _solve_by_size(graph: TravelGraph, chosen: Params, limits: Limits) -> Result
         return _in_partial_order(graph, chosen, limits)
     limits = replace(limits, time=Clock.from_limit(limits.time))
     few_goals = graph.goal_count <= routes.max_walk_goals
-    if not graph.complete and graph.roadmapped:
+    if not graph.is_complete and not graph.has_cost_matrix:
         limits, proves = _prepare_truncated(graph, chosen, limits)
         if not proves:
             return _by_search(graph, chosen, limits)
@@ -95,12 +95,12 @@ def _solve_by_size(graph: TravelGraph, chosen: Params, limits: Limits) -> Result
             # a search and covers of paths need no matrix
             limits = replace(limits, warm_start=run.tour or limits.warm_start)
             return _by_search(graph, chosen, limits)
-    if few_goals and graph.roadmapped:
+    if few_goals and not graph.has_cost_matrix:
         return _over_shortest(graph, chosen, limits)
     return _by_search(graph, chosen, limits)
 
 
-def _over_subsets(graph: TravelGraph, limits: Limits) -> Result:
+def _over_subsets(graph: Instance, limits: Limits) -> Result:
     run = SolverRun(graph, limits)
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)
@@ -109,7 +109,7 @@ def _over_subsets(graph: TravelGraph, limits: Limits) -> Result:
     return run.finish("proven" if run.is_done else "exact")
 
 
-def _prepare_truncated(graph: TravelGraph, chosen: Params, limits: Limits) -> tuple[Limits, bool]:
+def _prepare_truncated(graph: Instance, chosen: Params, limits: Limits) -> tuple[Limits, bool]:
     """Bound by goals, and find a first tour, before a proof over a truncated roadmap.
 
     Such a proof may not come to an end. With many goals, a tour over few classes comes first.
@@ -124,23 +124,23 @@ def _prepare_truncated(graph: TravelGraph, chosen: Params, limits: Limits) -> tu
     """
     routes, clock = chosen.policy.routes, Clock.from_limit(limits.time)
     few_goals = graph.goal_count <= routes.max_walk_goals
-    if few_goals or not graph.knows_ways:
+    if few_goals or graph.parity_oracle is None:
         share = Limits(clock.part(routes.goal_bound_time_share), rng=limits.rng)
         _bound_by_goals(graph, chosen, share)
     if few_goals:
         return limits, True
     if limits.warm_start is None:
         limits = _warmed_by_few_classes(graph, chosen, limits)
-    tour, elsewhere = limits.warm_start, graph.least_by_way_of(graph.least_left_out)
-    if tour is not None and graph.knows_ways and elsewhere < graph.tour_length(tour):
+    tour, elsewhere = limits.warm_start, graph.min_length_left_out
+    if tour is not None and graph.parity_oracle is not None and elsewhere < graph.tour_length(tour):
         return limits, False
-    if tour is None and graph.knows_ways:
+    if tour is None and graph.parity_oracle is not None:
         share = Limits(clock.part(routes.goal_bound_time_share), rng=limits.rng)
         _bound_by_goals(graph, chosen, share)
     return limits, True
 
 
-def _by_search(graph: TravelGraph, chosen: Params, limits: Limits) -> Result:
+def _by_search(graph: Instance, chosen: Params, limits: Limits) -> Result:
     """Search, bound by covers, and search on, without a proof over all classes."""
     run = _mip_run(graph, chosen, limits)
     with run.until_stopped():
@@ -158,13 +158,13 @@ def _by_search(graph: TravelGraph, chosen: Params, limits: Limits) -> Result:
     return run.finish("proven" if run.is_done else "open")
 
 
-def _mip_run(graph: TravelGraph, chosen: Params, limits: Limits) -> MipRun:
+def _mip_run(graph: Instance, chosen: Params, limits: Limits) -> MipRun:
     policy = chosen.policy
     rounds = policy.search_effort.rounds(graph.goal_count)
     return MipRun(graph, limits, search_rounds=rounds, policy=policy.mip)
 
 
-def _in_partial_order(graph: TravelGraph, chosen: Params, limits: Limits) -> Result:
+def _in_partial_order(graph: Instance, chosen: Params, limits: Limits) -> Result:
     """Solve with precedences: prove by walks, which remember them, if goals are few; else search.
 
     A bound on tours in any order holds as well, and takes little time.
@@ -193,7 +193,7 @@ def _in_partial_order(graph: TravelGraph, chosen: Params, limits: Limits) -> Res
 
 
 def _bound_by_goals(
-    graph: TravelGraph,
+    graph: Instance,
     chosen: Params,
     limits: Limits,
     tour: Sequence[int] | None = None,
@@ -213,10 +213,10 @@ def _bound_by_goals(
     return graph.bound_in_any_class
 
 
-def _warmed_by_few_classes(graph: TravelGraph, chosen: Params, limits: Limits) -> Limits:
+def _warmed_by_few_classes(graph: Instance, chosen: Params, limits: Limits) -> Limits:
     """Return the limits with the shortest tour over few classes as warm start, if there is one."""
     routes = chosen.policy.routes
-    core = least_tethers(graph.costs_to_base, graph.cluster, routes.first_tour_classes)
+    core = cheapest_per_cluster(graph.costs_to_base, graph.cluster, routes.first_tour_classes)
     if len(core) == len(graph):
         return limits
     share = Clock.from_limit(limits.time).part(routes.first_tour_time_share)
@@ -229,10 +229,10 @@ def _warmed_by_few_classes(graph: TravelGraph, chosen: Params, limits: Limits) -
     return replace(limits, warm_start=[int(core[v]) for v in found.tour])
 
 
-def _over_shortest(graph: TravelGraph, chosen: Params, limits: Limits) -> Result:
+def _over_shortest(graph: Instance, chosen: Params, limits: Limits) -> Result:
     """Prove over the classes of shortest tether; twice the tether of any other bounds its tours."""
     count = chosen.policy.routes.kept_vertices // graph.goal_count
-    core = least_tethers(graph.costs_to_base, graph.cluster, count)
+    core = cheapest_per_cluster(graph.costs_to_base, graph.cluster, count)
     given = limits.warm_start
     if given is not None:
         core = np.union1d(core, np.asarray(given, dtype=np.int64))
@@ -240,7 +240,7 @@ def _over_shortest(graph: TravelGraph, chosen: Params, limits: Limits) -> Result
     others[core] = False
     place = {int(v): k for k, v in enumerate(core)}
     warm = None if given is None else [place[int(v)] for v in given]
-    least = graph.least_by_way_of(float(graph.tethers[others].min(initial=np.inf)))
+    least = graph.min_length_through(np.flatnonzero(others))
     because = "a tour by way of another class goes along its tether and back"
 
     def bound_of_whole(bound: LowerBound | None) -> LowerBound | None:
@@ -252,7 +252,7 @@ def _over_shortest(graph: TravelGraph, chosen: Params, limits: Limits) -> Result
     if found.tour is None:
         return with_classes_left_out(found, least, graph.scope, because)
     whole = replace(found, tour=tuple(int(core[v]) for v in found.tour))
-    elsewhere = min(least, graph.least_by_way_of(graph.least_left_out))
+    elsewhere = min(least, graph.min_length_left_out)
     clock = Clock.from_limit(limits.time)
     if elsewhere < (whole.length or 0.0) and not clock.is_up:
         # with few goals the shortest tour in any class is known soon

@@ -15,10 +15,10 @@ import numpy as np
 
 from netsp.base.errors import InputError
 from netsp.base.validated import shown
+from netsp.gtsp.instance import Instance
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.params import read_params
 from netsp.gtsp.solver_run import SolverRun
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
 from netsp.model.solution import Status
@@ -87,7 +87,7 @@ def _asked(solver: Callable[..., Any]) -> Mapping[str, Parameter]:
 
 
 def call(
-    solver: Callable[..., Any], name: str, graph: TravelGraph, params: Mapping[str, Any] | None,
+    solver: Callable[..., Any], name: str, graph: Instance, params: Mapping[str, Any] | None,
     limits: Limits,
 ) -> Result:  # fmt: skip
     """Call a solver with the graph and whatever it asks for by name: `params` (a mapping, or the

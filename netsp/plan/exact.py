@@ -11,24 +11,24 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.gtsp.cost_oracle import Estimate
+from netsp.gtsp.instance import Instance
 from netsp.gtsp.solver_run import SolverRun
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.plan.solve_policy import SubsetPolicy
 
 
-def fits(graph: TravelGraph, policy: SubsetPolicy = SubsetPolicy()) -> bool:
+def fits(graph: Instance, policy: SubsetPolicy = SubsetPolicy()) -> bool:
     """Return whether a graph is small enough."""
     return len(graph) <= policy.max_vertices and _sums(graph, policy) <= policy.max_sums
 
 
-def estimate(graph: TravelGraph, policy: SubsetPolicy = SubsetPolicy()) -> Estimate:
+def estimate(graph: Instance, policy: SubsetPolicy = SubsetPolicy()) -> Estimate:
     """Return the estimated time and memory of `solve`."""
     return Estimate(
         policy.s_per_sum * _sums(graph, policy), 8.0 * 2.0**graph.goal_count * len(graph)
     )
 
 
-def _sums(graph: TravelGraph, policy: SubsetPolicy) -> float:
+def _sums(graph: Instance, policy: SubsetPolicy) -> float:
     v, n = len(graph), graph.goal_count
     return float(2.0**n * (v * v + policy.sums_per_call * n))
 

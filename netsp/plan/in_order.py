@@ -10,12 +10,12 @@ import numpy as np
 
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError
-from netsp.gtsp.search.layers import Instance, best_classes
-from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.search.layers import LayeredInstance, best_classes
 from netsp.gtsp.travel.result import OnProgress, Progress, Result
 from netsp.model.arrangement import respects_precedences
 from netsp.model.bound_scope import LowerBound
 from netsp.model.solution import Status
+from netsp.roadmap.travel_graph import TravelGraph
 
 
 def solve_in_order(graph: TravelGraph, clock: Clock, on_progress: OnProgress | None) -> Result:
@@ -49,7 +49,7 @@ def solve_in_order(graph: TravelGraph, clock: Clock, on_progress: OnProgress | N
     last = graph.goal_count
     needed = (np.abs(ahead) == 1) | (np.abs(ahead) == last)
     with graph.on_clock(clock):
-        instance = Instance(graph.cluster, graph.costs_among(every, needed))
+        instance = LayeredInstance(graph.cluster, graph.costs_among(every, needed))
     order = np.arange(1, last + 1, dtype=np.int64)
     length, tour = best_classes(order, instance.start, instance.costs)
     found = instance.original(tour)

@@ -20,11 +20,11 @@ from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.cost_oracle import Estimate
 from netsp.gtsp.dp.dp_solver import fits as walks_fit
 from netsp.gtsp.dp.dp_solver import walk_steps
+from netsp.gtsp.instance import Instance, cheapest_per_cluster
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.resumable import Steps
 from netsp.gtsp.scheduler import Scheduler, Task
 from netsp.gtsp.solver_run import RunStopped
-from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.gtsp.travel.result import Result
 from netsp.mip.cover_bounds import GoalBound
 from netsp.mip.cuts import Cut
@@ -39,7 +39,7 @@ from netsp.plan import exact
 from netsp.plan.solve_policy import SolvePolicy
 
 
-def solve(graph: TravelGraph, backend: str, policy: SolvePolicy, limits: Limits) -> Result:
+def solve(graph: Instance, backend: str, policy: SolvePolicy, limits: Limits) -> Result:
     """Solve by tasks that share the time; an iteration is one that a task counts as its own."""
     run = ScheduledRun(graph, limits, policy)
     with run.until_stopped():
@@ -53,7 +53,7 @@ def solve(graph: TravelGraph, backend: str, policy: SolvePolicy, limits: Limits)
 class ScheduledRun(MipRun):
     """Run whose incumbent and bound all tasks share."""
 
-    def __init__(self, graph: TravelGraph, limits: Limits, policy: SolvePolicy) -> None:
+    def __init__(self, graph: Instance, limits: Limits, policy: SolvePolicy) -> None:
         rounds = policy.search_effort.rounds(graph.goal_count)
         super().__init__(graph, limits, search_rounds=rounds, policy=policy.mip)
         self.solve_policy = policy
@@ -75,7 +75,7 @@ class ScheduledRun(MipRun):
                 return False
         return super().update_incumbent(tour, walk, length)
 
-    def run_over(self, graph: TravelGraph, limits: Limits) -> ScheduledRun:
+    def run_over(self, graph: Instance, limits: Limits) -> ScheduledRun:
         """Return a run over another graph with the same settings."""
         return ScheduledRun(graph, limits, self.solve_policy)
 
@@ -84,7 +84,7 @@ class ScheduledRun(MipRun):
         if self.tour is None:
             return math.inf
         bound = LowerBound(max(self.bound or 0.0, 0.0), self.graph.scope)
-        asked = self.graph.bound_as_asked(bound)
+        asked = self.graph.bound_for_problem(bound)
         if asked is None:
             return self.length
         return 0.0 if asked.proves(self.length) else self.length - asked.length
@@ -131,11 +131,11 @@ class Portfolio:
             return tasks
         pairs = (graph.goal_count + 1) ** 2
         tasks.append(Task("goals", self._goals, Estimate(self.times.s_per_goal_pair * pairs, 0.0)))
-        if graph.roadmapped:
+        if not graph.has_cost_matrix:
             tasks.append(Task("covers", self._covers, self._estimate_of_covers()))
         if walks_fit(graph, policy.gtsp.walks):
             tasks.append(Task("walks", self._walks, self._estimate_of_walks()))
-        if graph.roadmapped:
+        if not graph.has_cost_matrix:
             core = self.run.core_classes_per_goal * graph.goal_count
             if self.times.min_core_ratio * core < len(graph):
                 tasks.append(Task("core", self._core, self._estimate_of_cuts(core)))
@@ -173,7 +173,9 @@ class Portfolio:
         policy = run.gtsp_policy.proof_search
         run.find_first_tour()
         yield
-        core = least_tethers(graph.costs_to_base, graph.cluster, run.searched_classes_per_goal)
+        core = cheapest_per_cluster(
+            graph.costs_to_base, graph.cluster, run.searched_classes_per_goal
+        )
         vain = 0
         while True:
             before = run.length
@@ -206,7 +208,7 @@ class Portfolio:
         """Bound tours by one over the goals alone."""
         run, policy = self.run, self.policy.mip
 
-        def prove_goals(graph: TravelGraph, limits: Limits) -> tuple[Result, Sequence[Cut]]:
+        def prove_goals(graph: Instance, limits: Limits) -> tuple[Result, Sequence[Cut]]:
             goal_run = MipRun(graph, limits, policy=policy)
             return goal_run.solve(self.backend, None), goal_run.cuts
 
@@ -221,7 +223,7 @@ class Portfolio:
             return
         self._adopt_bound_in_any_class()
 
-        def prove_nothing(graph: TravelGraph, limits: Limits) -> tuple[Result, Sequence[Cut]]:
+        def prove_nothing(graph: Instance, limits: Limits) -> tuple[Result, Sequence[Cut]]:
             return prove(graph, MipParams(policy=policy), replace(limits, iterations=0)), ()
 
         anyway = replace(policy, covers=replace(policy.covers, min_classes=0))
@@ -249,7 +251,7 @@ class Portfolio:
         """Prove over a core of the classes; its bound holds with twice the tether of the others."""
         run, graph = self.run, self.graph
         near = run.classes_near_incumbent() if run.tour is not None else None
-        core = least_tethers(graph.costs_to_base, graph.cluster, run.core_classes_per_goal)
+        core = cheapest_per_cluster(graph.costs_to_base, graph.cluster, run.core_classes_per_goal)
         core = core if near is None else np.union1d(core, near)
         core = np.union1d(core, np.array(run.tour or (0,), dtype=np.int64))
         inner = self.core = run.run_over(graph.subgraph(core), Limits(run.clock, rng=run.rng))
@@ -259,7 +261,7 @@ class Portfolio:
             inner.update_incumbent(np.searchsorted(core, np.array(run.tour)).tolist())
         others = np.ones(len(graph), dtype=bool)
         others[core] = False
-        elsewhere = graph.least_by_way_of(float(graph.tethers[others].min(initial=np.inf)))
+        elsewhere = graph.min_length_through(np.flatnonzero(others))
         costs = CostMatrix(inner.graph, policy=self.policy.gtsp.costs)
         yield
         for _ in inner.cut_steps(costs, self.backend, None):

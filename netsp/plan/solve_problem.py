@@ -16,9 +16,9 @@ from netsp.base.field_types import checked_argument
 from netsp.base.interrupt_signals import until_interrupt
 from netsp.base.registry import foreign, load
 from netsp.base.validated import shown
+from netsp.gtsp.instance import BaselessInstance, Instance
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.params import NoParams, read_params
-from netsp.gtsp.travel.graph import BaselessGraph, TravelGraph
 from netsp.gtsp.travel.result import OnProgress, Progress, Result
 from netsp.model.bound_scope import Scope
 from netsp.model.problem import Problem
@@ -31,6 +31,7 @@ from netsp.plan.solve_policy import SolvePolicy
 from netsp.plan.solver_table import ROADMAPS, SOLVERS
 from netsp.plan.tether_carry_columns import OnGraph, with_carried
 from netsp.plan.warm_start import old_tour, tour_from, with_old_classes
+from netsp.roadmap.travel_graph import TravelGraph
 
 SolverLike = str | Callable[..., Any]
 """A solver's name, or a callable that takes a travel graph (`netsp.plan.custom`)."""
@@ -132,7 +133,7 @@ def _graph_of_places(problem: Problem, roadmap: str, options: dict[str, Any]) ->
 
 
 def solve_graph(
-    graph: TravelGraph,
+    graph: Instance,
     solver: SolverLike = DEFAULT_SOLVER,
     *,
     time_limit: TimeLimit = None,
@@ -146,8 +147,8 @@ def solve_graph(
 
     Parameters
     ----------
-    graph : TravelGraph
-        Graph of a roadmap or of `TravelGraph.from_costs`.
+    graph : Instance
+        Travel graph of a roadmap, or an instance from a matrix of costs.
     solver : str or callable
         Name, or callable `f(graph) -> tour`, which may have parameters named `params`, `limits`,
         `rng` and more (`netsp.plan.custom.call`).
@@ -187,14 +188,14 @@ def solve_graph(
     """
     check_solver(solver, params)
     _check_limits(time_limit, iteration_limit)
-    if not isinstance(graph, TravelGraph):
-        raise InputError(f"graph: expected a TravelGraph, got {graph!r}")
+    if not isinstance(graph, Instance):
+        raise InputError(f"graph: expected a TravelGraph or an Instance, got {graph!r}")
     tour = None if warm_start is None else _as_tour(warm_start, graph)
     rng = np.random.default_rng(_seed(seed))
     clock = Clock.from_limit(time_limit)
     with graph.on_clock(clock):
         limits = Limits(clock, iteration_limit, rng, tour, graph.progress_listener(on_progress))
-        if isinstance(graph, BaselessGraph):
+        if isinstance(graph, BaselessInstance):
             return without_base.solve(
                 graph,
                 lambda part, limits: _run(part, solver, params, limits),
@@ -203,11 +204,11 @@ def solve_graph(
                 policy=policy_of(solver, params).baseless,
             )
         result = _run(graph, solver, params, limits)
-    return graph.as_asked(result)
+    return graph.for_problem(result)
 
 
 def _run(
-    graph: TravelGraph, solver: SolverLike, params: Mapping[str, Any] | None, limits: Limits
+    graph: Instance, solver: SolverLike, params: Mapping[str, Any] | None, limits: Limits
 ) -> Result:
     """Call a solver of netsp with its options checked, or another with the parameters it names."""
     if callable(solver):
@@ -219,6 +220,8 @@ def _run(
             f"solver {solver!r}: cannot keep the order that goals ask for with 'after'; expected "
             f"one of {able}"
         )
+    if record.geometric and not isinstance(graph, TravelGraph):
+        raise InputError("solver: needs the geometry of a problem, and this instance has none")
     if record.ours:
         kind = load(record.params) if record.params else NoParams
         run: Callable[..., Result] = load(record.function)
@@ -399,7 +402,7 @@ def solve(
         built = clock.elapsed
         if keep_order:
             listener = graph.progress_listener(on_progress)
-            result = graph.as_asked(solve_in_order(graph, rest, listener))
+            result = graph.for_problem(solve_in_order(graph, rest, listener))
             found = to_solution(problem, graph, result, "in-order", seed)
             return found.model_copy(
                 update={"kept_order": True, "timings": _timings(clock, built, graph), **limits}
@@ -462,7 +465,7 @@ def solve_over(
     policy = policy_of(solver, params)
     # keep time to draw a tour of a problem that is too large for its limit
     drawing_s = policy.drawing_time_share * (clock.limit or 0.0)
-    spare = 0.0 if graph.complete else min(drawing_s, policy.max_drawing_s)
+    spare = 0.0 if graph.is_complete else min(drawing_s, policy.max_drawing_s)
     start: Sequence[int] | None = None
     if warm_start is not None:
         graph = with_old_classes(problem, warm_start, graph, clock, policy.warm_start)
@@ -585,7 +588,7 @@ def _seed(seed: int) -> int:
     return int(seed)
 
 
-def _as_tour(vertices: Sequence[int], graph: TravelGraph) -> tuple[int, ...]:
+def _as_tour(vertices: Sequence[int], graph: Instance) -> tuple[int, ...]:
     tour = whole_numbers(vertices)
     if not tour or not graph.is_tour(tour):
         raise InputError(

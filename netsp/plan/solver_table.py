@@ -94,7 +94,7 @@ SOLVERS: Registry[Solver] = Registry(
             ),
             Solver("anneal", "netsp.anneal.icra2017:solve", "netsp.anneal.icra2017:Params"),
             Solver(
-                "anneal-2016", "netsp.anneal.rss2016:solve", "netsp.anneal.rss2016:Params",
+                "anneal-2016", "netsp.plan.rss2016:solve", "netsp.plan.rss2016:Params",
                 geometric=True,
             ),
             Solver(
@@ -105,7 +105,7 @@ SOLVERS: Registry[Solver] = Registry(
                 "greedy-2016", "netsp.gtsp.greedy.backtracking:solve_2016",
                 "netsp.gtsp.greedy.backtracking:Params2016",
             ),
-            Solver("greedy-tsp", "netsp.gtsp.greedy.blind:solve", geometric=True, blind=True),
+            Solver("greedy-tsp", "netsp.plan.greedy_blind:solve", geometric=True, blind=True),
         )
     },
     lambda name, where: Solver(name, where),

@@ -21,12 +21,13 @@ import numpy as np
 from netsp.base.arrays import Ints
 from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
-from netsp.gtsp.search.layers import Instance
+from netsp.gtsp.instance import cheapest_per_cluster
+from netsp.gtsp.search.layers import LayeredInstance
 from netsp.gtsp.search.local_search import Search
-from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.gtsp.travel.result import OnProgress, Progress
 from netsp.hsignature import Word, concatenate
 from netsp.plan.solve_policy import CarryPolicy
+from netsp.roadmap.travel_graph import TravelGraph
 
 Class = tuple[int, Word]
 """Goal, from 1, and word."""
@@ -78,11 +79,11 @@ def with_carried(
         The graph and the best tour found in it, or the warm start.
     """
     carrier = graph.carrier
-    if graph.complete or carrier is None or graph.goal_count < 3:
+    if graph.is_complete or carrier is None or graph.goal_count < 3:
         return Carried(graph, None if start is None else tuple(start))
     share = clock.part(policy.time_share)
     paths = {0: carrier.ways(0, graph.goal_count)}
-    least = least_tethers(graph.costs_to_base, graph.cluster, policy.first_classes)
+    least = cheapest_per_cluster(graph.costs_to_base, graph.cluster, policy.first_classes)
     first = _classes(graph, least)
     best: list[Class] = []
     shortest = np.inf
@@ -196,7 +197,7 @@ class _Columns:
         bounds = graph.lower_bounds(core)
         bounds[0] = bounds[:, 0] = graph.costs_to_base[core]
         start = [0, *(g for g, _ in best)] if best else None
-        instance = Instance(graph.cluster[core], bounds, core, graph.before)
+        instance = LayeredInstance(graph.cluster[core], bounds, core, graph.before)
         _, tour = _search(instance, self.rng, start, self.clock, self.policy)
         return graph.tour_length(tour), _classes(graph, np.array(tour, dtype=np.int64))
 
@@ -211,10 +212,10 @@ def _along_straight_lines(
     """
     carrier = graph.carrier
     assert carrier is not None
-    apart, places = graph.between_goals(lambda: True), np.arange(graph.goal_count + 1)
-    instance = Instance(places, apart, places, graph.before)
+    apart, places = graph.distances_between_goals(lambda: True), np.arange(graph.goal_count + 1)
+    instance = LayeredInstance(places, apart, places, graph.before)
     _, tour = _search(instance, rng, None, clock, policy)
-    shortest = dict(_classes(graph, least_tethers(graph.costs_to_base, graph.cluster, 1)))
+    shortest = dict(_classes(graph, cheapest_per_cluster(graph.costs_to_base, graph.cluster, 1)))
     out: list[Class] = []
     word: Word = ()
     for start, goal in pairwise(tour):
@@ -250,7 +251,7 @@ def _vertices(graph: TravelGraph, classes: list[Class]) -> tuple[int, ...]:
 
 
 def _search(
-    instance: Instance,
+    instance: LayeredInstance,
     rng: np.random.Generator,
     start: list[int] | None,
     clock: Clock,

@@ -15,14 +15,15 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError
-from netsp.gtsp.search import Instance, best_classes
-from netsp.gtsp.travel.graph import TravelGraph, least_tethers
+from netsp.gtsp.instance import cheapest_per_cluster
+from netsp.gtsp.search import LayeredInstance, best_classes
 from netsp.hsignature import Word, concatenate
 from netsp.hsignature.rays import crossings
 from netsp.model.arrangement import respects_precedences
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
 from netsp.plan.solve_policy import WarmStartPolicy
+from netsp.roadmap.travel_graph import TravelGraph
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ def with_old_classes(
     InputError
         None of the solution's goals is in the problem.
     """
-    if graph.complete or graph.carrier is None:
+    if graph.is_complete or graph.carrier is None:
         return graph
     found = old_tour(problem, solution, policy)
     wanted = [(goal + 1, word) for goal, word in zip(found.goals, found.words, strict=True)]
@@ -175,9 +176,9 @@ def tour_from(
         return None
     if len(known) == len(order):
         return [0, *known]
-    shortest = least_tethers(graph.costs_to_base, graph.cluster, policy.classes_per_goal)
+    shortest = cheapest_per_cluster(graph.costs_to_base, graph.cluster, policy.classes_per_goal)
     core = np.union1d(shortest, known)
-    instance = Instance.among(graph, core.astype(np.int64))
+    instance = LayeredInstance.among(graph, core.astype(np.int64))
     _, tour = best_classes(np.array(order, dtype=np.int64), instance.start, instance.costs)
     return list(instance.original(tour))
 

@@ -15,21 +15,21 @@ import numpy as np
 from netsp.base.arrays import Ints
 from netsp.base.clock import Clock
 from netsp.base.interrupt_signals import until_interrupt
+from netsp.gtsp.instance import BaselessInstance, Instance
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.search.lns_solver import Params as SearchParams
 from netsp.gtsp.search.lns_solver import solve as search
-from netsp.gtsp.travel.graph import BaselessGraph, TravelGraph
 from netsp.gtsp.travel.result import OnProgress, Progress, Result, of_part, proven
 from netsp.mip.goal_relaxation import bound_by_one_trees
 from netsp.model.bound_scope import Scope
 from netsp.model.solution import Status
 from netsp.plan.solve_policy import BaselessPolicy
 
-Run = Callable[[TravelGraph, Limits], Result]
+Run = Callable[[Instance, Limits], Result]
 
 
 def solve(
-    graph: BaselessGraph,
+    graph: BaselessInstance,
     run: Run,
     limits: Limits,
     *,
@@ -40,7 +40,7 @@ def solve(
 
     Parameters
     ----------
-    graph : BaselessGraph
+    graph : BaselessInstance
         Graph without a base.
     run : callable
         Solver.
@@ -103,7 +103,7 @@ def solve(
     return replace(best, status=status, lower_bound=claimed, trace=tuple(rows))
 
 
-def _given(graph: BaselessGraph, limits: Limits) -> Result:
+def _given(graph: BaselessInstance, limits: Limits) -> Result:
     """Return the warm start as a result, if there is one."""
     tour = limits.warm_start
     if tour is None:
@@ -112,7 +112,7 @@ def _given(graph: BaselessGraph, limits: Limits) -> Result:
 
 
 def _search(
-    graph: BaselessGraph, roots: Ints, limits: Limits, best: Result, policy: BaselessPolicy
+    graph: BaselessInstance, roots: Ints, limits: Limits, best: Result, policy: BaselessPolicy
 ) -> tuple[Result, Ints]:
     """Search from each root, and return the best tour and the roots by length of their tours."""
     lengths = []

@@ -19,13 +19,13 @@ import shapely
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock
 from netsp.base.compiled.kernel import kernel
-from netsp.gtsp.travel.tether_blind_legs import Detours
 from netsp.hsignature import signature
 from netsp.model.problem import Problem
 from netsp.roadmap.outline import Outline, build_outline
 from netsp.roadmap.roadmap_policy import DetourPolicy, RoadmapPolicy
 from netsp.roadmap.shortest import ContactGraph, ShortestPaths
 from netsp.roadmap.tangents import build_tangents
+from netsp.roadmap.tether_blind_legs import Detours
 
 
 def taut_detours(

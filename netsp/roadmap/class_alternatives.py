@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from netsp.base.errors import InfeasibleError, InputError
-from netsp.gtsp.travel.choices import with_choices
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.model.problem import Problem
 from netsp.roadmap.explain_unreachable import shortest_tethers
+from netsp.roadmap.goal_choices import with_choices
 from netsp.roadmap.reachable_goals import REACH_TOLERANCE
+from netsp.roadmap.travel_graph import TravelGraph
 
 
 def nearest_places(problem: Problem) -> list[int]:

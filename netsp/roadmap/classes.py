@@ -30,19 +30,19 @@ class Classes:
     ----------
     cluster, signatures, planar
         (V,) goal, word and planar tether length of each.
-    least_left_out
+    min_tether_left_out
         Lower bound on the 3D tether of every class left out; inf if none is.
     """
 
     cluster: Ints
     signatures: list[Word]
     planar: Floats
-    least_left_out: float = math.inf
+    min_tether_left_out: float = math.inf
 
     @property
     def complete(self) -> bool:
         """Return whether no class was left out."""
-        return self.least_left_out == math.inf
+        return self.min_tether_left_out == math.inf
 
 
 def find_classes(paths: TautPaths, rule: int, max_classes: int, clock: Clock) -> Classes:

@@ -24,20 +24,21 @@ from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock, TimeLimit
 from netsp.base.errors import InputError, NetspError
 from netsp.gtsp.cost_oracle import Estimate
+from netsp.gtsp.instance import ParityOracle
 from netsp.gtsp.travel.costs import rounded_down
-from netsp.gtsp.travel.graph import TravelGraph
-from netsp.gtsp.travel.leg_provider import Legs
-from netsp.gtsp.travel.parity_distances import BITS_PER_WORD, WaysByParity
+from netsp.gtsp.travel.parity_distances import BITS_PER_WORD, ParityDistances
 from netsp.gtsp.travel.result import OnProgress, Progress, Result
 from netsp.hsignature import reduce
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE, LowerBound, Scope
 from netsp.model.problem import Goal, Problem
 from netsp.model.solution import Status
+from netsp.roadmap.leg_provider import Legs
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.reach_bounds import find_parity_paths
 from netsp.roadmap.roadmap_policy import RoadmapPolicy
 from netsp.roadmap.taut import TautRoadmap
 from netsp.roadmap.taut_legs import TautLegs
+from netsp.roadmap.travel_graph import TravelGraph
 
 PATH_GAP_TOLERANCE = 10.0 * OPTIMALITY_TOLERANCE
 """Tolerance of the gap of a path that is called optimal."""
@@ -72,13 +73,15 @@ class GraphFromState(TravelGraph):
             _SurchargedLegs(within, start, surcharge),
             within.roadmap,
             classes=within.classes,
-            least_left_out=within.least_left_out,
+            min_tether_left_out=within.min_tether_left_out,
         )
         self.within, self.start, self.surcharge = within, start, surcharge
         self.start_tether = start_tether
         self.goal, self.before = within.goal, within.before
         self.excluded_by_rule = within.excluded_by_rule
         self.declared_scope = within.declared_scope
+        if within.parity_oracle is not None:
+            self.parity_oracle = partial(self._surcharged_parity, within.parity_oracle)
 
     def as_tour(self, order: tuple[int, ...]) -> tuple[int, ...]:
         """Return a closed tour in the direction in which the state follows the base."""
@@ -86,41 +89,42 @@ class GraphFromState(TravelGraph):
             return (0, *reversed(order[1:]))
         return order
 
-    def between_goals(self, up: Callable[[], bool] = lambda: False) -> Floats:
+    def distances_between_goals(self, is_up: Callable[[], bool] = lambda: False) -> Floats:
         """Return the bounds of `TravelGraph`, with the surcharge."""
         places = np.arange(self.goal_count + 1)
         ends = int(self.cluster[self.start or 0])
-        return add_surcharge(self.within.between_goals(up), places, places, ends, self.surcharge)
+        return add_surcharge(
+            self.within.distances_between_goals(is_up), places, places, ends, self.surcharge
+        )
 
-    @property
-    def knows_ways(self) -> bool:
-        """Return whether the graph without the surcharge does."""
-        return self.within.knows_ways
-
-    def ways_by_parity(self, up: Callable[[], bool] = lambda: False) -> WaysByParity | None:
-        """Return the paths of `TravelGraph`, with the surcharge."""
-        ways = self.within.ways_by_parity(up)
-        if ways is None or self.start is None:
+    def _surcharged_parity(
+        self, find: ParityOracle, is_up: Callable[[], bool]
+    ) -> ParityDistances | None:
+        """Return the distances of a parity oracle, with the surcharge."""
+        paths = find(is_up)
+        if paths is None or self.start is None:
             return None
         goal = int(self.cluster[self.start])
-        base, start = (ways.ends == 0).any(axis=1), (ways.ends == goal).any(axis=1)
-        length = ways.length + self.surcharge * (base.astype(np.float64) + start)
+        base, start = (paths.ends == 0).any(axis=1), (paths.ends == goal).any(axis=1)
+        length = paths.length + self.surcharge * (base.astype(np.float64) + start)
         # the leg between base and state is free
         rest = ~(base & start)
-        odd = np.zeros((1, ways.odd.shape[1]), dtype=np.uint64)
+        odd = np.zeros((1, paths.odd.shape[1]), dtype=np.uint64)
         for a in self.signatures[self.start]:
             odd[0, (abs(a) - 1) // BITS_PER_WORD] ^= np.uint64(1 << (abs(a) - 1) % BITS_PER_WORD)
         return dataclasses.replace(
-            ways,
-            ends=np.vstack([ways.ends[rest], [[0, goal]]]),
-            odd=np.vstack([ways.odd[rest], odd]),
+            paths,
+            ends=np.vstack([paths.ends[rest], [[0, goal]]]),
+            odd=np.vstack([paths.odd[rest], odd]),
             length=np.append(length[rest], 0.0),
         )
 
-    def as_asked(self, result: Result) -> Result:
+    def for_problem(self, result: Result) -> Result:
         """Return a solver's result on this graph as a result for the path from the state."""
         kept_bound = self._path_bound(result.bound)
-        low = self._path_bound(self.bound_as_asked(result.bound, anywhere=result.tour is not None))
+        low = self._path_bound(
+            self.bound_for_problem(result.bound, anywhere=result.tour is not None)
+        )
         result = dataclasses.replace(
             result,
             trace=tuple(self._path_progress(r, anywhere=False) for r in result.trace),
@@ -165,14 +169,14 @@ class GraphFromState(TravelGraph):
             return None
         return dataclasses.replace(bound, length=max(0.0, bound.length - 2.0 * self.surcharge))
 
-    def least_along_left_out(self) -> float:
+    def min_length_along_left_out(self) -> float:
         """Return a lower bound on paths along a leg left out: the leg and the path home, with the
         surcharge of every tour."""
         first, leg, second = self.bounds_of_left_out().T
         shortest = float((leg + np.minimum(first, second)).min(initial=math.inf))
         return shortest + 2.0 * self.surcharge
 
-    def least_by_way_of(self, tether: float) -> float:
+    def min_length_by_tether(self, tether: float) -> float:
         """Return a lower bound on paths through a class whose tether is at least `tether` long.
 
         It is the path home from there, with the surcharge of every tour.
@@ -190,7 +194,7 @@ class GraphFromState(TravelGraph):
         return dataclasses.replace(
             row,
             incumbent=None if row.incumbent is None else row.incumbent - off,
-            bound=self._path_bound(self.bound_as_asked(row.bound, anywhere=anywhere)),
+            bound=self._path_bound(self.bound_for_problem(row.bound, anywhere=anywhere)),
             current=None if row.current is None else row.current - off,
             tour=None if row.tour is None else self.as_tour(row.tour),
         )
@@ -233,10 +237,10 @@ class _SurchargedLegs(Legs):
         return add_surcharge(table, rows, columns, self.start, self.surcharge)
 
     def lengths(
-        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+        self, vertices: Ints, wanted: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
         with self.within.on_clock(clock or self.within.clock):
-            return self._charged(self.within.costs_among(vertices, asked), vertices, vertices)
+            return self._charged(self.within.costs_among(vertices, wanted), vertices, vertices)
 
     def estimate(self, k: int) -> Estimate:
         """Return the estimate without the surcharge."""
@@ -344,7 +348,7 @@ def graph_from_state(
         roadmap="taut",
         between=legs.paths.bounds_in_any_class,
         classes=roadmap.rule if roadmap.complete else "shortest",
-        least_left_out=roadmap.least_left_out,
+        min_tether_left_out=roadmap.min_tether_left_out,
         by_parity=partial(find_parity_paths, legs.paths),
     )
     part.excluded_by_rule = roadmap.rule != "all"

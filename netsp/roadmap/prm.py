@@ -23,20 +23,20 @@ from netsp.base.compiled.kernel import kernel
 from netsp.base.errors import InputError, LimitReachedError, counted, warn_left_out
 from netsp.base.geometry.kernels import Blockers, depth_in_obstacle, segment_blocked
 from netsp.gtsp.cost_oracle import Estimate
-from netsp.gtsp.travel.graph import TravelGraph
-from netsp.gtsp.travel.leg_provider import Legs
-from netsp.gtsp.travel.tether_blind_legs import Detours
 from netsp.hsignature import Word
 from netsp.model.problem import Circle, Problem
 from netsp.roadmap.any_class_paths import sub_goals, tabulate_detours
 from netsp.roadmap.augmented import AugmentedGraph, augment
 from netsp.roadmap.explain_unreachable import find_unreached_error
+from netsp.roadmap.leg_provider import Legs
 from netsp.roadmap.letters import segment_letters
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.paths import TautPaths, UnknownPathError
 from netsp.roadmap.roadmap_policy import RoadmapPolicy
 from netsp.roadmap.shortest import MilestoneGraph
 from netsp.roadmap.taut_legs import TautLegs
+from netsp.roadmap.tether_blind_legs import Detours
+from netsp.roadmap.travel_graph import TravelGraph
 
 
 class PrmRoadmap(Legs):
@@ -141,7 +141,7 @@ class PrmRoadmap(Legs):
             detours=self._detours,
             between=self.paths.bounds_in_any_class,
             classes="non-looping" if self.complete else "shortest",
-            least_left_out=math.inf if self.complete else 0.0,
+            min_tether_left_out=math.inf if self.complete else 0.0,
         )
 
     def _taut_lengths(self, clock: Clock) -> Floats:
@@ -236,7 +236,7 @@ class PrmRoadmap(Legs):
         return cluster, words, np.concatenate([[0], rows]).astype(np.int64)
 
     def lengths(
-        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+        self, vertices: Ints, wanted: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
         """Return the (k, k) leg lengths along the augmented graph; inf within a cluster.
 
@@ -244,7 +244,7 @@ class PrmRoadmap(Legs):
         """
         vertices = np.asarray(vertices, dtype=np.int64)
         if self.shortcut:
-            return self._taut.lengths(vertices, asked, clock)
+            return self._taut.lengths(vertices, wanted, clock)
         rows = self._vertex[vertices]
         check = partial(
             (clock or Clock()).check, f"measuring legs over {len(self.augmented)} states"

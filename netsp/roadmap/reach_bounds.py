@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from netsp.base.arrays import Floats, Ints
 from netsp.base.compiled.kernel import kernel
-from netsp.gtsp.travel.parity_distances import BITS_PER_WORD, WaysByParity
+from netsp.gtsp.travel.parity_distances import BITS_PER_WORD, ParityDistances
 from netsp.roadmap.explore import ALL, run_explore
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.trie import LETTER, PARENT, Trie
@@ -23,7 +23,7 @@ ParityRows = tuple[Ints, Floats, npt.NDArray[np.uint64]]
 """Paths from a goal: other goals (k,), planar lengths (k,), and parity bits (k, w)."""
 
 
-def find_parity_paths(paths: TautPaths, up: Callable[[], bool]) -> WaysByParity | None:
+def find_parity_paths(paths: TautPaths, up: Callable[[], bool]) -> ParityDistances | None:
     """Return paths between goals, up to a length at which there are not too many, and all paths
     from the base up to the tether length; None if the time is up first."""
     points, tether = paths.outline.points, paths.problem.tether_length
@@ -45,7 +45,7 @@ def find_parity_paths(paths: TautPaths, up: Callable[[], bool]) -> WaysByParity 
 
 def _paths_up_to(
     paths: TautPaths, reach: float, from_base: ParityRows, first: bool, up: Callable[[], bool]
-) -> WaysByParity | None:
+) -> ParityDistances | None:
     """Return all paths up to a planar length; None if the time is up, or if they are too many and
     not the first."""
     each, count = [from_base], 0
@@ -64,7 +64,7 @@ def _paths_up_to(
     planar: Floats = np.concatenate([length for _, length, _ in each])
     in_space = np.hypot(planar, z[ends[:, 1]] - z[ends[:, 0]])
     odd = np.vstack([bits for _, _, bits in each])
-    return WaysByParity(ends, odd, in_space, reach, len(paths.outline.rays))
+    return ParityDistances(ends, odd, in_space, reach, len(paths.outline.rays))
 
 
 def _paths_from(paths: TautPaths, a: int, reach: float) -> tuple[ParityRows, int] | None:

@@ -16,8 +16,8 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.clock import Clock, TimeLimit
+from netsp.base.deprecated import deprecated_method
 from netsp.base.errors import InputError
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.hsignature import Word, concatenate, is_looping, signature
 from netsp.model.problem import Problem
 from netsp.model.solution import KeptClasses
@@ -28,6 +28,7 @@ from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.reach_bounds import find_parity_paths
 from netsp.roadmap.roadmap_policy import RoadmapPolicy
 from netsp.roadmap.taut_legs import TautLegs
+from netsp.roadmap.travel_graph import TravelGraph
 
 RULES = {"all": ALL, "non-looping": NON_LOOPING}
 """Rules for the classes that a roadmap holds, by name."""
@@ -54,7 +55,7 @@ class TautRoadmap:
     ----------
     complete
         Whether no class was left out.
-    least_left_out
+    min_tether_left_out
         Lower bound on the tether of every class left out; inf if none is.
 
     Raises
@@ -95,9 +96,11 @@ class TautRoadmap:
         self._z = problem.points[:, 2]
         found = find_classes(self.paths, RULES[classes], int(max_classes), self.clock)
         self.cluster, self.signatures, self.planar = found.cluster, found.signatures, found.planar
-        self.complete, self.least_left_out = found.complete, found.least_left_out
+        self.complete, self.min_tether_left_out = found.complete, found.min_tether_left_out
         self.tethers: Floats = np.hypot(self.planar, self._z[self.cluster] - self._z[0])
         self.legs = TautLegs(self.paths, self.cluster, self.signatures, self.planar)
+
+    least_left_out = deprecated_method("least_left_out", "min_tether_left_out")
 
     def to_travel_graph(self) -> TravelGraph:
         """Return the travel graph over this roadmap; legs are computed when first asked for."""
@@ -110,7 +113,7 @@ class TautRoadmap:
             detours=partial(taut_detours, self.problem, policy=self.policy),
             between=self.paths.bounds_in_any_class,
             classes=self.rule if self.complete else "shortest",
-            least_left_out=self.least_left_out,
+            min_tether_left_out=self.min_tether_left_out,
             carrier=None if self.complete else self,
             by_parity=partial(find_parity_paths, self.paths),
         )
@@ -118,7 +121,7 @@ class TautRoadmap:
         return graph
 
     def ways(self, goal: int, most: int) -> list[tuple[int, Word]]:
-        """Return what `netsp.gtsp.travel.graph.Carrier.ways` does."""
+        """Return what `netsp.roadmap.travel_graph.Carrier.ways` does."""
         contacts = self.paths.contacts
         length, before = contacts.tree_to_nearest(goal, most + 2)  # with itself and the base
         near = np.argsort(length[: contacts.points], kind="stable")
@@ -130,7 +133,7 @@ class TautRoadmap:
         ]
 
     def carried(self, start: int, word: Word, goal: int) -> Word | None:
-        """Return what `netsp.gtsp.travel.graph.Carrier.carried` does."""
+        """Return what `netsp.roadmap.travel_graph.Carrier.carried` does."""
         contacts = self.paths.contacts
         line = contacts.draw(start, goal, contacts.tree_to(start, goal))
         arrived = concatenate(word, signature(line, self.outline.rays))
@@ -139,7 +142,7 @@ class TautRoadmap:
     def with_classes(
         self, wanted: Iterable[tuple[int, Word]], up: Callable[[], bool]
     ) -> TravelGraph:
-        """Return what `netsp.gtsp.travel.graph.Carrier.with_classes` does. The classes are then
+        """Return what `netsp.roadmap.travel_graph.Carrier.with_classes` does. The classes are then
         part of this roadmap."""
         known = set(zip(self.cluster.tolist(), self.signatures, strict=True))
         added = [

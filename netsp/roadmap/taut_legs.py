@@ -15,9 +15,9 @@ from netsp.base.errors import LimitReachedError
 from netsp.base.ram import check_available
 from netsp.base.time_flags import NEVER, Flag
 from netsp.gtsp.cost_oracle import Estimate
-from netsp.gtsp.travel.leg_provider import Legs
 from netsp.hsignature import Word, concatenate, invert
 from netsp.roadmap.branches import OPEN, Branches, Lengths, build_branches, fill, fill_parallel
+from netsp.roadmap.leg_provider import Legs
 from netsp.roadmap.paths import TautPaths, UnknownPathError
 from netsp.roadmap.slits import Ends, flatten_words, slit_lengths
 from netsp.roadmap.taut_by_word import Path, path_from_pieces, pull_each
@@ -59,24 +59,25 @@ class TautLegs(Legs):
         return Estimate(self.policy.s_per_leg * k * (k - 1) / 2, 8.0 * k * k)
 
     def lengths(
-        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+        self, vertices: Ints, wanted: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
         """Return the (k, k) 3D leg lengths among vertices; inf within a cluster, and undefined
-        where `asked` is false.
+        where `wanted` is false.
 
         Raises LimitReachedError when the clock is up before all are found. Legs among up to
         `untimed_vertices` are found whatever the clock says.
         """
         vertices = np.asarray(vertices, dtype=np.int64)
         if (
-            asked is None
+            wanted is None
             and len(vertices) <= self.policy.untimed_vertices
             and len(self.cluster) > self.policy.max_parted_classes
         ):
             # one by one, even if time is up, because building the tree of tethers takes a while
-            asked = np.ones((len(vertices), len(vertices)), dtype=bool)
-        if asked is not None and asked.sum() <= max(self.policy.max_single_legs, 2 * len(vertices)):
-            return self._selected(vertices, asked)
+            wanted = np.ones((len(vertices), len(vertices)), dtype=bool)
+        few = max(self.policy.max_single_legs, 2 * len(vertices))
+        if wanted is not None and wanted.sum() <= few:
+            return self._selected(vertices, wanted)
         return self._matrix(vertices, np.float64, 1.0, clock)
 
     def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
@@ -320,11 +321,11 @@ class TautLegs(Legs):
         part = 0.0 if self._tree is None else self._tree.shared_length(u, v)
         return float(self.planar[u] + self.planar[v] - 2.0 * part)
 
-    def _selected(self, vertices: Ints, asked: Bools) -> Floats:
+    def _selected(self, vertices: Ints, wanted: Bools) -> Floats:
         """Return the lengths of a few legs, as `lengths` does; where pulling fails, by a search for
         each leg."""
-        out = np.full(asked.shape, np.inf)
-        rows, columns = np.nonzero(np.triu(asked, 1) | np.tril(asked, -1).T)
+        out = np.full(wanted.shape, np.inf)
+        rows, columns = np.nonzero(np.triu(wanted, 1) | np.tril(wanted, -1).T)
         us, vs = vertices[rows], vertices[columns]
         apart = self.cluster[us] != self.cluster[vs]
         rows, columns, us, vs = rows[apart], columns[apart], us[apart], vs[apart]

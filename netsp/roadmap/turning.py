@@ -19,10 +19,10 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.errors import InfeasibleError, LimitReachedError, counted, warn_left_out
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.model.bound_scope import Scope
 from netsp.model.problem import Problem
 from netsp.roadmap.paths import TautPaths, UnknownPathError
+from netsp.roadmap.travel_graph import TravelGraph
 
 TURNING_TOLERANCE = 1e-9
 """Tolerance for rounding in the sum of angles by which a tether turns, radians."""
@@ -78,14 +78,16 @@ def limit_turning(problem: Problem, graph: TravelGraph, max_turning: float) -> T
     part = graph.subgraph(np.flatnonzero(turning <= max_turning + TURNING_TOLERANCE))
     # the limit is the problem's: no class that breaks it is in an admissible tour
     part.declared_scope = graph.scope
-    part.classes, part.least_left_out = graph.classes, graph.least_left_out
+    part.classes, part.min_tether_left_out = graph.classes, graph.min_tether_left_out
     unknown = np.isnan(turning)
     if unknown.any():
         # classes of unknown turning may be admissible
         if graph.scope is Scope.ALL_TOURS:
             part.declared_scope = Scope.KEPT_CLASSES
         part.classes = "shortest"
-        part.least_left_out = min(graph.least_left_out, float(graph.tethers[unknown].min()))
+        part.min_tether_left_out = min(
+            graph.min_tether_left_out, float(graph.tethers[unknown].min())
+        )
     part.excluded_by_rule = graph.excluded_by_rule
     lost = sorted(set(graph.cluster.tolist()) - set(part.cluster.tolist()))
     if lost:

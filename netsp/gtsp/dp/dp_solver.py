@@ -21,10 +21,10 @@ from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.dp.handover import Handover
 from netsp.gtsp.dp.walks import Walks
 from netsp.gtsp.gtsp_policy import GtspPolicy, WalkPolicy
+from netsp.gtsp.instance import Instance
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.resumable import Steps, run_to_end
 from netsp.gtsp.searching import SearchingRun
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
 from netsp.model.arrangement import respects_precedences
 
@@ -54,7 +54,7 @@ class Params:
             )
 
 
-def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
+def solve(graph: Instance, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Bound and prove by walks, for few goals with many classes.
 
     With many goals it ends with the gap at which walks make no more progress. An iteration is one
@@ -83,7 +83,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     return run.finish("proven" if run.is_done else "open")
 
 
-def fits(graph: TravelGraph, policy: WalkPolicy = WalkPolicy()) -> bool:
+def fits(graph: Instance, policy: WalkPolicy = WalkPolicy()) -> bool:
     """Return whether the tables of the walks over a graph are of a reasonable size."""
     return (graph.goal_count + 1) ** 2 * len(graph) <= policy.max_table_cells
 

@@ -37,7 +37,7 @@ class Memory:
     size
         Number of nearest goals that are remembered at first, the goal itself (bit 0) among them.
     before
-        (n + 1, n + 1) which goals come before which (`TravelGraph.before`), (0, 0) for none: a walk
+        (n + 1, n + 1) which goals come before which (`Instance.before`), (0, 0) for none: a walk
         that remembers a goal must not visit one that comes before it.
     """
 

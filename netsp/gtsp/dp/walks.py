@@ -63,7 +63,7 @@ class Walks:
     stop
         Flag of the clock; once it is set, `check` must raise.
     before
-        Which goals come before which (`TravelGraph.before`).
+        Which goals come before which (`Instance.before`).
     policy
         Policy of walks.
 

@@ -27,9 +27,9 @@ import numpy as np
 
 from netsp.base.arrays import Floats, Ints
 from netsp.gtsp.gtsp_policy import CostPolicy
+from netsp.gtsp.instance import Instance
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.solver_run import SolverRun
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
 
 
@@ -54,7 +54,7 @@ class Params:
             raise ValueError(f"option 'retrace': expected path or tether, got {self.retrace!r}")
 
 
-def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
+def solve(graph: Instance, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Go to the nearest goal not yet visited, in its nearest class, and home from the last.
 
     One iteration builds the whole tour. There is no bound.
@@ -65,7 +65,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)
         if not run.solve_if_trivial():
-            stage = _nearest_by_tether(run, retrace=chosen.retrace == "path" and graph.geometric)
+            stage = _nearest_by_tether(run, retrace=chosen.retrace == "path" and graph.can_retrace)
     return run.finish(stage)
 
 
@@ -137,7 +137,7 @@ class Params2016:
 
 
 def solve_2016(
-    graph: TravelGraph, params: Params2016 | None = None, limits: Limits | None = None
+    graph: Instance, params: Params2016 | None = None, limits: Limits | None = None
 ) -> Result:
     """Go out to the goal nearest to the base and back, then to the next.
 
@@ -155,7 +155,7 @@ def solve_2016(
             if chosen.retrace == "goal":
                 _out_and_back(run)
             else:
-                stage = _nearest_by_tether(run, retrace=graph.geometric)
+                stage = _nearest_by_tether(run, retrace=graph.can_retrace)
     return run.finish(stage)
 
 
@@ -168,7 +168,7 @@ def _out_and_back(run: SolverRun) -> None:
         nearest.append(int(members[np.argmin(out[members])]))
     nearest.sort(key=lambda v: (out[v], v))
     run.iterations = 1
-    if graph.geometric:
+    if graph.can_retrace:
         walk = [0]
         for v in nearest:
             walk += [v, 0]

@@ -1,5 +1,8 @@
 """Generalised TSPs in the format of TSPLIB and GTSPLIB."""
 
-from netsp.gtsp.gtsplib.gtsp_file import Instance, load
+from netsp.base.deprecated import deprecated_names
+from netsp.gtsp.gtsplib.gtsp_file import GtsplibInstance, load
 
-__all__ = ["Instance", "load"]
+__getattr__ = deprecated_names(globals(), Instance="GtsplibInstance")
+
+__all__ = ["GtsplibInstance", "load"]

@@ -13,13 +13,15 @@ from pathlib import Path
 import numpy as np
 
 from netsp.base.arrays import ComparesArrays, Floats, Ints
+from netsp.base.deprecated import deprecated_method, deprecated_names
 from netsp.base.errors import InputError
 from netsp.base.files import read_text
 from netsp.base.ram import check_available
 from netsp.base.validated import shown
 from netsp.gtsp.gtsp_policy import FilePolicy
 from netsp.gtsp.gtsplib.metrics import METRICS
-from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.instance import BaselessInstance
+from netsp.gtsp.instance import Instance as Instance_
 
 SYMMETRIC, ASYMMETRIC = ("GTSP", "TSP"), ("AGTSP", "ATSP")
 """Types of problems; a TSP is a GTSP with one vertex in each cluster."""
@@ -46,7 +48,7 @@ FORMATS = ("FULL_MATRIX", *TRIANGLES)
 
 
 @dataclass(frozen=True, eq=False)
-class Instance(ComparesArrays):
+class GtsplibInstance(ComparesArrays):
     """A generalised TSP.
 
     Parameters
@@ -75,8 +77,8 @@ class Instance(ComparesArrays):
             f"{sizes.max()}"
         )
 
-    def to_travel_graph(self) -> TravelGraph:
-        """Return the travel graph, without a base, for `netsp.solve_graph`.
+    def to_instance(self) -> Instance_:
+        """Return the instance, without a base, for `netsp.solve_graph`.
 
         Its vertex k is the file's vertex k + 1.
 
@@ -85,10 +87,12 @@ class Instance(ComparesArrays):
         InputError
             Asymmetric costs, or no tour of finite cost.
         """
-        return TravelGraph.from_costs(self.costs, self.clusters, base=None)
+        return BaselessInstance.from_costs(self.costs, self.clusters, base=None)
+
+    to_travel_graph = deprecated_method("to_travel_graph", "to_instance")
 
 
-def load(path: str | Path, policy: FilePolicy = FilePolicy()) -> Instance:
+def load(path: str | Path, policy: FilePolicy = FilePolicy()) -> GtsplibInstance:
     """Read a file of TSPLIB's format with the sets of GTSPLIB's.
 
     Parameters
@@ -110,7 +114,7 @@ def load(path: str | Path, policy: FilePolicy = FilePolicy()) -> Instance:
     >>> from netsp import solve_graph
     >>> from netsp.gtsp.gtsplib import load
     >>> instance = load("examples/7ring28.gtsp")
-    >>> solve_graph(instance.to_travel_graph()).length
+    >>> solve_graph(instance.to_instance()).length
     136.0
     """
     return _Reader(str(path), read_text(path), policy).read()
@@ -154,7 +158,7 @@ class _Reader:
     def wrong(self, line: int | None, text: str) -> InputError:
         return InputError(f"{self.path}: {'' if line is None else f'line {line}: '}{text}")
 
-    def read(self) -> Instance:
+    def read(self) -> GtsplibInstance:
         kind = self.values.get("TYPE", "GTSP").upper()
         if kind not in (*SYMMETRIC, *ASYMMETRIC):
             known = ", ".join((*SYMMETRIC, *ASYMMETRIC))
@@ -183,7 +187,7 @@ class _Reader:
             clusters = np.arange(n)
         flat = None if places is None else places[:, :2]
         name = self.values.get("NAME", "") or Path(self.path).stem
-        return Instance(name, costs, clusters, flat)
+        return GtsplibInstance(name, costs, clusters, flat)
 
     def whole(self, name: str, minimum: int, maximum: int) -> int:
         """Return the value of a keyword, a whole number."""
@@ -313,3 +317,6 @@ class _Reader:
                     "vertex in one",
                 )
             out[v] = cluster
+
+
+__getattr__ = deprecated_names(globals(), Instance="GtsplibInstance")

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from netsp.gtsp.gtsplib.gtsp_file import Instance
+from netsp.gtsp.gtsplib.gtsp_file import GtsplibInstance
 from netsp.gtsp.travel.result import Result
 
 
-def tour_text(instance: Instance, result: Result) -> str:
+def tour_text(instance: GtsplibInstance, result: Result) -> str:
     """Return a tour as the text of a file, with length, bound and status in its comment.
 
     Parameters
     ----------
-    instance : Instance
+    instance : GtsplibInstance
         Problem of the tour.
     result : Result
         Result with a tour.

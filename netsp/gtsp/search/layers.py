@@ -11,10 +11,10 @@ import numpy.typing as npt
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.compiled.interpretation import interprets
 from netsp.base.compiled.kernel import kernel
-from netsp.base.deprecated import deprecated_method
+from netsp.base.deprecated import deprecated_method, deprecated_names
 from netsp.gtsp.gtsp_policy import LocalSearchPolicy
+from netsp.gtsp.instance import Instance
 from netsp.gtsp.search.links import EQUAL_LENGTHS
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.model.arrangement import UNORDERED
 
 MIN_GAIN = 1e-9
@@ -25,7 +25,7 @@ MAX_EXACT_SUM = 2.0**53
 """Tolerance of whole numbers: up to this size double precision adds them without rounding."""
 
 
-class Instance:
+class LayeredInstance:
     """Vertices grouped by cluster: members of cluster c are order[start[c]:start[c + 1]].
 
     Parameters
@@ -37,7 +37,7 @@ class Instance:
     labels : ndarray of int, shape (V,), optional
         Vertices of the travel graph; by default the positions.
     before : ndarray of bool, optional
-        Which clusters come before which (`TravelGraph.before`).
+        Which clusters come before which (`Instance.before`).
     policy : LocalSearchPolicy
         Policy of searches over this instance.
     """
@@ -81,13 +81,13 @@ class Instance:
 
     @classmethod
     def of_graph(
-        cls, graph: TravelGraph, policy: LocalSearchPolicy = LocalSearchPolicy()
-    ) -> Instance:
+        cls, graph: Instance, policy: LocalSearchPolicy = LocalSearchPolicy()
+    ) -> LayeredInstance:
         """Return an instance of all vertices of a travel graph, whose legs are measured.
 
         Parameters
         ----------
-        graph : TravelGraph
+        graph : Instance
             Travel graph.
         policy : LocalSearchPolicy
             Policy of searches.
@@ -98,13 +98,13 @@ class Instance:
 
     @classmethod
     def among(
-        cls, graph: TravelGraph, core: Ints, policy: LocalSearchPolicy = LocalSearchPolicy()
-    ) -> Instance:
+        cls, graph: Instance, core: Ints, policy: LocalSearchPolicy = LocalSearchPolicy()
+    ) -> LayeredInstance:
         """Return an instance of some vertices of a travel graph, whose legs are measured.
 
         Parameters
         ----------
-        graph : TravelGraph
+        graph : Instance
             Travel graph.
         core : ndarray of int
             Vertices, the base first.
@@ -217,3 +217,6 @@ def _best_classes_in_numpy(clusters: Ints, start: Ints, costs: Floats) -> tuple[
         tour[k + 1] = own[k].start + at
         at = int(back[k - 1][at]) if k else 0
     return best, tour
+
+
+__getattr__ = deprecated_names(globals(), Instance="LayeredInstance")

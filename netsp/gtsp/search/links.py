@@ -30,7 +30,7 @@ from netsp.base.compiled.rng import uniform
 
 EQUAL_LENGTHS = 1e-13
 """Tolerance, relative, within which two lengths are equal. At each cluster along the tour a table
-may be off by this share of its largest number (`netsp.gtsp.search.layers.Instance.rounding`)."""
+may be off by this share of its largest number (`LayeredInstance.rounding`)."""
 
 
 class Tables(NamedTuple):
@@ -39,8 +39,8 @@ class Tables(NamedTuple):
     ``nearest`` is (m + 1, m + 1), ``rank`` (m + 1, k). The clusters that cluster c may be inserted
     next to are ``beside[first[c]:first[c + 1]]``, as in ``near``. ``min_gain`` is the share of the
     tour's length that a move must save, ``rounding`` the gain that rounding may feign
-    (`netsp.gtsp.search.layers.Instance`). The kernels that are called most often get these arrays
-    one by one, because passing a tuple of arrays on would cost more than their work.
+    (`LayeredInstance`). The kernels that are called most often get these arrays one by one, because
+    passing a tuple of arrays on would cost more than their work.
     """
 
     start: Ints

@@ -9,12 +9,12 @@ import numpy as np
 from netsp.base.arrays import Ints
 from netsp.base.clock import Clock
 from netsp.gtsp.gtsp_policy import GtspPolicy, NeighbourhoodPolicy
+from netsp.gtsp.instance import Instance, cheapest_per_cluster
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.neighbourhood import classes_near_tour
-from netsp.gtsp.search.layers import Instance
+from netsp.gtsp.search.layers import LayeredInstance
 from netsp.gtsp.search.local_search import Search
 from netsp.gtsp.solver_run import SolverRun
-from netsp.gtsp.travel.graph import TravelGraph, least_tethers
 from netsp.gtsp.travel.result import Result
 
 
@@ -54,7 +54,7 @@ class Params:
                 raise ValueError(f"option {name!r}: expected 1 or more, got {getattr(self, name)}")
 
 
-def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
+def solve(graph: Instance, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Search orders of goals, without a bound.
 
     An iteration is one round of ruin and recreate. The search cools over the iterations, or over
@@ -79,7 +79,7 @@ def _search(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
         policy.neighbourhood.vertices_per_cluster(graph.goal_count),
     )
     core = search_core(run, count)
-    instance = Instance.among(graph, core, policy.local_search)
+    instance = LayeredInstance.among(graph, core, policy.local_search)
     by_clock = run.clock.limit is not None and run.iteration_limit == np.inf
     if not by_clock and run.iteration_limit == np.inf:
         run.iteration_limit = chosen.rounds_per_goal * graph.goal_count
@@ -89,7 +89,7 @@ def _search(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
         run.check()
         if k and len(core) < len(graph) and run.tour is not None:
             core = _near_incumbent(run, count, policy.neighbourhood)
-            instance = Instance.among(graph, core, policy.local_search)
+            instance = LayeredInstance.among(graph, core, policy.local_search)
         clock = run.clock.part(1.0 / (chosen.restarts - k))
         search = Search(instance, rng, start, clock)
         search.settle()
@@ -112,7 +112,7 @@ def _search(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
 def search_core(run: SolverRun, classes: int) -> Ints:
     """Return the vertices of each goal nearest to the base, and those of the incumbent."""
     graph = run.graph
-    core = least_tethers(graph.costs_to_base, graph.cluster, classes)
+    core = cheapest_per_cluster(graph.costs_to_base, graph.cluster, classes)
     return np.union1d(core, run.tour) if run.tour is not None else core
 
 
@@ -127,7 +127,7 @@ def _offer_incumbent(run: SolverRun, search: Search) -> None:
     run.update_incumbent(tour, length=length)
 
 
-def max_classes_per_goal(graph: TravelGraph, vertices: int) -> int:
+def max_classes_per_goal(graph: Instance, vertices: int) -> int:
     """Return the number of classes per goal, at least 3, that make at most some vertices in all."""
     sizes = np.bincount(graph.cluster)
     k = 3

@@ -12,13 +12,13 @@ from netsp.base.clock import Clock
 from netsp.base.compiled.rng import seeded
 from netsp.base.time_flags import NEVER
 from netsp.gtsp.search.descent import descend, two_opt
-from netsp.gtsp.search.layers import Instance, best_classes
+from netsp.gtsp.search.layers import LayeredInstance, best_classes
 from netsp.gtsp.search.links import Tables, link, no_links
 from netsp.gtsp.search.ruin import StringPolicy, ruin_and_recreate
 
 
 def local_search(
-    instance: Instance,
+    instance: LayeredInstance,
     rng: np.random.Generator,
     *,
     rounds: int,
@@ -31,7 +31,7 @@ def local_search(
 
     Parameters
     ----------
-    instance : Instance
+    instance : LayeredInstance
         Instance that is searched.
     rng : numpy.random.Generator
         Random generator.
@@ -68,7 +68,7 @@ class Search:
 
     def __init__(
         self,
-        instance: Instance,
+        instance: LayeredInstance,
         rng: np.random.Generator,
         start_order: npt.ArrayLike | None = None,
         clock: Clock | None = None,

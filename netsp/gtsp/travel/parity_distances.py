@@ -8,13 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Bools, ComparesArrays, Floats, Ints
+from netsp.base.deprecated import deprecated_names
 
 BITS_PER_WORD = 64
 """Format of sets of obstacles: bits of a word of uint64."""
 
 
 @dataclass(frozen=True, eq=False)
-class WaysByParity(ComparesArrays):
+class ParityDistances(ComparesArrays):
     """Lengths of the shortest paths between two goals, one for each set of rays crossed oddly.
 
     Attributes
@@ -45,3 +46,6 @@ class WaysByParity(ComparesArrays):
         return np.asarray(
             (words >> (bits % BITS_PER_WORD).astype(np.uint64)) & np.uint64(1), dtype=bool
         )
+
+
+__getattr__ = deprecated_names(globals(), WaysByParity="ParityDistances")

@@ -27,7 +27,6 @@ from netsp.base.errors import InfeasibleError, InputError, LimitReachedError
 from netsp.base.files import csv_cell, write_text
 from netsp.base.interrupt_signals import until_interrupt
 from netsp.base.reprs import Drawn
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.mip.cost_fixing import PATH_ROUNDING
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE, LowerBound, Scope, strongest
 from netsp.model.problem import Problem
@@ -36,6 +35,7 @@ from netsp.plan.sizing.sizing_policy import SizingPolicy
 from netsp.plan.solve_problem import solve, solve_graph
 from netsp.roadmap.outline import build_outline
 from netsp.roadmap.shortest import ContactGraph
+from netsp.roadmap.travel_graph import TravelGraph
 
 if TYPE_CHECKING:
     import pandas

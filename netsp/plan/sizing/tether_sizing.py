@@ -34,7 +34,6 @@ from netsp.base.field_types import checked_argument
 from netsp.base.files import write_text
 from netsp.base.interrupt_signals import until_interrupt
 from netsp.base.reprs import Drawn
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.kept import with_classes_left_out
 from netsp.gtsp.travel.result import Result
 from netsp.model.bound_scope import LowerBound, Scope
@@ -43,6 +42,7 @@ from netsp.model.solution import Status
 from netsp.plan.sizing.sizing_policy import SizingPolicy
 from netsp.plan.solve_problem import solve_graph, travel_graph
 from netsp.roadmap.explain_unreachable import shortest_tethers
+from netsp.roadmap.travel_graph import TravelGraph
 
 if TYPE_CHECKING:
     import pandas
@@ -338,7 +338,7 @@ def _solve_step(
     vertices = np.flatnonzero(fits)
     with graph.on_clock(clock):
         result = solve_graph(graph.subgraph(vertices), solver, time_limit=clock, seed=seed)
-    left_out = graph.least_left_out
-    bound_left_out = graph.least_by_way_of(left_out) if left_out <= limit else math.inf
+    left_out = graph.min_tether_left_out
+    bound_left_out = graph.min_length_by_tether(left_out) if left_out <= limit else math.inf
     because = "a tour by way of a class left out goes along its tether and back"
     return with_classes_left_out(result, bound_left_out, Scope.ALL_TOURS, because), vertices

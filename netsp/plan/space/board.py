@@ -15,7 +15,6 @@ from netsp.base.arrays import Floats
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
 from netsp.model.solution import Status
 from netsp.plan.solve_problem import solve_graph
@@ -23,6 +22,7 @@ from netsp.plan.space.planning_context import PlanningContext
 from netsp.plan.space.space_legs import DrivenLegs
 from netsp.plan.space.states import States, hang_alike
 from netsp.roadmap.from_state import from_state
+from netsp.roadmap.travel_graph import TravelGraph
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,6 @@ from netsp.base.arrays import Floats
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.board import DrivenTour, StateGraph, TourVisit
 from netsp.plan.space.detour_variants import perpendiculars
@@ -32,6 +31,7 @@ from netsp.plan.space.planning_context import is_straight_clear, keeps_clearance
 from netsp.plan.space.space_legs import RobotPaths
 from netsp.plan.space.states import hang_alike
 from netsp.roadmap.from_state import from_state
+from netsp.roadmap.travel_graph import TravelGraph
 from netsp.world.tether import Tether
 
 HOME = -1

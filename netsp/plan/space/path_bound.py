@@ -22,7 +22,6 @@ import numpy as np
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock
 from netsp.base.geometry import polylines
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.mission_policy import BoundPolicy, PotentialPolicy
 from netsp.plan.space.planning_context import (
@@ -34,6 +33,7 @@ from netsp.plan.space.potential import Ends, Region, cells_at_level, path_bound
 from netsp.plan.space.space_legs import RobotPaths
 from netsp.plan.space.upright import bound_by_upright_solids
 from netsp.roadmap.from_state import from_state
+from netsp.roadmap.travel_graph import TravelGraph
 
 
 def bound_all_tours(

@@ -18,7 +18,6 @@ import numpy as np
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock
 from netsp.base.errors import InfeasibleError, InputError, LimitReachedError
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.hsignature.rays import signature
 from netsp.model.problem import Circle, Goal, Polygon, Problem
 from netsp.model.solution import Status
@@ -31,6 +30,7 @@ from netsp.plan.space.planning_context import PlanningContext
 from netsp.roadmap.explain_unreachable import shortest_tethers
 from netsp.roadmap.from_state import from_state
 from netsp.roadmap.taut import TautRoadmap
+from netsp.roadmap.travel_graph import TravelGraph
 from netsp.world.mission.mission import Mission
 from netsp.world.scene.scene import Scene
 from netsp.world.scene.shapes import Box, Capsule, Cylinder, HalfSpace, Post, Prism, Shape

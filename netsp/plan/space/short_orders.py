@@ -14,7 +14,6 @@ import numpy as np
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock
 from netsp.base.geometry import polylines
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.board import DrivenTour
 from netsp.plan.space.given_order import drive_order
@@ -22,6 +21,7 @@ from netsp.plan.space.mission_policy import OrderPolicy
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import PlanningContext, is_straight_clear
 from netsp.roadmap.from_state import from_state
+from netsp.roadmap.travel_graph import TravelGraph
 
 
 def short_order_tour(

@@ -26,7 +26,6 @@ from netsp.base.clock import Clock, TimeLimit
 from netsp.base.deprecated import deprecated_method
 from netsp.base.errors import InputError, LimitReachedError, counted
 from netsp.base.interrupt_signals import until_interrupt
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result, relative_gap
 from netsp.model.bound_scope import LowerBound, Scope
 from netsp.model.solution import Status
@@ -45,6 +44,7 @@ from netsp.plan.space.short_orders import short_order_tour
 from netsp.plan.space.space_legs import RobotPaths, StateGrowth
 from netsp.plan.space.states import States, add_states_with_room, find_first_states
 from netsp.plan.space.trees import add_states_of_trees
+from netsp.roadmap.travel_graph import TravelGraph
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.mission_limits import check_bounds, check_size, check_tether
 from netsp.world.mission.planned_tour import PlannedTour, PlannedVisit, thinned_path

@@ -19,12 +19,12 @@ from netsp.base.arrays import Ints
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
-from netsp.gtsp.search import Instance, best_classes
-from netsp.gtsp.travel.graph import TravelGraph
+from netsp.gtsp.search import LayeredInstance, best_classes
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.mission_policy import MissionPolicy
 from netsp.plan.space.planning_context import drive_step, is_straight_clear
 from netsp.plan.space.states import hang_alike
+from netsp.roadmap.travel_graph import TravelGraph
 from netsp.world.mission.mission import Mission
 from netsp.world.paths.tree import Grid, ShortestTree, pull_taut
 from netsp.world.scene.field import DistanceField
@@ -81,7 +81,7 @@ def order_by_going_on(
     policy = policy or MissionPolicy()
     graph, points, start = waypoint_graph(mission, field, grid, clock, policy)
     given = [start.index(n) + 1 for n in range(len(mission.waypoints)) if n in start]
-    instance = Instance.of_graph(graph)
+    instance = LayeredInstance.of_graph(graph)
     _, warm = best_classes(np.array(given), instance.start, instance.costs)
     result = solve_graph(
         graph,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from netsp.gtsp.travel.graph import TravelGraph
+from netsp.roadmap.travel_graph import TravelGraph
 from netsp.view.pictures import style
 
 
@@ -17,12 +17,12 @@ def draw_classes(graph: TravelGraph, *, ax: Any = None) -> Any:
 
     if ax is None:
         ax = Figure(figsize=(7, 3.5), layout="constrained").subplots()
-    shown = graph.tethers if graph.roadmapped else graph.costs_to_base
+    shown = graph.tethers if not graph.has_cost_matrix else graph.costs_to_base
     ax.plot(graph.cluster[1:] - 1, shown[1:], "_", color=style.TETHER, ms=9, mew=1.2)
     ax.set(
         xlabel="goal",
         ylim=(0, None),
-        ylabel="tether length of each class" if graph.roadmapped else "leg from the base",
+        ylabel="tether length of each class" if not graph.has_cost_matrix else "leg from the base",
     )
     ax.set_title(repr(graph).strip("<>"), fontsize=9, loc="left")
     return ax

@@ -10,11 +10,11 @@ from netsp.base.errors import InputError
 from netsp.view.pictures import style
 
 if TYPE_CHECKING:
-    from netsp.gtsp.gtsplib import Instance
+    from netsp.gtsp.gtsplib import GtsplibInstance
     from netsp.gtsp.travel.result import Result
 
 
-def draw_gtsp(instance: Instance, result: Result, *, ax: Any = None) -> Any:
+def draw_gtsp(instance: GtsplibInstance, result: Result, *, ax: Any = None) -> Any:
     """Draw vertices, joined to the centres of their clusters, and the tour; return the axes.
 
     Raises

@@ -13,10 +13,10 @@ import numpy as np
 
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.solver_run import SolverRun
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result, Trajectory
 from netsp.hsignature import Word, concatenate, entangled
 from netsp.model.solution import Status
+from netsp.roadmap.travel_graph import TravelGraph
 
 
 def solve(graph: TravelGraph, params: None = None, limits: Limits | None = None) -> Result:
@@ -41,7 +41,7 @@ def solve(graph: TravelGraph, params: None = None, limits: Limits | None = None)
     with run.until_stopped(blind=True):
         if not run.solve_if_trivial():
             run.check()
-            trajectory = _nearest_neighbour(run)
+            trajectory = _nearest_neighbour(graph, run)
     if trajectory is None:
         return run.finish("greedy")
     length, wrapped = trajectory.length, len(entangled(trajectory.word))
@@ -49,9 +49,8 @@ def solve(graph: TravelGraph, params: None = None, limits: Limits | None = None)
     return Result(None, length, None, Status.INVALID, trace, trajectory=trajectory)
 
 
-def _nearest_neighbour(run: SolverRun) -> Trajectory | None:
+def _nearest_neighbour(graph: TravelGraph, run: SolverRun) -> Trajectory | None:
     """Return the trajectory, or None if it is a tour of the graph and so the incumbent."""
-    graph = run.graph
     detours = graph.detours(sub_goals=False, check=run.check)
     order, at = [], 0
     left = set(range(1, graph.goal_count + 1))

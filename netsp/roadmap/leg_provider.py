@@ -42,7 +42,7 @@ class LegProvider(Protocol):
     """
 
     def lengths(
-        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+        self, vertices: Ints, wanted: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
         """Return what `CostOracle.lengths` does."""
 
@@ -78,10 +78,10 @@ class AdaptedLegs(Legs):
         return Estimate(leg_s * k * (k - 1) / 2, 8.0 * k * k)
 
     def lengths(
-        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+        self, vertices: Ints, wanted: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
         """Return the lengths of the provider."""
-        return self.provider.lengths(vertices, asked, clock)
+        return self.provider.lengths(vertices, wanted, clock)
 
     def pairs(self, us: Ints, vs: Ints, clock: Clock | None = None) -> Floats:
         """Return the lengths of single legs."""

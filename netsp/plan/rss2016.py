@@ -31,8 +31,8 @@ from netsp.base.compiled.kernel import kernel
 from netsp.base.compiled.rng import below, metropolis, seeded
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.solver_run import SolverRun
-from netsp.gtsp.travel.graph import TravelGraph
 from netsp.gtsp.travel.result import Result
+from netsp.roadmap.travel_graph import TravelGraph
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Params(Cooling):
 
 
 class Table(NamedTuple):
-    """Constant tables of a run: those of `netsp.gtsp.travel.tether_blind_legs.Detours` (planar to
+    """Constant tables of a run: those of `netsp.roadmap.tether_blind_legs.Detours` (planar to
     near), and those of `_admissible` words (trie, vertex)."""
 
     planar: Floats
@@ -129,12 +129,11 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     with run.until_stopped(blind=True):
         run.update_incumbent(limits.warm_start)
         if not run.solve_if_trivial():
-            _anneal(run, rng, chosen)
+            _anneal(graph, run, rng, chosen)
     return run.finish("done")
 
 
-def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
-    graph = run.graph
+def _anneal(graph: TravelGraph, run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     run.check()
     detours = graph.detours(sub_goals=True, check=run.check)
     goals = graph.goal_count

@@ -11,9 +11,10 @@ import numpy as np
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock
 from netsp.gtsp.cost_oracle import Estimate
-from netsp.gtsp.travel.graph import TravelGraph
-from netsp.gtsp.travel.leg_provider import Legs
-from netsp.gtsp.travel.parity_distances import WaysByParity
+from netsp.gtsp.instance import ParityOracle
+from netsp.gtsp.travel.parity_distances import ParityDistances
+from netsp.roadmap.leg_provider import Legs
+from netsp.roadmap.travel_graph import TravelGraph
 
 
 def with_choices(graph: TravelGraph, clusters: Ints) -> TravelGraph:
@@ -35,8 +36,8 @@ def with_choices(graph: TravelGraph, clusters: Ints) -> TravelGraph:
     out = TravelGraph(
         cluster, graph.signatures, graph.tethers, _LegsOfChoices(graph, cluster), graph.roadmap,
         between=partial(_goal_bounds, graph, clusters), classes=graph.classes,
-        least_left_out=graph.least_left_out,
-        by_parity=partial(_paths_by_parity, graph, clusters) if graph.knows_ways else None,
+        min_tether_left_out=graph.min_tether_left_out,
+        by_parity=_parity_oracle(graph, clusters),
     )  # fmt: skip
     out.goal, out.excluded_by_rule = graph.goal, graph.excluded_by_rule
     out.declared_scope = graph.declared_scope
@@ -62,10 +63,10 @@ class _LegsOfChoices(Legs):
         return self.graph.oracle.estimate(k)
 
     def lengths(
-        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+        self, vertices: Ints, wanted: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
         with self.graph.on_clock(clock or self.graph.clock):
-            out = np.array(self.graph.costs_among(vertices, asked))
+            out = np.array(self.graph.costs_among(vertices, wanted))
         own = self.cluster[vertices]
         out[own[:, None] == own[None, :]] = np.inf
         return out
@@ -107,11 +108,17 @@ class _LegsOfChoices(Legs):
         return self.graph.path(u, v)
 
 
-def _paths_by_parity(
-    graph: TravelGraph, clusters: Ints, up: Callable[[], bool]
-) -> WaysByParity | None:
-    """Return the paths between goals: those between any of their places."""
-    places = graph.ways_by_parity(up)
+def _parity_oracle(graph: TravelGraph, clusters: Ints) -> ParityOracle | None:
+    if graph.parity_oracle is None:
+        return None
+    return partial(_distances_by_parity, graph.parity_oracle, clusters)
+
+
+def _distances_by_parity(
+    find: ParityOracle, clusters: Ints, is_up: Callable[[], bool]
+) -> ParityDistances | None:
+    """Return the distances between goals: those between any of their places."""
+    places = find(is_up)
     if places is None:
         return None
     ends = np.sort(clusters[places.ends], axis=1)
@@ -121,7 +128,7 @@ def _paths_by_parity(
 
 def _goal_bounds(graph: TravelGraph, clusters: Ints, up: Callable[[], bool]) -> Floats:
     """Return the bounds between goals: the least between any of their places."""
-    places = graph.between_goals(up)
+    places = graph.distances_between_goals(up)
     out = np.full((int(clusters.max()) + 1,) * 2, np.inf)
     rows, columns = np.meshgrid(clusters, clusters, indexing="ij")
     np.minimum.at(out, (rows, columns), places)
